@@ -1,0 +1,163 @@
+"""
+Cameras around an object: azimuth and elevation to pose, intrinsics, projection.
+
+Frames follow REP-103. The object frame is right-handed with z up, its origin the centre of the
+voxel grid. A camera's pose is that of its optical frame: z forward, x right, y down. Azimuth is
+counter-clockwise about +z from +x.
+"""
+
+from dataclasses import dataclass
+import math
+
+from active_recon.errors import ViewError
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+TURN = 2 * math.pi
+VIEW_COUNT = 24
+AZIMUTHS: NDArray[np.float64] = np.arange(VIEW_COUNT) * TURN / VIEW_COUNT
+"""Azimuths of the rendered views, radians, (24,)."""
+CANONICAL_ELEVATION = math.radians(30)
+CANONICAL_DISTANCE = 2.1
+"""Distance of the canonical camera in sides of the voxel grid: the grid's sphere just fits."""
+
+
+def wrap_azimuth(azimuth: float) -> float:
+    """Return the azimuth in [0, 2 pi)."""
+    wrapped = azimuth % TURN
+    return 0.0 if wrapped >= TURN else wrapped  # -1e-20 % TURN rounds up to TURN itself
+
+
+def azimuth_difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    """Return a minus b, the short way round, in [-pi, pi); shapes broadcast."""
+    return (np.asarray(a, np.float64) - b + math.pi) % TURN - math.pi
+
+
+def nearest_view(azimuth: float, azimuths: ArrayLike = AZIMUTHS) -> int:
+    """Return the index of the azimuth nearest to the one asked for, the short way round."""
+    return int(np.argmin(np.abs(azimuth_difference(azimuths, azimuth))))
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """A pinhole: focal lengths and principal point in pixels, image size in pixels."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """K of the paper's section 3.2, (3, 3)."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
+
+    def resized(self, width: int, height: int) -> 'Intrinsics':
+        """Return the same pinhole seen on an image of another size."""
+        across, down = width / self.width, height / self.height
+        return Intrinsics(self.fx * across, self.fy * down, self.cx * across, self.cy * down,
+                          width, height)
+
+
+_FOCAL = 35 / 32 * 137  # R2N2's lens and sensor, verified by reprojection
+CANONICAL_INTRINSICS = Intrinsics(_FOCAL, _FOCAL, 68.5, 68.5, 137, 137)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pose in the object frame, (4, 4) object from optical frame, and a pinhole."""
+
+    pose: NDArray[np.float64]
+    intrinsics: Intrinsics = CANONICAL_INTRINSICS
+
+    def __post_init__(self) -> None:
+        """Refuse what is no rigid pose."""
+        if self.pose.shape != (4, 4) or not np.isfinite(self.pose).all():
+            raise ViewError(f'expected a finite 4 x 4 camera pose, got\n{self.pose}', 'pose')
+        rotation = self.pose[:3, :3]
+        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
+            raise ViewError(f'expected a rotation in the camera pose, got\n{rotation}', 'pose')
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Optical centre in the object frame, metres, (3,)."""
+        return self.pose[:3, 3]
+
+    @property
+    def distance(self) -> float:
+        """Metres from the object frame's origin."""
+        return float(np.linalg.norm(self.position))
+
+    @property
+    def azimuth(self) -> float:
+        """Radians in [0, 2 pi), counter-clockwise about +z from +x."""
+        return wrap_azimuth(math.atan2(self.position[1], self.position[0]))
+
+    @property
+    def elevation(self) -> float:
+        """Radians up from the horizon."""
+        return math.asin(self.position[2] / self.distance)
+
+    @property
+    def object_to_camera(self) -> NDArray[np.float64]:
+        """[R t; 0 1] of the paper's section 3.2, (4, 4): the inverse of the pose."""
+        rotation, position = self.pose[:3, :3], self.pose[:3, 3]
+        inverse = np.eye(4)
+        inverse[:3, :3] = rotation.T
+        inverse[:3, 3] = -rotation.T @ position
+        return inverse
+
+    def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """
+        Project points of the object frame, P^s ~ T P^w (section 3.2).
+
+        Takes (N, 3) metres; returns pixels (N, 2), where the centre of the first pixel is
+        (0.5, 0.5), and depths along the optical axis (N,).
+        """
+        transform = self.object_to_camera
+        optical = np.asarray(points, np.float64) @ transform[:3, :3].T + transform[:3, 3]
+        image = optical @ self.intrinsics.matrix.T
+        return image[:, :2] / image[:, 2:], optical[:, 2]
+
+    def ray_directions(self, samples: int = 1) -> NDArray[np.float64]:
+        """
+        Return rays through the pixels in the object frame, (height, width, 3), depth 1 each.
+
+        `samples` asks for a grid of samples x samples rays in each pixel; height and width grow
+        by that factor.
+        """
+        lens = self.intrinsics.resized(
+            self.intrinsics.width * samples, self.intrinsics.height * samples)
+        across = (np.arange(lens.width) + 0.5 - lens.cx) / lens.fx
+        down = (np.arange(lens.height) + 0.5 - lens.cy) / lens.fy
+        right, below, forward = self.pose[:3, :3].T
+        return across[None, :, None] * right + down[:, None, None] * below + forward
+
+
+def orbit_camera(
+    azimuth: float,
+    elevation: float = CANONICAL_ELEVATION,
+    distance: float = CANONICAL_DISTANCE,
+    intrinsics: Intrinsics = CANONICAL_INTRINSICS,
+) -> Camera:
+    """
+    Return the camera that looks at the origin from an azimuth, upright.
+
+    Angles in radians, distance in metres. An elevation of exactly +-pi/2 has no upright.
+    """
+    if not all(map(math.isfinite, (azimuth, elevation, distance))) or distance <= 0:
+        raise ViewError('expected finite angles and a distance above 0, got azimuth '
+                        f'{azimuth}, elevation {elevation}, distance {distance}', 'pose')
+    if abs(elevation) >= math.pi / 2 - 1e-6:
+        raise ViewError(f'expected an elevation within +-90 degrees, got {elevation} rad', 'pose')
+    backward = np.array([math.cos(elevation) * math.cos(azimuth),
+                         math.cos(elevation) * math.sin(azimuth), math.sin(elevation)])
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    pose = np.eye(4)
+    pose[:3, 0] = right
+    pose[:3, 1] = np.cross(-backward, right)
+    pose[:3, 2] = -backward
+    pose[:3, 3] = distance * backward
+    return Camera(pose, intrinsics)

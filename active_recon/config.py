@@ -1,0 +1,76 @@
+"""Frozen configurations: what is written beside the weights, and nothing a layer ever sees."""
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Self
+
+from active_recon.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class Config:
+    """A configuration that is read from a mapping, unknown keys refused."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """Return the configuration of a mapping; raises ConfigError naming unknown keys."""
+        known = {field.name for field in fields(cls)}
+        unknown = sorted(set(values) - known)
+        if unknown:
+            raise ConfigError(f'{cls.__name__}: unknown key {", ".join(unknown)}; '
+                              f'expected keys out of {", ".join(sorted(known))}')
+        lists_as_tuples = {key: tuple(value) if isinstance(value, list) else value
+                           for key, value in values.items()}
+        return cls(**lists_as_tuples)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plain mapping."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class NetworkConfig(Config):
+    """Sizes of the 2D-3D-attention network; the paper states none of them."""
+
+    stem_channels: int = 32
+    block_channels: tuple[int, int, int] = (48, 96, 128)
+    recurrent_channels: int = 128
+    bottleneck_channels: int = 320
+    latent_channels: int = 24
+    volume_channels: int = 48
+    decoder_channels: tuple[int, int] = (40, 20)
+    glimpse_channels: int = 128
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that make no network."""
+        sizes = [size for value in self.to_dict().values()
+                 for size in (value if isinstance(value, tuple) else (value,))]
+        if min(sizes) < 1:
+            raise ConfigError(f'NetworkConfig: expected channels of 1 or more, got {min(sizes)}')
+
+
+@dataclass(frozen=True)
+class LossConfig(Config):
+    """Weights of section 3.2's losses and the measure that compares voxels."""
+
+    volume_weight: float = 0.4
+    silhouette_weight: float = 0.6
+    volume_loss: str = 'mse'  # mse (the paper), bce, dice
+
+    def __post_init__(self) -> None:
+        """Refuse weights that train nothing."""
+        if min(self.volume_weight, self.silhouette_weight) < 0 or not (
+                self.volume_weight + self.silhouette_weight > 0):
+            raise ConfigError('LossConfig: expected weights of 0 or more, not both 0, got '
+                              f'{self.volume_weight} and {self.silhouette_weight}')
+        if self.volume_loss not in ('mse', 'bce', 'dice'):
+            raise ConfigError(f'LossConfig: expected mse, bce or dice, got {self.volume_loss!r}')
+
+
+@dataclass(frozen=True)
+class RewardConfig(Config):
+    """The three-part reward of section 3.3; tau in radians. `paper_distance` is its 1 / d^2."""
+
+    distance_weight: float = 0.02
+    distance_tau: float = 0.5235987755982988
+    paper_distance: bool = False
+    policy_sigma: float = 0.35

@@ -1,0 +1,60 @@
+"""Meshes from files, brought into the object frame: z up, front +x, centred, longest side 1."""
+
+from pathlib import Path
+
+from active_recon.errors import ConfigError, MeshError
+import numpy as np
+from numpy.typing import NDArray
+import trimesh
+
+GLTF = {'.glb', '.gltf'}
+_AXES = {sign + name: (-1 if sign == '-' else 1) * np.eye(3)[i]
+         for i, name in enumerate('xyz') for sign in ('', '+', '-')}
+
+
+def upright(up: str, front: str) -> NDArray[np.float64]:
+    """Return the rotation, (3, 3), that turns axis `up` to +z and axis `front` to +x."""
+    for option, axis in (('up', up), ('front', front)):
+        if axis not in _AXES:
+            raise ConfigError(f'{option}: expected one of x, y, z with an optional sign, '
+                              f'got {axis!r}')
+    z, x = _AXES[up], _AXES[front]
+    if z @ x:
+        raise ConfigError(f'up ({up}) and front ({front}) must be different axes')
+    return np.array([x, np.cross(z, x), z])
+
+
+def fit_to_grid(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return a copy centred on the origin by its bounding box, its longest side 1."""
+    fitted = mesh.copy()
+    fitted.apply_translation(-fitted.bounds.mean(axis=0))
+    fitted.apply_transform(np.diag([*[1 / fitted.extents.max()] * 3, 1.0]))
+    return fitted
+
+
+def load_mesh(path: Path, up: str | None = None, front: str | None = None) -> trimesh.Trimesh:
+    """
+    Read any mesh that trimesh reads and fit it to the grid, z up and front +x.
+
+    `up` and `front` name the file's axes (for example 'y' and '-z'); glTF and GLB are y up with
+    the front at +z by their standard, other formats are taken as z up with the front at +x.
+    Raises MeshError where the file is missing, is no mesh, or holds no face with an area.
+    """
+    gltf = path.suffix.lower() in GLTF
+    rotation = upright(up or ('y' if gltf else 'z'), front or ('z' if gltf else 'x'))
+    if not path.is_file():
+        raise MeshError(f'{path}: expected a mesh file, but there is no such file')
+    try:
+        mesh = trimesh.load(path, force='mesh', process=False)
+    except Exception as error:  # trimesh's readers raise whatever their parser raised
+        raise MeshError(f'{path}: expected a mesh that trimesh reads, but it failed with '
+                        f'{type(error).__name__}: {error}') from error
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise MeshError(f'{path}: expected a mesh with faces, got none')
+    if not np.isfinite(mesh.vertices).all() or not mesh.extents.max() > 0 or not mesh.area > 0:
+        raise MeshError(f'{path}: expected faces with finite corners and an area, got extents '
+                        f'{mesh.extents}')
+    transform = np.eye(4)
+    transform[:3, :3] = rotation
+    mesh.apply_transform(transform)
+    return fit_to_grid(mesh)

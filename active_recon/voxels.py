@@ -1,0 +1,174 @@
+"""The voxel grid: a cube of occupancy probabilities, its measures, and its forms on disk."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from active_recon.errors import ConfigError, DataError
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import entr, xlogy
+import trimesh
+
+RESOLUTION = 32
+MESH_FORMATS = ('ply', 'obj', 'stl')
+
+
+def iou(predicted: Any, truth: Any, axes: tuple[int, ...] = (-3, -2, -1)) -> Any:
+    """
+    Return intersection over union of two boolean arrays or tensors of one shape, in [0, 1].
+
+    The measure of the paper's section 3.3, over the last three axes (voxels) or those given
+    (silhouettes: the last two); the other axes stay. Two empty shapes are alike: 1.
+    """
+    intersection = (predicted & truth).sum(axes)
+    union = (predicted | truth).sum(axes)
+    empty = union == 0
+    return (intersection + empty) / (union + empty)
+
+
+@dataclass(frozen=True, eq=False)
+class VoxelGrid:
+    """
+    A cube of voxels in the object frame, centred at its origin.
+
+    `occupancy` is (X, Y, Z) float32 in [0, 1], indexed [x, y, z]; `size` is the cube's side in
+    metres.
+    """
+
+    occupancy: NDArray[np.float32]
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no cube of probabilities."""
+        shape = self.occupancy.shape
+        if len(shape) != 3 or len(set(shape)) != 1:
+            raise DataError(f'expected a cube of voxels, got the shape {shape}')
+
+    @property
+    def cell_size(self) -> float:
+        """Side of one cell, metres."""
+        return self.size / self.occupancy.shape[0]
+
+    def occupied(self, threshold: float) -> NDArray[np.bool_]:
+        """Return which cells are above the threshold, (X, Y, Z)."""
+        above: NDArray[np.bool_] = self.occupancy > threshold
+        return above
+
+    def entropy(self) -> float:
+        """Return the entropy of all cells in nats: -sum(p log p + (1 - p) log(1 - p))."""
+        p = self.occupancy.astype(np.float64)
+        return float((entr(p) + entr(1 - p)).sum())
+
+    def paper_entropy(self) -> float:
+        """Return -sum(p log p) in nats, as section 4.6 writes it, without the second term."""
+        p = self.occupancy.astype(np.float64)
+        return float(-xlogy(p, p).sum())
+
+    def points(self, threshold: float) -> NDArray[np.float32]:
+        """Return x, y, z (metres, object frame) and occupancy of the cells above, (N, 4)."""
+        index = np.argwhere(self.occupied(threshold))
+        centers = (index + 0.5) * self.cell_size - self.size / 2
+        return np.column_stack([centers, self.occupancy[tuple(index.T)]]).astype(np.float32)
+
+    def mesh(self, threshold: float) -> trimesh.Trimesh:
+        """
+        Return the surface at the threshold by marching cubes, in metres, closed at the border.
+
+        Raises DataError where no cell is above the threshold.
+        """
+        from skimage.measure import marching_cubes  # slow to import, and only meshes need it
+
+        if not self.occupied(threshold).any():
+            raise DataError(f'no cell is above the threshold {threshold}: there is no surface yet')
+        # A margin of empty cells closes the surface of an object that touches the border.
+        padded = np.pad(self.occupancy, 1)
+        vertices, faces, _, _ = marching_cubes(padded, threshold)
+        # Sample (i, j, k) of the padded array is the centre of cell (i - 1, j - 1, k - 1).
+        placed = (vertices - 0.5) * self.cell_size - self.size / 2
+        mesh = trimesh.Trimesh(placed, faces, process=False)
+        if mesh.volume < 0:
+            mesh.invert()
+        return mesh
+
+
+def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
+                     resolution: int = RESOLUTION) -> VoxelGrid:
+    """Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `points`."""
+    index = np.floor((points[:, :3] + size / 2) / size * resolution).astype(int)
+    if ((index < 0) | (index >= resolution)).any():
+        raise DataError(f'expected points inside a cube of {size} m about the origin')
+    occupancy = np.zeros((resolution,) * 3, np.float32)
+    occupancy[tuple(index.T)] = points[:, 3]
+    return VoxelGrid(occupancy, size)
+
+
+def write_mesh(mesh: trimesh.Trimesh, path: Path) -> None:
+    """Write a mesh as PLY, OBJ or STL, by the file's suffix."""
+    suffix = path.suffix.lower().lstrip('.')
+    if suffix not in MESH_FORMATS:
+        raise ConfigError(f'{path}: expected a suffix out of {", ".join(MESH_FORMATS)}')
+    path.parent.mkdir(parents=True, exist_ok=True)
+    mesh.export(path)
+
+
+def read_binvox(path: Path) -> VoxelGrid:
+    """
+    Read a binvox file as R2N2 writes it, turned upright: z up, front +x.
+
+    The data runs x, z, y, and the model turns upright by (x, y, z) -> (x, -z, y). The grid is
+    centred at the origin with the header's scale as its side; the header's translate says where
+    the model once stood and is ignored. Raises DataError on what is no whole binvox file.
+    """
+    try:
+        raw = path.read_bytes()
+        header, _, data = raw.partition(b'\ndata\n')
+        lines = header.split(b'\n')
+        fields = {line.split()[0]: line.split()[1:] for line in lines if line.strip()}
+        if not lines[0].startswith(b'#binvox'):
+            raise ValueError('the first line is not #binvox')
+        dims = tuple(int(n) for n in fields[b'dim'])
+        scale = float(fields[b'scale'][0])
+        values, counts = np.frombuffer(data, np.uint8).reshape(-1, 2).T
+        cells = np.repeat(values, counts)
+        if len(dims) != 3 or cells.size != np.prod(dims) or cells.max() > 1:
+            raise ValueError(f'{cells.size} cells for the dimensions {dims}')
+        file_order = cells.reshape(dims)  # [x, z, y] of the file's own axes: y is up
+    except OSError as error:
+        raise DataError(f'{path}: cannot be read: {error.strerror}') from error
+    except (ValueError, KeyError, IndexError) as error:
+        raise DataError(f'{path}: expected a whole binvox file, got {error}') from error
+    occupancy = file_order[:, ::-1, :]  # (x, y, z) -> (x, -z, y)
+    return VoxelGrid(np.ascontiguousarray(occupancy, np.float32), scale)
+
+
+def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
+    """Write the occupied cells as binvox, the way `read_binvox` reads them."""
+    cells = grid.occupied(threshold)[:, ::-1, :].reshape(-1).astype(np.uint8)
+    starts = np.flatnonzero(np.r_[True, cells[1:] != cells[:-1]])
+    runs = bytearray()
+    for value, length in zip(cells[starts], np.diff(np.r_[starts, cells.size]), strict=True):
+        whole, rest = divmod(int(length), 255)
+        runs += bytes((value, 255)) * whole + (bytes((value, rest)) if rest else b'')
+    dims = ' '.join(map(str, grid.occupancy.shape))
+    header = f'#binvox 1\ndim {dims}\ntranslate 0 0 0\nscale {grid.size:.9g}\ndata\n'
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(header.encode() + runs)
+
+
+def turned(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:
+    """
+    Return occupancies (X, Y, Z) turned counter-clockwise about +z by a yaw in radians.
+
+    Cells are interpolated linearly; what turns out of the cube is lost. A yaw of 0 is exact.
+    """
+    if yaw == 0:
+        return occupancy
+    from scipy.ndimage import affine_transform
+
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    to_source = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    center = (np.array(occupancy.shape) - 1) / 2
+    result: NDArray[np.float32] = affine_transform(
+        occupancy, to_source, center - to_source @ center, order=1)
+    return result
