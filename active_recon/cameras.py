@@ -30,7 +30,8 @@ def wrap_azimuth(azimuth: float) -> float:
 
 def azimuth_difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     """Return a minus b, the short way round, in [-pi, pi); shapes broadcast."""
-    return (np.asarray(a, np.float64) - b + math.pi) % TURN - math.pi
+    apart = np.asarray(a, np.float64) - np.asarray(b, np.float64)
+    return np.asarray((apart + math.pi) % TURN - math.pi)
 
 
 def nearest_view(azimuth: float, azimuths: ArrayLike = AZIMUTHS) -> int:
@@ -133,7 +134,9 @@ class Camera:
         across = (np.arange(lens.width) + 0.5 - lens.cx) / lens.fx
         down = (np.arange(lens.height) + 0.5 - lens.cy) / lens.fy
         right, below, forward = self.pose[:3, :3].T
-        return across[None, :, None] * right + down[:, None, None] * below + forward
+        rays: NDArray[np.float64] = (
+            across[None, :, None] * right + down[:, None, None] * below + forward)
+        return rays
 
 
 def orbit_camera(

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from active_recon.cameras import AZIMUTHS, azimuth_difference, wrap_azimuth
+from active_recon.cameras import azimuth_difference, AZIMUTHS, wrap_azimuth
 from active_recon.errors import ConfigError, ViewError
 from active_recon.policies import Choice, load_policy, Policy
 import numpy as np

@@ -1,5 +1,7 @@
 """Meshes to images: ray casting with embree, flat shading, straight alpha."""
 
+from typing import Any
+
 from active_recon.cameras import Camera
 import cv2
 from embreex.mesh_construction import TriangleMesh
@@ -28,9 +30,7 @@ class Renderer:
         self._geometry = TriangleMesh(self._scene, mesh.triangles.astype(np.float32))
         self._vertices = np.asarray(mesh.vertices)
         self._normals = np.asarray(mesh.face_normals, np.float32)
-        colors = mesh.visual.face_colors if mesh.visual.kind else None
-        self._colors = (np.full((len(mesh.faces), 3), 178, np.float32) if colors is None
-                        else np.asarray(colors[:, :3], np.float32))
+        self._colors = _face_colors(mesh)
 
     def render(self, camera: Camera, samples: int = 2) -> NDArray[np.uint8]:
         """
@@ -75,11 +75,22 @@ class Renderer:
         return shaded
 
 
+def _face_colors(mesh: trimesh.Trimesh) -> NDArray[np.float32]:
+    """Return one RGB for each face, (faces, 3) in [0, 255]; plain grey where none is given."""
+    visual: Any = mesh.visual
+    if visual is None or visual.kind is None:
+        return np.full((len(mesh.faces), 3), 178, np.float32)
+    if visual.kind == 'texture':
+        visual = visual.to_color()
+    colors: NDArray[np.float32] = np.asarray(visual.face_colors[:, :3], np.float32)
+    return colors
+
+
 def _averaged(rgba: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
     """Average blocks of samples down to (width, height), colours weighted by their alpha."""
-    mean = cv2.resize(rgba.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    mean = np.asarray(cv2.resize(rgba.astype(np.float32), size, interpolation=cv2.INTER_AREA))
     # Empty samples are black, so the mean colour is already multiplied by the mean alpha.
-    mean[..., :3] *= 255 / np.maximum(mean[..., 3:], 1)
+    mean[..., :3] *= (255 / np.maximum(mean[..., 3:], 1)).astype(np.float32)
     averaged: NDArray[np.uint8] = np.rint(np.minimum(mean, 255)).astype(np.uint8)
     return averaged
 

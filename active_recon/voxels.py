@@ -48,7 +48,7 @@ class VoxelGrid:
     @property
     def cell_size(self) -> float:
         """Side of one cell, metres."""
-        return self.size / self.occupancy.shape[0]
+        return float(self.size / self.occupancy.shape[0])
 
     def occupied(self, threshold: float) -> NDArray[np.bool_]:
         """Return which cells are above the threshold, (X, Y, Z)."""
@@ -83,7 +83,8 @@ class VoxelGrid:
             raise DataError(f'no cell is above the threshold {threshold}: there is no surface yet')
         # A margin of empty cells closes the surface of an object that touches the border.
         padded = np.pad(self.occupancy, 1)
-        vertices, faces, _, _ = marching_cubes(padded, threshold)
+        vertices, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
+            padded, threshold)
         # Sample (i, j, k) of the padded array is the centre of cell (i - 1, j - 1, k - 1).
         placed = (vertices - 0.5) * self.cell_size - self.size / 2
         mesh = trimesh.Trimesh(placed, faces, process=False)

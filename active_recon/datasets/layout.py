@@ -1,0 +1,109 @@
+"""
+R2N2's layout on disk, read and written: one reader for real ShapeNet and for what is made here.
+
+    <root>/ShapeNetRendering/<category>/<id>/rendering/NN.png  RGBA, 137 x 137
+                                                      /rendering_metadata.txt
+                                                      /renderings.txt
+    <root>/ShapeNetVox32/<category>/<id>/model.binvox
+
+A row of the metadata holds azimuth, elevation and in-plane rotation in degrees, distance, and a
+field of view that is not to be used. Its azimuth runs clockwise, so it is negated, and its
+distance counts in units of 1.75 sides of the grid.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from active_recon.cameras import Camera, orbit_camera
+from active_recon.errors import DataError
+from active_recon.voxels import read_binvox, VoxelGrid, write_binvox
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+RENDERING, VOXELS = 'ShapeNetRendering', 'ShapeNetVox32'
+_DISTANCE_UNIT = 1.75
+_FIELD_OF_VIEW_COLUMN = 25.0  # what R2N2 writes; it is not the lens's
+
+
+@dataclass(frozen=True)
+class ObjectFolder:
+    """One object of a dataset: its images, its cameras and its voxels, read when asked for."""
+
+    root: Path
+    category: str
+    name: str
+
+    @property
+    def images_folder(self) -> Path:
+        """Where the images and their metadata lie."""
+        return self.root / RENDERING / self.category / self.name / 'rendering'
+
+    @property
+    def voxels_path(self) -> Path:
+        """Where the voxels lie."""
+        return self.root / VOXELS / self.category / self.name / 'model.binvox'
+
+    def cameras(self) -> list[Camera]:
+        """Return the camera of every image; positions count in metres, the grid as in the file."""
+        path = self.images_folder / 'rendering_metadata.txt'
+        try:
+            rows = np.loadtxt(path, ndmin=2)
+        except (OSError, ValueError) as error:
+            raise DataError(f'{path}: expected rows of five numbers, got: {error}') from error
+        if rows.shape[1] != 5 or not np.isfinite(rows).all():
+            raise DataError(f'{path}: expected rows of five numbers, got the shape {rows.shape}')
+        return [orbit_camera(-math.radians(azimuth), math.radians(elevation),
+                             distance * _DISTANCE_UNIT)
+                for azimuth, elevation, _, distance, _ in rows]
+
+    def image(self, index: int) -> NDArray[np.uint8]:
+        """Return one image, (H, W, 4) uint8 RGBA."""
+        path = self.images_folder / f'{index:02d}.png'
+        bgra = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        if bgra is None:
+            found = 'no whole PNG' if path.is_file() else 'no file'
+            raise DataError(f'{path}: expected an image, found {found}')
+        if bgra.ndim != 3 or bgra.shape[2] != 4:
+            raise DataError(f'{path}: expected four channels (RGBA), got the shape {bgra.shape}')
+        return np.asarray(cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA), np.uint8)
+
+    def voxels(self) -> VoxelGrid:
+        """Return the true voxels."""
+        return read_binvox(self.voxels_path)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the object was written to its end: its voxels come last."""
+        return self.voxels_path.is_file()
+
+
+def list_objects(root: Path) -> list[ObjectFolder]:
+    """Return the objects of a dataset that have images, sorted by category and name."""
+    top = root / RENDERING
+    if not top.is_dir():
+        raise DataError(f"{root}: expected a dataset in R2N2's layout, but it has no folder "
+                        f'{RENDERING}; make one with `active-recon render` or `dataset`')
+    return [ObjectFolder(root, folder.parent.name, folder.name)
+            for folder in sorted(top.glob('*/*')) if folder.is_dir()]
+
+
+def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
+                 cameras: Sequence[Camera], grid: VoxelGrid) -> None:
+    """Write one object, its voxels last and at once, so that a broken-off run can go on."""
+    folder.images_folder.mkdir(parents=True, exist_ok=True)
+    rows, names = [], []
+    for index, (image, camera) in enumerate(zip(images, cameras, strict=True)):
+        names.append(f'{index:02d}.png')
+        cv2.imwrite(str(folder.images_folder / names[-1]),
+                    cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_PNG_COMPRESSION, 4])
+        azimuth_deg = math.degrees(-camera.azimuth) % 360
+        rows.append(f'{azimuth_deg:.9g} {math.degrees(camera.elevation):.9g} 0 '
+                    f'{camera.distance / _DISTANCE_UNIT:.9g} {_FIELD_OF_VIEW_COLUMN:g}')
+    (folder.images_folder / 'rendering_metadata.txt').write_text('\n'.join(rows) + '\n')
+    (folder.images_folder / 'renderings.txt').write_text('\n'.join(names) + '\n')
+    unfinished = folder.voxels_path.with_suffix('.part')
+    write_binvox(grid, unfinished)
+    unfinished.replace(folder.voxels_path)

@@ -1,0 +1,98 @@
+"""Meshes to a dataset: every object rendered from 24 azimuths and voxelised, on all cores."""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import as_completed, ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+import math
+import multiprocessing
+from pathlib import Path
+
+from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.datasets.layout import ObjectFolder, write_object
+from active_recon.errors import ActiveReconError, DataError
+from active_recon.meshes import fit_to_grid, load_mesh
+from active_recon.rendering import Renderer
+from active_recon.shapes import make_shape
+from active_recon.voxelise import voxelise
+import numpy as np
+import trimesh
+
+MESH_SUFFIXES = {'.glb', '.gltf', '.obj', '.ply', '.stl', '.off', '.3mf', '.dae'}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One object to be made: where it goes, and what makes its mesh (called in a worker)."""
+
+    folder: ObjectFolder
+    make_mesh: Callable[[], trimesh.Trimesh]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job: done, already there, or refused with a reason."""
+
+    folder: ObjectFolder
+    refusal: str = ''
+
+
+def yawed(mesh: trimesh.Trimesh, yaw: float) -> trimesh.Trimesh:
+    """Return the mesh turned counter-clockwise about +z, radians, and fitted again."""
+    turned = mesh.copy()
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    turn = np.eye(4)
+    turn[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    turned.apply_transform(turn)
+    return fit_to_grid(turned)  # a turn can lengthen the bounding box
+
+
+def mesh_jobs(meshes: Path, out: Path, up: str | None, front: str | None) -> list[Job]:
+    """Return a job for one mesh file, or for each in a folder of `<category>/<mesh>`."""
+    if meshes.is_file():
+        files = [meshes]
+    elif meshes.is_dir():
+        files = sorted(path for path in meshes.rglob('*') if path.suffix.lower() in MESH_SUFFIXES)
+    else:
+        raise DataError(f'{meshes}: expected a mesh file or a folder of <category>/<mesh>, '
+                        'but there is neither')
+    if not files:
+        raise DataError(f'{meshes}: expected meshes ({", ".join(sorted(MESH_SUFFIXES))}), '
+                        'found none')
+    return [Job(ObjectFolder(out, path.parent.name or 'object', path.stem),
+                partial(load_mesh, path, up, front)) for path in files]
+
+
+def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
+    """Return a job for each seed of a parametric category."""
+    return [Job(ObjectFolder(out, category, f'{category}-{seed:06d}'),
+                partial(make_shape, category, seed)) for seed in seeds]
+
+
+def make_object(job: Job, samples: int) -> Outcome:
+    """Render and voxelise one object, unless it is already there."""
+    if job.folder.complete:
+        return Outcome(job.folder)
+    try:
+        mesh = job.make_mesh()
+        renderer = Renderer(mesh)
+        cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+        images = [renderer.render(camera, samples) for camera in cameras]
+        if not np.any(images[0]):
+            raise DataError('nothing of it can be seen')
+        write_object(job.folder, images, cameras, voxelise(mesh))
+    except ActiveReconError as error:
+        return Outcome(job.folder, str(error))
+    return Outcome(job.folder)
+
+
+def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1) -> Iterator[Outcome]:
+    """Make all objects, yielding what became of each as it is done."""
+    if workers == 1:
+        yield from (make_object(job, samples) for job in jobs)
+        return
+    # spawn, because a fork of a process that has threads (torch, embree, ROS) may hang
+    with ProcessPoolExecutor(workers, multiprocessing.get_context('spawn')) as pool:
+        futures = [pool.submit(make_object, job, samples) for job in jobs]
+        for future in as_completed(futures):
+            yield future.result()

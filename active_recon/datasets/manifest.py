@@ -1,0 +1,74 @@
+"""A folder of models found in the wild, with a table of what each is and its licence."""
+
+import csv
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from active_recon.cameras import TURN
+from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.making import Job, yawed
+from active_recon.errors import DataError
+from active_recon.meshes import load_mesh
+import numpy as np
+import trimesh
+
+_COLUMNS = {'category', 'file', 'split', 'source', 'licence', 'licence_evidence', 'front_axis',
+            'sha256'}
+EXPLICIT = 'explicit for the models'
+"""The evidence of a licence that lets a model be trained on."""
+
+
+@dataclass(frozen=True)
+class ModelRow:
+    """One row of a manifest; `file` is relative to the manifest's folder."""
+
+    category: str
+    file: Path
+    split: str
+    source: str
+    licence: str
+    licence_evidence: str
+    front_axis: str
+    sha256: str
+
+    @property
+    def front(self) -> str | None:
+        """The axis of the front in a y-up file: 'z', 'x', or None where it is unknown."""
+        sign_and_axis = self.front_axis[:2].upper()
+        return {'+Z': 'z', '+X': 'x'}.get(sign_and_axis)
+
+
+def read_manifest(path: Path) -> list[ModelRow]:
+    """Read the rows of a manifest (CSV); raises DataError where it is none."""
+    try:
+        with path.open(newline='') as file:
+            rows = list(csv.DictReader(file))
+    except OSError as error:
+        raise DataError(f'{path}: expected a manifest (CSV): {error.strerror}') from error
+    missing = _COLUMNS - set(rows[0] if rows else ())
+    if missing:
+        raise DataError(f'{path}: expected the columns {", ".join(sorted(_COLUMNS))}; missing: '
+                        f'{", ".join(sorted(missing))}')
+    return [ModelRow(row['category'], path.parent / row['file'], row['split'], row['source'],
+                     row['licence'], row['licence_evidence'], row['front_axis'], row['sha256'])
+            for row in rows]
+
+
+def manifest_jobs(rows: list[ModelRow], out: Path) -> list[Job]:
+    """
+    Return a job for each row.
+
+    Where the front is unknown the object stands at a random yaw, drawn from the file's own hash,
+    so that it is the same wherever the model is measured.
+    """
+    return [Job(ObjectFolder(out, row.category, row.file.stem), partial(_load, row))
+            for row in rows]
+
+
+def _load(row: ModelRow) -> trimesh.Trimesh:
+    mesh = load_mesh(row.file, 'y', row.front or 'z')
+    if row.front is not None:
+        return mesh
+    rng = np.random.default_rng(int(row.sha256, 16))
+    return yawed(mesh, rng.uniform(0, TURN))

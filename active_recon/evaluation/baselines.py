@@ -1,0 +1,62 @@
+"""Two answers that know nothing of an image's detail, to measure a network against."""
+
+from active_recon.datasets.views import ViewSet
+from active_recon.voxels import iou
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+import torch
+from torch import Tensor
+
+_THUMBNAIL = 16  # pixels a side
+
+
+def category_means(training: ViewSet) -> dict[str, Tensor]:
+    """Return the mean occupancy of every training category, and under '' of all, (X, Y, Z)."""
+    names = training.categories
+    means = {str(name): training.voxels[torch.from_numpy(names == name)].float().mean(dim=0)
+             for name in np.unique(names)}
+    return means | {'': training.voxels.float().mean(dim=0)}
+
+
+def mean_shape_iou(means: dict[str, Tensor], views: ViewSet,
+                   threshold: float) -> NDArray[np.float64]:
+    """
+    Return the IoU of each object with its category's mean shape, (N,).
+
+    It is told the category, which no network is; an unknown category gets the mean of all.
+    """
+    return np.array([
+        float(iou(means.get(str(name), means['']) > threshold, truth))
+        for name, truth in zip(views.categories, views.voxels, strict=True)])
+
+
+def thumbnails(views: ViewSet) -> NDArray[np.float32]:
+    """Return every image, colours and alpha, at 16 x 16, flat and centred, (N, V, 1024)."""
+    objects, count = views.images.shape[:2]
+    flat = views.images.numpy().reshape(objects * count, *views.images.shape[2:])
+    small = np.stack([cv2.resize(image, (_THUMBNAIL, _THUMBNAIL), interpolation=cv2.INTER_AREA)
+                      for image in flat])
+    return small.reshape(objects, count, -1).astype(np.float32) / np.float32(255)
+
+
+def nearest_image_iou(training: ViewSet, views: ViewSet, objects: Tensor, starts: Tensor,
+                      batch: int = 256) -> NDArray[np.float64]:
+    """
+    Return the IoU of each episode's object with the training shape whose image is nearest, (E,).
+
+    The first view's image is compared with all views of all training objects, by Euclidean
+    distance of thumbnails.
+    """
+    known = thumbnails(training)
+    owners = np.repeat(np.arange(len(training)), known.shape[1])
+    library = torch.from_numpy(known.reshape(-1, known.shape[-1]))
+    library_norm = library.square().sum(dim=1)
+    asked = torch.from_numpy(thumbnails(views)[objects.numpy(), starts.numpy()])
+    values = np.empty(len(objects))
+    for low in range(0, len(objects), batch):
+        part = slice(low, low + batch)
+        nearest = (library_norm - 2 * asked[part] @ library.T).argmin(dim=1).numpy()
+        values[part] = iou(training.voxels[torch.from_numpy(owners[nearest])],
+                           views.voxels[objects[part]]).numpy()
+    return values

@@ -1,0 +1,53 @@
+"""The attentive-recurrent visual model of section 3.3: where to look next."""
+
+from typing import NamedTuple
+
+from active_recon.config import NetworkConfig
+from active_recon.models.encoder import LATENT_GRID
+import torch
+from torch import nn, Tensor
+from torch.nn import functional
+
+
+class Attention(NamedTuple):
+    """What the model proposes: the mean azimuth (B,), radians in (-pi, pi], and b_t (B,)."""
+
+    mean_azimuth: Tensor
+    baseline: Tensor
+
+
+class AttentionModel(nn.Module):
+    """
+    Glimpse, LSTM, location and baseline (figures 3 and 4).
+
+    - latent A_t: (B, 4 C, 4, 4), azimuth l_t of the view just taken: (B,) radians
+    - state: the LSTM's h and c, (B, hidden) each, passed in and handed back
+
+    The glimpse is g_t = A_t * ReLU(W [sin l_t, cos l_t]), broadcast over the grid: a product with
+    the bare angle would erase A_t at azimuth 0. The mean azimuth is the angle of a vector of two.
+    """
+
+    def __init__(self, latent_channels: int, hidden_channels: int) -> None:
+        super().__init__()
+        channels = latent_channels * LATENT_GRID
+        self.where = nn.Linear(2, channels)
+        self.memory = nn.LSTMCell(channels * LATENT_GRID ** 2, hidden_channels)
+        self.location = nn.Linear(hidden_channels, 2)
+        self.baseline = nn.Linear(hidden_channels, 1)
+
+    @classmethod
+    def from_config(cls, config: NetworkConfig) -> 'AttentionModel':
+        """Build the model of a configuration, with fresh weights."""
+        return cls(config.latent_channels, config.glimpse_channels)
+
+    def forward(self, latent: Tensor, azimuth: Tensor, state: tuple[Tensor, Tensor] | None = None,
+                ) -> tuple[Attention, tuple[Tensor, Tensor]]:
+        """Return the proposal after this view and the next state; None is no view yet."""
+        direction = torch.stack([azimuth.sin(), azimuth.cos()], dim=-1)
+        gate = functional.relu(self.where(direction))  # (B, 4 C)
+        glimpse = (latent * gate[:, :, None, None]).flatten(1)  # (B, 4 C x 16)
+        hidden, memory = self.memory(glimpse, state)
+        sine, cosine = self.location(hidden).unbind(dim=-1)
+        # The baseline learns from the return alone; its gradient must not shape the policy.
+        baseline = self.baseline(hidden.detach())[:, 0]
+        return Attention(torch.atan2(sine, cosine), baseline), (hidden, memory)

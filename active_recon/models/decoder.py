@@ -1,0 +1,36 @@
+"""The 3D convolutional LSTM decoder of section 3.2: the attentive latent unit to occupancy."""
+
+from active_recon.models.encoder import LATENT_GRID
+from active_recon.models.recurrent import ConvLSTMCell, LstmState
+from torch import nn, Tensor
+
+
+class Decoder(nn.Module):
+    """
+    A 3D ConvLSTM and three (transposed) convolutions, each doubling the grid.
+
+    - latent A_t: (B, 4 C, 4, 4), read as (B, C, 4, 4, 4)
+    - logits of the occupancy: (B, 32, 32, 32), indexed [x, y, z]
+    """
+
+    def __init__(self, latent_channels: int, volume_channels: int,
+                 decoder_channels: tuple[int, int]) -> None:
+        super().__init__()
+        self.latent_channels = latent_channels
+        self.memory = ConvLSTMCell(latent_channels, volume_channels, (LATENT_GRID,) * 3)
+        wide, narrow = decoder_channels
+        to_logits = nn.ConvTranspose3d(narrow, 1, 4, stride=2, padding=1)
+        self.grow = nn.Sequential(
+            nn.ConvTranspose3d(volume_channels, wide, 4, stride=2, padding=1), nn.LeakyReLU(0.1),
+            nn.ConvTranspose3d(wide, narrow, 4, stride=2, padding=1), nn.LeakyReLU(0.1),
+            to_logits)
+        # Most of a grid is empty: a start at p = 0.1 spares the first thousand steps
+        assert to_logits.bias is not None
+        nn.init.constant_(to_logits.bias, -2.2)
+
+    def forward(self, latent: Tensor, state: LstmState | None) -> tuple[Tensor, LstmState]:
+        """Return the logits and the next state; a state of None is that of no view yet."""
+        volume = latent.reshape(
+            len(latent), self.latent_channels, LATENT_GRID, LATENT_GRID, LATENT_GRID)
+        state = self.memory(volume, state or self.memory.initial_state(volume))
+        return self.grow(state.hidden)[:, 0], state

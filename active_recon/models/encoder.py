@@ -1,0 +1,59 @@
+"""The 2D convolutional LSTM encoder of section 3.1: an image to the attentive latent unit A_t."""
+
+from active_recon.models.recurrent import ConvLSTMCell, LstmState
+from torch import nn, Tensor
+
+IMAGE_SIZE = 64
+LATENT_GRID = 4  # cells a side of A_t in the image's plane, and of the decoder's first volume
+
+
+class ResidualBlock(nn.Module):
+    """Two 3 x 3 convolutions and a shortcut (He et al. 2016), halving the image."""
+
+    def __init__(self, in_channels: int, out_channels: int) -> None:
+        super().__init__()
+        self.first = nn.Conv2d(in_channels, out_channels, 3, stride=2, padding=1)
+        self.second = nn.Conv2d(out_channels, out_channels, 3, padding=1)
+        self.shortcut = nn.Conv2d(in_channels, out_channels, 1, stride=2)
+        self.activation = nn.LeakyReLU(0.1)
+
+    def forward(self, image: Tensor) -> Tensor:
+        """(B, in, S, S) to (B, out, S / 2, S / 2)."""
+        changed = self.second(self.activation(self.first(image)))
+        result: Tensor = self.activation(changed + self.shortcut(image))
+        return result
+
+
+class Encoder(nn.Module):
+    """
+    Three residual blocks, a ConvLSTM, and three convolutions to A_t.
+
+    - images: (B, 3, 64, 64) in [0, 1]
+    - latent A_t: (B, 4 C, 4, 4), the same numbers as a volume of C channels and 4 x 4 x 4 cells
+
+    An image says nothing of its azimuth, and the object is to be rebuilt in its own frame, so
+    what is seen on one side of the image may belong anywhere: the first of the three
+    convolutions after the memory spans its whole grid.
+    """
+
+    def __init__(self, stem_channels: int, block_channels: tuple[int, int, int],
+                 recurrent_channels: int, bottleneck_channels: int, latent_channels: int) -> None:
+        super().__init__()
+        widths = (stem_channels, *block_channels)
+        self.stem = nn.Sequential(
+            nn.Conv2d(3, stem_channels, 5, stride=2, padding=2), nn.LeakyReLU(0.1))
+        self.blocks = nn.Sequential(
+            *(ResidualBlock(a, b) for a, b in zip(widths[:-1], widths[1:], strict=True)))
+        self.memory = ConvLSTMCell(block_channels[-1], recurrent_channels, (LATENT_GRID,) * 2)
+        self.to_latent = nn.Sequential(
+            nn.Conv2d(recurrent_channels, bottleneck_channels, LATENT_GRID), nn.LeakyReLU(0.1),
+            nn.Conv2d(bottleneck_channels, bottleneck_channels, 1), nn.LeakyReLU(0.1),
+            nn.Conv2d(bottleneck_channels, latent_channels * LATENT_GRID ** 3, 1),
+            nn.LeakyReLU(0.1))
+
+    def forward(self, images: Tensor, state: LstmState | None) -> tuple[Tensor, LstmState]:
+        """Return A_t and the next state; a state of None is that of no view yet."""
+        features = self.blocks(self.stem(2 * images - 1))  # (B, F, 4, 4)
+        state = self.memory(features, state or self.memory.initial_state(features))
+        latent = self.to_latent(state.hidden)  # (B, 64 C, 1, 1)
+        return latent.reshape(len(images), -1, LATENT_GRID, LATENT_GRID), state

@@ -1,0 +1,31 @@
+"""The paper's policy at run time: the attentive-recurrent visual model's mean azimuth."""
+
+from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN
+from active_recon.models.attention import AttentionModel
+from active_recon.policies.base import Choice
+import numpy as np
+from numpy.typing import NDArray
+import torch
+from torch import Tensor
+
+_State = tuple[Tensor, Tensor]
+
+
+class AttentionPolicy:
+    """The mean of pi(u_t | theta; s_t); its state is the LSTM's."""
+
+    def __init__(self, model: AttentionModel, sigma: float = 0.35) -> None:
+        self._model = model
+        self._sigma = sigma
+        self._device = next(model.parameters()).device
+
+    @torch.inference_mode()
+    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
+               state: _State | None = None) -> tuple[Choice, _State]:
+        """Take the mean; an azimuth's worth is its log density, up to a constant."""
+        azimuth = torch.as_tensor(taken[:, -1], dtype=torch.float32, device=self._device)
+        seen = torch.as_tensor(latent, device=self._device)
+        proposal, state = self._model(seen, azimuth, state)
+        mean = proposal.mean_azimuth.cpu().numpy().astype(np.float64) % TURN
+        away = azimuth_difference(AZIMUTHS[None], mean[:, None]) / self._sigma
+        return Choice(mean, (-away ** 2 / 2).astype(np.float32)), state

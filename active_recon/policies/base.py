@@ -1,0 +1,38 @@
+"""What every view policy is: what was seen in, what every azimuth is worth out."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from active_recon.cameras import azimuth_difference, AZIMUTHS
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Where to look next, for B episodes: azimuths (B,) and the worth of all 24, (B, 24)."""
+
+    azimuth: NDArray[np.float64]
+    scores: NDArray[np.float32]
+
+
+class Policy(Protocol):
+    """Chooses the next azimuth; its state is handed back to be passed in again."""
+
+    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
+               state: Any = None) -> tuple[Choice, Any]:
+        """
+        Choose after a view, for B episodes at once.
+
+        - latent: (B, C, h, w), A_t after that view
+        - taken: (B, t), the azimuths of all views so far, radians, the last one's last
+        - state: what the last call handed back; None before the first
+        """
+        ...
+
+
+def distance_to_taken(taken: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far each of the 24 azimuths is from the nearest taken, (B, t) to (B, 24)."""
+    gaps = np.abs(azimuth_difference(AZIMUTHS[None, :, None], taken[:, None, :]))
+    nearest: NDArray[np.float64] = gaps.min(axis=2)
+    return nearest

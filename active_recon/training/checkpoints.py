@@ -1,0 +1,59 @@
+"""Training checkpoints: safetensors for the numbers, JSON for the rest; never pickle."""
+
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+from active_recon.errors import DataError
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import nn, Tensor
+from torch.optim import Optimizer
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Where a training stands: steps done, what it was told, what it measured."""
+
+    step: int
+    settings: dict[str, Any]
+    log: list[dict[str, float]]
+
+
+def save_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
+                    checkpoint: Checkpoint) -> None:
+    """Write a checkpoint in one move: a training cut off while writing keeps the one before."""
+    tensors = {f'module.{name}': tensor.detach().contiguous()
+               for name, tensor in module.state_dict().items()}
+    for name, parameter in module.named_parameters():
+        for key, value in optimizer.state[parameter].items():
+            tensors[f'optimizer.{key}.{name}'] = value
+    meta = json.dumps({'step': checkpoint.step, 'settings': checkpoint.settings,
+                       'log': checkpoint.log})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix('.part')
+    save_file(tensors, unfinished, {'checkpoint': meta})
+    unfinished.replace(path)
+
+
+def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Checkpoint:
+    """Restore a module and its optimizer; raises DataError on what is no whole checkpoint."""
+    from safetensors import safe_open
+
+    try:
+        with safe_open(path, framework='pt') as stored:
+            meta = json.loads(stored.metadata()['checkpoint'])
+        tensors: dict[str, Tensor] = load_file(path)
+        module.load_state_dict({name.removeprefix('module.'): tensor
+                                for name, tensor in tensors.items()
+                                if name.startswith('module.')})
+    except (OSError, SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise DataError(f'{path}: expected a whole checkpoint of this model, got: '
+                        f'{error}') from error
+    for name, parameter in module.named_parameters():
+        for key in ('step', 'exp_avg', 'exp_avg_sq'):
+            stored_name = f'optimizer.{key}.{name}'
+            if stored_name in tensors:
+                optimizer.state[parameter][key] = tensors[stored_name]
+    return Checkpoint(meta['step'], meta['settings'], meta['log'])
