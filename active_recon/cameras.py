@@ -78,7 +78,8 @@ class Camera:
         if self.pose.shape != (4, 4) or not np.isfinite(self.pose).all():
             raise ViewError(f'expected a finite 4 x 4 camera pose, got\n{self.pose}', 'pose')
         rotation = self.pose[:3, :3]
-        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
+        if (not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
+                or np.linalg.det(rotation) < 0):  # a mirror is no rotation
             raise ViewError(f'expected a rotation in the camera pose, got\n{rotation}', 'pose')
 
     @property
@@ -99,7 +100,8 @@ class Camera:
     @property
     def elevation(self) -> float:
         """Radians up from the horizon."""
-        return math.asin(self.position[2] / self.distance)
+        across = math.hypot(self.position[0], self.position[1])
+        return math.atan2(self.position[2], across)
 
     @property
     def object_to_camera(self) -> NDArray[np.float64]:

@@ -32,10 +32,12 @@ def canonical_image(image: NDArray[np.uint8], camera: Camera,
     if depth.min() <= 0:
         raise ViewError('expected a camera that looks at the object; it looks away from it',
                         'camera_direction')
-    # Pixels of the source per pixel of the result: so many samples are averaged
+    # Pixels of the source per pixel of the result: so many samples are averaged, though never
+    # more than the whole image has, however near the camera stands
     density = np.linalg.norm(seen[1] - seen[0]) / np.linalg.norm(
         np.diff(target.project(plane[:2])[0], axis=0)) * CANONICAL_INTRINSICS.width / IMAGE_SIZE
-    samples = max(1, math.ceil(density))
+    most = math.ceil(max(lens.width, lens.height) / IMAGE_SIZE)
+    samples = min(max(1, math.ceil(density)), most)
     size = IMAGE_SIZE * samples
     wanted = Camera(target.pose, CANONICAL_INTRINSICS.resized(size, size)).project(plane)[0]
     if np.allclose(wanted * [lens.width / size, lens.height / size], seen, atol=0.01):

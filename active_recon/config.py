@@ -74,3 +74,9 @@ class RewardConfig(Config):
     distance_tau: float = 0.5235987755982988
     paper_distance: bool = False
     policy_sigma: float = 0.35
+
+    def __post_init__(self) -> None:
+        """Refuse widths that divide by 0."""
+        if not (self.distance_tau > 0 and self.policy_sigma > 0 and self.distance_weight >= 0):
+            raise ConfigError('RewardConfig: expected tau and sigma above 0 and a weight of 0 or '
+                              f'more, got {self.to_dict()}')

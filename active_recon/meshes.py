@@ -20,8 +20,15 @@ def upright(up: str, front: str) -> NDArray[np.float64]:
                               f'got {axis!r}')
     z, x = _AXES[up], _AXES[front]
     if z @ x:
-        raise ConfigError(f'up ({up}) and front ({front}) must be different axes')
+        raise ConfigError(f'expected up and front to be different axes, got {up} and {front}; '
+                          'name both')
     return np.array([x, np.cross(z, x), z])
+
+
+def file_rotation(path: Path, up: str | None, front: str | None) -> NDArray[np.float64]:
+    """Return the rotation, (3, 3), of a file's axes, by its format where they are not named."""
+    gltf = path.suffix.lower() in GLTF
+    return upright(up or ('y' if gltf else 'z'), front or ('z' if gltf else 'x'))
 
 
 def fit_to_grid(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -40,8 +47,7 @@ def load_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
     the front at +z by their standard, other formats are taken as z up with the front at +x.
     Raises MeshError where the file is missing, is no mesh, or holds no face with an area.
     """
-    gltf = path.suffix.lower() in GLTF
-    rotation = upright(up or ('y' if gltf else 'z'), front or ('z' if gltf else 'x'))
+    rotation = file_rotation(path, up, front)
     if not path.is_file():
         raise MeshError(f'{path}: expected a mesh file, but there is no such file')
     try:

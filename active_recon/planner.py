@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, wrap_azimuth
+from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN, wrap_azimuth
 from active_recon.errors import ConfigError, ViewError
 from active_recon.policies import Choice, load_policy, Policy
 import numpy as np
@@ -44,10 +44,13 @@ class Planner:
         if not 0 <= entropy_tolerance < 1:
             raise ConfigError(f'entropy_tolerance: expected a share in [0, 1), got '
                               f'{entropy_tolerance}')
+        if not math.isfinite(object_yaw):
+            raise ConfigError(f'object_yaw: expected finite radians, got {object_yaw}')
         self._policy = policy
         self._max_views = max_views
         self._entropy_tolerance = entropy_tolerance
         self._yaw = object_yaw
+        self._candidates = (AZIMUTHS + object_yaw) % TURN
         self.reset()
 
     @classmethod
@@ -70,8 +73,9 @@ class Planner:
         """Return the goal of the view that no policy chooses: the first."""
         if not math.isfinite(azimuth):
             raise ViewError(f'expected a finite azimuth, got {azimuth}', 'azimuth')
-        away = azimuth_difference(AZIMUTHS, azimuth)
-        self._goal = Goal(wrap_azimuth(azimuth), AZIMUTHS, -np.abs(away).astype(np.float32))
+        away = azimuth_difference(self._candidates, azimuth)
+        self._goal = Goal(wrap_azimuth(azimuth), self._candidates,
+                          -np.abs(away).astype(np.float32))
         return self._goal
 
     def add_view(self, latent: NDArray[np.float32], azimuth: float, entropy: float) -> Decision:
@@ -81,13 +85,17 @@ class Planner:
         - latent: (C, h, w), A_t after that view
         - azimuth: of the view that was really taken, radians
         - entropy: of the reconstruction after that view, nats
+
+        Raises ViewError, and then nothing has changed.
         """
-        if not math.isfinite(azimuth) or not np.isfinite(latent).all():
-            raise ViewError('expected a finite azimuth and latent', 'latent')
-        self._taken.append(azimuth)
+        if not (math.isfinite(azimuth) and math.isfinite(entropy) and np.isfinite(latent).all()):
+            raise ViewError('expected a finite latent, azimuth and entropy, got azimuth '
+                            f'{azimuth} and entropy {entropy}', 'latent')
+        taken = [*self._taken, azimuth]
+        choice, self._state = self._policy.choose(
+            latent[None], np.array([taken]) - self._yaw, self._state)
+        self._taken = taken
         self._entropies.append(entropy)
-        taken = np.array([self._taken]) - self._yaw
-        choice, self._state = self._policy.choose(latent[None], taken, self._state)
         self._goal = self._in_object_frame(choice)
         if len(self._taken) >= self._max_views:
             return Decision(None, 'max_views')
@@ -102,8 +110,7 @@ class Planner:
         return self._goal
 
     def _in_object_frame(self, choice: Choice) -> Goal:
-        candidates = (AZIMUTHS + self._yaw) % (2 * math.pi)
-        return Goal(wrap_azimuth(float(choice.azimuth[0]) + self._yaw), candidates,
+        return Goal(wrap_azimuth(float(choice.azimuth[0]) + self._yaw), self._candidates,
                     choice.scores[0])
 
     def _settled(self) -> bool:

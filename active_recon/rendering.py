@@ -80,9 +80,12 @@ def _face_colors(mesh: trimesh.Trimesh) -> NDArray[np.float32]:
     visual: Any = mesh.visual
     if visual is None or visual.kind is None:
         return np.full((len(mesh.faces), 3), 178, np.float32)
-    if visual.kind == 'texture':
-        visual = visual.to_color()
-    colors: NDArray[np.float32] = np.asarray(visual.face_colors[:, :3], np.float32)
+    if visual.kind != 'texture':
+        return np.asarray(visual.face_colors[:, :3], np.float32)
+    corners = visual.material.to_color(visual.uv)
+    if np.ndim(corners) != 2:  # a material without a picture
+        corners = np.tile(visual.material.main_color, (len(mesh.vertices), 1))
+    colors: NDArray[np.float32] = corners[mesh.faces, :3].mean(axis=1, dtype=np.float32)
     return colors
 
 

@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from active_recon.errors import ConfigError, DataError
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import entr, xlogy
-import trimesh
+
+if TYPE_CHECKING:
+    import trimesh
 
 RESOLUTION = 32
 MESH_FORMATS = ('ply', 'obj', 'stl')
@@ -40,10 +42,12 @@ class VoxelGrid:
     size: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no cube of probabilities."""
+        """Refuse what is no cube."""
         shape = self.occupancy.shape
         if len(shape) != 3 or len(set(shape)) != 1:
             raise DataError(f'expected a cube of voxels, got the shape {shape}')
+        if not 0 < self.size < np.inf:
+            raise DataError(f'expected a finite side of the cube above 0 m, got {self.size}')
 
     @property
     def cell_size(self) -> float:
@@ -71,13 +75,14 @@ class VoxelGrid:
         centers = (index + 0.5) * self.cell_size - self.size / 2
         return np.column_stack([centers, self.occupancy[tuple(index.T)]]).astype(np.float32)
 
-    def mesh(self, threshold: float) -> trimesh.Trimesh:
+    def mesh(self, threshold: float) -> 'trimesh.Trimesh':
         """
         Return the surface at the threshold by marching cubes, in metres, closed at the border.
 
         Raises DataError where no cell is above the threshold.
         """
-        from skimage.measure import marching_cubes  # slow to import, and only meshes need it
+        from skimage.measure import marching_cubes  # slow to import, and only meshes need them
+        import trimesh
 
         if not self.occupied(threshold).any():
             raise DataError(f'no cell is above the threshold {threshold}: there is no surface yet')
@@ -96,15 +101,15 @@ class VoxelGrid:
 def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
                      resolution: int = RESOLUTION) -> VoxelGrid:
     """Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `points`."""
-    index = np.floor((points[:, :3] + size / 2) / size * resolution).astype(int)
-    if ((index < 0) | (index >= resolution)).any():
+    index = np.floor((points[:, :3] + size / 2) / size * resolution)
+    if not ((index >= 0) & (index < resolution)).all():  # also where a coordinate is NaN
         raise DataError(f'expected points inside a cube of {size} m about the origin')
     occupancy = np.zeros((resolution,) * 3, np.float32)
-    occupancy[tuple(index.T)] = points[:, 3]
+    occupancy[tuple(index.astype(int).T)] = points[:, 3]
     return VoxelGrid(occupancy, size)
 
 
-def write_mesh(mesh: trimesh.Trimesh, path: Path) -> None:
+def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
     """Write a mesh as PLY, OBJ or STL, by the file's suffix."""
     suffix = path.suffix.lower().lstrip('.')
     if suffix not in MESH_FORMATS:
@@ -125,9 +130,9 @@ def read_binvox(path: Path) -> VoxelGrid:
         raw = path.read_bytes()
         header, _, data = raw.partition(b'\ndata\n')
         lines = header.split(b'\n')
-        fields = {line.split()[0]: line.split()[1:] for line in lines if line.strip()}
         if not lines[0].startswith(b'#binvox'):
-            raise ValueError('the first line is not #binvox')
+            raise ValueError('another first line than #binvox')
+        fields = {line.split()[0]: line.split()[1:] for line in lines if line.strip()}
         dims = tuple(int(n) for n in fields[b'dim'])
         scale = float(fields[b'scale'][0])
         values, counts = np.frombuffer(data, np.uint8).reshape(-1, 2).T
@@ -135,12 +140,15 @@ def read_binvox(path: Path) -> VoxelGrid:
         if len(dims) != 3 or cells.size != np.prod(dims) or cells.max() > 1:
             raise ValueError(f'{cells.size} cells for the dimensions {dims}')
         file_order = cells.reshape(dims)  # [x, z, y] of the file's own axes: y is up
+        occupancy = file_order[:, ::-1, :]  # (x, y, z) -> (x, -z, y)
+        return VoxelGrid(np.ascontiguousarray(occupancy, np.float32), scale)
     except OSError as error:
         raise DataError(f'{path}: cannot be read: {error.strerror}') from error
-    except (ValueError, KeyError, IndexError) as error:
-        raise DataError(f'{path}: expected a whole binvox file, got {error}') from error
-    occupancy = file_order[:, ::-1, :]  # (x, y, z) -> (x, -z, y)
-    return VoxelGrid(np.ascontiguousarray(occupancy, np.float32), scale)
+    except KeyError as error:
+        raise DataError(f'{path}: expected a whole binvox file, its header lacks '
+                        f'{error.args[0].decode()}') from error
+    except (ValueError, IndexError, DataError) as error:
+        raise DataError(f'{path}: expected a whole binvox file, got: {error}') from error
 
 
 def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
@@ -171,5 +179,5 @@ def turned(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:
     to_source = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
     center = (np.array(occupancy.shape) - 1) / 2
     result: NDArray[np.float32] = affine_transform(
-        occupancy, to_source, center - to_source @ center, order=1)
+        occupancy, to_source, center - to_source @ center, order=1, mode='grid-constant')
     return result

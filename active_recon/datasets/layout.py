@@ -17,7 +17,7 @@ import math
 from pathlib import Path
 
 from active_recon.cameras import Camera, orbit_camera
-from active_recon.errors import DataError
+from active_recon.errors import DataError, ViewError
 from active_recon.voxels import read_binvox, VoxelGrid, write_binvox
 import cv2
 import numpy as np
@@ -50,14 +50,14 @@ class ObjectFolder:
         """Return the camera of every image; positions count in metres, the grid as in the file."""
         path = self.images_folder / 'rendering_metadata.txt'
         try:
-            rows = np.loadtxt(path, ndmin=2)
-        except (OSError, ValueError) as error:
+            rows = np.array([line.split() for line in path.read_text().splitlines()], np.float64)
+            if rows.ndim != 2 or rows.shape[1] != 5:
+                raise ValueError(f'the shape {rows.shape}')
+            return [orbit_camera(-math.radians(azimuth), math.radians(elevation),
+                                 distance * _DISTANCE_UNIT)
+                    for azimuth, elevation, _, distance, _ in rows]
+        except (OSError, ValueError, ViewError) as error:
             raise DataError(f'{path}: expected rows of five numbers, got: {error}') from error
-        if rows.shape[1] != 5 or not np.isfinite(rows).all():
-            raise DataError(f'{path}: expected rows of five numbers, got the shape {rows.shape}')
-        return [orbit_camera(-math.radians(azimuth), math.radians(elevation),
-                             distance * _DISTANCE_UNIT)
-                for azimuth, elevation, _, distance, _ in rows]
 
     def image(self, index: int) -> NDArray[np.uint8]:
         """Return one image, (H, W, 4) uint8 RGBA."""
@@ -66,8 +66,9 @@ class ObjectFolder:
         if bgra is None:
             found = 'no whole PNG' if path.is_file() else 'no file'
             raise DataError(f'{path}: expected an image, found {found}')
-        if bgra.ndim != 3 or bgra.shape[2] != 4:
-            raise DataError(f'{path}: expected four channels (RGBA), got the shape {bgra.shape}')
+        if bgra.ndim != 3 or bgra.shape[2] != 4 or bgra.dtype != np.uint8:
+            raise DataError(f'{path}: expected four channels (RGBA) of 8 bits, got the shape '
+                            f'{bgra.shape} {bgra.dtype}')
         return np.asarray(cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA), np.uint8)
 
     def voxels(self) -> VoxelGrid:
@@ -97,8 +98,10 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
     rows, names = [], []
     for index, (image, camera) in enumerate(zip(images, cameras, strict=True)):
         names.append(f'{index:02d}.png')
-        cv2.imwrite(str(folder.images_folder / names[-1]),
-                    cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_PNG_COMPRESSION, 4])
+        path = folder.images_folder / names[-1]
+        if not cv2.imwrite(str(path), cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA),
+                           [cv2.IMWRITE_PNG_COMPRESSION, 4]):
+            raise DataError(f'{path}: cannot be written; is the disk full?')
         azimuth_deg = math.degrees(-camera.azimuth) % 360
         rows.append(f'{azimuth_deg:.9g} {math.degrees(camera.elevation):.9g} 0 '
                     f'{camera.distance / _DISTANCE_UNIT:.9g} {_FIELD_OF_VIEW_COLUMN:g}')

@@ -1,8 +1,9 @@
 """Meshes to a dataset: every object rendered from 24 azimuths and voxelised, on all cores."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import as_completed, ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 import math
 import multiprocessing
@@ -10,10 +11,10 @@ from pathlib import Path
 
 from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.datasets.layout import ObjectFolder, write_object
-from active_recon.errors import ActiveReconError, DataError
-from active_recon.meshes import fit_to_grid, load_mesh
+from active_recon.errors import ActiveReconError, ConfigError, DataError
+from active_recon.meshes import file_rotation, fit_to_grid, load_mesh
 from active_recon.rendering import Renderer
-from active_recon.shapes import make_shape
+from active_recon.shapes import CATEGORIES, make_shape
 from active_recon.voxelise import voxelise
 import numpy as np
 import trimesh
@@ -48,23 +49,43 @@ def yawed(mesh: trimesh.Trimesh, yaw: float) -> trimesh.Trimesh:
 
 
 def mesh_jobs(meshes: Path, out: Path, up: str | None, front: str | None) -> list[Job]:
-    """Return a job for one mesh file, or for each in a folder of `<category>/<mesh>`."""
+    """
+    Return a job for one mesh file, or for each in a folder of `<category>/<mesh>`.
+
+    A mesh that lies deeper bears the folders between in its name; of meshes of one name each
+    bears its suffix. Raises DataError where there is no mesh, ConfigError on bad axes.
+    """
     if meshes.is_file():
-        files = [meshes]
+        files, top = [meshes], meshes.parent
     elif meshes.is_dir():
         files = sorted(path for path in meshes.rglob('*') if path.suffix.lower() in MESH_SUFFIXES)
+        top = meshes
     else:
         raise DataError(f'{meshes}: expected a mesh file or a folder of <category>/<mesh>, '
                         'but there is neither')
     if not files:
         raise DataError(f'{meshes}: expected meshes ({", ".join(sorted(MESH_SUFFIXES))}), '
                         'found none')
-    return [Job(ObjectFolder(out, path.parent.name or 'object', path.stem),
-                partial(load_mesh, path, up, front)) for path in files]
+    for path in files:
+        file_rotation(path, up, front)  # a bad option is refused once, before the work
+    folders = [_mesh_folder(out, top, path) for path in files]
+    alike = Counter(folders)
+    return [Job(folder if alike[folder] == 1 else
+                replace(folder, name=f'{folder.name}{path.suffix}'),
+                partial(load_mesh, path, up, front))
+            for folder, path in zip(folders, files, strict=True)]
+
+
+def _mesh_folder(out: Path, top: Path, path: Path) -> ObjectFolder:
+    *folders, name = path.relative_to(top).with_suffix('').parts
+    category = folders[0] if folders else top.resolve().name
+    return ObjectFolder(out, category or 'object', '-'.join([*folders[1:], name]))
 
 
 def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
-    """Return a job for each seed of a parametric category."""
+    """Return a job for each seed of a parametric category; ConfigError if there is none such."""
+    if category not in CATEGORIES:
+        raise ConfigError(f'expected a category out of {", ".join(CATEGORIES)}, got {category!r}')
     return [Job(ObjectFolder(out, category, f'{category}-{seed:06d}'),
                 partial(make_shape, category, seed)) for seed in seeds]
 
@@ -78,16 +99,24 @@ def make_object(job: Job, samples: int) -> Outcome:
         renderer = Renderer(mesh)
         cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
         images = [renderer.render(camera, samples) for camera in cameras]
-        if not np.any(images[0]):
-            raise DataError('nothing of it can be seen')
+        if not np.any(images):
+            raise DataError('expected a surface, but none of it is seen from any azimuth')
         write_object(job.folder, images, cameras, voxelise(mesh))
-    except ActiveReconError as error:
+    except (ActiveReconError, OSError) as error:
         return Outcome(job.folder, str(error))
     return Outcome(job.folder)
 
 
 def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1) -> Iterator[Outcome]:
-    """Make all objects, yielding what became of each as it is done."""
+    """
+    Make all objects, yielding what became of each as it is done.
+
+    Raises DataError where two jobs would write one object.
+    """
+    for folder, count in Counter(job.folder for job in jobs).most_common(1):
+        if count > 1:
+            raise DataError(f'expected each object once, but {count} would become '
+                            f'{folder.category}/{folder.name}; rename their files')
     if workers == 1:
         yield from (make_object(job, samples) for job in jobs)
         return

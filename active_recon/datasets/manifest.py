@@ -4,6 +4,7 @@ import csv
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+import re
 
 from active_recon.cameras import TURN
 from active_recon.datasets.layout import ObjectFolder
@@ -15,6 +16,7 @@ import trimesh
 
 _COLUMNS = {'category', 'file', 'split', 'source', 'licence', 'licence_evidence', 'front_axis',
             'sha256'}
+_HEX = re.compile('[0-9a-f]+')
 EXPLICIT = 'explicit for the models'
 """The evidence of a licence that lets a model be trained on."""
 
@@ -44,12 +46,16 @@ def read_manifest(path: Path) -> list[ModelRow]:
     try:
         with path.open(newline='') as file:
             rows = list(csv.DictReader(file))
-    except OSError as error:
-        raise DataError(f'{path}: expected a manifest (CSV): {error.strerror}') from error
+    except (OSError, ValueError, csv.Error) as error:
+        raise DataError(f'{path}: expected a manifest (CSV): {error}') from error
     missing = _COLUMNS - set(rows[0] if rows else ())
     if missing:
         raise DataError(f'{path}: expected the columns {", ".join(sorted(_COLUMNS))}; missing: '
                         f'{", ".join(sorted(missing))}')
+    for number, row in enumerate(rows, start=2):
+        if any(row[column] is None for column in _COLUMNS) or not _HEX.fullmatch(row['sha256']):
+            raise DataError(f'{path}: expected every column and a hexadecimal sha256 in line '
+                            f'{number}, got {row}')
     return [ModelRow(row['category'], path.parent / row['file'], row['split'], row['source'],
                      row['licence'], row['licence_evidence'], row['front_axis'], row['sha256'])
             for row in rows]

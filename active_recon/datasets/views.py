@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from active_recon.cameras import VIEW_COUNT
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.errors import DataError
 from active_recon.models.encoder import IMAGE_SIZE
@@ -81,6 +82,9 @@ _Object = tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.bool_]]
 
 def _read_object(folder: ObjectFolder) -> _Object:
     cameras = folder.cameras()
+    if len(cameras) != VIEW_COUNT:
+        raise DataError(f'{folder.images_folder}: expected {VIEW_COUNT} views, '
+                        f'got {len(cameras)}')
     images = np.stack([_premultiplied(folder.image(index)) for index in range(len(cameras))])
     voxels = folder.voxels().occupied(0.5)
     if voxels.shape != (RESOLUTION,) * 3:

@@ -32,7 +32,7 @@ def mean_shape_iou(means: dict[str, Tensor], views: ViewSet,
 
 
 def thumbnails(views: ViewSet) -> NDArray[np.float32]:
-    """Return every image, colours and alpha, at 16 x 16, flat and centred, (N, V, 1024)."""
+    """Return every image, colours and alpha, at 16 x 16, flat, in [0, 1], (N, V, 1024)."""
     objects, count = views.images.shape[:2]
     flat = views.images.numpy().reshape(objects * count, *views.images.shape[2:])
     small = np.stack([cv2.resize(image, (_THUMBNAIL, _THUMBNAIL), interpolation=cv2.INTER_AREA)

@@ -7,8 +7,8 @@ from typing import Any
 
 from active_recon.cameras import azimuth_difference
 from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.metrics import half_a_batch_away, object_bootstrap
-from active_recon.evaluation.rollouts import roll_out
+from active_recon.evaluation.metrics import half_the_set_away, object_bootstrap
+from active_recon.evaluation.rollouts import nearest_views, roll_out
 from active_recon.models.reconstruction import ReconstructionNetwork
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Policy
@@ -48,15 +48,16 @@ class Episodes:
 
 
 def run_policy(network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
-               starts: Tensor, threshold: float, count: int = 5, swap_latents: bool = False,
+               starts: Tensor, threshold: float, count: int = 5,
+               stand_ins: Tensor | None = None,
                progress: Callable[[int], None] = lambda done: None) -> Episodes:
-    """Run all episodes (E,) under a policy; `swap_latents` hands it another object's latents."""
+    """Run all episodes (E,) under a policy, which is shown the stand-ins (E,) if there are any."""
     parts: list[Episodes] = []
     for low in range(0, len(objects), _BATCH):
-        own = objects[low:low + _BATCH]
-        other = half_a_batch_away(len(own)) if swap_latents else None
-        steps = list(roll_out(network, policy, views, own, starts[low:low + _BATCH], count,
-                              other))
+        part = slice(low, low + _BATCH)
+        own = objects[part]
+        steps = list(roll_out(network, policy, views, own, starts[part], count,
+                              None if stand_ins is None else stand_ins[part]))
         truth = views.voxels[own]
         grids = [[VoxelGrid(grid) for grid in step.occupancy.numpy()] for step in steps]
         parts.append(Episodes(
@@ -128,21 +129,25 @@ class Blindness:
 def blindness(network: ReconstructionNetwork, policy: AttentionPolicy, views: ViewSet,
               objects: Tensor, starts: Tensor, threshold: float, count: int = 5) -> Blindness:
     """
-    Swap the latents of every episode for another object's and measure what changes.
+    Swap every latent for another object's, seen from the same azimuths; measure what changes.
 
     `goal_change_deg`: how far the first goal moves, the start being the same. `auc_loss`: how
     much the area under the IoU curve falls, paired by episode; its interval tells whether it does.
+    Raises DataError on a set of a single object.
     """
+    stand_ins = half_the_set_away(objects, len(views))
     moved = []
     for low in range(0, len(objects), _BATCH):
-        own, start = objects[low:low + _BATCH], starts[low:low + _BATCH]
-        seen, _ = network(views.white(own, start))
-        taken = views.azimuths[own, start].double().numpy()[:, None]
-        latents = seen.latent, seen.latent[half_a_batch_away(len(own))]
-        goals = [policy.choose(latent.numpy(), taken)[0].azimuth for latent in latents]
+        part = slice(low, low + _BATCH)
+        taken = views.azimuths[objects[part], starts[part]].double().numpy()
+        goals = []
+        for shown in (objects[part], stand_ins[part]):
+            alike = nearest_views(views.azimuths[shown].numpy(), taken)
+            seen, _ = network(views.white(shown, alike))
+            goals.append(policy.choose(seen.latent.numpy(), taken[:, None])[0].azimuth)
         moved.append(np.degrees(np.abs(azimuth_difference(*goals))))
     seeing = run_policy(network, policy, views, objects, starts, threshold, count)
-    swapped = run_policy(network, policy, views, objects, starts, threshold, count, True)
+    swapped = run_policy(network, policy, views, objects, starts, threshold, count, stand_ins)
     index = objects.numpy()
     return Blindness(interval(np.concatenate(moved), index), interval(seeing.auc, index),
                      interval(swapped.auc, index), interval(seeing.auc - swapped.auc, index))

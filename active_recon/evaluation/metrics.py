@@ -2,6 +2,7 @@
 
 from active_recon.cameras import VIEW_COUNT
 from active_recon.datasets.views import ViewSet
+from active_recon.errors import DataError
 from active_recon.evaluation.rollouts import roll_out
 from active_recon.models.reconstruction import ReconstructionNetwork
 from active_recon.policies.base import Policy
@@ -28,18 +29,12 @@ def episodes(views: ViewSet, starts: int, seed: int = 0) -> tuple[Tensor, Tensor
 def iou_per_view(
     network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
     starts: Tensor, thresholds: NDArray[np.float64], count: int = 5, batch: int = 64,
-    swap_latents: bool = False,
 ) -> NDArray[np.float64]:
-    """
-    Return the IoU of every episode after every view at every threshold, (E, count, thresholds).
-
-    `swap_latents` hands the policy the latent of another object (half a batch away).
-    """
+    """Return the IoU of every episode after every view at every threshold, (E, count, K)."""
     result = np.empty((len(objects), count, len(thresholds)))
     for low in range(0, len(objects), batch):
         part = slice(low, low + batch)
-        other = half_a_batch_away(len(objects[part])) if swap_latents else None
-        rollout = roll_out(network, policy, views, objects[part], starts[part], count, other)
+        rollout = roll_out(network, policy, views, objects[part], starts[part], count)
         truth = views.voxels[objects[part]]
         for t, step in enumerate(rollout):
             for k, threshold in enumerate(thresholds):
@@ -47,9 +42,17 @@ def iou_per_view(
     return result
 
 
-def half_a_batch_away(size: int) -> Tensor:
-    """Return for each episode of a batch, (B,), the one whose latent it is given instead."""
-    return torch.arange(size).roll(size // 2)
+def half_the_set_away(objects: Tensor, count: int) -> Tensor:
+    """
+    Return for objects (E,) of a set of `count` the ones that stand in for them, never the same.
+
+    In a set sorted by category that is mostly an object of another one. Raises DataError where
+    there is no other.
+    """
+    if count < 2:
+        raise DataError(f'expected two objects or more, so that one can stand in for another, '
+                        f'got {count}')
+    return (objects + count // 2) % count
 
 
 def object_bootstrap(values: NDArray[np.float64], objects: NDArray[np.int64], rounds: int = 2000,

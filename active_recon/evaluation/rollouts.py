@@ -24,16 +24,16 @@ class Step:
 
 @torch.inference_mode()
 def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
-             starts: Tensor, count: int, latent_of: Tensor | None = None) -> Iterator[Step]:
+             starts: Tensor, count: int, stand_ins: Tensor | None = None) -> Iterator[Step]:
     """
     Run one episode for each object (B,) from the view it starts at (B,), yielding every view.
 
-    The policy's azimuth is shown by the nearest rendered view, as on the turntable. `latent_of`,
-    (B,), gives the policy the latent of another episode of the batch instead of its own: what a
-    policy loses by it is what it owes to seeing.
+    The policy's azimuth is shown by the nearest rendered view, as on the turntable. `stand_ins`,
+    (B,), are objects whose latents, seen from the same azimuths, the policy is given instead of
+    the true ones: what a policy loses by it is what it owes to seeing.
     """
     azimuths = views.azimuths.numpy()
-    chosen, hidden, state = starts, None, None
+    chosen, hidden, other_hidden, state = starts, None, None, None
     taken = np.empty((len(objects), 0))
     for _ in range(count):
         at = azimuths[objects.numpy(), chosen.numpy()].astype(np.float64)
@@ -42,7 +42,11 @@ def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, obj
         yield Step(seen.logits.sigmoid(), seen.latent, taken)
         if taken.shape[1] == count:
             return
-        latent = seen.latent if latent_of is None else seen.latent[latent_of]
+        latent = seen.latent
+        if stand_ins is not None:
+            alike = nearest_views(azimuths[stand_ins.numpy()], at)
+            other, other_hidden = network(views.white(stand_ins, alike), other_hidden)
+            latent = other.latent
         choice, state = policy.choose(latent.numpy(), taken, state)
         chosen = nearest_views(azimuths[objects.numpy()], choice.azimuth)
 

@@ -1,6 +1,6 @@
 """The 3D convolutional LSTM decoder of section 3.2: the attentive latent unit to occupancy."""
 
-from active_recon.models.encoder import LATENT_GRID
+from active_recon.models.encoder import group_norm, LATENT_GRID
 from active_recon.models.recurrent import ConvLSTMCell, LstmState
 from torch import nn, Tensor
 
@@ -21,8 +21,10 @@ class Decoder(nn.Module):
         wide, narrow = decoder_channels
         to_logits = nn.ConvTranspose3d(narrow, 1, 4, stride=2, padding=1)
         self.grow = nn.Sequential(
-            nn.ConvTranspose3d(volume_channels, wide, 4, stride=2, padding=1), nn.LeakyReLU(0.1),
-            nn.ConvTranspose3d(wide, narrow, 4, stride=2, padding=1), nn.LeakyReLU(0.1),
+            nn.ConvTranspose3d(volume_channels, wide, 4, stride=2, padding=1), group_norm(wide),
+            nn.LeakyReLU(0.1),
+            nn.ConvTranspose3d(wide, narrow, 4, stride=2, padding=1), group_norm(narrow),
+            nn.LeakyReLU(0.1),
             to_logits)
         # Most of a grid is empty: a start at p = 0.1 spares the first thousand steps
         assert to_logits.bias is not None

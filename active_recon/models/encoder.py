@@ -1,5 +1,7 @@
 """The 2D convolutional LSTM encoder of section 3.1: an image to the attentive latent unit A_t."""
 
+import math
+
 from active_recon.models.recurrent import ConvLSTMCell, LstmState
 from torch import nn, Tensor
 
@@ -7,20 +9,31 @@ IMAGE_SIZE = 64
 LATENT_GRID = 4  # cells a side of A_t in the image's plane, and of the decoder's first volume
 
 
+def group_norm(channels: int) -> nn.GroupNorm:
+    """
+    Return the normalisation that stands after every convolution but the last (Wu and He 2018).
+
+    Without it the two memories, whose outputs are small at first, leave next to nothing of the
+    image for the decoder to learn from. It looks at one object at a time.
+    """
+    return nn.GroupNorm(math.gcd(8, channels), channels)
+
+
 class ResidualBlock(nn.Module):
     """Two 3 x 3 convolutions and a shortcut (He et al. 2016), halving the image."""
 
     def __init__(self, in_channels: int, out_channels: int) -> None:
         super().__init__()
-        self.first = nn.Conv2d(in_channels, out_channels, 3, stride=2, padding=1)
-        self.second = nn.Conv2d(out_channels, out_channels, 3, padding=1)
+        self.change = nn.Sequential(
+            nn.Conv2d(in_channels, out_channels, 3, stride=2, padding=1),
+            group_norm(out_channels), nn.LeakyReLU(0.1),
+            nn.Conv2d(out_channels, out_channels, 3, padding=1), group_norm(out_channels))
         self.shortcut = nn.Conv2d(in_channels, out_channels, 1, stride=2)
         self.activation = nn.LeakyReLU(0.1)
 
     def forward(self, image: Tensor) -> Tensor:
         """(B, in, S, S) to (B, out, S / 2, S / 2)."""
-        changed = self.second(self.activation(self.first(image)))
-        result: Tensor = self.activation(changed + self.shortcut(image))
+        result: Tensor = self.activation(self.change(image) + self.shortcut(image))
         return result
 
 
@@ -41,15 +54,18 @@ class Encoder(nn.Module):
         super().__init__()
         widths = (stem_channels, *block_channels)
         self.stem = nn.Sequential(
-            nn.Conv2d(3, stem_channels, 5, stride=2, padding=2), nn.LeakyReLU(0.1))
+            nn.Conv2d(3, stem_channels, 5, stride=2, padding=2), group_norm(stem_channels),
+            nn.LeakyReLU(0.1))
         self.blocks = nn.Sequential(
             *(ResidualBlock(a, b) for a, b in zip(widths[:-1], widths[1:], strict=True)))
         self.memory = ConvLSTMCell(block_channels[-1], recurrent_channels, (LATENT_GRID,) * 2)
         self.to_latent = nn.Sequential(
-            nn.Conv2d(recurrent_channels, bottleneck_channels, LATENT_GRID), nn.LeakyReLU(0.1),
-            nn.Conv2d(bottleneck_channels, bottleneck_channels, 1), nn.LeakyReLU(0.1),
+            nn.Conv2d(recurrent_channels, bottleneck_channels, LATENT_GRID),
+            nn.GroupNorm(1, bottleneck_channels), nn.LeakyReLU(0.1),
+            nn.Conv2d(bottleneck_channels, bottleneck_channels, 1),
+            nn.GroupNorm(1, bottleneck_channels), nn.LeakyReLU(0.1),
             nn.Conv2d(bottleneck_channels, latent_channels * LATENT_GRID ** 3, 1),
-            nn.LeakyReLU(0.1))
+            nn.GroupNorm(1, latent_channels * LATENT_GRID ** 3), nn.LeakyReLU(0.1))
 
     def forward(self, images: Tensor, state: LstmState | None) -> tuple[Tensor, LstmState]:
         """Return A_t and the next state; a state of None is that of no view yet."""

@@ -68,12 +68,12 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
     try:
         config = NetworkConfig.from_dict(json.loads(metadata['config']))
         threshold = float(metadata['threshold'])
+        # Built on no device: the fresh weights would only be overwritten, and drawing takes time
+        with torch.device('meta'):
+            bundle = Bundle(ReconstructionNetwork.from_config(config),
+                            AttentionModel.from_config(config), config, threshold)
     except (KeyError, ValueError, TypeError, ConfigError) as error:
         raise WeightsError(f'{path}: its config cannot be read: {error}') from error
-    # Built on no device: the fresh weights would only be overwritten, and drawing them takes time
-    with torch.device('meta'):
-        bundle = Bundle(ReconstructionNetwork.from_config(config),
-                        AttentionModel.from_config(config), config, threshold)
     for part, module in _parts(bundle).items():
         own = {name.removeprefix(f'{part}.'): tensor.float()
                for name, tensor in tensors.items() if name.startswith(f'{part}.')}

@@ -1,7 +1,9 @@
 """The paper's policy at run time: the attentive-recurrent visual model's mean azimuth."""
 
 from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN
+from active_recon.errors import ViewError
 from active_recon.models.attention import AttentionModel
+from active_recon.models.encoder import LATENT_GRID
 from active_recon.policies.base import Choice
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +20,21 @@ class AttentionPolicy:
         self._model = model
         self._sigma = sigma
         self._device = next(model.parameters()).device
+        self._latent_shape = (model.where.out_features, LATENT_GRID, LATENT_GRID)
 
     @torch.inference_mode()
     def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
                state: _State | None = None) -> tuple[Choice, _State]:
-        """Take the mean; an azimuth's worth is its log density, up to a constant."""
+        """
+        Take the mean; an azimuth's worth is its log density, up to a constant.
+
+        Raises ViewError where the latents are those of another model.
+        """
+        if latent.shape[1:] != self._latent_shape:
+            raise ViewError(f'expected a latent of the shape {self._latent_shape}, as the policy '
+                            f'was trained on, got {latent.shape[1:]}', 'latent')
         azimuth = torch.as_tensor(taken[:, -1], dtype=torch.float32, device=self._device)
-        seen = torch.as_tensor(latent, device=self._device)
+        seen = torch.tensor(latent, device=self._device)
         proposal, state = self._model(seen, azimuth, state)
         mean = proposal.mean_azimuth.cpu().numpy().astype(np.float64) % TURN
         away = azimuth_difference(AZIMUTHS[None], mean[:, None]) / self._sigma

@@ -41,6 +41,6 @@ class FarthestPolicy:
     def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
                state: None = None) -> tuple[Choice, None]:
         """Take the first of the farthest."""
-        # Rounding settles ties the same way from every start
-        scores = distance_to_taken(taken).round(6).astype(np.float32)
+        # Rounding settles ties the same way, whatever the precision of the azimuths
+        scores = distance_to_taken(taken).round(4).astype(np.float32)
         return Choice(AZIMUTHS[scores.argmax(axis=1)], scores), None

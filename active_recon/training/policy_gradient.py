@@ -14,7 +14,11 @@ from active_recon.models.attention import AttentionModel
 from active_recon.models.reconstruction import ReconstructionNetwork
 from active_recon.silhouettes import frustum, project
 from active_recon.training.checkpoints import Checkpoint, load_checkpoint, save_checkpoint
-from active_recon.training.supervised import learning_rate_share, TrainingConfig
+from active_recon.training.supervised import (
+    learning_rate_share,
+    refuse_divergence,
+    TrainingConfig,
+)
 from active_recon.voxels import iou
 import numpy as np
 import torch
@@ -144,6 +148,7 @@ def train_policy(
         episode = run_episodes(network, attention, views, objects, starts, config.max_views,
                                threshold, rewards, rng)
         objective, error = policy_loss(episode)
+        refuse_divergence(step, objective + error, views, objects)
         optimizer.zero_grad(set_to_none=True)
         (objective + error).backward()  # type: ignore[no-untyped-call]
         optimizer.step()

@@ -86,10 +86,7 @@ def train_reconstruction(
         seen_from = frusta[torch.from_numpy(rng.integers(len(frusta), size=config.batch_size))]
         total, parts = reconstruction_loss(
             sequence, batch.voxels, seen_from, int(rng.integers(length)), loss)
-        if not torch.isfinite(total):
-            names = [views.folders[i].name for i in batch.objects.tolist()]
-            raise TrainingDivergedError(f'step {step}: the loss is {total.item()} on the batch '
-                                        f'{", ".join(names)}; try a lower learning rate')
+        refuse_divergence(step, total, views, batch.objects)
         optimizer.zero_grad(set_to_none=True)
         total.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -106,6 +103,14 @@ def train_reconstruction(
             save_checkpoint(checkpoint_path, network, optimizer,
                             Checkpoint(step + 1, settings, log))
     network.eval()
+
+
+def refuse_divergence(step: int, loss: Tensor, views: ViewSet, objects: Tensor) -> None:
+    """Raise TrainingDivergedError, naming the batch's objects (B,), if a loss is not finite."""
+    if not torch.isfinite(loss):
+        names = [views.folders[i].name for i in objects.tolist()]
+        raise TrainingDivergedError(f'step {step}: the loss is {loss.item()} on the batch '
+                                    f'{", ".join(names)}; try a lower learning rate')
 
 
 def unroll(network: ReconstructionNetwork, batch: Batch) -> list[Tensor]:

@@ -1,0 +1,79 @@
+# Everything runs in .venv, which the first target that needs it makes.
+#   make demo PYTHON=python3.12        another interpreter (3.11 or 3.12)
+#   make venv TORCH='torch==2.13.0'    another torch build: whatever `pip install` takes
+# TORCH and PYTHON count when .venv is made: `make clean` first to change them.
+
+PYTHON ?= $(shell for python in python3.11 python3.12 python3; do $$python -c 'import ensurepip, \
+	sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' 2>/dev/null \
+	&& echo $$python && break; done)
+TORCH ?= torch==2.13.0
+
+# .venv has a ROS of its own, from wheels: one that is sourced must not be mixed into it.
+unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION ROS_DISTRO
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --quiet
+SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell find \
+	active_recon msg_tools resource scripts launch config rviz \
+	-type f -not -path '*/__pycache__/*' 2>/dev/null)
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help venv demo test test-full bench lint clean
+
+help:  ## this list
+	@echo 'make TARGET, where TARGET is one of'
+	@awk -F ':.*  ## ' '/^[a-z-]+:.*  ## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+venv: .venv/installed  ## .venv with the package and all that it needs
+
+demo: .venv/installed  ## the loop over ROS 2 on a real model; ARGS='--views 3' and so on
+	@$(BIN)/active-recon demo $(ARGS)
+
+test: lint .venv/colcon/installed  ## style, types, and every test but the long ones; ARGS go to pytest
+	@echo '== testing; the long tests run with `make test-full`'
+	@$(BIN)/python -m pytest -m 'not slow' $(ARGS)
+
+test-full: lint .venv/colcon/installed  ## every test, high counts and soak too
+	@echo '== testing everything'
+	@$(BIN)/python -m pytest $(ARGS)
+
+bench: .venv/installed  ## the figures of the README's table, measured here
+	@echo '== measuring'
+	@$(BIN)/python -m benchmarks $(ARGS)
+
+lint: .venv/installed  ## ruff and mypy
+	@echo '== checking the style and the types'
+	@$(BIN)/ruff check
+	@$(BIN)/mypy
+
+clean:  ## forget .venv and what was built
+	@echo '== removing .venv and what was built'
+	@rm -rf .venv build install log *.egg-info
+
+# torch goes first, by itself: what needs torch would otherwise choose the build.
+.venv/torch:
+	@test -n '$(PYTHON)' || { echo 'expected Python 3.11 or 3.12 with venv on the PATH, found' \
+		"none: install one, or name it by PYTHON=..."; exit 1; }
+	@echo '== making .venv with $(PYTHON) (a few minutes, once)'
+	@$(PYTHON) -m venv --clear .venv
+	@echo '== installing $(TORCH)'
+	@$(PIP) install -c constraints.txt $(TORCH) setuptools
+	@touch $@
+
+# A copy is installed, since an editable install leaves out lib/active_recon/ and the ament index;
+# it is made anew whenever a source has changed. build/ would keep modules that are gone.
+.venv/installed: .venv/torch $(SOURCES)
+	@echo '== installing active_recon and what it needs'
+	@rm -rf build
+	@$(PIP) install --no-build-isolation -c constraints.txt '.[lint,test]'
+	@rm -rf build active_recon.egg-info
+	@touch $@
+
+# colcon needs an older setuptools than ours: both stand in a folder that only colcon sees.
+.venv/colcon/installed: constraints-colcon.txt | .venv/torch
+	@echo '== installing colcon'
+	@rm -rf .venv/colcon
+	@$(PIP) install --target .venv/colcon -c $< setuptools colcon-common-extensions
+	@touch $@

@@ -1,0 +1,45 @@
+"""`active-recon demo`: the loop over real ROS 2, live in the terminal."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+from active_recon.demo.interrupts import held_interrupts
+import typer
+
+
+class PolicyName(StrEnum):
+    """How the next view is chosen."""
+
+    attention = 'attention'
+    random = 'random'
+    uniform = 'uniform'
+    farthest = 'farthest'
+
+
+def demo(
+    object_name: Annotated[str, typer.Option(
+        '--object', help='bed, car, chair, sofa, table, or the path of a mesh file.')] = 'chair',
+    views: Annotated[int, typer.Option(min=1, max=24, help='Views to take.')] = 5,
+    policy: Annotated[PolicyName, typer.Option(help='How the next view is chosen.')] = (
+        PolicyName.attention),
+    seed: Annotated[int, typer.Option(
+        min=0, help='Of the first view and of the policy random.')] = 0,
+    output_dir: Annotated[Path, typer.Option(
+        help='The folder in which the run gets its own.')] = Path('bags'),
+) -> None:
+    """Watch a camera reconstruct an object and decide by itself where to look next."""
+    from rich.console import Console
+
+    console = Console()
+    try:
+        with held_interrupts():  # some libraries swallow what interrupts their import
+            from active_recon.demo.run import Demo, run_demo
+            from active_recon.objects import find_object
+
+        folder = run_demo(
+            Demo(find_object(object_name), views, policy.value, seed, output_dir), console)
+    except KeyboardInterrupt:
+        console.print('interrupted; the nodes are stopped and the bag is closed')
+        raise typer.Exit(130) from None
+    console.print(f'the bag, the mesh and the picture are in {folder}', soft_wrap=True)

@@ -1,0 +1,30 @@
+"""The command `active-recon`; what a subcommand needs is imported when it runs."""
+
+import sys
+
+from active_recon.cli.demo import demo
+from active_recon.cli.evaluate import evaluate
+from active_recon.cli.making import dataset, render
+from active_recon.cli.sheet import sheet
+from active_recon.cli.train import train
+from active_recon.errors import ActiveReconError
+import typer
+
+app = typer.Typer(
+    help='Active 3D reconstruction of an object from few camera views.',
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+for command in (demo, render, dataset, train, evaluate, sheet):
+    app.command()(command)
+
+
+def main() -> None:
+    """Run the command; what the package refuses is one line and exit code 2."""
+    try:
+        app()
+    except ActiveReconError as error:
+        sys.stderr.write(f'active-recon: {error}\n')
+        sys.exit(2)
+
+
+if __name__ == '__main__':
+    main()

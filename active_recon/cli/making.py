@@ -1,0 +1,116 @@
+"""`active-recon render` and `active-recon dataset`: meshes and parametric shapes to datasets."""
+
+import os
+from pathlib import Path
+from typing import Annotated, TYPE_CHECKING
+
+from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError, DataError
+import typer
+
+if TYPE_CHECKING:
+    from active_recon.datasets.making import Job
+
+Workers = Annotated[int, typer.Option(min=1, help='Processes; default: one for each core.')]
+Samples = Annotated[int, typer.Option(
+    min=1, max=4, help='Rays in each pixel, N x N: 1 is flat and fast, 2 smooths the edges.')]
+
+_CORES = os.cpu_count() or 1
+_SEEDS = 1_000_000  # for each split
+_SPLIT_SEEDS = {'train': 0, 'val': _SEEDS, 'test': 2 * _SEEDS}
+
+
+def render(
+    meshes: Annotated[Path, typer.Argument(
+        help='A mesh file, a folder of <category>/<mesh>, or a manifest (CSV).')],
+    out: Annotated[Path, typer.Argument(help='Where the dataset goes.')],
+    up: Annotated[str | None, typer.Option(
+        help='The axis that points up in the files: x, y, z, or with a sign. glTF and GLB are y '
+             'by their standard, others are taken as z.')] = None,
+    front: Annotated[str | None, typer.Option(
+        help="The axis of the objects' front; glTF and GLB: z, others: x.")] = None,
+    split: Annotated[str | None, typer.Option(
+        help='Of a manifest: only the rows of this split.')] = None,
+    explicit_licence: Annotated[bool, typer.Option(
+        help='Of a manifest: only rows whose licence is explicit for the models.')] = False,
+    samples: Samples = 2,
+    workers: Workers = _CORES,
+) -> None:
+    """
+    Render meshes from 24 azimuths and voxelise them, into R2N2's layout.
+
+    Any format that trimesh reads will do. A run that was broken off goes on where it stopped: what
+    is there is not made again. What could not be read is listed at the end, with the reason.
+    """
+    from active_recon.datasets.making import mesh_jobs
+    from active_recon.datasets.manifest import EXPLICIT, manifest_jobs, read_manifest
+
+    if meshes.suffix == '.csv':
+        if up or front:
+            raise ConfigError('expected neither --up nor --front with a manifest, which tells '
+                              'them for each model')
+        rows = [row for row in read_manifest(meshes)
+                if split in (None, row.split)
+                and (not explicit_licence or row.licence_evidence == EXPLICIT)]
+        jobs = manifest_jobs(rows, out)
+    elif split or explicit_licence:
+        raise ConfigError('expected a manifest (CSV) with --split or --explicit-licence, '
+                          f'got {meshes}')
+    else:
+        jobs = mesh_jobs(meshes, out, up, front)
+    _make('rendering', jobs, samples, workers)
+
+
+def dataset(
+    out: Annotated[Path, typer.Argument(help='Folder for train/, val/ and test/.')],
+    train: Annotated[int, typer.Option(
+        min=0, max=_SEEDS, help='Training objects in each category.')] = 500,
+    val: Annotated[int, typer.Option(
+        min=0, max=_SEEDS, help='Validation objects in each category.')] = 50,
+    test: Annotated[int, typer.Option(
+        min=0, max=_SEEDS, help='Test objects in each category.')] = 100,
+    category: Annotated[list[str] | None, typer.Option(
+        help='Only these categories (may be given several times).')] = None,
+    samples: Samples = 2,
+    workers: Workers = _CORES,
+) -> None:
+    """
+    Make a dataset of parametric shapes, so that nothing needs a download.
+
+    Each object is drawn from a seed of its own, so the same numbers give the same objects; the
+    splits' seeds never meet. The hash of the generators' code is written beside.
+    """
+    from active_recon.datasets.making import shape_jobs
+    from active_recon.shapes import CATEGORIES, generators_hash
+
+    counts = {'train': train, 'val': val, 'test': test}
+    jobs = [job for name in dict.fromkeys(category or CATEGORIES)
+            for split, count in counts.items()
+            for job in shape_jobs(name, range(_SPLIT_SEEDS[split], _SPLIT_SEEDS[split] + count),
+                                  out / split)]
+    made_by, code = out / 'generators.sha256', generators_hash()
+    if made_by.is_file() and made_by.read_text().strip() != code:
+        raise DataError(f'{out}: expected shapes of these generators ({code[:12]}), but what is '
+                        f'there was made by others ({made_by}); choose another folder')
+    out.mkdir(parents=True, exist_ok=True)
+    made_by.write_text(code + '\n')
+    _make('making', jobs, samples, workers)
+
+
+def _make(title: str, jobs: 'list[Job]', samples: int, workers: int) -> None:
+    from active_recon.datasets.making import make_dataset
+
+    if not jobs:
+        raise DataError('expected objects to make; what was asked for leaves none')
+    refused = []
+    with progress_bar(title, len(jobs)) as advance:
+        for outcome in make_dataset(jobs, samples, workers):
+            if outcome.refusal:
+                refused.append(outcome)
+            advance(1, f'{len(refused)} refused' if refused else '')
+    typer.echo(f'{len(jobs) - len(refused)} objects of {len(jobs)} are there')
+    for outcome in refused:
+        typer.echo(f'refused: {outcome.folder.category}/{outcome.folder.name}: '
+                   f'{outcome.refusal}', err=True)
+    if refused and len(refused) == len(jobs):
+        raise typer.Exit(2)

@@ -1,0 +1,57 @@
+"""One progress bar for everything that takes more than two seconds."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import time
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+_LINE_EVERY = 30.0  # seconds between lines where there is no terminal to draw a bar on
+
+
+@contextmanager
+def progress_bar(title: str, total: int) -> Iterator[Callable[[int, str], None]]:
+    """
+    Yield `advance(steps, note)`: a bar with the note and the time left, or lines in a log.
+
+    A long note stands on a line of its own above the bar's.
+    """
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _log_lines(title, total)
+        return
+    columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
+               TimeElapsedColumn(), TimeRemainingColumn(), TextColumn('{task.fields[note]}'))
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task(title, total=total, note='')
+
+        def advance(steps: int, note: str) -> None:
+            bar.update(task, advance=steps, note=note)
+
+        yield advance
+
+
+def _log_lines(title: str, total: int) -> Callable[[int, str], None]:
+    start = last = time.monotonic()
+    done = first = 0
+
+    def advance(steps: int, note: str) -> None:
+        nonlocal last, done, first
+        first = first or steps  # what a resumed run had done already took no time
+        done += steps
+        now = time.monotonic()
+        if done < total and now - last < _LINE_EVERY:
+            return
+        last = now
+        left = (now - start) / max(done - first, 1) * (total - done)
+        print(f'{title}: {done}/{total}, {left:.0f} s left  {note}', flush=True)  # noqa: T201
+
+    return advance

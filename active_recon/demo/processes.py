@@ -1,0 +1,116 @@
+"""The four nodes as processes of their own, on a private domain of this machine."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+import os
+from pathlib import Path
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+from types import TracebackType
+
+from active_recon.errors import ActiveReconError
+
+_PROFILE = Path(__file__).parents[1] / 'nodes' / 'fastdds_local.xml'
+_LAST_LINES = 8
+_STOP_S = 5.0  # for a node to close what it holds open
+_ASK_AGAIN_S = 1.0
+
+
+class NodeError(ActiveReconError):
+    """A node that ended by itself."""
+
+
+def private_environment() -> dict[str, str]:
+    """Return the variables under which nodes hear this machine alone, on a domain of their own."""
+    return {
+        'ROS_DOMAIN_ID': str(_free_domain_id()),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'RMW_IMPLEMENTATION': 'rmw_fastrtps_cpp',
+        'FASTRTPS_DEFAULT_PROFILES_FILE': str(_PROFILE),
+    }
+
+
+def _free_domain_id() -> int:
+    """Return a domain id whose first participant's port nobody holds."""
+    for domain in random.sample(range(1, 102), 101):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', 7410 + 250 * domain))  # the DDS standard's numbering
+            except OSError:
+                continue
+            return domain
+    raise NodeError('expected a free ROS domain from 1 to 101, but other nodes use them all')
+
+
+class NodeProcesses:
+    """
+    Starts nodes by their module's name, tells which has died, and stops them, the last first.
+
+    A node's output goes to a log in `log_folder`. `environment` is added to this process's own.
+    """
+
+    def __init__(self, log_folder: Path, environment: Mapping[str, str]) -> None:
+        self._logs = log_folder
+        self._environment = {**os.environ, **environment, 'ROS_LOG_DIR': str(log_folder),
+                             'PYTHONUNBUFFERED': '1', 'RCUTILS_COLORIZED_OUTPUT': '0'}
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, node: str, parameters: Mapping[str, object]) -> None:
+        """Start `active_recon.nodes.<node>` with parameters."""
+        settings = [word for name, value in parameters.items()
+                    for word in ('-p', f'{name}:={_as_yaml(value)}')]
+        with self._log(node).open('wb') as log:
+            # A session of its own keeps the terminal's Ctrl-C from it: the demo stops the nodes.
+            self._running[node] = subprocess.Popen(
+                [sys.executable, '-m', f'active_recon.nodes.{node}', '--ros-args', *settings],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                env=self._environment, start_new_session=True)
+
+    def pid(self, node: str) -> int:
+        """Return the process id of a node that was started."""
+        return self._running[node].pid
+
+    def check(self) -> None:
+        """Raise NodeError, with the last lines of its log, where a node has ended."""
+        for node, process in self._running.items():
+            code = process.poll()
+            if code is not None:
+                lines = self._log(node).read_text(errors='replace').splitlines()[-_LAST_LINES:]
+                said = '\n  '.join(lines) or '(it said nothing)'
+                raise NodeError(f'{node} ended with code {code}. It said last:\n  {said}')
+
+    def stop(self) -> None:
+        """Ask the nodes to end, the last started first, and wait; kill what does not."""
+        deadline = time.monotonic() + _STOP_S
+        while alive := [process for process in reversed(self._running.values())
+                        if process.poll() is None]:
+            late = time.monotonic() > deadline
+            for process in alive:
+                process.send_signal(signal.SIGKILL if late else signal.SIGINT)
+            # Some libraries swallow what interrupts their import, so it is said again.
+            with suppress(subprocess.TimeoutExpired):
+                alive[-1].wait(_ASK_AGAIN_S)
+        self._running.clear()
+
+    def _log(self, node: str) -> Path:
+        return self._logs / f'{node}.txt'
+
+    def __enter__(self) -> 'NodeProcesses':
+        """Stop the nodes where the block ends, however it ends."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Stop the nodes."""
+        self.stop()
+
+
+def _as_yaml(value: object) -> str:
+    """Return a parameter's value as the command line takes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str | Path) else str(value)

@@ -1,0 +1,105 @@
+"""The demo from start to end: start the nodes, watch the loop, keep what came of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+import time
+
+from active_recon.cameras import wrap_azimuth
+from active_recon.demo.interrupts import held_interrupts
+from active_recon.demo.picture import run_picture
+from active_recon.demo.processes import NodeProcesses, private_environment
+from active_recon.demo.table import loop_table, turning
+from active_recon.meshes import load_mesh
+from active_recon.nodes.demo_watch import DemoWatch, watching
+from active_recon.voxelise import voxelise
+import cv2
+import numpy as np
+from rich.console import Console, RenderableType
+from rich.live import Live
+
+_START_S = 20.0
+_VIEW_S = 30.0
+_ANSWER_S = 10.0
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What to show: a mesh file, how many views, which policy chooses them, and its seed."""
+
+    mesh: Path
+    views: int = 5
+    policy: str = 'attention'
+    seed: int = 0
+    output_dir: Path = Path('bags')
+
+
+def run_demo(demo: Demo, console: Console) -> Path:
+    """
+    Run the loop and return the folder that holds its bag, its mesh and its picture.
+
+    Raises MeshError on what is no mesh, NodeError where a node dies, ActiveReconError where the
+    loop does not go on. However it ends, the nodes are stopped and the bag is closed.
+    """
+    mesh = load_mesh(demo.mesh)
+    truth = voxelise(mesh)
+    environment = private_environment()
+    os.environ.update(environment)  # for the observer in this process
+    title = f'{demo.mesh.stem}: {demo.views} views, policy {demo.policy}'
+    with (held_interrupts() as raise_if_asked, TemporaryDirectory() as logs,
+          NodeProcesses(Path(logs), environment) as nodes,
+          watching(truth.occupied(0.5)) as watch):
+        def check() -> None:
+            raise_if_asked()
+            nodes.check()
+
+        console.print('starting the recorder, the turntable camera, the reconstructor and the '
+                      f'view planner on ROS domain {environment["ROS_DOMAIN_ID"]}')
+        nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
+                                 'record_at_start': False})
+        folder = Path(watch.ask('start', _START_S, check))
+        try:
+            _start_loop(nodes, demo, folder)
+            _follow(watch, demo, title, console, check)
+            saved = Path(watch.ask('save_mesh', _ANSWER_S, check))
+            saved.replace(folder / f'{demo.mesh.stem}{saved.suffix}')
+            watch.ask('stop', _ANSWER_S, check)
+        finally:
+            if watch.views:
+                picture = run_picture(f'active_recon: {title}', watch.views, mesh, truth)
+                cv2.imwrite(str(folder / 'run.png'), picture[..., ::-1])
+    return demo.output_dir / folder.name
+
+
+def _start_loop(nodes: NodeProcesses, demo: Demo, folder: Path) -> None:
+    nodes.start('turntable_camera', {'mesh': demo.mesh, 'start_azimuth': _start_azimuth(demo)})
+    nodes.start('reconstructor', {'output_dir': folder})
+    # A tolerance of 0 keeps an early end away: as many views as were asked for are shown.
+    nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
+                                 'max_views': demo.views, 'entropy_tolerance': 0.0})
+
+
+def _start_azimuth(demo: Demo) -> float:
+    """Return where the camera stands at first: anywhere, by the seed."""
+    return wrap_azimuth(np.random.default_rng(demo.seed).uniform(0, 2 * np.pi))
+
+
+def _follow(watch: DemoWatch, demo: Demo, title: str, console: Console,
+            check: Callable[[], None]) -> None:
+    """Show each view as it comes, until the planner is done and its last view is there."""
+    began = time.monotonic()
+
+    def table() -> RenderableType:
+        now = (f'done ({watch.done}) after {time.monotonic() - began:.0f} s' if watch.done
+               else turning(watch.azimuth, watch.goal))
+        return loop_table(title, watch.views, now)
+
+    with Live(console=console, get_renderable=table, refresh_per_second=10):
+        for number in range(1, demo.views + 1):
+            watch.until(partial(watch.has_views, number), _VIEW_S, f'view {number}', check)
+        watch.until(lambda: watch.done != '', _ANSWER_S, "the planner's end", check)
+    if not console.is_terminal:  # where `Live` leaves its last line open
+        console.line()

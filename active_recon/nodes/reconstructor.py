@@ -1,0 +1,207 @@
+"""ROS shell of the reconstructor: views in, the object's occupancy out; it owns the episode."""
+
+import math
+from pathlib import Path
+import time
+import uuid
+
+from active_recon.cameras import (
+    Camera,
+    CANONICAL_DISTANCE,
+    CANONICAL_ELEVATION,
+    CANONICAL_INTRINSICS,
+    orbit_camera,
+)
+from active_recon.errors import ConfigError, DataError, MessageError
+from active_recon.nodes.diagnostics import Diagnostics
+from active_recon.nodes.parameters import declare
+from active_recon.nodes.qos import HEARD, HEARD_OFTEN, LATCHED
+from active_recon.nodes.run import one_line, run_node
+from active_recon.reconstructor import Reconstruction, Reconstructor
+from active_recon.view_gate import TAKE_VIEWS, ViewGate
+from active_recon.voxels import MESH_FORMATS, write_mesh
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import intrinsics_from_msg, OBJECT_FRAME, pose_from_msg, pose_to_msg
+from msg_tools.episodes import Episode, episode_to_msg
+from msg_tools.goals import view_goal_from_msg
+from msg_tools.images import image_from_msg, latent_to_msg
+from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
+from msg_tools.views import View, ViewJoiner
+from msg_tools.voxels import FLOOR, voxel_grid_to_msg
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import Float64, Header
+from std_srvs.srv import Trigger
+import torch
+
+_ELEVATION_TOLERANCE = math.radians(5)
+
+
+class ReconstructorNode(Node):
+    """Fold the views that the gate lets through into the reconstruction and publish it."""
+
+    def __init__(self) -> None:
+        super().__init__('reconstructor')
+        self._reconstructor = self._load()
+        self._gate = ViewGate(
+            declare(self, 'take_views', 'auto', 'which images become views', choices=TAKE_VIEWS),
+            declare(self, 'goal_tolerance', 0.14, 'rad from a goal that still reach it',
+                    0.0, math.pi),
+            declare(self, 'min_view_separation', 0.2, 'rad between views without goals',
+                    0.0, math.pi))
+        self._joiner = ViewJoiner(declare(
+            self, 'max_pose_gap', 0.1, 's from an image to a pose that is interpolated',
+            0.0, 10.0))
+        self._output_dir = Path(declare(self, 'output_dir', '.', 'where meshes are saved'))
+        self._mesh_format = declare(
+            self, 'mesh_format', 'ply', 'the format of saved meshes', choices=MESH_FORMATS)
+        self._object_frame = declare(
+            self, 'object_frame', OBJECT_FRAME, 'the frame in which poses are expected')
+        self._reconstruction: Reconstruction | None = None
+        self._diagnostics = Diagnostics(self)
+
+        self._view_pub = self.create_publisher(PoseStamped, 'view', LATCHED)
+        self._occupancy_pub = self.create_publisher(PointCloud2, 'occupancy', LATCHED)
+        self._probabilities_pub = self.create_publisher(PointCloud2, 'probabilities', LATCHED)
+        self._latent_pub = self.create_publisher(Image, 'latent', LATCHED)
+        self._entropy_pub = self.create_publisher(Float64, 'entropy', LATCHED)
+        self._episode_pub = self.create_publisher(Header, 'episode', LATCHED)
+        self._begin_episode()
+        self.create_subscription(Image, 'camera/image_raw', self._on_image, HEARD)
+        self.create_subscription(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
+        self.create_subscription(PoseStamped, 'camera/pose', self._on_pose, HEARD_OFTEN)
+        self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
+        self.create_timer(0.1, self._take_in)  # what has waited in vain is refused
+        self.create_service(Trigger, 'start_episode', self._on_start)
+        self.create_service(Trigger, 'save_mesh', self._on_save)
+        self.get_logger().info('ready')
+
+    def _load(self) -> Reconstructor:
+        """Load the network and run it once, so that the first view is as fast as the others."""
+        # One by default: with more, the slowest of the loop's busy cores holds up every view.
+        torch.set_num_threads(declare(self, 'threads', 1, 'CPU threads of the network', 1, 256))
+        weights = declare(self, 'weights', '', 'a weights file; empty for those that ship')
+        device = declare(self, 'device', 'cpu', 'where the network runs', choices=('cpu', 'cuda'))
+        if device == 'cuda' and not torch.cuda.is_available():
+            raise ConfigError('parameter device: expected a device that torch can use, got cuda, '
+                              'but this torch finds none; use cpu')
+        threshold = declare(self, 'threshold', math.nan,
+                            "occupancy above which a cell is occupied; nan for the weights' own",
+                            0.01, 0.99)
+        reconstructor = Reconstructor.load(
+            Path(weights) if weights else None, device,
+            declare(self, 'object_size', 1.0, 'side of the voxel grid, m', 0.001, 1000.0),
+            declare(self, 'object_yaw', 0.0, "azimuth of the object's front, rad",
+                    -2 * math.pi, 2 * math.pi),
+            None if math.isnan(threshold) else threshold)
+        lens = CANONICAL_INTRINSICS
+        blank = np.zeros((lens.height, lens.width, 3), np.uint8)
+        distance = CANONICAL_DISTANCE * reconstructor.object_size
+        reconstructor.add_view(blank, orbit_camera(0.0, distance=distance))
+        return reconstructor
+
+    def _begin_episode(self) -> None:
+        self._reconstructor.reset()
+        self._gate.reset()
+        self._joiner.clear()
+        self._reconstruction = None
+        self._episode = Episode(uuid.uuid4().hex[:12], self.get_clock().now().nanoseconds)
+        self._diagnostics.count('episodes')
+        self._episode_pub.publish(episode_to_msg(self._episode))
+
+    def _on_image(self, msg: Image) -> None:
+        self._diagnostics.count('images')
+        with self._diagnostics.refusing():
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            if stamp < self._episode.begin:
+                raise MessageError(
+                    'expected an image of this episode, which began at '
+                    f'{self._episode.begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
+                    'recording, play its clock and set use_sim_time', 'last_episode')
+            self._joiner.add_image(stamp, image_from_msg(msg), time.monotonic())
+        self._take_in()
+
+    def _on_camera_info(self, msg: CameraInfo) -> None:
+        with self._diagnostics.refusing():
+            self._joiner.add_intrinsics(
+                nanoseconds_from_stamp(msg.header.stamp), intrinsics_from_msg(msg))
+        self._take_in()
+
+    def _on_pose(self, msg: PoseStamped) -> None:
+        with self._diagnostics.refusing():
+            self._joiner.add_pose(nanoseconds_from_stamp(msg.header.stamp),
+                                  pose_from_msg(msg, self._object_frame))
+        self._take_in()
+
+    def _on_goal(self, msg: PoseStamped) -> None:
+        with self._diagnostics.refusing():
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            if stamp >= self._episode.begin:
+                self._gate.set_goal(view_goal_from_msg(msg, self._object_frame), stamp)
+
+    def _take_in(self) -> None:
+        """Fold in what is joined by now and is to be a view."""
+        for view in self._joiner.joined(time.monotonic()):
+            if isinstance(view, MessageError):
+                self._diagnostics.refuse(view)
+            elif not self._gate.wants(view.camera, view.stamp,
+                                      self.count_publishers('next_view') > 0):
+                self._diagnostics.count('images_unused')
+            else:
+                with self._diagnostics.refusing():
+                    self._fold(view)
+
+    def _fold(self, view: View) -> None:
+        reconstruction = self._reconstructor.add_view(view.image, view.camera)
+        self._gate.took(view.camera)
+        self._warn_of(view.camera)
+        self._reconstruction = reconstruction
+        self._diagnostics.count('views')
+        grid = reconstruction.grid
+        header = Header(stamp=stamp_from_nanoseconds(view.stamp), frame_id=self._object_frame)
+        self._occupancy_pub.publish(
+            voxel_grid_to_msg(grid, self._reconstructor.threshold, header))
+        self._latent_pub.publish(latent_to_msg(reconstruction.latent, header))
+        self._view_pub.publish(pose_to_msg(view.camera.pose, header))
+        self._probabilities_pub.publish(voxel_grid_to_msg(grid, FLOOR, header))
+        self._entropy_pub.publish(Float64(data=grid.entropy()))
+
+    def _warn_of(self, camera: Camera) -> None:
+        away = camera.elevation - CANONICAL_ELEVATION
+        if abs(away) > _ELEVATION_TOLERANCE:
+            self._diagnostics.warn('elevation', (
+                'expected views from an elevation of 30 degrees, as the network was trained with, '
+                f'got {math.degrees(camera.elevation):.1f}; the reconstruction will be worse'))
+
+    def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Answer with the new episode's id."""
+        self._begin_episode()
+        response.success = True
+        response.message = self._episode.id
+        return response
+
+    def _on_save(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Answer with the path of the mesh."""
+        if self._reconstruction is None:
+            response.message = 'expected a view before a mesh; this episode has none yet'
+            return response
+        name = f'{self._episode.id}-{self._reconstructor.view_count}.{self._mesh_format}'
+        path = (self._output_dir / name).absolute()
+        try:
+            write_mesh(self._reconstruction.grid.mesh(self._reconstructor.threshold), path)
+        except (DataError, OSError) as error:
+            response.message = f'{path} was not written: {one_line(error)}'
+        else:
+            response.success = True
+            response.message = str(path)
+        return response
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the reconstructor until it is asked to stop."""
+    run_node(ReconstructorNode, args)
+
+
+if __name__ == '__main__':
+    main()

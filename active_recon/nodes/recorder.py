@@ -1,0 +1,196 @@
+"""ROS shell of the bag writer: what passes on the loop's topics, as the bytes that passed."""
+
+from datetime import datetime
+from functools import partial
+from importlib import import_module
+from itertools import count
+from pathlib import Path
+
+from active_recon.bags.metadata import QosProfile
+from active_recon.bags.writer import BagWriter
+from active_recon.errors import ConfigError, RecordingError
+from active_recon.nodes.definitions import message_definition
+from active_recon.nodes.diagnostics import Diagnostics
+from active_recon.nodes.parameters import declare
+from active_recon.nodes.run import one_line, run_node
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+from std_srvs.srv import Trigger
+
+TOPICS = ['camera/image_raw', 'camera/camera_info', 'camera/pose', 'view', 'occupancy',
+          'probabilities', 'latent', 'entropy', 'episode', 'next_view', 'next_azimuth',
+          'azimuth_scores', 'done', '/diagnostics']
+WATCH_EVERY_S = 0.1
+FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second
+_QUEUE = 1000  # messages that may wait while the disk is slow
+
+
+class RecorderNode(Node):
+    """Write the messages of each topic into an MCAP bag, with the QoS they were offered."""
+
+    def __init__(self) -> None:
+        super().__init__('recorder')
+        self._output_dir = Path(declare(
+            self, 'output_dir', 'bags', 'the folder in which each recording gets its own'))
+        at_start = declare(self, 'record_at_start', True, 'whether to record without being asked')
+        self._topics = [self.resolve_topic_name(name) for name in self._declare_topics()]
+        self._diagnostics = Diagnostics(self)
+        self._bag: BagWriter | None = None
+        self._offered: dict[str, tuple[QosProfile, ...]] = {}
+        self._heard: dict[str, Subscription] = {}
+        self.create_service(Trigger, 'start', self._on_start)
+        self.create_service(Trigger, 'stop', self._on_stop)
+        self.create_timer(WATCH_EVERY_S, self._watch)
+        self.create_timer(FLUSH_EVERY_S, self._flush)
+        if at_start:
+            self._begin()
+        self.get_logger().info('ready')
+
+    def _declare_topics(self) -> list[str]:
+        topics = self.declare_parameter('topics', TOPICS, ParameterDescriptor(
+            description='the topics to record', read_only=True, dynamic_typing=True)).value
+        if not isinstance(topics, list) or not all(isinstance(name, str) for name in topics):
+            raise ConfigError(f'parameter topics: expected a list of names, got {topics!r}')
+        return topics
+
+    def _begin(self) -> Path:
+        """Begin a bag in a new folder named after the time."""
+        now = datetime.now().strftime('%Y-%m-%d_%H-%M-%S')
+        names = (now if again == 1 else f'{now}_{again}' for again in count(1))
+        folder = next(path for name in names if not (path := self._output_dir / name).exists())
+        self._bag = BagWriter(folder)
+        self._diagnostics.count('recording')
+        self.get_logger().info(f'recording into {folder}')
+        return folder
+
+    def _end(self) -> None:
+        """
+        Stop listening and complete the bag.
+
+        Each bag listens anew, so that each begins with the latched messages.
+        """
+        for subscription in self._heard.values():
+            self.destroy_subscription(subscription)
+        self._heard.clear()
+        self._offered.clear()
+        bag, self._bag = self._bag, None
+        if bag is not None:
+            self._diagnostics.count('recording', -1)
+            bag.close()
+
+    def _watch(self) -> None:
+        """Listen to the publishers that have appeared, as each offers its messages."""
+        for name in self._topics if self._bag is not None else ():
+            publishers = self.get_publishers_info_by_topic(name)
+            offered = tuple(sorted(map(_offered_profile, publishers), key=str))
+            if publishers and self._offered.get(name) != offered:
+                self._offered[name] = offered
+                self._listen(name, publishers[0].topic_type, offered)
+
+    def _listen(self, name: str, type_name: str, offered: tuple[QosProfile, ...]) -> None:
+        assert self._bag is not None
+        try:
+            self._bag.add_topic(name, type_name, message_definition(type_name), offered)
+        except RecordingError as error:
+            self._diagnostics.refuse(error)
+            return
+        profile = _common_profile(offered)
+        heard = self._heard.get(name)
+        if heard is not None:
+            if heard.qos_profile == profile:
+                return
+            self.destroy_subscription(heard)
+        self._heard[name] = self.create_subscription(
+            _message_class(type_name), name, partial(self._on_message, name), profile, raw=True)
+
+    def _on_message(self, topic: str, data: bytes, info: dict[str, int]) -> None:
+        if self._bag is None:
+            return
+        try:
+            self._bag.write(topic, data, info['received_timestamp'], info['source_timestamp'])
+        except RecordingError as error:
+            self._fail(error)
+            return
+        self._diagnostics.count('messages')
+
+    def _flush(self) -> None:
+        if self._bag is None:
+            return
+        try:
+            self._bag.flush()
+        except RecordingError as error:
+            self._fail(error)
+
+    def _fail(self, error: RecordingError) -> None:
+        """Say that the recording has ended by itself; the bag has closed itself already."""
+        self._diagnostics.count(f'refused/{error.kind}')
+        self.get_logger().error(f'recording stopped: {one_line(error)}')
+        self._end()
+
+    def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Answer with the bag's folder."""
+        if self._bag is not None:
+            response.message = f'already recording into {self._bag.folder}'
+            return response
+        try:
+            response.message = str(self._begin())
+            response.success = True
+        except RecordingError as error:
+            self._diagnostics.refuse(error)
+            response.message = one_line(error)
+        return response
+
+    def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Answer with the bag's folder, complete by then."""
+        if self._bag is None:
+            response.message = 'expected a recording to stop, but there is none'
+            return response
+        response.message = str(self._bag.folder)
+        try:
+            self._end()
+            response.success = True
+        except RecordingError as error:
+            self._fail(error)
+            response.message = one_line(error)
+        return response
+
+    def destroy_node(self) -> None:
+        """Complete the bag before the node goes."""
+        try:
+            self._end()
+        except RecordingError as error:
+            self._fail(error)
+        super().destroy_node()
+
+
+def _offered_profile(publisher: TopicEndpointInfo) -> QosProfile:
+    profile = publisher.qos_profile
+    return QosProfile(profile.reliability.name.lower(), profile.durability.name.lower())
+
+
+def _common_profile(offered: tuple[QosProfile, ...]) -> QoSProfile:
+    """Return the strictest request that hears all of the publishers."""
+    reliable = all(profile.reliability == 'reliable' for profile in offered)
+    latched = all(profile.durability == 'transient_local' for profile in offered)
+    return QoSProfile(
+        depth=_QUEUE,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE))
+
+
+def _message_class(type_name: str) -> type:
+    package, kind, name = type_name.split('/')
+    message: type = getattr(import_module(f'{package}.{kind}'), name)
+    return message
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the recorder until it is asked to stop."""
+    run_node(RecorderNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,141 @@
+"""ROS shell of the simulated turntable: a stream of the views around an object."""
+
+from functools import partial
+import math
+from pathlib import Path
+
+from active_recon.datasets.layout import list_objects
+from active_recon.errors import ConfigError, DataError
+from active_recon.nodes.diagnostics import Diagnostics
+from active_recon.nodes.parameters import declare
+from active_recon.nodes.qos import HEARD, STREAM
+from active_recon.nodes.run import one_line, run_node
+from active_recon.shown_object import rendered_object, ShownObject, stored_object
+from active_recon.turntable import Turntable
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import camera_to_msgs, OBJECT_FRAME
+from msg_tools.goals import azimuth_goal_from_msg
+from msg_tools.images import image_to_msg
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+ANSWER_S = 2.0
+"""For so long the reconstructor may take to begin an episode."""
+
+
+class TurntableCameraNode(Node):
+    """Stream image, camera info and pose, also while it turns to a goal."""
+
+    def __init__(self) -> None:
+        super().__init__('turntable_camera')
+        self._turntable = Turntable(
+            declare(self, 'start_azimuth', 0.0, 'of the camera at start, rad',
+                    -2 * math.pi, 2 * math.pi),
+            declare(self, 'speed', 1.0, 'of the turntable, rad/s', 0.001, 100.0),
+            declare(self, 'time_scale', 1.0, 'how much faster than the clock it turns',
+                    0.001, 1000.0))
+        self._object_frame = declare(
+            self, 'object_frame', OBJECT_FRAME, "the frame of the camera's pose")
+        self._camera_frame = declare(
+            self, 'camera_frame', 'camera_optical_frame', 'the frame of the images')
+        rate = declare(self, 'rate', 10.0, 'of the stream, Hz', 0.1, 1000.0)
+        self._objects = self._declare_objects()
+        self._index = 0
+        self._shown: ShownObject | None = self._objects[0]()
+        self._diagnostics = Diagnostics(self)
+        self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM)
+        self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM)
+        self._pose_pub = self.create_publisher(PoseStamped, 'camera/pose', STREAM)
+        self.create_subscription(JointState, 'next_azimuth', self._on_goal, HEARD)
+        self._start_episode = self.create_client(Trigger, 'start_episode')
+        # In a group of its own: while it waits for an answer, that answer must be let in.
+        self.create_service(Trigger, 'next_object', self._on_next_object,
+                            callback_group=MutuallyExclusiveCallbackGroup())
+        self.create_timer(1 / rate, self._show)
+        self.get_logger().info('ready')
+
+    def _declare_objects(self) -> list[partial[ShownObject]]:
+        """Return what makes each object, for only one of them is held at a time."""
+        mesh = declare(self, 'mesh', '', 'a mesh file to show')
+        dataset = declare(self, 'dataset', '', 'a folder of rendered objects to show')
+        up = declare(self, 'up', '', "the mesh file's axis that is up; empty for its format's")
+        front = declare(self, 'front', '', "the mesh file's axis of the front; the same")
+        size = declare(self, 'object_size', 1.0, 'side of the voxel grid, m', 0.001, 1000.0)
+        background = declare(self, 'background', 255.0, 'grey behind the object', 0.0, 255.0)
+        if bool(mesh) == bool(dataset):
+            raise ConfigError('parameters mesh, dataset: expected one of them, got '
+                              f'{"both" if mesh else "neither"}')
+        if mesh:
+            return [partial(rendered_object, Path(mesh), size, background, up or None,
+                            front or None)]
+        folders = list_objects(Path(dataset))
+        if not folders:
+            raise DataError(f'{dataset}: expected a dataset with objects, got none')
+        return [partial(stored_object, folder, size, background) for folder in folders]
+
+    def _now_s(self) -> float:
+        return self.get_clock().now().nanoseconds / 1e9
+
+    def _show(self) -> None:
+        if self._shown is None:
+            return
+        now = self.get_clock().now()
+        image, camera = self._shown.seen_from(self._turntable.azimuth_at(now.nanoseconds / 1e9))
+        header = Header(stamp=now.to_msg(), frame_id=self._camera_frame)
+        info, pose = camera_to_msgs(camera, header, self._object_frame)
+        # The image comes last: whoever hears it has what belongs to it.
+        self._pose_pub.publish(pose)
+        self._info_pub.publish(info)
+        self._image_pub.publish(image_to_msg(image, header))
+        self._diagnostics.count('images')
+
+    def _on_goal(self, msg: JointState) -> None:
+        with self._diagnostics.refusing():
+            self._turntable.turn_to(azimuth_goal_from_msg(msg), self._now_s())
+            self._diagnostics.count('goals')
+
+    async def _on_next_object(self, _request: Trigger.Request,
+                              response: Trigger.Response) -> Trigger.Response:
+        """Begin an episode, then show the next object; the first follows the last."""
+        index = (self._index + 1) % len(self._objects)
+        try:
+            following = self._objects[index]()
+        except DataError as error:
+            self._diagnostics.refuse(error)
+            response.message = one_line(error)
+            return response
+        shown, self._shown = self._shown, None  # nothing of the old object in the new episode
+        begun = await self._begin_episode()
+        if not begun:
+            self._shown = shown
+            response.message = ('expected the reconstructor to begin an episode, but it did not '
+                                f'answer within {ANSWER_S:g} s; the object is still the same')
+            return response
+        self._index, self._shown = index, following
+        response.success = True
+        response.message = f'{following.name} ({index + 1} of {len(self._objects)})'
+        return response
+
+    async def _begin_episode(self) -> bool:
+        """Ask the reconstructor for a new episode; return whether it began one in time."""
+        answered = Future()
+        late = self.create_timer(ANSWER_S, lambda: answered.done() or answered.set_result(None))
+        request = self._start_episode.call_async(Trigger.Request())
+        request.add_done_callback(
+            lambda call: answered.done() or answered.set_result(call.result()))
+        answer = await answered
+        self.destroy_timer(late)
+        return answer is not None and answer.success
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the simulated turntable until it is asked to stop."""
+    run_node(TurntableCameraNode, args)
+
+
+if __name__ == '__main__':
+    main()

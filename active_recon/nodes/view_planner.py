@@ -1,0 +1,217 @@
+"""ROS shell of the planner: after every view, where to look next, or that it is enough."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from active_recon.cameras import Camera, CANONICAL_DISTANCE, CANONICAL_ELEVATION
+from active_recon.errors import ActiveReconError
+from active_recon.nodes.diagnostics import Diagnostics
+from active_recon.nodes.parameters import declare
+from active_recon.nodes.qos import HEARD, LATCHED
+from active_recon.nodes.run import one_line, run_node
+from active_recon.planner import Goal, Planner
+from active_recon.policies import POLICIES
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import OBJECT_FRAME, pose_from_msg
+from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
+from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
+from msg_tools.images import latent_from_msg
+from msg_tools.joins import StampJoiner
+from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
+from msg_tools.voxels import voxel_grid_from_msg
+from rclpy.node import Node
+from sensor_msgs.msg import Image, JointState, PointCloud2
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+FIND_VIEWS_S = 0.5
+"""An episode older than this node may have views already: for so long they may come first."""
+REPEAT_S = 1.0
+"""A goal whose view has not come is sent again, with its stamp: it may not have been heard."""
+
+
+class ViewPlannerNode(Node):
+    """Ask for the first view of an episode, then for the next after each one, until done."""
+
+    def __init__(self) -> None:
+        super().__init__('view_planner')
+        self._object_size = declare(
+            self, 'object_size', 1.0, 'side of the voxel grid, m', 0.001, 1000.0)
+        self._elevation = declare(
+            self, 'elevation', CANONICAL_ELEVATION, "of the goals' cameras, rad", -1.5, 1.5)
+        distance = declare(
+            self, 'distance', math.nan, "of the goals' cameras, m; nan for 2.1 object_size",
+            0.001, 10000.0)
+        self._distance = (
+            CANONICAL_DISTANCE * self._object_size if math.isnan(distance) else distance)
+        self._start_azimuth = declare(
+            self, 'start_azimuth', math.nan, 'of the first view, rad; nan for where the camera is',
+            -2 * math.pi, 2 * math.pi)
+        self._frame = declare(
+            self, 'object_frame', OBJECT_FRAME, 'the frame of the object, in which poses count')
+        self._planner = self._load()
+        self._joiner = StampJoiner(('latent', 'view', 'probabilities'))
+        self._diagnostics = Diagnostics(self)
+        self._episode: Episode | None = None
+        self._early: tuple[int, dict[str, Any]] | None = None
+        self._begun_at = self.get_clock().now().nanoseconds
+        self._last_goal_stamp = 0
+        self._forget()
+
+        self._next_view_pub = self.create_publisher(PoseStamped, 'next_view', LATCHED)
+        self._next_azimuth_pub = self.create_publisher(JointState, 'next_azimuth', LATCHED)
+        self._scores_pub = self.create_publisher(PointCloud2, 'azimuth_scores', LATCHED)
+        self._done_pub = self.create_publisher(Header, 'done', LATCHED)
+        self.create_subscription(PoseStamped, 'camera/pose', self._on_camera, HEARD)
+        self.create_subscription(Image, 'latent', self._on_latent, LATCHED)
+        self.create_subscription(PoseStamped, 'view', self._on_view, LATCHED)
+        self.create_subscription(PointCloud2, 'probabilities', self._on_probabilities, LATCHED)
+        self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
+        self.create_service(Trigger, 'plan', self._on_plan)
+        self.create_timer(0.1, self._ask_first)
+        self.create_timer(REPEAT_S, self._repeat)
+        self.get_logger().info('ready')
+
+    def _load(self) -> Planner:
+        policy = declare(
+            self, 'policy', 'attention', 'how the next view is chosen', choices=POLICIES)
+        weights = declare(self, 'weights', '', 'a weights file; empty for those that ship')
+        threads = declare(self, 'threads', 1, 'CPU threads of the network', 1, 256)
+        if policy == 'attention':  # the others need no network, and so not the time to load torch
+            import torch
+            torch.set_num_threads(threads)
+        return Planner.load(
+            policy, Path(weights) if weights else None,
+            declare(self, 'seed', 0, 'of the policy random', 0, 2**32 - 1),
+            declare(self, 'max_views', 5, 'views after which an episode is done', 1, 1000),
+            declare(self, 'entropy_tolerance', 0.01, 'share by which the entropy may still change '
+                    'when it has settled; 0 to go on until max_views', 0.0, 0.99),
+            declare(self, 'object_yaw', 0.0, "azimuth of the object's front, rad",
+                    -2 * math.pi, 2 * math.pi))
+
+    def _forget(self) -> None:
+        """Begin with no camera, no goal and no view."""
+        self._planner.reset()
+        self._joiner.clear()
+        self._camera_azimuth = math.nan
+        self._asked: tuple[PoseStamped, JointState] | None = None
+        self._started = False
+        self._done = False
+
+    def _on_episode(self, msg: Header) -> None:
+        with self._diagnostics.refusing():
+            episode = episode_from_msg(msg)
+            if self._episode is not None and episode.id == self._episode.id:
+                return
+            self._forget()
+            self._episode = episode
+            self._heard_at = self.get_clock().now().nanoseconds
+            self._diagnostics.count('episodes')
+            self._done_pub.publish(done_to_msg(episode.begin, ''))
+            if self._early is not None:
+                self._decide(*self._early, episode)
+                self._early = None
+
+    def _on_camera(self, msg: PoseStamped) -> None:
+        with self._diagnostics.refusing():
+            pose = pose_from_msg(msg, self._frame)
+            if self._episode and nanoseconds_from_stamp(msg.header.stamp) >= self._episode.begin:
+                self._camera_azimuth = Camera(pose).azimuth
+        self._ask_first()
+
+    def _ask_first(self) -> None:
+        """Ask for the first view, once, where the camera or the parameter says."""
+        if self._episode is None or self._started:
+            return
+        older = self._episode.begin < self._begun_at
+        waited = self.get_clock().now().nanoseconds - self._heard_at
+        if older and waited < FIND_VIEWS_S * 1e9:
+            return
+        azimuth = (
+            self._camera_azimuth if math.isnan(self._start_azimuth) else self._start_azimuth)
+        if not math.isnan(azimuth):
+            self._ask(self._planner.first_goal(azimuth))
+
+    def _on_latent(self, msg: Image) -> None:
+        with self._diagnostics.refusing():
+            self._join('latent', msg.header, latent_from_msg(msg))
+
+    def _on_view(self, msg: PoseStamped) -> None:
+        with self._diagnostics.refusing():
+            self._join('view', msg.header, Camera(pose_from_msg(msg, self._frame)).azimuth)
+
+    def _on_probabilities(self, msg: PointCloud2) -> None:
+        with self._diagnostics.refusing():
+            grid = voxel_grid_from_msg(msg, self._object_size)
+            self._join('probabilities', msg.header, grid.entropy())
+
+    def _join(self, name: str, header: Header, part: Any) -> None:
+        """Decide once all parts of a view are there, and its episode is known."""
+        stamp = nanoseconds_from_stamp(header.stamp)
+        parts = self._joiner.add(name, stamp, part)
+        if parts is None:
+            return
+        if self._episode is None:  # a latched view may be heard before its latched episode
+            self._early = stamp, parts
+        else:
+            self._decide(stamp, parts, self._episode)
+
+    def _decide(self, stamp: int, parts: dict[str, Any], episode: Episode) -> None:
+        if stamp < episode.begin:
+            return
+        decision = self._planner.add_view(parts['latent'], parts['view'], parts['probabilities'])
+        self._started = True
+        self._diagnostics.count('views')
+        if decision.goal is not None:
+            self._ask(decision.goal)
+            return
+        self._asked = None
+        self._done = True
+        self._done_pub.publish(done_to_msg(stamp, decision.reason))
+        self.get_logger().info(f'done: {decision.reason}')
+
+    def _ask(self, goal: Goal) -> None:
+        """Publish a goal under a stamp of its own, its identity."""
+        now = self.get_clock().now().nanoseconds
+        # A paused clock would give two goals one identity
+        self._last_goal_stamp = max(now, self._last_goal_stamp + 1)
+        header = Header(stamp=stamp_from_nanoseconds(self._last_goal_stamp), frame_id=self._frame)
+        self._asked = (
+            view_goal_to_msg(goal.azimuth, self._elevation, self._distance, header),
+            azimuth_goal_to_msg(goal.azimuth, header))
+        self._started = True
+        self._diagnostics.count('goals')
+        self._scores_pub.publish(scores_to_msg(
+            goal.candidates, goal.scores, self._elevation, self._distance, header))
+        self._repeat()
+
+    def _repeat(self) -> None:
+        if self._asked is not None:
+            next_view, next_azimuth = self._asked
+            self._next_view_pub.publish(next_view)
+            self._next_azimuth_pub.publish(next_azimuth)
+
+    def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Ask for the goal after the views so far under a new stamp; answer with its azimuth."""
+        try:
+            goal = self._planner.plan()
+        except ActiveReconError as error:
+            response.message = one_line(error)
+            return response
+        if self._done and self._episode is not None:
+            self._done = False
+            self._done_pub.publish(done_to_msg(self._episode.begin, ''))
+        self._ask(goal)
+        response.success = True
+        response.message = f'{goal.azimuth:.6f}'
+        return response
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the view planner until it is asked to stop."""
+    run_node(ViewPlannerNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,47 @@
+"""Measure everything, print the README's table, and write it as JSON."""
+
+import json
+from pathlib import Path
+import platform
+
+from benchmarks.core import reconstruct_and_plan, rendering
+from benchmarks.figures import Figure, reference_ms
+from benchmarks.loop import demo_figure, reconstructor_figures
+
+RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'benchmarks.json'
+
+
+def main() -> None:
+    """Print a row for each figure as it comes."""
+    reference = reference_ms()
+    print(f'{platform.machine()}; reference (512 x 512 matrix product): {reference:.2f} ms')  # noqa: T201
+    print('| figure | measured | 5 to 95 % | goal | x reference |\n|---|---|---|---|---|')  # noqa: T201
+    figures = []
+    for measure in (lambda: [reconstruct_and_plan()], lambda: [rendering(1, 400)],
+                    lambda: [rendering(2, 100)], reconstructor_figures,
+                    lambda: [demo_figure()]):
+        for figure in measure():
+            figures.append(figure)
+            print(_row(figure, reference), flush=True)  # noqa: T201
+    RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    RESULTS.write_text(json.dumps({
+        'command': 'make bench', 'reference_ms': reference,
+        'figures': [{'name': figure.name, 'unit': figure.unit, 'value': figure.value,
+                     'percentile': figure.percentile, 'low_high': figure.spread,
+                     'goal': figure.goal, 'reached': figure.reached,
+                     'samples': len(figure.samples)} for figure in figures]}, indent=1) + '\n')
+    missed = [figure.name for figure in figures if not figure.reached]
+    print(f'missed: {", ".join(missed)}' if missed else 'every goal is reached')  # noqa: T201
+
+
+def _row(figure: Figure, reference: float) -> str:
+    low, high = figure.spread
+    goal = f'{"at least" if figure.more_is_better else "at most"} {figure.goal:g} {figure.unit}'
+    milliseconds = {'ms': 1.0, 's': 1e3}.get(figure.unit)
+    ratio = '' if milliseconds is None else f'{figure.value * milliseconds / reference:.1f}'
+    return (f'| {figure.name} | {figure.value:.3g} {figure.unit} | {low:.3g} to {high:.3g} '
+            f'| {goal} | {ratio} |')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,51 @@
+"""The core, with no ROS: one view reconstructed and planned, and views rendered."""
+
+from pathlib import Path
+
+from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.meshes import load_mesh
+from active_recon.planner import Planner
+from active_recon.reconstructor import Reconstructor
+from active_recon.rendering import composite, Renderer
+from benchmarks.figures import Figure, timed_ms
+import numpy as np
+import torch
+
+OBJECTS = Path(__file__).parents[1] / 'active_recon' / 'objects'
+MODELS = Path(__file__).parent / 'real_cc0'
+
+
+def reconstruct_and_plan() -> Figure:
+    """One view through network, grid, entropy and attention policy, on two threads."""
+    torch.set_num_threads(2)
+    reconstructor = Reconstructor.load()
+    planner = Planner.load('attention', max_views=10_000, entropy_tolerance=0)
+    cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+    renderer = Renderer(load_mesh(OBJECTS / 'chair.glb'))
+    images = [composite(renderer.render(camera), 255) for camera in cameras]
+    turn = iter(range(10_000))
+
+    def one_view() -> None:
+        index = next(turn) % len(cameras)
+        if index % 5 == 0:
+            reconstructor.reset()
+            planner.reset()
+        seen = reconstructor.add_view(images[index], cameras[index])
+        planner.add_view(seen.latent, cameras[index].azimuth, seen.grid.entropy())
+
+    return Figure('reconstruct and plan one view', 'ms', timed_ms(one_view, 300, 20), 15)
+
+
+def rendering(samples: int, goal: float) -> Figure:
+    """Render the models that ship to measure on (under 20,000 faces), on one core: views a second."""
+    rates = []
+    for path in sorted(MODELS.glob('*/*.glb')):
+        mesh = load_mesh(path)
+        if len(mesh.faces) >= 20_000:
+            continue
+        renderer = Renderer(mesh)
+        cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+        spent = timed_ms(lambda r=renderer, c=cameras: [r.render(one, samples) for one in c], 1, 1)
+        rates.append(1e3 * len(cameras) / float(np.median(spent)))
+    kind = 'flat' if samples == 1 else f'{samples} x {samples} antialiasing'
+    return Figure(f'rendering, {kind}', 'views/s', rates, goal, more_is_better=True)

@@ -1,0 +1,59 @@
+"""What every benchmark returns, and the reference that makes machines comparable."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import time
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A measured quantity: its samples in `unit`, what of them is judged, and the goal."""
+
+    name: str
+    unit: str
+    samples: Sequence[float]
+    goal: float
+    percentile: float = 50.0
+    more_is_better: bool = False
+
+    @property
+    def value(self) -> float:
+        """The percentile that is judged."""
+        return float(np.percentile(self.samples, self.percentile))
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """The samples' 5th and 95th percentiles."""
+        low, high = np.percentile(self.samples, [5, 95])
+        return float(low), float(high)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the goal is reached."""
+        return self.value >= self.goal if self.more_is_better else self.value <= self.goal
+
+
+def timed_ms(task: Callable[[], object], repeats: int, warm_up: int = 3) -> list[float]:
+    """Return how long each of `repeats` calls took, milliseconds."""
+    for _ in range(warm_up):
+        task()
+    samples = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        task()
+        samples.append(1e3 * (time.perf_counter() - start))
+    return samples
+
+
+def reference_ms() -> float:
+    """
+    Return the median time of the reference on this machine, now, milliseconds.
+
+    It is a product of two 512 x 512 float32 matrices in numpy. Figures are told as multiples of
+    it too, so that they can be compared from one machine, and one day, to another.
+    """
+    rng = np.random.default_rng(0)
+    a, b = rng.random((2, 512, 512), dtype=np.float32)
+    return float(np.median(timed_ms(lambda: a @ b, 50)))

@@ -1,0 +1,91 @@
+"""
+Cameras to and from CameraInfo and PoseStamped.
+
+A pose is that of the camera's optical frame in the object frame. The core counts pixels from the
+image's corner (the centre of the first pixel is 0.5), ROS from the first pixel's centre (0).
+"""
+
+from active_recon.cameras import Camera, Intrinsics
+from active_recon.errors import MessageError
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
+
+OBJECT_FRAME = 'object'
+
+
+def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
+    """
+    Return the pinhole of `k`; distortion is not modelled, so a wide lens wants rectified images.
+
+    Raises MessageError where the size is 0 or a focal length is not above 0 and finite.
+    """
+    fx, cx, fy, cy = (float(msg.k[index]) for index in (0, 2, 4, 5))
+    if msg.width == 0 or msg.height == 0:
+        raise MessageError('expected camera info with an image size above 0, '
+                           f'got {msg.height} x {msg.width}', 'camera_info')
+    if not np.isfinite([fx, fy, cx, cy]).all() or fx <= 0 or fy <= 0:
+        raise MessageError('expected camera info of a calibrated camera with finite focal lengths '
+                           f'above 0, got fx {fx}, fy {fy}, cx {cx}, cy {cy}', 'camera_info')
+    return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, int(msg.width), int(msg.height))
+
+
+def intrinsics_to_msg(intrinsics: Intrinsics, header: Header) -> CameraInfo:
+    """Return a pinhole without distortion as CameraInfo."""
+    fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx - 0.5, intrinsics.cy - 0.5
+    return CameraInfo(
+        header=header, width=intrinsics.width, height=intrinsics.height,
+        distortion_model='plumb_bob', d=[0.0] * 5,
+        k=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        r=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p=[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0])
+
+
+def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.float64]:
+    """
+    Return the pose, (4, 4), object from optical frame.
+
+    A quaternion is normalised. Raises MessageError where the pose is not in the object frame, is
+    not finite, has a quaternion of zero, or stands at the frame's origin.
+    """
+    if msg.header.frame_id != frame:
+        raise MessageError(f'expected a camera pose in the frame {frame!r}, '
+                           f'got {msg.header.frame_id!r}', 'frame')
+    point, turn = msg.pose.position, msg.pose.orientation
+    position = np.array([point.x, point.y, point.z])
+    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
+    if not (np.isfinite(position).all() and np.isfinite(quaternion).all()):
+        raise MessageError(f'expected a finite camera pose, got position {position.tolist()} and '
+                           f'quaternion {quaternion.tolist()}', 'pose')
+    if np.linalg.norm(quaternion) < 1e-6:
+        raise MessageError('expected a unit quaternion in the camera pose, '
+                           f'got {quaternion.tolist()}', 'quaternion')
+    if np.linalg.norm(position) < 1e-6:
+        raise MessageError('expected a camera away from the object, got one at its centre', 'pose')
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+    pose[:3, 3] = position
+    return pose
+
+
+def pose_to_msg(pose: NDArray[np.float64], header: Header) -> PoseStamped:
+    """Return a pose, (4, 4), as a message; the header names the object frame."""
+    x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
+    px, py, pz = pose[:3, 3].tolist()
+    return PoseStamped(header=header, pose=Pose(
+        position=Point(x=px, y=py, z=pz), orientation=Quaternion(x=x, y=y, z=z, w=w)))
+
+
+def camera_from_msgs(info: CameraInfo, pose: PoseStamped, frame: str = OBJECT_FRAME) -> Camera:
+    """Return the camera of both messages; raises MessageError as the two readers do."""
+    return Camera(pose_from_msg(pose, frame), intrinsics_from_msg(info))
+
+
+def camera_to_msgs(camera: Camera, stamp: Header, frame: str = OBJECT_FRAME
+                   ) -> tuple[CameraInfo, PoseStamped]:
+    """Return both messages of one camera; `stamp` bears the stamp and the camera's own frame."""
+    return (intrinsics_to_msg(camera.intrinsics, stamp),
+            pose_to_msg(camera.pose, Header(stamp=stamp.stamp, frame_id=frame)))

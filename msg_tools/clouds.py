@@ -1,0 +1,46 @@
+"""Tables of float32 columns to and from PointCloud2."""
+
+import array
+from collections.abc import Sequence
+
+from active_recon.errors import MessageError
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Header
+
+
+def cloud_from_msg(msg: PointCloud2, names: Sequence[str]) -> NDArray[np.float32]:
+    """
+    Return the named float32 fields of a cloud, (N, len(names)).
+
+    Raises MessageError where a field is missing or not float32, or bytes are.
+    """
+    offsets = {field.name: field.offset for field in msg.fields
+               if field.datatype == PointField.FLOAT32}
+    if missing := [name for name in names if name not in offsets]:
+        raise MessageError(f'expected a cloud with float32 fields {", ".join(names)}, '
+                           f'got none named {", ".join(missing)}', 'cloud')
+    count = msg.width * msg.height
+    if len(msg.data) < count * msg.point_step:
+        raise MessageError(f'expected {count * msg.point_step} bytes for {count} points, '
+                           f'got {len(msg.data)}', 'cloud')
+    if any(offsets[name] + 4 > msg.point_step for name in names):
+        raise MessageError(f'expected fields within points of {msg.point_step} bytes, '
+                           f'got offsets {offsets}', 'cloud')
+    order = '>' if msg.is_bigendian else '<'
+    row = np.dtype({'names': list(names), 'formats': [f'{order}f4'] * len(names),
+                    'offsets': [offsets[name] for name in names], 'itemsize': msg.point_step})
+    table = np.frombuffer(msg.data, row, count)
+    return np.column_stack([table[name] for name in names]).astype(np.float32)
+
+
+def cloud_to_msg(table: NDArray[np.float32], names: Sequence[str], header: Header) -> PointCloud2:
+    """Return a table, (N, len(names)) float32, as an unordered cloud."""
+    count, columns = table.shape
+    fields = [PointField(name=name, offset=4 * index, datatype=PointField.FLOAT32, count=1)
+              for index, name in enumerate(names)]
+    data = array.array('B', np.ascontiguousarray(table, np.float32).tobytes())
+    return PointCloud2(header=header, height=1, width=count, fields=fields, is_bigendian=False,
+                       point_step=4 * columns, row_step=4 * columns * count, data=data,
+                       is_dense=bool(np.isfinite(table).all()))

@@ -1,0 +1,69 @@
+"""Goals of the view planner to and from their messages."""
+
+import math
+
+from active_recon.cameras import Camera, orbit_camera, wrap_azimuth
+from active_recon.errors import MessageError
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import OBJECT_FRAME, pose_from_msg, pose_to_msg
+from msg_tools.clouds import cloud_from_msg, cloud_to_msg
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Header
+
+JOINT = 'camera_azimuth'
+SCORE_FIELDS = ('x', 'y', 'z', 'azimuth', 'score')
+
+
+def view_goal_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> float:
+    """Return the goal's azimuth in [0, 2 pi); raises MessageError as `pose_from_msg` does."""
+    return Camera(pose_from_msg(msg, frame)).azimuth
+
+
+def view_goal_to_msg(azimuth: float, elevation: float, distance: float,
+                     header: Header) -> PoseStamped:
+    """
+    Return the pose of a camera that looks at the object from there; the header's frame is its.
+
+    Angles in radians, distance in metres.
+    """
+    return pose_to_msg(orbit_camera(azimuth, elevation, distance).pose, header)
+
+
+def azimuth_goal_from_msg(msg: JointState) -> float:
+    """
+    Return the goal's azimuth in [0, 2 pi), whatever its joint is called.
+
+    Raises MessageError where there is not just one position, or it is not finite.
+    """
+    if len(msg.position) != 1:
+        raise MessageError('expected an azimuth goal with one position, '
+                           f'got {len(msg.position)}', 'goal')
+    azimuth = float(msg.position[0])
+    if not math.isfinite(azimuth):
+        raise MessageError(f'expected an azimuth goal that is finite, got {azimuth}', 'goal')
+    return wrap_azimuth(azimuth)
+
+
+def azimuth_goal_to_msg(azimuth: float, header: Header) -> JointState:
+    """Return an azimuth of the camera, radians, as the position of one joint, at rest there."""
+    # Some readers outside ROS fail on an empty list of numbers, so none is left empty
+    return JointState(
+        header=header, name=[JOINT], position=[wrap_azimuth(azimuth)],
+        velocity=[0.0], effort=[0.0])
+
+
+def scores_from_msg(msg: PointCloud2) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return azimuths (N,) in radians and their scores (N,)."""
+    table = cloud_from_msg(msg, SCORE_FIELDS)
+    return table[:, 3], table[:, 4]
+
+
+def scores_to_msg(azimuths: NDArray[np.float64], scores: NDArray[np.float32], elevation: float,
+                  distance: float, header: Header) -> PointCloud2:
+    """Return the candidates, azimuths (N,) and scores (N,), at their cameras' positions."""
+    positions = [orbit_camera(float(azimuth), elevation, distance).position
+                 for azimuth in azimuths]
+    table = np.column_stack([positions, azimuths, scores]).astype(np.float32)
+    return cloud_to_msg(table, SCORE_FIELDS, header)

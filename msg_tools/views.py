@@ -1,0 +1,134 @@
+"""A view out of three streams: the image, its camera info and its pose, joined on stamps."""
+
+import bisect
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from active_recon.cameras import Camera, Intrinsics
+from active_recon.errors import MessageError
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+_KEPT = 1024  # poses: five seconds of a fast tracker
+_WAITING = 32  # images
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """An image, (H, W, 3) uint8 RGB, and the camera that took it, at a stamp in nanoseconds."""
+
+    stamp: int
+    image: NDArray[np.uint8]
+    camera: Camera
+
+
+class ViewJoiner:
+    """
+    Joins what arrives in any order; stamps are nanoseconds, `now` any clock in seconds.
+
+    The camera info is that of the image's stamp. The pose is too, or is interpolated between its
+    neighbours, each at most `max_pose_gap` seconds away. An image waits for them until they can
+    no longer come: a later one is there, or `patience` seconds have passed.
+    """
+
+    def __init__(self, max_pose_gap: float, patience: float = 0.5) -> None:
+        self._gap = round(max_pose_gap * 1e9)
+        self._patience = patience
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, the order of stamps included."""
+        self._last_image = -1
+        self._images: deque[tuple[int, NDArray[np.uint8], float]] = deque()
+        self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_WAITING)
+        self._poses: list[tuple[int, NDArray[np.float64]]] = []
+
+    def add_image(self, stamp: int, image: NDArray[np.uint8], now: float) -> None:
+        """Raise MessageError on an image that came before, or is older than the last."""
+        if stamp == self._last_image:
+            raise MessageError(f'expected each image once, got that of {_seconds(stamp)} again',
+                               'duplicate')
+        if stamp < self._last_image:
+            raise MessageError(
+                f'expected images in the order of their stamps, got {_seconds(stamp)} after '
+                f'{_seconds(self._last_image)}; a new episode forgets the order', 'out_of_order')
+        self._last_image = stamp
+        self._images.append((stamp, image, now))
+
+    def add_intrinsics(self, stamp: int, intrinsics: Intrinsics) -> None:
+        self._intrinsics.append((stamp, intrinsics))
+
+    def add_pose(self, stamp: int, pose: NDArray[np.float64]) -> None:
+        """Take in a pose, (4, 4), object from optical frame."""
+        bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
+        del self._poses[:-_KEPT]
+
+    def joined(self, now: float) -> Iterator[View | MessageError]:
+        """Yield what has been decided since the last call, in the images' order."""
+        while self._images:
+            stamp, image, arrived = self._images[0]
+            late = now - arrived > self._patience or len(self._images) > _WAITING
+            try:
+                intrinsics = self._intrinsics_at(stamp, late)
+                pose = self._pose_at(stamp, late) if intrinsics else None
+                if intrinsics is None or pose is None:
+                    return
+                height, width = image.shape[:2]
+                if (intrinsics.height, intrinsics.width) != (height, width):
+                    raise MessageError(
+                        f"expected camera info of the image's size, {height} x {width}, "
+                        f'got {intrinsics.height} x {intrinsics.width}', 'camera_info')
+            except MessageError as error:
+                self._images.popleft()
+                yield error
+                continue
+            self._images.popleft()
+            yield View(stamp, image, Camera(pose, intrinsics))
+
+    def _intrinsics_at(self, stamp: int, late: bool) -> Intrinsics | None:
+        """Return the camera info of that stamp, None while it may still come."""
+        for known, intrinsics in reversed(self._intrinsics):
+            if known == stamp:
+                return intrinsics
+        if late or (self._intrinsics and self._intrinsics[-1][0] > stamp):
+            came = (f'the last is of {_seconds(self._intrinsics[-1][0])}' if self._intrinsics
+                    else 'none came')
+            raise MessageError("expected camera info of the image's stamp, "
+                               f'{_seconds(stamp)}, {came}', 'no_camera_info')
+        return None
+
+    def _pose_at(self, stamp: int, late: bool) -> NDArray[np.float64] | None:
+        """Return the pose at that stamp, None while it or its later neighbour may still come."""
+        after = bisect.bisect_left(self._poses, stamp, key=lambda entry: entry[0])
+        if after < len(self._poses):
+            later, pose = self._poses[after]
+            if later == stamp:
+                return pose
+            if after > 0:
+                earlier, pose_before = self._poses[after - 1]
+                if max(later - stamp, stamp - earlier) <= self._gap:
+                    return interpolated(pose_before, pose, (stamp - earlier) / (later - earlier))
+            late = True
+        if not late:
+            return None
+        distances = [abs(known - stamp) for known, _ in self._poses[max(after - 1, 0):after + 1]]
+        came = f'the nearest is {min(distances) / 1e9:.3f} s away' if distances else 'none came'
+        raise MessageError(
+            f"expected a pose of the image's stamp, {_seconds(stamp)}, or one before and one "
+            f'after it within {self._gap / 1e9:g} s, {came}', 'no_pose')
+
+
+def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
+                 fraction: float) -> NDArray[np.float64]:
+    """Return the pose, (4, 4), between two: positions on the line, rotations by slerp."""
+    rotations = Rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
+    pose = np.eye(4)
+    pose[:3, :3] = Slerp([0, 1], rotations)(fraction).as_matrix()
+    pose[:3, 3] = (1 - fraction) * start[:3, 3] + fraction * end[:3, 3]
+    return pose
+
+
+def _seconds(stamp: int) -> str:
+    return f'{stamp / 1e9:.3f} s'

@@ -1,0 +1,64 @@
+"""The ROS package active_recon, for `pip install .` and `colcon build` alike."""
+
+from glob import glob
+import os
+
+from setuptools import find_packages, setup
+
+NAME = 'active_recon'
+NODES = ('reconstructor', 'recorder', 'turntable_camera', 'view_planner')
+EXECUTABLES = {
+    'active-recon': f'{NAME}.cli.main', **{node: f'{NAME}.nodes.{node}' for node in NODES}}
+
+# A sourced ROS has rclpy and the messages; the wheels beside it would be a second ROS.
+ROS_WHEELS = () if 'ROS_DISTRO' in os.environ else (
+    'ros-jazzy-rclpy>=7.1,<8',
+    'ros-jazzy-rmw-fastrtps-cpp>=8.4,<9',
+    'ros-jazzy-common-interfaces>=5.3,<6',
+)
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    description='Active 3D reconstruction of an object from few camera views',
+    license='Apache-2.0',
+    maintainer='active_recon developers',
+    maintainer_email='active-recon@example.com',
+    python_requires='>=3.11',
+    packages=find_packages(include=[NAME, f'{NAME}.*', 'msg_tools', 'msg_tools.*']),
+    package_data={NAME: [
+        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*', 'nodes/*.xml']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        # colcon overwrites these with its own; pip installs executables into bin/ alone.
+        (f'lib/{NAME}', [f'scripts/{name}' for name in EXECUTABLES]),
+        *((f'share/{NAME}/{folder}', files) for folder in ('launch', 'config', 'rviz')
+          if (files := sorted(glob(f'{folder}/*')))),
+    ],
+    entry_points={'console_scripts': [
+        f'{name} = {module}:main' for name, module in EXECUTABLES.items()]},
+    install_requires=[
+        'embreex>=2.17.7.post6,<5',
+        'mcap>=1.5,<2',
+        'numpy>=1.26,<3',
+        'opencv-python-headless>=4.9,<6',
+        'PyYAML>=6,<7',
+        'pillow>=10.1,<14',
+        'rich>=13.7,<16',
+        'safetensors>=0.4.3,<1',
+        'scikit-image>=0.22,<1',
+        'scipy>=1.11,<2',
+        'tensorboard>=2.16,<3',
+        'torch>=2.5,<3',
+        'trimesh>=4.4,<6',
+        'typer>=0.12,<1',
+        *ROS_WHEELS,
+    ],
+    extras_require={
+        'lint': ['mypy>=1.11', 'ruff>=0.6'],
+        'test': [
+            'mcap-ros2-support>=0.5.5', 'pymcap-cli>=0.30', 'pytest>=8', 'rosbags>=0.10',
+            'rosless>=0.5', 'setuptools>=70.1'],
+    },
+)

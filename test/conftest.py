@@ -1,0 +1,49 @@
+"""Six small objects and a network that learns in seconds, for whatever tests the learned core."""
+
+from pathlib import Path
+
+from active_recon.config import NetworkConfig
+from active_recon.datasets.layout import list_objects
+from active_recon.datasets.making import make_dataset, shape_jobs
+from active_recon.datasets.views import read_views, ViewSet
+from active_recon.models.attention import AttentionModel
+from active_recon.models.reconstruction import ReconstructionNetwork
+import pytest
+import torch
+
+
+@pytest.fixture(scope='session')
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of three lamps and three tables in R2N2's layout."""
+    out = tmp_path_factory.mktemp('dataset')
+    jobs = [job for category in ('lamp', 'table') for job in shape_jobs(category, range(3), out)]
+    assert not [outcome.refusal for outcome in make_dataset(jobs, samples=1) if outcome.refusal]
+    return out
+
+
+@pytest.fixture(scope='session')
+def views(dataset: Path) -> ViewSet:
+    """Return the same six objects in memory."""
+    return read_views(list_objects(dataset))
+
+
+@pytest.fixture(scope='session')
+def tiny() -> NetworkConfig:
+    """Return the sizes of a network that is fast, and need not be good."""
+    return NetworkConfig(
+        stem_channels=4, block_channels=(6, 8, 8), recurrent_channels=8, bottleneck_channels=16,
+        latent_channels=2, volume_channels=6, decoder_channels=(6, 4), glimpse_channels=8)
+
+
+@pytest.fixture
+def network(tiny: NetworkConfig) -> ReconstructionNetwork:
+    """Return a small reconstruction network with the same fresh weights every time."""
+    torch.manual_seed(0)
+    return ReconstructionNetwork.from_config(tiny).eval()
+
+
+@pytest.fixture
+def attention(tiny: NetworkConfig) -> AttentionModel:
+    """Return a small attention model with the same fresh weights every time."""
+    torch.manual_seed(0)
+    return AttentionModel.from_config(tiny).eval()

@@ -1,0 +1,257 @@
+"""Real nodes as processes, on a private domain of this machine, and a bench that talks to them."""
+
+from collections.abc import Callable, Iterator
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+from active_recon.cameras import CANONICAL_ELEVATION, orbit_camera
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import camera_to_msgs
+from msg_tools.diagnostics import counts_from_msg
+from msg_tools.images import image_to_msg
+from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
+import numpy as np
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+import trimesh
+
+ROOT = Path(__file__).parents[2]
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM = QoSProfile(depth=100)
+BUDGET_S = 30.0  # for what takes a second on an idle machine
+_PIXELS = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
+
+
+class NodeProcess:
+    """A node in a process of its own, its log in a file."""
+
+    def __init__(self, name: str, parameters: dict[str, Any], folder: Path) -> None:
+        arguments = [f'{key}:={value}' for key, value in parameters.items()]
+        command = [sys.executable, '-m', f'active_recon.nodes.{name}', '--ros-args']
+        for argument in arguments:
+            command += ['-p', argument]
+        folder.mkdir(parents=True, exist_ok=True)
+        self._log_path = folder / f'{name}.log'
+        with self._log_path.open('w') as log:
+            self._process = subprocess.Popen(
+                command, cwd=folder, stdout=log, stderr=subprocess.STDOUT,
+                env={**os.environ, 'PYTHONPATH': str(ROOT)})
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        return self._process.poll() is None
+
+    def log(self, pattern: str = '.') -> list[str]:
+        """Return the log's lines in which the pattern is found."""
+        return [line for line in self._log_path.read_text().splitlines()
+                if re.search(pattern, line)]
+
+    def wait_ready(self) -> None:
+        """Wait until the node says that it is ready."""
+        deadline = time.monotonic() + BUDGET_S
+        while not self.log(r'\]: ready$'):
+            code = self.wait(0.02)
+            assert code is None, f'ended with {code} before it was ready: {self.log()}'
+            assert time.monotonic() < deadline, f'not ready in {BUDGET_S} s: {self.log()}'
+
+    def wait(self, timeout_s: float = BUDGET_S) -> int | None:
+        """Return the exit code, None if it still runs after that time."""
+        try:
+            return self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def ask_to_stop(self, how: signal.Signals = signal.SIGINT) -> None:
+        """Send the signal, unless the node has ended."""
+        if self.running:
+            self._process.send_signal(how)
+
+    def stop(self, how: signal.Signals = signal.SIGINT) -> int | None:
+        """Ask the node to stop; return its exit code, None if it had to be killed."""
+        self.ask_to_stop(how)
+        code = self.wait()
+        if code is None:
+            self._process.kill()
+            self._process.wait()
+        return code
+
+
+class Bench:
+    """The test's own node: it publishes, hears, calls, and waits for what it awaits."""
+
+    def __init__(self) -> None:
+        self.node = rclpy.create_node('bench')
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._counts: dict[str, dict[str, int]] = {}
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._on_counts, 10)
+
+    def _on_counts(self, msg: DiagnosticArray) -> None:
+        for status in msg.status:
+            self._counts[status.name] = counts_from_msg(msg, status.name)
+
+    def counts(self, name: str) -> dict[str, int]:
+        """Return the counters that a node published last."""
+        return self._counts.get(f'/{name}', {})
+
+    def hear(self, kind: type, topic: str, qos: QoSProfile = STREAM) -> list[Any]:
+        """Return a list that grows by what is heard."""
+        heard: list[Any] = []
+        self.node.create_subscription(kind, topic, heard.append, qos)
+        return heard
+
+    def advertise(self, kind: type, topic: str, qos: QoSProfile = STREAM) -> Any:
+        """Return a publisher that somebody is about to hear."""
+        publisher = self.node.create_publisher(kind, topic, qos)
+        self.until(lambda: publisher.get_subscription_count() > 0, f'a listener on {topic}')
+        return publisher
+
+    def until(self, condition: Callable[[], Any], what: str, budget_s: float = BUDGET_S) -> Any:
+        """Spin until the condition holds; return what it returned."""
+        deadline = time.monotonic() + budget_s
+        while not (value := condition()):
+            assert time.monotonic() < deadline, f'waited {budget_s} s in vain for {what}'
+            self._executor.spin_once(timeout_sec=0.02)
+        return value
+
+    def call(self, service: str) -> Trigger.Response:
+        """Call a Trigger service and return its answer."""
+        client = self.node.create_client(Trigger, service)
+        self.until(client.service_is_ready, f'the service {service}')
+        answer = client.call_async(Trigger.Request())
+        self.until(answer.done, f'an answer of {service}')
+        self.node.destroy_client(client)
+        return answer.result()
+
+    def now(self) -> int:
+        """Return the time in nanoseconds."""
+        return self.node.get_clock().now().nanoseconds
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+
+@pytest.fixture(scope='session')
+def ros_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """Return a domain that no other session uses, heard on this machine only."""
+    domain = 1 + os.getpid() % 100
+    patch = pytest.MonkeyPatch()
+    patch.setenv('ROS_DOMAIN_ID', str(domain))
+    patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('ros_log')))
+    patch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE',
+                 str(ROOT / 'active_recon' / 'nodes' / 'fastdds_local.xml'))
+    patch.setenv('OMP_NUM_THREADS', '1')
+    yield domain
+    patch.undo()
+
+
+@pytest.fixture(scope='session')
+def ros(ros_domain: int) -> Iterator[None]:
+    rclpy.init()
+    yield
+    rclpy.try_shutdown()
+
+
+class FakeCamera:
+    """A camera in the bench's hand, whose messages can be spoilt one by one."""
+
+    def __init__(self, bench: Bench, qos: QoSProfile = STREAM) -> None:
+        self._bench = bench
+        self._publishers = [bench.advertise(kind, f'camera/{topic}', qos) for kind, topic in (
+            (PoseStamped, 'pose'), (CameraInfo, 'camera_info'), (Image, 'image_raw'))]
+        self.occupancy = bench.hear(PointCloud2, 'occupancy')
+        bench.until(lambda: bench.node.count_publishers('occupancy'), 'a publisher of occupancy')
+
+    def messages(self, stamp: int | None = None, azimuth: float = 0.5,
+                 elevation: float = CANONICAL_ELEVATION
+                 ) -> tuple[Image, CameraInfo, PoseStamped]:
+        """Return a good view, of now if no stamp in nanoseconds is given."""
+        at = stamp_from_nanoseconds(self._bench.now() if stamp is None else stamp)
+        header = Header(stamp=at, frame_id='camera')
+        info, pose = camera_to_msgs(orbit_camera(azimuth, elevation), header)
+        return image_to_msg(_PIXELS, header), info, pose
+
+    def send(self, image: Image | None = None, info: CameraInfo | None = None,
+             pose: PoseStamped | None = None) -> None:
+        for publisher, msg in zip(self._publishers, (pose, info, image), strict=True):
+            if msg is not None:
+                publisher.publish(msg)
+
+    def show(self) -> int:
+        """Send a good view and wait for its occupancy; return its stamp."""
+        image, info, pose = self.messages()
+        self.send(image, info, pose)
+        self._bench.until(
+            lambda: any(msg.header.stamp == image.header.stamp for msg in self.occupancy),
+            'the occupancy after a good view')
+        return nanoseconds_from_stamp(image.header.stamp)
+
+
+def _started(folder: Path) -> Iterator[Callable[..., NodeProcess]]:
+    processes: list[NodeProcess] = []
+
+    def start(name: str, ready: bool = True, **parameters: Any) -> NodeProcess:
+        process = NodeProcess(name, parameters, folder / str(len(processes)))
+        processes.append(process)
+        if ready:
+            process.wait_ready()
+        return process
+
+    yield start
+    for process in processes:
+        process.ask_to_stop()
+    for process in processes:
+        process.stop()
+
+
+@pytest.fixture
+def start_node(ros_domain: int, tmp_path: Path) -> Iterator[Callable[..., NodeProcess]]:
+    """Start a node by its name, for one test; `ready=False` does not wait for it."""
+    yield from _started(tmp_path)
+
+
+@pytest.fixture(scope='module')
+def start_shared_node(ros_domain: int, tmp_path_factory: pytest.TempPathFactory
+                      ) -> Iterator[Callable[..., NodeProcess]]:
+    """Start a node by its name, for all tests of a module."""
+    yield from _started(tmp_path_factory.mktemp('nodes'))
+
+
+@pytest.fixture(scope='session')
+def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the smallest mesh that can be shown."""
+    path = tmp_path_factory.mktemp('mesh') / 'box.ply'
+    trimesh.creation.box((1, 0.6, 0.4)).export(path)
+    return path
+
+
+@pytest.fixture
+def bench(ros: None) -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.close()
+
+
+@pytest.fixture(scope='module')
+def shared_bench(ros: None) -> Iterator[Bench]:
+    bench = Bench()
+    yield bench
+    bench.close()

@@ -1,0 +1,169 @@
+"""What the reconstructor and the turntable refuse, over real DDS: said, counted, and survived."""
+
+from array import array
+import math
+import re
+
+from conftest import FakeCamera
+from geometry_msgs.msg import PoseStamped
+import numpy as np
+import pytest
+from sensor_msgs.msg import JointState
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture(scope='module')
+def reconstructor(start_shared_node):
+    return start_shared_node('reconstructor', take_views='all')
+
+
+@pytest.fixture(scope='module')
+def listening_camera(shared_bench, reconstructor):
+    return FakeCamera(shared_bench)
+
+
+@pytest.fixture
+def camera(shared_bench, listening_camera):
+    assert shared_bench.call('start_episode').success
+    listening_camera.show()
+    return listening_camera
+
+
+def image_of_no_size(camera):
+    image, info, pose = camera.messages()
+    image.height = image.width = 0
+    camera.send(image, info, pose)
+
+
+def image_of_unknown_encoding(camera):
+    image, info, pose = camera.messages()
+    image.encoding = 'yuv9'
+    camera.send(image, info, pose)
+
+
+def image_of_too_few_bytes(camera):
+    image, info, pose = camera.messages()
+    image.data = image.data[:1000]
+    camera.send(image, info, pose)
+
+
+def image_of_nan(camera):
+    image, info, pose = camera.messages()
+    pixels = np.full((137, 137, 3), np.nan, np.float32)
+    image.encoding, image.step, image.data = '32FC3', 12 * 137, array('B', pixels.tobytes())
+    camera.send(image, info, pose)
+
+
+def image_with_no_pose(camera):
+    image, info, _ = camera.messages()
+    camera.send(image, info)
+
+
+def image_with_no_camera_info(camera):
+    image, _, pose = camera.messages()
+    camera.send(image, pose=pose)
+
+
+def pose_in_another_frame(camera):
+    _, _, pose = camera.messages()
+    pose.header.frame_id = 'map'
+    camera.send(pose=pose)
+
+
+def pose_with_a_zero_quaternion(camera):
+    _, _, pose = camera.messages()
+    turn = pose.pose.orientation
+    turn.x = turn.y = turn.z = turn.w = 0.0
+    camera.send(pose=pose)
+
+
+def pose_of_nan(camera):
+    _, _, pose = camera.messages()
+    pose.pose.position.x = math.nan
+    camera.send(pose=pose)
+
+
+def camera_info_of_another_size(camera):
+    image, info, pose = camera.messages()
+    info.width, info.height = 640, 480
+    camera.send(image, info, pose)
+
+
+def image_that_arrives_twice(camera):
+    camera.send(camera.messages(camera.show())[0])
+
+
+def image_older_than_the_last(camera):
+    camera.send(camera.messages(camera.show() - 1)[0])
+
+
+def image_of_the_last_episode(camera):
+    camera.send(*camera.messages(10**9))
+
+
+@pytest.mark.parametrize(('spoil', 'kind', 'said'), [
+    (image_of_no_size, 'image_size', 'height and a width above 0, got 0 x 0'),
+    (image_of_unknown_encoding, 'encoding', "encoded as one of rgb8.*, got 'yuv9'"),
+    (image_of_too_few_bytes, 'image_bytes', 'expected 56307 bytes.*, got 1000'),
+    (image_of_nan, 'image_values', r'expected values of 32FC3 in \[0, 1\], got nan'),
+    (image_with_no_pose, 'no_pose', "expected a pose of the image's stamp.*the nearest is"),
+    (image_with_no_camera_info, 'no_camera_info', "camera info of the image's stamp.*the last is"),
+    (pose_in_another_frame, 'frame', "expected.*frame 'object', got 'map'"),
+    (pose_with_a_zero_quaternion, 'quaternion', r'expected a unit quaternion.*got \[0.0'),
+    (pose_of_nan, 'pose', r'expected a finite camera pose, got position \[nan'),
+    (camera_info_of_another_size, 'camera_info', "image's size, 137 x 137, got 480 x 640"),
+    (image_that_arrives_twice, 'duplicate', 'expected each image once, got that of'),
+    (image_older_than_the_last, 'out_of_order', 'expected images in the order.*got .* after'),
+    (image_of_the_last_episode, 'last_episode', 'expected an image of this episode.*got one of'),
+], ids=lambda value: value.__name__ if callable(value) else '')
+def test_bad_input_is_said_once_counted_and_survived(
+        reconstructor, shared_bench, camera, spoil, kind, said):
+    said_before = len(reconstructor.log('WARN|ERROR|Traceback'))
+    spoil(camera)
+    shared_bench.until(
+        lambda: shared_bench.counts('reconstructor').get(f'refused/{kind}') == 1,
+        f'refused/{kind} to be counted once')
+    line, = reconstructor.log('WARN|ERROR|Traceback')[said_before:]
+    assert re.search(f'refused: .*{said}', line)
+    camera.show()
+
+
+@pytest.fixture
+def turntable(start_node, box):
+    return start_node('turntable_camera', mesh=box, time_scale=100.0)
+
+
+@pytest.fixture
+def ask(bench, turntable):
+    """Return what asks the turntable for an azimuth; it is known to listen."""
+    goals = bench.advertise(JointState, 'next_azimuth')
+
+    def heard():
+        goals.publish(JointState(position=[0.0]))
+        return bench.counts('turntable_camera').get('goals')
+
+    bench.until(heard, 'the turntable to hear a goal')
+    return lambda *azimuths: goals.publish(JointState(position=azimuths))
+
+
+def test_a_stream_of_bad_input_is_no_stream_of_lines(bench, turntable, ask):
+    for _ in range(50):
+        ask(1.0, 2.0)
+        bench.until(lambda: True, 'one turn of the executor')
+    bench.until(lambda: bench.counts('turntable_camera').get('refused/goal', 0) >= 5,
+                'the goals to be refused')
+    assert len(turntable.log('refused')) == 1
+
+
+@pytest.mark.parametrize('azimuth', [math.nan, math.inf, -math.inf])
+def test_a_goal_that_is_not_finite_is_said_once_counted_and_survived(
+        bench, turntable, ask, azimuth):
+    poses = bench.hear(PoseStamped, 'camera/pose')
+    ask(azimuth)
+    bench.until(lambda: bench.counts('turntable_camera').get('refused/goal') == 1,
+                'the goal to be refused')
+    line, = turntable.log('WARN|ERROR|Traceback')
+    assert f'expected an azimuth goal that is finite, got {azimuth}' in line
+    ask(math.pi)
+    bench.until(lambda: poses and poses[-1].pose.position.x < -1, 'the camera on the other side')

@@ -1,0 +1,230 @@
+"""The demo itself: from the command to the bag, the mesh and the picture, and when it is cut."""
+
+import math
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import time
+
+from active_recon.meshes import load_mesh
+from active_recon.objects import find_object
+from active_recon.voxelise import voxelise
+from active_recon.voxels import grid_from_points, iou
+import cv2
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+import trimesh
+
+pytestmark = pytest.mark.ros
+ROOT = Path(__file__).parents[2]
+BUDGET_S = 60.0
+VIEWS = 3
+
+
+class DemoProcess:
+    """The demo in a process of its own."""
+
+    def __init__(self, folder, *options):
+        self.bags = folder / 'bags'
+        command = [sys.executable, '-m', 'active_recon.cli.main', 'demo',
+                   '--output-dir', str(self.bags), *options]
+        self._process = subprocess.Popen(
+            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env={**os.environ, 'PYTHONPATH': str(ROOT), 'OMP_NUM_THREADS': '1',
+                 'COLUMNS': '120', 'PYTHONUNBUFFERED': '1', 'TMPDIR': str(folder)})
+
+    def until(self, condition, what):
+        deadline = time.monotonic() + BUDGET_S
+        while not (value := condition()):
+            assert time.monotonic() < deadline, f'waited {BUDGET_S} s in vain for {what}'
+            if self._process.poll() is not None:
+                pytest.fail(f'ended before {what}: {self.end()}')
+            os.sched_yield()
+        return value
+
+    def interrupt(self, how=signal.SIGINT):
+        self._process.send_signal(how)
+
+    def end(self):
+        """Wait for the end; return the exit code and what was said."""
+        out, err = self._process.communicate(timeout=BUDGET_S)
+        return self._process.returncode, out, err
+
+    def nodes(self):
+        """Return the process ids of the nodes by their names, orphans too."""
+        found = {}
+        for folder in Path('/proc').glob('[0-9]*'):
+            try:
+                words = (folder / 'cmdline').read_text().split('\0')
+                ours = f'TMPDIR={self.bags.parent}' in (folder / 'environ').read_text()
+            except OSError:  # it has ended meanwhile
+                continue
+            module = next((word for word in words if word.startswith('active_recon.nodes.')), '')
+            if module and ours:
+                found[module.rpartition('.')[2]] = int(folder.name)
+        return found
+
+    def recording(self):
+        """Return the bag's file, None before it is there."""
+        return next(self.bags.glob('*/*.mcap'), None)
+
+
+@pytest.fixture
+def start_demo(tmp_path):
+    demos = []
+
+    def start(*options):
+        demos.append(DemoProcess(tmp_path, *options))
+        return demos[-1]
+
+    yield start
+    for demo in demos:
+        demo.interrupt()
+        demo.end()
+
+
+@pytest.fixture(scope='module')
+def finished(tmp_path_factory):
+    """One whole run: its folder, what it said, and the seconds it took."""
+    began = time.monotonic()
+    demo = DemoProcess(tmp_path_factory.mktemp('demo'), '--views', str(VIEWS))
+    code, out, err = demo.end()
+    assert code == 0, out + err
+    (folder,) = demo.bags.iterdir()
+    return folder, out, time.monotonic() - began
+
+
+@pytest.fixture(scope='module')
+def messages(finished):
+    """What the bag holds: each topic's messages."""
+    folder, _, _ = finished
+    topics = {}
+    with AnyReader([folder]) as reader:
+        for connection, _, data in reader.messages():
+            topics.setdefault(connection.topic, []).append(
+                reader.deserialize(data, connection.msgtype))
+    return topics
+
+
+def rows(out):
+    """Return view, azimuth, entropy, IoU and milliseconds as the table says them."""
+    cells = [re.findall(r'[\d.]+', line) for line in out.splitlines() if line.startswith('│')]
+    return [tuple(map(float, row)) for row in cells]
+
+
+def stamp(msg):
+    return msg.header.stamp.sec * 1_000_000_000 + msg.header.stamp.nanosec
+
+
+def test_demo_leaves_a_bag_a_mesh_and_a_picture_within_a_minute(finished):
+    folder, out, seconds = finished
+    assert seconds < 60
+    assert {path.name for path in folder.iterdir()} == {
+        f'{folder.name}.mcap', 'metadata.yaml', 'chair.ply', 'run.png'}
+    assert len(trimesh.load(folder / 'chair.ply').faces) > 0
+    assert min(cv2.imread(str(folder / 'run.png')).shape[:2]) > 500
+    assert str(folder) in out.replace('\n', '')
+
+
+def test_demo_tells_of_each_view_what_the_bag_holds(finished, messages):
+    told = rows(finished[1])
+    truth = voxelise(load_mesh(find_object('chair'))).occupied(0.5)
+    assert [row[0] for row in told] == list(range(1, VIEWS + 1))
+    for row, view, occupancy in zip(told, messages['/view'], messages['/occupancy'], strict=True):
+        position = view.pose.position
+        azimuth = math.degrees(math.atan2(position.y, position.x)) % 360
+        points = np.frombuffer(occupancy.data.tobytes(), np.float32).reshape(-1, 4)
+        assert stamp(view) == stamp(occupancy)
+        assert abs((row[1] - azimuth + 180) % 360 - 180) <= 0.51
+        assert row[3] == pytest.approx(
+            iou(grid_from_points(points).occupied(0), truth), abs=6e-4)
+        assert 0 < row[4] < 60_000
+
+
+def test_every_view_is_an_image_that_the_camera_took(messages):
+    images = {stamp(image) for image in messages['/camera/image_raw']}
+    assert {stamp(view) for view in messages['/view']} <= images
+
+
+def test_the_whole_loop_is_in_the_bag(messages):
+    assert {'/camera/image_raw', '/camera/camera_info', '/camera/pose', '/view', '/occupancy',
+            '/probabilities', '/latent', '/entropy', '/episode', '/next_view', '/next_azimuth',
+            '/azimuth_scores', '/done', '/diagnostics'} == set(messages)
+    assert messages['/done'][-1].frame_id == 'max_views'
+    refused = {value.key for msg in messages['/diagnostics'] for status in msg.status
+               for value in status.values if value.key.startswith('refused')}
+    assert not refused
+
+
+def test_mcap_ros2_decodes_every_message(finished, messages):
+    folder, _, _ = finished
+    with (folder / f'{folder.name}.mcap').open('rb') as stream:
+        decoded = list(make_reader(
+            stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
+    assert len(decoded) == sum(map(len, messages.values()))
+
+
+def nothing_yet(demo):
+    return True
+
+
+def a_recorder(demo):
+    return demo.recording()
+
+
+def a_streaming_camera(demo):
+    return demo.recording() and demo.recording().stat().st_size > 20_000
+
+
+@pytest.mark.parametrize(('moment', 'how'), [
+    (nothing_yet, signal.SIGTERM), (a_recorder, signal.SIGINT),
+    (a_streaming_camera, signal.SIGINT), (a_streaming_camera, signal.SIGTERM)])
+def test_interrupted_demo_ends_its_nodes_and_closes_the_bag(start_demo, moment, how):
+    demo = start_demo('--policy', 'farthest', '--views', '24')
+    demo.until(lambda: demo.nodes(), 'the first node')
+    demo.until(lambda: moment(demo), moment.__name__)
+    demo.interrupt(how)
+    code, out, err = demo.end()
+    assert code == 130, out + err
+    assert 'Traceback' not in err
+    assert not demo.nodes()
+    for folder in demo.bags.glob('*'):
+        with AnyReader([folder]) as reader:
+            assert reader.message_count == len(list(reader.messages()))
+
+
+def test_a_node_that_dies_is_told_with_its_last_words(start_demo):
+    demo = start_demo('--policy', 'farthest', '--views', '24')
+    nodes = demo.until(lambda: len(found := demo.nodes()) == 4 and found, 'the four nodes')
+    demo.until(lambda: a_streaming_camera(demo), 'the camera')
+    os.kill(nodes['turntable_camera'], signal.SIGKILL)
+    code, _, err = demo.end()
+    assert code == 2
+    assert 'turntable_camera ended with code -9' in err
+    assert '[turntable_camera]: ready' in err
+    assert 'Traceback' not in err
+    assert not demo.nodes()
+
+
+@pytest.mark.parametrize(('name', 'said'), [
+    ('teapot', 'teapot: expected one of bed, car, chair, sofa, table or the path of a mesh'),
+    (__file__, 'expected a mesh that trimesh reads'),
+])
+def test_what_is_no_object_is_refused_in_one_line(start_demo, name, said):
+    code, out, err = start_demo('--object', name).end()
+    assert (code, out) == (2, '')
+    assert said in err
+    assert 'Traceback' not in err
+
+
+def test_help_needs_neither_ros_nor_torch():
+    code = ('import sys, active_recon.cli.main; '
+            'sys.exit(bool({"torch", "rclpy", "cv2", "trimesh"} & set(sys.modules)))')
+    assert subprocess.run([sys.executable, '-c', code], timeout=BUDGET_S,
+                          env={**os.environ, 'PYTHONPATH': str(ROOT)}).returncode == 0

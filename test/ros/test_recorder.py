@@ -1,0 +1,211 @@
+"""The recorder over real DDS: it writes what passed, byte for byte, also when things go wrong."""
+
+from contextlib import suppress
+from pathlib import Path
+import resource
+import signal
+
+from geometry_msgs.msg import PoseStamped
+from mcap.exceptions import EndOfFile
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+import numpy as np
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header, String
+
+pytestmark = pytest.mark.ros
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM = QoSProfile(depth=100)
+BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def poses(count):
+    """Return poses as CDR bytes: made once, because what pads them differs each time.
+
+    All that is sent here is a multiple of 4 bytes long: DDS fills up what is not.
+    """
+    msgs = [PoseStamped(header=Header(frame_id='object')) for _ in range(count)]
+    for number, msg in enumerate(msgs):
+        msg.header.stamp.sec, msg.pose.position.x = number, number / 7
+    return [serialize_message(msg) for msg in msgs]
+
+
+def publish(bench, kind, topic, qos, msgs=()):
+    """Return a publisher that the recorder hears, once it has said the messages (CDR bytes)."""
+    publisher = bench.node.create_publisher(kind, topic, qos)
+    bench.until(publisher.get_subscription_count, f'the recorder on {topic}')
+    for msg in msgs:
+        publisher.publish(msg)
+    return publisher
+
+
+def recorded(bench, count):
+    """Wait until the recorder has taken in as many messages as that."""
+    bench.until(lambda: bench.counts('recorder').get('messages', 0) >= count,
+                f'{count} messages, of which came {bench.counts("recorder")}')
+
+
+def bags(folder):
+    return sorted(path.parent for path in Path(folder).glob('*/metadata.yaml'))
+
+
+def read(path):
+    """Return each topic's messages as CDR bytes, read by rosbags."""
+    topics: dict[str, list[bytes]] = {}
+    with AnyReader([path]) as reader:
+        for connection, _, data in reader.messages():
+            topics.setdefault(connection.topic, []).append(bytes(data))
+    return topics
+
+
+@pytest.fixture
+def recorder(start_node, tmp_path):
+    return start_node('recorder', output_dir=tmp_path / 'bags', topics="['episode', 'view']")
+
+
+def test_what_passes_is_recorded_byte_for_byte_with_its_times(bench, recorder, tmp_path):
+    sent = poses(50)
+    before = bench.now()
+    publish(bench, PoseStamped, 'view', BEST_EFFORT, sent)
+    recorded(bench, 50)
+    assert bench.call('stop').success
+    (bag,) = bags(tmp_path / 'bags')
+    assert read(bag) == {'/view': sent}
+    with (bag / f'{bag.name}.mcap').open('rb') as stream:
+        times = [(record.publish_time, record.log_time)
+                 for record in StreamReader(stream).records if isinstance(record, Message)]
+    assert all(before <= published <= received <= bench.now() for published, received in times)
+
+
+def test_latched_messages_from_before_the_recording_begin_every_bag(bench, start_node, tmp_path):
+    episode = serialize_message(Header(frame_id='one'))
+    bench.node.create_publisher(Header, 'episode', LATCHED).publish(episode)
+    start_node('recorder', output_dir=tmp_path / 'bags', topics="['episode']")
+    recorded(bench, 1)
+    assert bench.call('stop').success
+    assert bench.call('start').success
+    recorded(bench, 2)
+    assert bench.call('stop').success
+    first, second = bags(tmp_path / 'bags')
+    assert read(first) == read(second) == {'/episode': [episode]}
+    with AnyReader([first]) as reader:
+        (profile,) = reader.connections[0].ext.offered_qos_profiles
+    assert (profile.durability.name, profile.reliability.name) == ('TRANSIENT_LOCAL', 'RELIABLE')
+
+
+def test_publishers_that_offer_less_than_those_before_are_heard_too(bench, recorder, tmp_path):
+    publish(bench, PoseStamped, 'view', STREAM, poses(1))
+    recorded(bench, 1)
+    second = publish(bench, PoseStamped, 'view', BEST_EFFORT)
+    second.publish(*poses(1))
+    recorded(bench, 2)
+
+
+def test_a_user_may_name_topics_of_any_installed_type(bench, start_node, tmp_path):
+    start_node('recorder', output_dir=tmp_path / 'bags', topics="['chatter']")
+    goodbye = serialize_message(String(data='goodbye'))
+    publish(bench, String, 'chatter', STREAM, [goodbye])
+    recorded(bench, 1)
+    assert bench.call('stop').success
+    assert read(*bags(tmp_path / 'bags')) == {'/chatter': [goodbye]}
+
+
+def test_diagnostics_are_recorded_by_default_and_tell_the_state(bench, start_node, tmp_path):
+    start_node('recorder', output_dir=tmp_path / 'bags')
+    bench.until(lambda: bench.counts('recorder').get('recording') == 1, 'a recording')
+    recorded(bench, 1)
+    assert bench.call('stop').success
+    bench.until(lambda: bench.counts('recorder').get('recording') == 0, 'no recording')
+    with AnyReader(bags(tmp_path / 'bags')) as reader:
+        kinds = {connection.topic: connection.msgtype for connection in reader.connections}
+    assert kinds == {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
+
+
+def test_start_and_stop_out_of_turn_are_refused_and_say_why(bench, recorder):
+    answer = bench.call('start')
+    assert not answer.success and 'already recording into' in answer.message
+    assert bench.call('stop').success
+    answer = bench.call('stop')
+    assert not answer.success and 'there is none' in answer.message
+
+
+def test_a_recorder_told_to_wait_records_when_it_is_asked(bench, start_node, tmp_path):
+    start_node('recorder', output_dir=tmp_path / 'bags', record_at_start=False)
+    assert not (tmp_path / 'bags').exists()
+    answer = bench.call('start')
+    assert answer.success and Path(answer.message).is_dir()
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
+def test_a_recorder_that_is_stopped_completes_its_bag(bench, recorder, tmp_path, how):
+    publish(bench, PoseStamped, 'view', STREAM, poses(3))
+    recorded(bench, 3)
+    assert recorder.stop(how) == 0
+    assert len(read(*bags(tmp_path / 'bags'))['/view']) == 3
+
+
+def test_a_killed_recorder_leaves_what_it_had_on_the_disk(bench, recorder, tmp_path):
+    sent = poses(3)
+    publish(bench, PoseStamped, 'view', STREAM, sent)
+    recorded(bench, 3)
+    (path,) = (tmp_path / 'bags').glob('*/*.mcap')
+    bench.until(lambda: list(whole_messages(path)) == sent, 'the messages on the disk')
+    recorder.stop(signal.SIGKILL)
+    assert list(whole_messages(path)) == sent
+
+
+def whole_messages(path):
+    """Yield the messages of a file that ends where its writer was killed."""
+    with path.open('rb') as stream, suppress(EndOfFile):
+        for record in StreamReader(stream).records:
+            if isinstance(record, Message):
+                yield record.data
+
+
+def test_a_full_disk_stops_the_recording_and_not_the_node(bench, start_node, tmp_path):
+    recorder = start_node('recorder', output_dir=tmp_path / 'bags', topics="['camera/image_raw']")
+    # For one process, files that may not grow are a full disk that needs no administrator.
+    resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (300_000, resource.RLIM_INFINITY))
+    image = serialize_message(
+        Image(height=100, width=300, step=900, encoding='rgb8', data=noise(90_000)))
+    publisher = publish(bench, Image, 'camera/image_raw', STREAM)
+    while not recorder.log('ERROR'):
+        publisher.publish(image)
+        heard = bench.counts('recorder').get('messages', 0)
+        bench.until(lambda heard=heard: recorder.log('ERROR') or (
+            bench.counts('recorder').get('messages', 0) > heard), 'the next message')
+    bench.until(lambda: bench.counts('recorder').get('refused/disk_full') == 1, 'its count')
+    assert bench.counts('recorder')['recording'] == 0
+    (line,) = recorder.log('ERROR')
+    assert 'recording stopped' in line and 'the disk took no more' in line
+    (bag,) = bags(tmp_path / 'bags')
+    left = read(bag)['/camera/image_raw']
+    assert left and set(left) == {image}
+
+    assert bench.call('start').success
+    bench.until(lambda: publisher.get_subscription_count(), 'the recorder to listen again')
+    heard = bench.counts('recorder')['messages']
+    publisher.publish(image)
+    recorded(bench, heard + 1)
+    assert bench.call('stop').success
+    assert read(bags(tmp_path / 'bags')[-1]) == {'/camera/image_raw': [image]}
+
+
+def noise(size):
+    """Return bytes that do not compress."""
+    return np.random.default_rng(0).integers(0, 256, size, np.uint8).tobytes()
+
+
+@pytest.mark.parametrize(('parameters', 'said'), [
+    ({'topics': '7'}, 'parameter topics: expected a list of names, got 7'),
+    ({'output_dir': '/proc/bags'}, 'expected to begin a new bag in /proc/bags'),
+])
+def test_what_cannot_be_recorded_is_refused_at_start(start_node, parameters, said):
+    recorder = start_node('recorder', ready=False, **parameters)
+    assert recorder.wait() == 1
+    assert len(recorder.log(said)) == 1
+    assert not recorder.log('Traceback')

@@ -1,0 +1,127 @@
+"""A node that cannot start says why in one line, with what was expected, and ends."""
+
+import math
+import re
+
+from active_recon.errors import ConfigError
+from active_recon.models.weights import SHIPPED
+from active_recon.nodes.parameters import declare
+import numpy as np
+import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from safetensors.numpy import save_file
+import trimesh
+
+pytestmark = pytest.mark.ros
+
+
+def refusal(start_node, name, **parameters):
+    """Return the one line with which the node gave up."""
+    node = start_node(name, ready=False, **parameters)
+    assert node.wait() == 1
+    line, = node.log()
+    assert '[FATAL]' in line
+    return line
+
+
+@pytest.mark.parametrize(('name', 'parameters', 'said'), [
+    ('turntable_camera', {'speed': 0.0}, 'speed: expected a number from 0.001 to 100, got 0.0'),
+    ('turntable_camera', {'rate': '.inf'}, 'rate: expected a number from 0.1 to 1000, got inf'),
+    ('turntable_camera', {}, 'mesh, dataset: expected one of them, got neither'),
+    ('view_planner', {'policy': 'guess'}, "policy: expected one of attention.*, got 'guess'"),
+    ('view_planner', {'policy': 'random', 'max_views': 0},
+     'max_views: expected an integer from 1 to 1000, got 0'),
+    ('reconstructor', {'object_size': -1}, 'object_size: expected a number.*, got -1'),
+    ('reconstructor', {'threshold': 1.5}, 'threshold: expected.*0.01 to 0.99, or nan, got 1.5'),
+])
+def test_a_parameter_out_of_range_is_refused_with_its_range(start_node, name, parameters, said):
+    assert re.search(f'parameters? {said}', refusal(start_node, name, **parameters))
+
+
+@pytest.mark.parametrize(('given', 'rule', 'said'), [
+    ('fast', {'default': 1.0, 'low': 0.0, 'high': 2.0}, "a number from 0 to 2, got 'fast'"),
+    (3, {'default': 1.0, 'low': 0.0, 'high': 2.0}, 'a number from 0 to 2, got 3.0'),
+    (math.nan, {'default': 1.0, 'low': 0.0, 'high': 2.0}, 'a number from 0 to 2, got nan'),
+    (math.inf, {'default': math.nan}, 'a number, or nan, got inf'),
+    (1.5, {'default': 1, 'low': 0, 'high': 2}, 'an integer from 0 to 2, got 1.5'),
+    (True, {'default': 1, 'low': 0, 'high': 2}, 'an integer from 0 to 2, got True'),
+    ('c', {'default': 'a', 'choices': ('a', 'b')}, "one of a, b, got 'c'"),
+    (1, {'default': True}, 'true or false, got 1')])
+def test_a_value_of_another_kind_or_out_of_range_is_refused(ros, given, rule, said):
+    node = Node('declares', parameter_overrides=[Parameter('it', value=given)])
+    try:
+        with pytest.raises(ConfigError, match=f'parameter it: expected {said}'):
+            declare(node, 'it', description='', **rule)
+    finally:
+        node.destroy_node()
+
+
+@pytest.mark.parametrize(('given', 'rule'), [
+    (2, {'default': 1.0, 'low': 0.0, 'high': 2.0}), (math.nan, {'default': math.nan}),
+    (0, {'default': 1, 'low': 0, 'high': 2}), ('b', {'default': 'a', 'choices': ('a', 'b')})])
+def test_the_ends_of_a_range_are_inside_and_an_integer_may_stand_for_a_number(ros, given, rule):
+    node = Node('declares', parameter_overrides=[Parameter('it', value=given)])
+    try:
+        value = declare(node, 'it', description='', **rule)
+    finally:
+        node.destroy_node()
+    assert type(value) is type(rule['default'])
+    assert value == given or math.isnan(given)
+
+
+def missing_weights(folder):
+    return folder / 'none.safetensors'
+
+
+def truncated_weights(folder):
+    path = folder / 'truncated.safetensors'
+    path.write_bytes(SHIPPED.read_bytes()[:100_000])
+    return path
+
+
+def weights_of_another_model(folder):
+    path = folder / 'other.safetensors'
+    save_file({'layer': np.zeros(3, np.float32)}, path, {'model': 'other'})
+    return path
+
+
+@pytest.mark.parametrize(('make', 'said'), [
+    (missing_weights, 'expected a weights file .*there is no such file'),
+    (truncated_weights, 'expected a whole safetensors file, got'),
+    (weights_of_another_model, 'expected weights of the model 2d3d-attention, got other')])
+def test_weights_that_cannot_be_used_are_refused(start_node, tmp_path, make, said):
+    assert re.search(said, refusal(start_node, 'reconstructor', weights=make(tmp_path)))
+
+
+def test_a_planner_without_its_weights_is_refused(start_node, tmp_path):
+    assert 'no such file' in refusal(start_node, 'view_planner', weights=missing_weights(tmp_path))
+
+
+def missing_mesh(folder):
+    return folder / 'none.ply'
+
+
+def empty_mesh(folder):
+    path = folder / 'empty.obj'
+    path.touch()
+    return path
+
+
+def mesh_without_faces(folder):
+    path = folder / 'points.ply'
+    trimesh.PointCloud(np.eye(3)).export(path)
+    return path
+
+
+def text(folder):
+    path = folder / 'text.stl'
+    path.write_text('this is no mesh')
+    return path
+
+
+@pytest.mark.parametrize('make', [missing_mesh, empty_mesh, mesh_without_faces, text])
+def test_a_mesh_that_cannot_be_shown_is_refused(start_node, tmp_path, make):
+    path = make(tmp_path)
+    assert re.search(f'{path}: expected (a mesh|faces)', refusal(
+        start_node, 'turntable_camera', mesh=path))

@@ -1,0 +1,120 @@
+"""Training batches: repeatable, varied, and true to the objects they show."""
+
+from active_recon.cameras import azimuth_difference
+from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.making import Job, make_dataset
+from active_recon.datasets.views import read_views
+from active_recon.training.batches import draw_batch
+from active_recon.voxels import iou
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+import trimesh
+
+
+def draw(views, seed=0, size=64, length=3):
+    return draw_batch(views, size, length, np.random.default_rng([seed, 5]))
+
+
+def sources(views, batch):
+    """Return for each image (T, B) the view it was drawn from, and whether it was mirrored."""
+    turned = azimuth_difference(batch.azimuths.numpy(), 0)
+    index, mirrored = [], []
+    for b, item in enumerate(batch.objects):
+        straight = batch.voxels[b].bool().equal(views.voxels[item])
+        flipped = batch.voxels[b].bool().equal(views.voxels[item].flip(1))
+        assert straight or flipped
+        sign = -1 if (batch.azimuths[:, b] < 0).any() or not straight else 1
+        mirrored.append(sign < 0)
+        own = views.azimuths[item].numpy()
+        index.append([np.abs(azimuth_difference(own, sign * at)).argmin() for at in turned[:, b]])
+    return np.array(index).T, np.array(mirrored)
+
+
+def test_the_same_seed_and_step_draw_the_same_batch(views):
+    first, again, other = draw(views), draw(views), draw(views, seed=1)
+    for name in ('images', 'azimuths', 'voxels', 'objects'):
+        assert_close(getattr(again, name), getattr(first, name), rtol=0, atol=0)
+    assert (other.images != first.images).any()
+
+
+def test_shapes_and_ranges_are_those_of_the_network(views):
+    batch = draw(views, size=5, length=4)
+    assert batch.images.shape == (4, 5, 3, 64, 64)
+    assert batch.azimuths.shape == (4, 5)
+    assert batch.voxels.shape == (5, 32, 32, 32)
+    assert 0 <= batch.images.min() <= batch.images.max() <= 1
+    assert set(batch.voxels.unique().tolist()) == {0.0, 1.0}
+
+
+def test_the_views_of_a_sequence_differ(views):
+    chosen, _ = sources(views, draw(views, length=24))
+    assert (np.sort(chosen, axis=0) == np.arange(24)[:, None]).all()
+
+
+def test_every_object_is_drawn_and_half_of_the_sequences_are_mirrored(views):
+    batch = draw(views, size=400)
+    _, mirrored = sources(views, batch)
+    assert set(batch.objects.tolist()) == set(range(6))
+    assert 0.4 < mirrored.mean() < 0.6
+
+
+def test_each_image_shows_its_object_from_its_azimuth(views):
+    batch = draw(views, size=32)
+    chosen, mirrored = sources(views, batch)
+    for t, row in enumerate(chosen):
+        alpha = views.images[batch.objects, torch.from_numpy(row), :, :, 3]
+        for b, flip in enumerate(mirrored):
+            image = batch.images[t, b]
+            outline = alpha[b].flip(-1) if flip else alpha[b]
+            background = image[:, outline == 0]
+            assert (background == background[:, :1]).all()  # one plain colour
+            assert (image[:, outline > 200] != background[:, :1]).any()
+
+
+def test_half_of_the_sequences_stand_on_white(views):
+    corners = draw(views, size=400).images[0, :, :, 0, 0]
+    # Gains of 0.8 to 1.2 dim white to 0.8 at most; a random colour is seldom as bright
+    assert 0.45 < (corners.min(dim=1).values >= 0.8).float().mean() < 0.6
+
+
+def test_the_background_is_the_same_in_all_views_of_a_sequence(views):
+    corners = draw(views).images[:, :, :, 0, 0]
+    assert_close(corners, corners[:1].expand_as(corners))
+
+
+@pytest.fixture(scope='module')
+def lopsided(tmp_path_factory):
+    """Return a set of an object that no mirror maps onto itself, and of its mirror in y = 0."""
+    boxes = [((1, 0.2, 0.2), (0, 0, -0.4)), ((0.2, 0.6, 0.2), (0.4, 0.2, -0.4)),
+             ((0.2, 0.2, 0.9), (-0.1, -0.3, 0.05))]
+    mesh = trimesh.util.concatenate([
+        trimesh.creation.box(extents, trimesh.transformations.translation_matrix(at))
+        for extents, at in boxes])
+    mirrored = mesh.copy()
+    mirrored.apply_transform(np.diag([1.0, -1.0, 1.0, 1.0]))
+    out = tmp_path_factory.mktemp('lopsided')
+    jobs = [Job(ObjectFolder(out, 'box', name), lambda made=made: made)
+            for name, made in (('straight', mesh), ('mirrored', mirrored))]
+    assert not any(outcome.refusal for outcome in make_dataset(jobs, samples=2))
+    return tuple(read_views([job.folder]) for job in jobs)
+
+
+def test_a_mirrored_sequence_is_the_mirrored_object_seen_from_the_mirrored_azimuths(lopsided):
+    straight, mirrored = lopsided
+    batch = draw(straight, size=16, length=4)
+    cells = mirrored.voxels[0].float()
+    flipped = (batch.voxels - cells).abs().mean((1, 2, 3)) < 0.005
+    assert 0 < flipped.sum() < 16  # both occur, and differ
+    for b in range(16):
+        shown = mirrored if flipped[b] else straight
+        for t in range(4):
+            away = azimuth_difference(shown.azimuths[0].numpy(), batch.azimuths[t, b].item())
+            nearest = np.abs(away).argmin()
+            assert abs(away[nearest]) < 1e-5
+            outline = shown.images[0, nearest, :, :, 3] > 10
+            background = batch.images[t, b][:, :1, :1]
+            found = (batch.images[t, b] - background).abs().amax(dim=0) > 0.02
+            assert iou(found, outline, (0, 1)) > 0.85
+            assert iou(found.flip(1), outline, (0, 1)) < iou(found, outline, (0, 1))

@@ -1,0 +1,151 @@
+"""`active-recon render` and `active-recon dataset`, as they are typed."""
+
+import subprocess
+import sys
+
+from active_recon.cli.main import app
+from active_recon.datasets.layout import list_objects
+from active_recon.errors import ConfigError, DataError
+from active_recon.shapes import CATEGORIES, generators_hash
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+ONE_WORKER = ('--workers', '1', '--samples', '1')
+
+
+def run(*arguments):
+    """Run the command in this process; what the package refuses is raised."""
+    result = CliRunner().invoke(app, list(map(str, arguments)))
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+@pytest.fixture
+def meshes(tmp_path):
+    for category, size in (('chair', (1, 1, 2)), ('table', (2, 2, 1))):
+        folder = tmp_path / 'meshes' / category
+        folder.mkdir(parents=True)
+        trimesh.creation.box(size).export(folder / 'box.ply')
+    return tmp_path / 'meshes'
+
+
+def test_render_makes_every_mesh_and_says_how_many(meshes, tmp_path):
+    result = run('render', meshes, tmp_path / 'out', *ONE_WORKER)
+    assert result.exit_code == 0
+    assert '2 objects of 2 are there' in result.stdout
+    objects = list_objects(tmp_path / 'out')
+    assert [(folder.category, folder.complete) for folder in objects] == [
+        ('chair', True), ('table', True)]
+
+
+def test_render_lists_what_was_refused_and_why_and_goes_on(meshes, tmp_path):
+    (meshes / 'chair' / 'bad.obj').write_text('no mesh')
+    result = run('render', meshes, tmp_path / 'out', *ONE_WORKER)
+    assert result.exit_code == 0
+    assert '2 objects of 3 are there' in result.stdout
+    assert 'refused: chair/bad: ' in result.stderr
+    assert 'bad.obj: expected a mesh' in result.stderr
+
+
+def test_render_fails_where_nothing_could_be_read(tmp_path):
+    (tmp_path / 'bad.obj').write_text('no mesh')
+    result = run('render', tmp_path / 'bad.obj', tmp_path / 'out', *ONE_WORKER)
+    assert result.exit_code == 2
+    assert '0 objects of 1 are there' in result.stdout
+
+
+def test_render_does_not_make_again_what_is_there(meshes, tmp_path):
+    run('render', meshes, tmp_path / 'out', *ONE_WORKER)
+    written = {path: path.stat().st_mtime_ns for path in (tmp_path / 'out').rglob('*.*')}
+    trimesh.creation.box((1, 2, 1)).export(meshes / 'chair' / 'new.ply')
+    assert '3 objects of 3' in run('render', meshes, tmp_path / 'out', *ONE_WORKER).stdout
+    assert all(path.stat().st_mtime_ns == time for path, time in written.items())
+
+
+def test_render_turns_files_by_their_axes(meshes, tmp_path):
+    run('render', meshes, tmp_path / 'out', '--up', 'x', '--front', 'z', *ONE_WORKER)
+    chair = list_objects(tmp_path / 'out')[0].voxels().occupied(0.5)
+    lengths = [int(chair.any(axis=axes).sum()) for axes in ((1, 2), (0, 2), (0, 1))]
+    assert lengths[0] == 32  # the long z of the file stands at x
+    assert max(lengths[1:]) <= 18
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--up', 'w'], "up: expected one of x, y, z .*got 'w'"),
+    (['--up', 'x'], 'different axes, got x and x; name both'),
+    (['--split', 'train'], 'expected a manifest')])
+def test_render_refuses_options_that_cannot_be_used(arguments, message, meshes, tmp_path):
+    with pytest.raises(ConfigError, match=message):
+        run('render', meshes, tmp_path / 'out', *arguments)
+
+
+def test_render_takes_the_rows_of_a_manifest_that_are_asked_for(meshes, tmp_path):
+    manifest = meshes / 'manifest.csv'
+    columns = 'category,file,split,source,licence,licence_evidence,front_axis,sha256'
+    manifest.write_text(f'{columns}\n'
+                        'chair,chair/box.ply,train,a,CC0,explicit for the models,+Z,ab\n'
+                        'table,table/box.ply,train,a,?,of the collection,+Z,cd\n'
+                        'table,table/box.ply,val,a,?,of the collection,+Z,cd\n')
+    asked = ('--split', 'train', '--explicit-licence')
+    result = run('render', manifest, tmp_path / 'out', *asked, *ONE_WORKER)
+    assert '1 objects of 1 are there' in result.stdout
+    assert [folder.category for folder in list_objects(tmp_path / 'out')] == ['chair']
+    with pytest.raises(DataError, match='expected objects to make'):
+        run('render', manifest, tmp_path / 'out', '--split', 'tests')
+    with pytest.raises(ConfigError, match='expected neither --up nor --front'):
+        run('render', manifest, tmp_path / 'out', '--up', 'y')
+
+
+def test_dataset_makes_three_splits_that_share_no_object(tmp_path):
+    counts = ('--train', 2, '--val', 1, '--test', 1)
+    result = run('dataset', tmp_path, *counts, '--category', 'lamp', *ONE_WORKER)
+    assert '4 objects of 4 are there' in result.stdout
+    names = {split: [folder.name for folder in list_objects(tmp_path / split)]
+             for split in ('train', 'val', 'test')}
+    assert [len(found) for found in names.values()] == [2, 1, 1]
+    assert len(set(sum(names.values(), []))) == 4
+    assert (tmp_path / 'generators.sha256').read_text().strip() == generators_hash()
+
+
+def test_dataset_makes_every_category_unless_told(tmp_path):
+    run('dataset', tmp_path, '--train', 0, '--val', 1, '--test', 0, *ONE_WORKER)
+    categories = tuple(folder.category for folder in list_objects(tmp_path / 'val'))
+    assert categories == CATEGORIES
+
+
+def test_dataset_does_not_go_on_with_objects_of_other_generators(tmp_path):
+    (tmp_path / 'generators.sha256').write_text('0123456789abcdef\n')
+    with pytest.raises(DataError, match='was made by others .*choose another folder'):
+        run('dataset', tmp_path, '--train', 1, '--val', 0, '--test', 0)
+
+
+def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp_path):
+    with pytest.raises(ConfigError, match="expected a category out of .*, got 'castle'"):
+        run('dataset', tmp_path, '--category', 'castle')
+    with pytest.raises(DataError, match='expected objects to make'):
+        run('dataset', tmp_path, '--train', 0, '--val', 0, '--test', 0)
+
+
+def command(*arguments):
+    return subprocess.run(
+        [sys.executable, '-m', 'active_recon.cli.main', *map(str, arguments)],
+        capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_two_processes_make_what_one_makes(meshes, tmp_path):
+    result = command('render', meshes, tmp_path / 'two', '--workers', 2, '--samples', 1)
+    assert result.returncode == 0, result.stderr
+    run('render', meshes, tmp_path / 'one', *ONE_WORKER)
+    files = sorted(path.relative_to(tmp_path / 'one') for path in (tmp_path / 'one').rglob('*.*'))
+    assert len(files) == 2 * 27
+    for file in files:
+        assert (tmp_path / 'one' / file).read_bytes() == (tmp_path / 'two' / file).read_bytes()
+
+
+def test_a_refusal_is_one_line_and_exit_code_2(tmp_path):
+    result = command('render', tmp_path / 'none', tmp_path / 'out')
+    assert result.returncode == 2
+    assert result.stderr == (f'active-recon: {tmp_path}/none: expected a mesh file or a folder of '
+                             '<category>/<mesh>, but there is neither\n')

@@ -1,0 +1,159 @@
+"""`active-recon train` and `evaluate`, from the command line to the files that they write."""
+
+import json
+
+from active_recon.cli.main import main
+from active_recon.models.weights import load_weights, weights_hash
+import pytest
+from safetensors.torch import load_file
+import torch
+from torch.testing import assert_close
+
+
+@pytest.fixture(autouse=True)
+def as_many_threads_as_before():
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+def command(monkeypatch, *arguments):
+    """Run a command; return its exit code."""
+    monkeypatch.setattr('sys.argv', ['active-recon', *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code or 0
+
+
+def refusal(monkeypatch, capsys, *arguments):
+    """Run a command that is refused with exit code 2; return its one line."""
+    capsys.readouterr()
+    assert command(monkeypatch, *arguments) == 2
+    line = capsys.readouterr().err
+    assert line.startswith('active-recon: ')
+    assert line.count('\n') == 1
+    return line
+
+
+def training(dataset, out, *more):
+    return ('train', dataset, '--validation', dataset, '--out', out, '--steps', 2,
+            '--policy-steps', 2, '--batch-size', 2, '--policy-batch-size', 2, '--threads', 1,
+            *more)
+
+
+@pytest.fixture(scope='module')
+def run(dataset, tmp_path_factory):
+    """Return the folder of a short training."""
+    out = tmp_path_factory.mktemp('run')
+    with pytest.MonkeyPatch.context() as patch:
+        assert command(patch, *training(dataset, out)) == 0
+    return out
+
+
+def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, dataset):
+    assert {path.name for path in run.iterdir()} == {
+        'reconstruction.safetensors', 'policy.safetensors', 'tensorboard', 'weights.safetensors',
+        'weights.json'}
+    assert list((run / 'tensorboard').glob('events.*'))
+    bundle = load_weights(run / 'weights.safetensors')
+    card = json.loads((run / 'weights.json').read_text())
+    assert card['threshold'] == bundle.threshold
+    assert card['command'].startswith('active-recon train ')
+    assert card['data'] == {str(dataset): 6}
+    assert card['reconstruction']['steps'] == card['policy']['steps'] == 2
+    assert card['reconstruction']['silhouette_weight'] == 0.6
+    assert len(card['generators_sha256']) == 64
+
+
+def test_a_training_that_is_done_is_resumed_to_the_same_weights(run, dataset, monkeypatch):
+    before = load_file(run / 'weights.safetensors')
+    assert command(monkeypatch, *training(dataset, run, '--resume')) == 0
+    assert_close(load_file(run / 'weights.safetensors'), before, rtol=0, atol=0)
+
+
+def test_a_training_of_other_settings_is_not_resumed(run, dataset, monkeypatch, capsys):
+    line = refusal(monkeypatch, capsys, *training(dataset, run, '--resume', '--seed', 3))
+    assert 'expected a checkpoint of the same settings' in line
+
+
+def test_a_training_is_told_as_it_goes(dataset, tmp_path, monkeypatch, capsys):
+    assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0,
+                                          '--silhouette-weight', 0)) == 0
+    told = capsys.readouterr().out
+    assert 'reconstruction: 2/2' in told
+    assert 'validation_iou_1' in told
+    assert 'chosen on validation' in told
+    assert 'policy' not in told
+    assert not (tmp_path / 'policy.safetensors').exists()
+    assert json.loads((tmp_path / 'weights.json').read_text())['policy'] is None
+
+
+def test_an_evaluation_measures_all_that_it_says(run, dataset, tmp_path, monkeypatch, capsys):
+    out = tmp_path / 'figures' / 'found.json'
+    assert command(
+        monkeypatch, 'evaluate', dataset, '--weights', run / 'weights.safetensors', '--views', 2,
+        '--starts', 2, '--training', dataset, '--validation', dataset, '--json', out,
+        '--threads', 1) == 0
+    found = json.loads(out.read_text())
+    assert found['command'].startswith('active-recon evaluate ')
+    assert found['weights'] == weights_hash(run / 'weights.safetensors')
+    assert found['threshold'] == load_weights(run / 'weights.safetensors').threshold
+    assert (found['objects'], found['episodes'], found['unreadable']) == (6, 12, [])
+    assert set(found['policies']) == {'random', 'uniform', 'farthest', 'attention'}
+    for figures in found['policies'].values():
+        assert set(figures) == {'iou', 'auc', 'entropy', 'paper_entropy', 'rotation',
+                                'per_category_iou'}
+        assert len(figures['iou']) == len(figures['entropy']) == 2
+        assert all(0 <= value['low'] <= value['mean'] <= value['high'] <= 1
+                   for value in (*figures['iou'], figures['auc']))
+        assert set(figures['per_category_iou']) == {'lamp', 'table'}
+    first = [figures['iou'][0] for figures in found['policies'].values()]
+    assert all(value == pytest.approx(first[0]) for value in first)  # nobody chose the first
+    assert set(found['yaw']) == {'0', '5', '15', '30', '90', '180'}
+    assert found['yaw']['0'] == pytest.approx(first[0])
+    assert set(found['blindness']) == {'goal_change_deg', 'auc', 'auc_swapped', 'auc_loss'}
+    assert found['blindness']['auc'] == pytest.approx(found['policies']['attention']['auc'])
+    assert found['baselines']['nearest_image']['mean'] == 1  # the training set itself was asked
+    assert 0 < found['baselines']['mean_shape']['mean'] <= 1
+    told = capsys.readouterr().out
+    assert all(word in told for word in ('random:', 'attention:', 'mean_shape:', 'nearest_image:',
+                                         'goals move by', "front's yaw", 'wrote'))
+
+
+def test_an_object_that_cannot_be_read_is_listed(run, dataset, tmp_path, monkeypatch, capsys):
+    import shutil
+    copy = tmp_path / 'copy'
+    shutil.copytree(dataset, copy)
+    next(copy.rglob('model.binvox')).write_bytes(b'#binvox 1\n')
+    out = tmp_path / 'found.json'
+    assert command(
+        monkeypatch, 'evaluate', copy, '--weights', run / 'weights.safetensors', '--views', 1,
+        '--starts', 1, '--policy', 'uniform', '--json', out, '--threads', 1) == 0
+    found = json.loads(out.read_text())
+    assert found['objects'] == 5
+    assert len(found['unreadable']) == 1
+    assert 'model.binvox' in capsys.readouterr().err
+    assert 'blindness' not in found
+
+
+def test_what_cannot_be_done_is_refused_before_anything_is_measured(
+        run, dataset, tmp_path, monkeypatch, capsys):
+    weights = run / 'weights.safetensors'
+    nothing = tmp_path / 'nothing'
+    for arguments, words in [
+        (('train', nothing, '--validation', dataset, '--out', tmp_path), "R2N2's layout"),
+        (('evaluate', nothing, '--weights', weights), "R2N2's layout"),
+        (('evaluate', dataset, '--weights', nothing), 'expected a weights file'),
+        (('evaluate', dataset, '--weights', weights, '--policy', 'random,best'), "got 'best'"),
+        (('evaluate', dataset, '--weights', weights, '--training', dataset), '--validation too'),
+    ]:
+        assert words in refusal(monkeypatch, capsys, *arguments)
+
+
+@pytest.mark.parametrize(('option', 'value', 'words'), [
+    ('--volume-loss', 'mae', 'expected mse, bce or dice'),
+    ('--silhouette-weight', -1, 'expected weights of 0 or more'),
+    ('--learning-rate', 0, 'expected numbers above 0')])
+def test_settings_that_train_nothing_are_refused(
+        dataset, tmp_path, monkeypatch, capsys, option, value, words):
+    assert words in refusal(monkeypatch, capsys, *training(dataset, tmp_path, option, value))

@@ -1,0 +1,74 @@
+"""The picture of a run: where things stand on it, and that it shows what it was given."""
+
+import math
+
+from active_recon.cameras import orbit_camera
+from active_recon.demo.drawing import PAPER, view_color
+from active_recon.demo.picture import COLUMNS, run_picture, TILE, turntable_plan
+from active_recon.demo.voxel_boxes import height_range, voxel_boxes
+from active_recon.rendering import composite, Renderer
+from active_recon.seen_view import SeenView
+from active_recon.voxelise import voxelise
+from active_recon.voxels import VoxelGrid
+import numpy as np
+import pytest
+import trimesh
+
+CONE = trimesh.creation.cone(radius=0.3, height=0.9).apply_translation([0, 0, -0.45])
+TRUTH = voxelise(CONE)
+
+
+def seen(number, azimuth=0.0, occupied=TRUTH):
+    image = composite(Renderer(CONE).render(orbit_camera(azimuth)), 255)
+    return SeenView(number, azimuth, image, occupied, 100.0, 1.0, 0.01)
+
+
+def center_of(picture, color):
+    """Return the mean x and y of the pixels of just that colour."""
+    y, x = np.nonzero((picture == color).all(axis=2))
+    return x.mean(), y.mean()
+
+
+@pytest.mark.parametrize(('azimuth_deg', 'right', 'down'), [
+    (0, 0, 1), (90, 1, 0), (180, 0, -1), (270, -1, 0)])
+def test_plan_puts_the_front_below_and_turns_counter_clockwise(azimuth_deg, right, down):
+    plan = turntable_plan([seen(1, math.radians(azimuth_deg))], CONE)
+    x, y = center_of(plan, view_color(1))
+    middle = plan.shape[0] / 2
+    direction = np.array([x - middle, y - middle]) / np.hypot(x - middle, y - middle)
+    np.testing.assert_allclose(direction, [right, down], atol=0.05)
+
+
+def test_views_that_came_back_to_a_place_are_all_seen():
+    plan = turntable_plan([seen(1), seen(2), seen(3)], CONE)
+    assert all((plan == view_color(number)).all(axis=2).sum() > 30 for number in (1, 2, 3))
+
+
+@pytest.mark.parametrize(('views', 'rows'), [(1, 1), (COLUMNS - 1, 1), (COLUMNS, 2), (24, 5)])
+def test_picture_has_room_for_every_view_and_the_truth(views, rows):
+    picture = run_picture('a run', [seen(n + 1, n / 4) for n in range(views)], CONE, TRUTH)
+    assert picture.dtype == np.uint8
+    assert rows * 2 * TILE < picture.shape[0] < (rows + 1) * 2 * TILE + 200
+
+
+def test_empty_occupancy_and_an_image_not_heard_leave_their_tiles_empty():
+    empty = VoxelGrid(np.zeros_like(TRUTH.occupancy))
+    view = SeenView(1, 0.0, None, empty, 0.0, 0.0, 0.01)
+    picture = run_picture('a run', [view], CONE, TRUTH)
+    tile = picture[-TILE - 60:-80, 600:600 + TILE - 60]
+    assert (tile == PAPER).all()
+
+
+def test_boxes_stand_where_their_cells_are():
+    occupancy = np.zeros((32, 32, 32), np.float32)
+    occupancy[31, 0, 16] = 1
+    boxes = voxel_boxes(VoxelGrid(occupancy, size=4.0), (0, 31))
+    np.testing.assert_allclose(boxes.centroid, [15.5 / 32, -15.5 / 32, 0.5 / 32])
+    assert boxes.volume == pytest.approx((0.93 / 32) ** 3)
+
+
+def test_heights_span_the_occupied_layers():
+    occupancy = np.zeros((32, 32, 32), np.float32)
+    assert height_range(VoxelGrid(occupancy)) == (0, 31)
+    occupancy[3, 4, 5:9] = 1
+    assert height_range(VoxelGrid(occupancy)) == (5, 8)

@@ -1,0 +1,122 @@
+"""Meshes to a dataset: every job once, what is there kept, what cannot be read told."""
+
+from active_recon.datasets.making import make_dataset, make_object, mesh_jobs, shape_jobs, yawed
+from active_recon.errors import ConfigError, DataError
+from active_recon.rendering import Renderer
+from active_recon.voxelise import voxelise
+import numpy as np
+import pytest
+import trimesh
+
+BOX = trimesh.creation.box((1, 0.5, 0.25))
+
+
+def names(jobs):
+    return [(job.folder.category, job.folder.name) for job in jobs]
+
+
+def save(folder, *names, mesh=BOX):
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        mesh.export(path)
+
+
+def test_a_folder_s_meshes_are_named_by_category_and_file(tmp_path):
+    save(tmp_path, 'chair/b.ply', 'chair/a.obj', 'car/a.stl')
+    (tmp_path / 'car/notes.txt').write_text('no mesh')
+    assert names(mesh_jobs(tmp_path, tmp_path, None, None)) == [
+        ('car', 'a'), ('chair', 'a'), ('chair', 'b')]
+
+
+def test_one_file_and_a_folder_of_files_are_of_their_folder_s_category(tmp_path):
+    save(tmp_path, 'chair/a.obj')
+    assert names(mesh_jobs(tmp_path / 'chair/a.obj', tmp_path, None, None)) == [('chair', 'a')]
+    assert names(mesh_jobs(tmp_path / 'chair', tmp_path, None, None)) == [('chair', 'a')]
+
+
+def test_meshes_of_one_name_bear_their_suffixes(tmp_path):
+    save(tmp_path, 'chair/a.obj', 'chair/a.stl', 'chair/b.stl')
+    jobs = mesh_jobs(tmp_path, tmp_path / 'out', None, None)
+    assert names(jobs) == [('chair', 'a.obj'), ('chair', 'a.stl'), ('chair', 'b')]
+    assert all(not outcome.refusal for outcome in make_dataset(jobs, samples=1))
+    assert all(job.folder.complete for job in jobs)
+
+
+def test_a_mesh_that_lies_deeper_bears_the_folders_between(tmp_path):
+    save(tmp_path, 'chair/1a/models/model.obj', 'chair/2b/models/model.obj')
+    assert names(mesh_jobs(tmp_path, tmp_path, None, None)) == [
+        ('chair', '1a-models-model'), ('chair', '2b-models-model')]
+
+
+def test_two_meshes_that_would_become_one_object_are_refused(tmp_path):
+    save(tmp_path, 'chair/a-b.obj', 'chair/a/b.obj')
+    with pytest.raises(DataError, match=r'2 would become chair/a-b\.obj; rename'):
+        next(make_dataset(mesh_jobs(tmp_path, tmp_path, None, None)))
+
+
+def test_bad_axes_and_folders_without_meshes_are_refused_before_the_work(tmp_path):
+    with pytest.raises(DataError, match='there is neither'):
+        mesh_jobs(tmp_path / 'none', tmp_path, None, None)
+    with pytest.raises(DataError, match='expected meshes .*found none'):
+        mesh_jobs(tmp_path, tmp_path, None, None)
+    save(tmp_path, 'chair/a.obj')
+    with pytest.raises(ConfigError, match="up: expected one of .*'w'"):
+        mesh_jobs(tmp_path, tmp_path, 'w', None)
+    with pytest.raises(ConfigError, match="category out of .*'castle'"):
+        shape_jobs('castle', range(2), tmp_path)
+
+
+def test_an_object_is_rendered_from_24_azimuths_and_voxelised(tmp_path):
+    (job,) = shape_jobs('lamp', [7], tmp_path)
+    assert not make_object(job, samples=1).refusal
+    mesh = job.make_mesh()
+    cameras = job.folder.cameras()
+    assert len(cameras) == 24
+    for index in (0, 5):
+        np.testing.assert_array_equal(
+            job.folder.image(index), Renderer(mesh).render(cameras[index], samples=1))
+    np.testing.assert_array_equal(job.folder.voxels().occupancy, voxelise(mesh).occupancy)
+
+
+def test_what_is_there_is_not_made_again_and_what_was_broken_off_is(tmp_path):
+    done, broken = shape_jobs('lamp', [7, 8], tmp_path)
+    for job in (done, broken):
+        make_object(job, samples=1)
+    broken.folder.voxels_path.unlink()
+    (broken.folder.images_folder / '20.png').unlink()
+    (done.folder.images_folder / '20.png').unlink()
+    assert len([*make_dataset([done, broken], samples=1)]) == 2
+    assert broken.folder.complete
+    assert (broken.folder.images_folder / '20.png').is_file()
+    assert not (done.folder.images_folder / '20.png').is_file()
+
+
+def test_what_cannot_be_read_or_written_is_told_and_the_rest_is_made(tmp_path):
+    save(tmp_path / 'in', 'chair/good.obj', 'car/good.obj')
+    (tmp_path / 'in/chair/bad.ply').write_text('no mesh')
+    (tmp_path / 'out/ShapeNetRendering').mkdir(parents=True)
+    (tmp_path / 'out/ShapeNetRendering/car').write_text('in the way')
+    outcomes = [*make_dataset(mesh_jobs(tmp_path / 'in', tmp_path / 'out', None, None), 1)]
+    refusals = {f'{outcome.folder.category}/{outcome.folder.name}': outcome.refusal
+                for outcome in outcomes}
+    assert refusals.pop('chair/good') == ''
+    assert 'bad.ply: expected a mesh' in refusals.pop('chair/bad')
+    assert 'Not a directory' in refusals.pop('car/good')
+    assert not refusals
+
+
+def test_a_sheet_that_the_first_camera_sees_from_its_edge_is_made(tmp_path):
+    sheet = trimesh.Trimesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]],
+                            [[0, 1, 2], [0, 2, 3]])
+    save(tmp_path, 'other/sheet.ply', mesh=sheet)
+    (job,) = mesh_jobs(tmp_path, tmp_path, None, None)
+    assert not make_object(job, samples=1).refusal
+
+
+def test_a_yaw_turns_counter_clockwise_and_the_object_still_fits():
+    turned = yawed(trimesh.creation.cone(0.1, 1).apply_transform(
+        trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0])), np.pi / 2)
+    np.testing.assert_allclose(turned.extents, [0.2, 1, 0.2], atol=0.01)
+    assert turned.vertices[turned.vertices[:, 1].argmax(), 0] == pytest.approx(0, abs=1e-6)
+    assert turned.center_mass[1] < 0  # the tip was at +x and is at +y now

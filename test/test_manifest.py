@@ -1,0 +1,72 @@
+"""A manifest of models: its rows, and how each stands."""
+
+import csv
+
+from active_recon.datasets.making import make_object
+from active_recon.datasets.manifest import EXPLICIT, manifest_jobs, read_manifest
+from active_recon.errors import DataError
+import numpy as np
+import pytest
+import trimesh
+
+ROW = {'category': 'chair', 'file': 'chair/one.ply', 'split': 'train', 'source': 'someone',
+       'licence': 'CC0-1.0', 'licence_evidence': EXPLICIT, 'front_axis': '+Z (by eye)',
+       'sha256': '0123abcd'}
+# y up, and its thick end at +z
+CONE = trimesh.creation.cone(0.3, 1).apply_translation([0, 0, -0.5]).apply_transform(
+    trimesh.transformations.rotation_matrix(np.pi, [0, 1, 0]))
+
+
+def write(folder, *rows):
+    path = folder / 'manifest.csv'
+    with path.open('w', newline='') as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def test_a_row_tells_its_file_and_its_front(tmp_path):
+    rows = read_manifest(write(tmp_path, ROW, {**ROW, 'front_axis': '+X muzzle'},
+                               {**ROW, 'front_axis': 'unknown'}))
+    assert [row.front for row in rows] == ['z', 'x', None]
+    assert rows[0].file == tmp_path / 'chair/one.ply'
+
+
+def test_a_known_front_is_turned_to_plus_x(tmp_path):
+    (tmp_path / 'chair').mkdir()
+    CONE.export(tmp_path / 'chair/one.ply')
+    (job,) = manifest_jobs(read_manifest(write(tmp_path, ROW)), tmp_path)
+    assert (job.folder.category, job.folder.name) == ('chair', 'one')
+    assert job.make_mesh().center_mass[0] > 0.1
+
+
+def test_an_unknown_front_stands_at_a_yaw_that_the_file_s_hash_draws(tmp_path):
+    (tmp_path / 'chair').mkdir()
+    CONE.export(tmp_path / 'chair/one.ply')
+    unknown = {**ROW, 'front_axis': 'unknown'}
+    one, same, other = manifest_jobs(read_manifest(write(
+        tmp_path, unknown, unknown, {**unknown, 'sha256': 'ffff'})), tmp_path)
+    np.testing.assert_array_equal(one.make_mesh().vertices, same.make_mesh().vertices)
+    assert not np.allclose(one.make_mesh().vertices, other.make_mesh().vertices)
+
+
+def test_a_model_that_is_missing_is_refused_and_told(tmp_path):
+    (job,) = manifest_jobs(read_manifest(write(tmp_path, ROW)), tmp_path)
+    assert 'there is no such file' in make_object(job, samples=1).refusal
+
+
+@pytest.mark.parametrize('content', [
+    b'', b'category,file\nchair,one.ply\n', b'\xff\xfe\x00\x00\n\xff\n',
+    b','.join(name.encode() for name in ROW) + b'\nchair,one.ply\n',
+    b','.join(name.encode() for name in ROW) + b'\na,b.ply,train,me,CC0,none,+Z,no hash\n'])
+def test_what_is_no_manifest_is_refused(content, tmp_path):
+    path = tmp_path / 'manifest.csv'
+    path.write_bytes(content)
+    with pytest.raises(DataError, match='manifest.csv: expected'):
+        read_manifest(path)
+
+
+def test_a_missing_manifest_is_refused(tmp_path):
+    with pytest.raises(DataError, match='No such file'):
+        read_manifest(tmp_path / 'manifest.csv')

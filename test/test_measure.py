@@ -1,0 +1,151 @@
+"""What is said of a network and its policies."""
+
+import json
+import math
+
+from active_recon.errors import DataError
+from active_recon.evaluation.measure import (
+    blindness,
+    Episodes,
+    interval,
+    iou_by_yaw,
+    run_policy,
+    summary,
+    YAWS_DEG,
+)
+from active_recon.evaluation.metrics import episodes, iou_per_view
+from active_recon.models.reconstruction import Reconstructed
+from active_recon.policies.attention import AttentionPolicy
+from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
+from active_recon.voxels import VoxelGrid
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+
+def some_episodes(azimuths, ious):
+    ious = np.array(ious, float)
+    return Episodes(ious, np.ones_like(ious), np.ones_like(ious), np.array(azimuths, float))
+
+
+def test_the_area_under_the_curve_is_the_mean_over_the_views():
+    found = some_episodes([[0, 1], [0, 2]], [[0.2, 0.6], [0.5, 0.5]])
+    np.testing.assert_allclose(found.auc, [0.4, 0.5])
+
+
+def test_the_rotation_goes_the_short_way_from_view_to_view():
+    azimuths = [[0.1, math.tau - 0.1, 0.1], [0.0, 2.0, 4.0], [0.0, math.pi, 0.0]]
+    found = some_episodes(azimuths, np.zeros((3, 3)))
+    np.testing.assert_allclose(found.rotation, [0.4, 4.0, math.tau])
+
+
+def test_a_run_measures_iou_both_entropies_and_azimuths_of_every_view(network, views):
+    objects, starts = episodes(views, 2)
+    told = []
+    run = run_policy(network, UniformPolicy(3), views, objects, starts, 0.1, 3,
+                     progress=told.append)
+    assert run.iou.shape == run.entropy.shape == run.paper_entropy.shape == (12, 3)
+    assert run.azimuths.shape == (12, 3)
+    assert sum(told) == 12
+    np.testing.assert_allclose(run.rotation, 4 * math.pi / 3, atol=1e-5)
+    expected = iou_per_view(network, UniformPolicy(3), views, objects, starts, np.array([0.1]), 3)
+    np.testing.assert_allclose(run.iou, expected[..., 0])
+    with torch.no_grad():
+        seen, _ = network(views.white(objects[:1], starts[:1]))
+    grid = VoxelGrid(seen.logits[0].sigmoid().numpy())
+    assert run.entropy[0, 0] == pytest.approx(grid.entropy(), rel=1e-4)
+    assert run.paper_entropy[0, 0] == pytest.approx(grid.paper_entropy(), rel=1e-4)
+    assert (run.paper_entropy < run.entropy).all()
+
+
+def test_a_run_longer_than_a_batch_is_the_same_as_its_parts(network, views):
+    objects, starts = episodes(views, 12)  # 72: one batch and a bit
+    whole = run_policy(network, FarthestPolicy(), views, objects, starts, 0.1, 2)
+    tail = run_policy(network, FarthestPolicy(), views, objects[64:], starts[64:], 0.1, 2)
+    np.testing.assert_allclose(whole.iou[64:], tail.iou, atol=2e-3)
+    np.testing.assert_array_equal(whole.azimuths[64:], tail.azimuths)
+
+
+def test_a_summary_is_ready_for_json_and_averages_over_objects(views):
+    objects = torch.tensor([0, 1, 3, 3])
+    found = some_episodes([[0, 1]] * 4, [[0.1, 0.3], [0.3, 0.5], [0.6, 0.8], [0.8, 1.0]])
+    told = json.loads(json.dumps(summary(found, views, objects)))
+    assert [value['mean'] for value in told['iou']] == pytest.approx([1.1 / 3, 1.7 / 3])
+    assert all(value['low'] <= value['mean'] <= value['high'] for value in told['iou'])
+    assert told['per_category_iou'] == {'lamp': pytest.approx([0.2, 0.4]),
+                                        'table': pytest.approx([0.7, 0.9])}
+    assert told['auc']['mean'] == pytest.approx((0.2 + 0.4 + 0.8) / 3)
+    assert told['rotation']['mean'] == pytest.approx(1)
+
+
+class Oracle(nn.Module):
+    """Answers with the truth of the object whose image it is shown."""
+
+    def __init__(self, views):
+        super().__init__()
+        self.views = views
+        every = torch.arange(24)
+        self.known = torch.stack([views.white(torch.full((24,), item), every)
+                                  for item in range(len(views))])
+
+    def forward(self, images, hidden=None):
+        item = torch.stack([(self.known - image).abs().mean((2, 3, 4)).amin(dim=1).argmin()
+                            for image in images])
+        latent = torch.ones(len(images), 8, 4, 4) * (item.float() + 1)[:, None, None, None]
+        return Reconstructed(20 * self.views.voxels[item].float() - 10, latent), hidden
+
+
+def test_a_front_that_stands_right_gives_the_plain_iou(network, views):
+    objects, starts = episodes(views, 2)
+    found = iou_by_yaw(network, views, objects, starts, 0.1)
+    plain = iou_per_view(network, FarthestPolicy(), views, objects, starts, np.array([0.1]), 1)
+    assert list(found) == [str(yaw) for yaw in YAWS_DEG]
+    assert found['0'] == pytest.approx(interval(plain[:, 0, 0], objects.numpy()))
+
+
+def test_a_perfect_answer_loses_by_every_degree_that_the_front_stands_wrong(views):
+    objects, starts = episodes(views, 2)
+    found = iou_by_yaw(Oracle(views), views, objects, starts, 0.5)
+    assert found['0']['mean'] == 1
+    assert 1 > found['5']['mean'] > found['15']['mean'] > found['30']['mean']
+
+
+class Recognising(nn.Module):
+    """An attention model whose proposal is the latent's first number, or nothing of it."""
+
+    def __init__(self, sees):
+        super().__init__()
+        self.where = nn.Linear(2, 8)
+        self.sees = sees
+
+    def forward(self, latent, azimuth, state=None):
+        from active_recon.models.attention import Attention
+        mean = latent[:, 0, 0, 0] * np.radians(20) if self.sees else azimuth + 1
+        return Attention(mean, mean), (mean, mean)
+
+
+def test_a_policy_that_looks_at_nothing_loses_nothing_by_anothers_latent(network, views):
+    objects, starts = episodes(views, 2)
+    blind = AttentionPolicy(Recognising(sees=False))
+    found = blindness(network, blind, views, objects, starts, 0.1, 3)
+    assert found.goal_change_deg['mean'] == pytest.approx(0, abs=1e-9)
+    assert found.auc_loss == {'mean': 0.0, 'low': 0.0, 'high': 0.0}
+    assert found.auc == found.auc_swapped
+
+
+def test_a_policy_that_knows_its_object_goes_elsewhere_by_anothers_latent(views):
+    objects, starts = episodes(views, 3)
+    found = blindness(Oracle(views), AttentionPolicy(Recognising(sees=True)), views, objects,
+                      starts, 0.5, 2)
+    assert found.goal_change_deg['mean'] == pytest.approx(60, abs=1e-3)  # three objects away
+    assert found.goal_change_deg['low'] == pytest.approx(60, abs=1e-3)
+    assert found.auc['mean'] == 1
+
+
+def test_blindness_needs_two_objects(network, attention, views):
+    from dataclasses import replace
+    one = replace(views, images=views.images[:1], azimuths=views.azimuths[:1],
+                  voxels=views.voxels[:1], folders=views.folders[:1])
+    with pytest.raises(DataError, match='two objects or more'):
+        blindness(network, AttentionPolicy(attention), one, *episodes(one, 2), 0.1)

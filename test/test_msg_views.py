@@ -1,0 +1,143 @@
+"""Image, camera info and pose, joined on stamps."""
+
+from itertools import permutations
+
+from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.errors import MessageError
+from msg_tools.joins import StampJoiner
+from msg_tools.views import interpolated, ViewJoiner
+import numpy as np
+import pytest
+
+MS = 1_000_000
+IMAGE = np.zeros((137, 137, 3), np.uint8)
+
+
+def pose(azimuth):
+    return orbit_camera(azimuth).pose
+
+
+def drain(joiner, now=0.0):
+    return list(joiner.joined(now))
+
+
+def only_error(joiner, now=0.0):
+    error, = drain(joiner, now)
+    assert isinstance(error, MessageError)
+    return error
+
+
+@pytest.mark.parametrize('order', list(permutations(range(3))))
+def test_the_three_are_joined_in_any_order_of_arrival(order):
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    arrivals = (lambda: joiner.add_image(5, IMAGE, 0.0),
+                lambda: joiner.add_intrinsics(5, CANONICAL_INTRINSICS),
+                lambda: joiner.add_pose(5, pose(1.0)))
+    for index in order:
+        assert not drain(joiner)
+        arrivals[index]()
+    view, = drain(joiner)
+    assert (view.stamp, view.camera.azimuth) == (5, pytest.approx(1.0))
+    assert not drain(joiner)
+
+
+@pytest.mark.parametrize('fraction', [0.0, 0.25, 0.5, 1.0])
+def test_a_pose_is_interpolated_along_the_way(fraction):
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    joiner.add_pose(0, pose(1.0))
+    joiner.add_image(round(100 * MS * fraction), IMAGE, 0.0)
+    joiner.add_intrinsics(round(100 * MS * fraction), CANONICAL_INTRINSICS)
+    joiner.add_pose(100 * MS, pose(1.1))
+    view, = drain(joiner)
+    assert view.camera.azimuth == pytest.approx(1.0 + 0.1 * fraction, abs=1e-4)
+
+
+def test_interpolation_is_exact_at_its_ends_and_rigid_between():
+    start, end = pose(0.3), pose(2.0)
+    np.testing.assert_allclose(interpolated(start, end, 0.0), start, atol=1e-12)
+    np.testing.assert_allclose(interpolated(start, end, 1.0), end, atol=1e-12)
+    rotation = interpolated(start, end, 0.4)[:3, :3]
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+
+
+def test_an_image_waits_for_its_later_pose_and_is_refused_when_none_can_come():
+    joiner = ViewJoiner(max_pose_gap=0.05, patience=0.5)
+    joiner.add_pose(0, pose(1.0))
+    joiner.add_image(20 * MS, IMAGE, now=0.0)
+    joiner.add_intrinsics(20 * MS, CANONICAL_INTRINSICS)
+    assert not drain(joiner, now=0.4)
+    error = only_error(joiner, now=0.6)
+    assert error.kind == 'no_pose'
+    assert 'within 0.05 s, the nearest is 0.020 s away' in str(error)
+
+
+def test_neighbours_that_are_too_far_apart_are_not_interpolated():
+    joiner = ViewJoiner(max_pose_gap=0.05)
+    joiner.add_pose(0, pose(1.0))
+    joiner.add_image(20 * MS, IMAGE, 0.0)
+    joiner.add_intrinsics(20 * MS, CANONICAL_INTRINSICS)
+    joiner.add_pose(100 * MS, pose(1.1))
+    assert only_error(joiner).kind == 'no_pose'
+
+
+def test_an_image_without_any_pose_is_refused_after_a_while():
+    joiner = ViewJoiner(max_pose_gap=0.1, patience=0.5)
+    joiner.add_image(0, IMAGE, now=10.0)
+    joiner.add_intrinsics(0, CANONICAL_INTRINSICS)
+    assert 'none came' in str(only_error(joiner, now=11.0))
+
+
+def test_an_image_without_camera_info_is_refused_once_later_info_came():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    joiner.add_image(0, IMAGE, 0.0)
+    joiner.add_pose(0, pose(1.0))
+    joiner.add_intrinsics(1, CANONICAL_INTRINSICS)
+    assert only_error(joiner).kind == 'no_camera_info'
+
+
+def test_camera_info_of_another_size_is_refused_and_the_next_view_is_joined():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    for stamp, lens in ((0, CANONICAL_INTRINSICS.resized(64, 48)), (1, CANONICAL_INTRINSICS)):
+        joiner.add_image(stamp, IMAGE, 0.0)
+        joiner.add_intrinsics(stamp, lens)
+        joiner.add_pose(stamp, pose(1.0))
+    error, view = drain(joiner)
+    assert error.kind == 'camera_info'
+    assert '137 x 137, got 48 x 64' in str(error)
+    assert view.stamp == 1
+
+
+def test_an_image_comes_once_and_in_order_until_an_episode_begins():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    joiner.add_image(5, IMAGE, 0.0)
+    for stamp, kind in ((5, 'duplicate'), (4, 'out_of_order')):
+        with pytest.raises(MessageError) as caught:
+            joiner.add_image(stamp, IMAGE, 0.0)
+        assert caught.value.kind == kind
+    joiner.clear()
+    joiner.add_image(4, IMAGE, 0.0)
+
+
+def test_a_flood_of_images_without_poses_does_not_pile_up():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    refused = 0
+    for stamp in range(200):
+        joiner.add_image(stamp, IMAGE, 0.0)
+        refused += len(drain(joiner))
+    assert refused >= 150
+
+
+def test_parts_of_a_stamp_are_complete_with_the_last_one():
+    joiner = StampJoiner(('a', 'b'))
+    assert joiner.add('a', 1, 'first') is None
+    assert joiner.add('b', 2, 'other') is None
+    assert joiner.add('b', 1, 'second') == {'a': 'first', 'b': 'second'}
+    assert joiner.add('b', 1, 'again') is None
+
+
+def test_parts_that_stay_incomplete_make_room():
+    joiner = StampJoiner(('a', 'b'))
+    for stamp in range(100):
+        joiner.add('a', stamp, stamp)
+    assert joiner.add('b', 0, 0) is None
+    assert joiner.add('b', 99, 0) == {'a': 99, 'b': 0}

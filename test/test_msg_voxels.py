@@ -1,0 +1,72 @@
+"""Voxels, episodes, counters and stamps between ROS and the core."""
+
+from active_recon.errors import DataError, MessageError
+from active_recon.voxels import VoxelGrid
+from diagnostic_msgs.msg import DiagnosticStatus
+from msg_tools.clouds import cloud_from_msg, cloud_to_msg
+from msg_tools.diagnostics import counts_from_msg, diagnostics_to_msg
+from msg_tools.episodes import (
+    done_from_msg,
+    done_to_msg,
+    Episode,
+    episode_from_msg,
+    episode_to_msg,
+)
+from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
+from msg_tools.voxels import FLOOR, voxel_grid_from_msg, voxel_grid_to_msg
+import numpy as np
+import pytest
+from std_msgs.msg import Header
+
+GRID = VoxelGrid(np.random.default_rng(0).random((32, 32, 32), np.float32), size=0.4)
+
+
+@pytest.mark.parametrize('threshold', [0.0, FLOOR, 0.5, 1.0])
+def test_the_cells_above_the_threshold_come_back(threshold):
+    msg = voxel_grid_to_msg(GRID, threshold, Header(frame_id='object'))
+    assert msg.width == GRID.occupied(threshold).sum()
+    expected = np.where(GRID.occupied(threshold), GRID.occupancy, 0)
+    np.testing.assert_array_equal(voxel_grid_from_msg(msg, 0.4).occupancy, expected)
+
+
+def test_points_outside_the_grid_are_refused():
+    with pytest.raises(DataError, match='inside a cube of 0.1 m'):
+        voxel_grid_from_msg(voxel_grid_to_msg(GRID, 0.5, Header()), 0.1)
+
+
+def test_a_cloud_is_read_by_the_names_of_its_fields():
+    table = np.arange(12, dtype=np.float32).reshape(3, 4)
+    msg = cloud_to_msg(table, 'abcd', Header())
+    np.testing.assert_array_equal(cloud_from_msg(msg, 'db'), table[:, [3, 1]])
+
+
+def test_a_cloud_that_lacks_fields_or_bytes_is_refused():
+    msg = cloud_to_msg(np.zeros((3, 2), np.float32), 'ab', Header())
+    with pytest.raises(MessageError, match='fields a, z, got none named z'):
+        cloud_from_msg(msg, 'az')
+    msg.width = 4
+    with pytest.raises(MessageError, match='expected 32 bytes for 4 points, got 24'):
+        cloud_from_msg(msg, 'ab')
+
+
+@pytest.mark.parametrize('nanoseconds', [0, 1, 999_999_999, 10**9, 1_795_000_000_123_456_789])
+def test_a_stamp_comes_back_to_the_nanosecond(nanoseconds):
+    assert nanoseconds_from_stamp(stamp_from_nanoseconds(nanoseconds)) == nanoseconds
+
+
+def test_an_episode_and_its_end_come_back_as_they_were():
+    episode = Episode('ab12', 5_000_000_001)
+    assert episode_from_msg(episode_to_msg(episode)) == episode
+    assert done_from_msg(done_to_msg(7, 'max_views')) == (7, 'max_views')
+    with pytest.raises(MessageError, match='unique id'):
+        episode_from_msg(Header())
+
+
+def test_counters_come_back_and_a_problem_is_a_warning():
+    counts = {'images': 3, 'refused/frame': 1}
+    stamp = stamp_from_nanoseconds(1)
+    msg = diagnostics_to_msg('/node', counts, 'refused: why', stamp)
+    assert counts_from_msg(msg, '/node') == counts
+    assert counts_from_msg(msg, '/other') == {}
+    assert msg.status[0].level == DiagnosticStatus.WARN
+    assert diagnostics_to_msg('/node', {}, '', stamp).status[0].level == DiagnosticStatus.OK

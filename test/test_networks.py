@@ -1,0 +1,127 @@
+"""Encoder, decoder and the network of both: shapes, memory, and that it can learn."""
+
+from active_recon.config import NetworkConfig
+from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.training.losses import volume_loss
+from active_recon.voxels import iou
+import pytest
+import torch
+from torch.testing import assert_close
+
+
+def some_views(count, batch):
+    torch.manual_seed(1)
+    return torch.rand(count, batch, 3, 64, 64)
+
+
+@torch.no_grad()
+def folded(network, images):
+    """Return what is known after views (T, B, ...)."""
+    hidden = None
+    for view in images:
+        seen, hidden = network(view, hidden)
+    return seen
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def test_images_become_a_latent_unit_and_occupancy(network, tiny):
+    seen, hidden = network(some_views(1, 3)[0])
+    assert seen.logits.shape == (3, 32, 32, 32)
+    assert seen.latent.shape == (3, 4 * tiny.latent_channels, 4, 4)
+    assert hidden.encoder.memory.shape == (3, tiny.recurrent_channels, 4, 4)
+    assert hidden.decoder.memory.shape == (3, tiny.volume_channels, 4, 4, 4)
+
+
+def test_the_latent_unit_is_read_as_a_volume_without_loss(network, tiny):
+    latent = torch.randn(2, 4 * tiny.latent_channels, 4, 4)
+    seen = []
+    network.decoder.memory.register_forward_hook(lambda _, inputs, __: seen.append(inputs[0]))
+    network.decoder(latent, None)
+    assert seen[0].shape == (2, tiny.latent_channels, 4, 4, 4)
+    assert_close(seen[0].flatten(), latent.flatten())
+
+
+def test_the_default_network_fits_the_budget_of_parameters():
+    count = sum(part.numel() for part in
+                ReconstructionNetwork.from_config(NetworkConfig()).parameters())
+    assert 1_500_000 <= count <= 6_000_000
+
+
+def test_most_of_the_grid_is_empty_before_any_training(network):
+    assert folded(network, some_views(1, 1)).logits.sigmoid().mean().item() == pytest.approx(
+        0.1, abs=0.03)
+
+
+@torch.no_grad()
+def test_the_state_is_passed_and_not_kept(network):
+    first, second = some_views(2, 2)
+    _, hidden = network(first)
+    before = [part.clone() for state in hidden for part in state]
+    once, _ = network(second, hidden)
+    network(first, hidden)
+    again, _ = network(second, hidden)
+    assert_close(again, once, rtol=0, atol=0)
+    assert_close([part for state in hidden for part in state], before, rtol=0, atol=0)
+
+
+def test_no_state_is_the_state_before_any_view(network):
+    with torch.no_grad():
+        images = some_views(1, 2)[0]
+        features = network.encoder.blocks(network.encoder.stem(images))
+        empty = network.encoder.memory.initial_state(features)
+        assert_close(network.encoder(images, None), network.encoder(images, empty))
+
+
+def test_a_view_more_changes_what_is_known(network):
+    images = some_views(2, 1)
+    assert (folded(network, images).logits - folded(network, images[:1]).logits).abs().max() > 1e-4
+
+
+def test_the_order_of_the_views_matters(network):
+    images = some_views(2, 1)
+    forth, back = folded(network, images), folded(network, images.flip(0))
+    assert (forth.latent - back.latent).abs().max() > 1e-5
+
+
+def test_the_order_of_the_batch_does_not(network):
+    images, order = some_views(3, 3), torch.tensor([2, 0, 1])
+    together, mixed = folded(network, images), folded(network, images[:, order])
+    assert_close(mixed.logits, together.logits[order])
+    assert_close(mixed.latent, together.latent[order])
+
+
+def test_every_parameter_learns_from_two_views(network):
+    images = some_views(2, 2)
+    torch.nn.init.normal_(network.encoder.memory.peepholes)
+    _, hidden = network(images[0])
+    network(images[1], hidden)[0].logits.square().mean().backward()
+    for name, parameter in network.named_parameters():
+        assert parameter.grad is not None, name
+        assert parameter.grad.any(), name
+
+
+def test_a_small_network_learns_one_object_by_heart(views):
+    torch.manual_seed(0)
+    network = ReconstructionNetwork.from_config(NetworkConfig(
+        stem_channels=8, block_channels=(8, 16, 16), recurrent_channels=16,
+        bottleneck_channels=32, latent_channels=4, volume_channels=16, decoder_channels=(16, 8)))
+    optimizer = torch.optim.Adam(network.parameters(), 5e-3)
+    objects, chosen = torch.tensor([3, 3, 3]), torch.tensor([0, 7, 15])
+    images, truth = views.white(objects, chosen), views.voxels[objects]
+    best = 0.0
+    for _ in range(300):
+        seen, _ = network(images)
+        best = iou(seen.logits > 0, truth).min().item()
+        if best > 0.9:
+            break
+        optimizer.zero_grad()
+        volume_loss(seen.logits, truth.float(), 'bce').backward()
+        optimizer.step()
+    assert best > 0.9

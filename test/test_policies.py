@@ -1,0 +1,146 @@
+"""View policies: where each of them goes, and what it says the others are worth."""
+
+import math
+
+from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view
+from active_recon.errors import ConfigError, ViewError, WeightsError
+from active_recon.models.weights import Bundle, save_weights
+from active_recon.policies import load_policy, POLICIES
+from active_recon.policies.attention import AttentionPolicy
+from active_recon.policies.base import distance_to_taken
+from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+import numpy as np
+import pytest
+
+STEP = math.tau / 24
+
+
+@pytest.fixture
+def latent(tiny):
+    return np.random.default_rng(0).normal(size=(3, 4 * tiny.latent_channels, 4, 4)).astype(
+        np.float32)
+
+
+def episode(policy, start, count, latent):
+    """Return the azimuths of an episode of `count` views, every goal reached exactly."""
+    taken, state = np.array([[start]]), None
+    while taken.shape[1] < count:
+        choice, state = policy.choose(latent[:1], taken, state)
+        taken = np.column_stack([taken, choice.azimuth])
+    return taken[0]
+
+
+def all_policies(attention):
+    return [RandomPolicy(np.random.default_rng(0)), UniformPolicy(5), FarthestPolicy(),
+            AttentionPolicy(attention)]
+
+
+@pytest.mark.parametrize('index', range(4), ids=['random', 'uniform', 'farthest', 'attention'])
+def test_the_choice_is_the_candidate_worth_most(attention, latent, index):
+    policy = all_policies(attention)[index]
+    taken = np.array([[0.0, 1.0], [AZIMUTHS[5], AZIMUTHS[20]], [6.2, 3.3]])
+    choice, _ = policy.choose(latent, taken, None)
+    assert choice.azimuth.shape == (3,)
+    assert choice.scores.shape == (3, 24)
+    assert np.isfinite(choice.scores).all()
+    assert ((choice.azimuth >= 0) & (choice.azimuth < math.tau)).all()
+    np.testing.assert_array_equal(choice.scores.argmax(axis=1),
+                                  [nearest_view(azimuth) for azimuth in choice.azimuth])
+
+
+@pytest.mark.parametrize('start', [0.0, AZIMUTHS[7], 0.1])
+def test_random_takes_every_view_once_before_any_twice(latent, start):
+    taken = episode(RandomPolicy(np.random.default_rng(3)), start, 24, latent)
+    assert sorted(nearest_view(azimuth) for azimuth in taken) == list(range(24))
+
+
+def test_random_goes_on_when_every_view_was_taken(latent):
+    taken = episode(RandomPolicy(np.random.default_rng(3)), 0.0, 30, latent)
+    assert len(taken) == 30
+
+
+def test_random_takes_all_that_are_left_alike_and_repeats_with_its_seed(latent):
+    taken = np.tile([[0.0, AZIMUTHS[1]]], (4400, 1))
+    chosen = [RandomPolicy(np.random.default_rng(seed)).choose(latent, taken)[0].azimuth
+              for seed in (1, 1, 2)]
+    counts = np.bincount([nearest_view(azimuth) for azimuth in chosen[0]], minlength=24)
+    assert not counts[:2].any()
+    assert abs(counts[2:] - 200).max() < 5 * math.sqrt(200)  # five sigma
+    np.testing.assert_array_equal(chosen[0], chosen[1])
+    assert (chosen[0] != chosen[2]).any()
+
+
+@pytest.mark.parametrize('count', [1, 2, 5, 8, 24])
+def test_uniform_for_n_views_divides_the_turn_into_n(latent, count):
+    taken = np.sort(episode(UniformPolicy(count), 1.3, count, latent))
+    gaps = np.diff(np.append(taken, taken[0] + math.tau))
+    np.testing.assert_allclose(gaps, math.tau / count, atol=1e-9)
+
+
+def test_uniform_keeps_to_its_sweep_however_roughly_it_is_followed(latent):
+    choice, _ = UniformPolicy(4).choose(latent[:1], np.array([[1.0, 2.9, 3.9]]))
+    assert choice.azimuth[0] == pytest.approx(1.0 + 3 * math.pi / 2)
+
+
+@pytest.mark.parametrize('start', AZIMUTHS)
+def test_farthest_goes_opposite_first_then_halves_the_largest_gap(latent, start):
+    taken = episode(FarthestPolicy(), start, 4, latent)
+    assert abs(azimuth_difference(taken[1], start)) == pytest.approx(math.pi)
+    gaps = np.diff(np.sort(azimuth_difference(taken, start) % math.tau))
+    np.testing.assert_allclose(gaps, math.pi / 2, atol=1e-6)
+
+
+def test_farthest_settles_ties_alike_for_azimuths_of_single_precision(latent):
+    for start in range(24):
+        exact = episode(FarthestPolicy(), AZIMUTHS[start], 12, latent)
+        taken = np.float32(exact)
+        for count in range(1, 12):
+            choice, _ = FarthestPolicy().choose(latent[:1], taken[None, :count].astype(float))
+            assert choice.azimuth[0] == exact[count]
+
+
+def test_the_distance_to_the_nearest_view_is_the_short_way():
+    distances = distance_to_taken(np.array([[AZIMUTHS[23], AZIMUTHS[2]]]))[0]
+    np.testing.assert_allclose(distances[[23, 0, 1, 2, 12]] / STEP, [0, 1, 1, 0, 10], atol=1e-9)
+
+
+def test_attention_takes_the_mean_of_its_model_and_carries_its_memory(attention, latent):
+    import torch
+    policy = AttentionPolicy(attention)
+    taken = np.array([[0.5], [1.5], [2.5]])
+    choice, state = policy.choose(latent, taken)
+    with torch.no_grad():
+        proposal, expected = attention(torch.from_numpy(latent), torch.tensor([0.5, 1.5, 2.5]))
+    np.testing.assert_allclose(
+        azimuth_difference(choice.azimuth, proposal.mean_azimuth.numpy()), 0, atol=1e-6)
+    np.testing.assert_allclose(state[1], expected[1], atol=1e-6)
+    with_memory, _ = policy.choose(latent, taken, state)
+    assert np.abs(azimuth_difference(with_memory.azimuth, choice.azimuth)).max() > 1e-5
+
+
+def test_attention_leaves_what_it_is_shown_as_it_is(attention, latent):
+    latent.setflags(write=False)
+    AttentionPolicy(attention).choose(latent, np.zeros((3, 1)))
+
+
+def test_attention_scores_an_azimuth_by_its_log_density(attention, latent):
+    choice, _ = AttentionPolicy(attention, sigma=0.5).choose(latent, np.zeros((3, 1)))
+    away = azimuth_difference(AZIMUTHS, choice.azimuth[:, None])
+    np.testing.assert_allclose(choice.scores, -(away / 0.5) ** 2 / 2, atol=1e-4)
+
+
+@pytest.mark.parametrize('shape', [(1, 3, 4, 4), (1, 8, 5, 4), (1, 8, 4)])
+def test_a_latent_of_another_model_is_refused(attention, shape):
+    with pytest.raises(ViewError, match=r'expected a latent of the shape \(8, 4, 4\).*got'):
+        AttentionPolicy(attention).choose(np.zeros(shape, np.float32), np.zeros((1, 1)))
+
+
+def test_policies_are_loaded_by_name(tmp_path, network, attention, tiny):
+    path = tmp_path / 'weights.safetensors'
+    save_weights(path, Bundle(network, attention, tiny, 0.4))
+    kinds = [type(load_policy(name, path)).__name__ for name in POLICIES]
+    assert kinds == ['AttentionPolicy', 'RandomPolicy', 'UniformPolicy', 'FarthestPolicy']
+    with pytest.raises(ConfigError, match="expected one of attention, random.*got 'greedy'"):
+        load_policy('greedy')
+    with pytest.raises(WeightsError, match='no such file'):
+        load_policy('attention', tmp_path / 'nothing.safetensors')

@@ -1,0 +1,224 @@
+"""The second stage: rewards, returns, and a policy that finds what is worth looking at."""
+
+import math
+
+from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.config import RewardConfig
+from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.views import ViewSet
+from active_recon.errors import ConfigError
+from active_recon.models.attention import AttentionModel
+from active_recon.models.reconstruction import Reconstructed
+from active_recon.training import policy_gradient
+from active_recon.training.policy_gradient import (
+    distance_reward,
+    Episode,
+    policy_loss,
+    returns_to_go,
+    run_episodes,
+    train_policy,
+)
+from active_recon.training.supervised import TrainingConfig, TrainingDivergedError
+from active_recon.voxels import iou
+import numpy as np
+import pytest
+import torch
+from torch import nn
+from torch.testing import assert_close
+
+CONFIG = TrainingConfig(steps=5, batch_size=4, max_views=3, checkpoint_every=2, validate_every=2)
+
+
+def reward(azimuth, *taken, **config):
+    return distance_reward(torch.tensor([float(azimuth)]), torch.tensor([taken]),
+                           RewardConfig(**config)).item()
+
+
+def test_going_where_one_was_costs_the_most_and_far_away_nothing():
+    costs = [reward(azimuth, 0.0) for azimuth in np.linspace(0, math.pi, 13)]
+    assert costs[0] == pytest.approx(-0.02)
+    assert (np.diff(costs) > 0).all()
+    assert costs[-1] == pytest.approx(0, abs=1e-6)
+    assert reward(math.radians(30), 0.0) == pytest.approx(-0.02 * math.exp(-0.5))
+
+
+@pytest.mark.parametrize('azimuth', [0.1, 1.0, 3.0])
+def test_the_distance_is_the_short_way_round(azimuth):
+    expected = reward(azimuth, 0.0)
+    for other, taken in ((-azimuth, 0.0), (azimuth + math.tau, 0.0), (math.tau - azimuth, 0.0),
+                         (0.0, azimuth), (azimuth, 2 * math.tau)):
+        assert reward(other, taken) == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_nearest_of_all_views_counts_and_not_the_last():
+    assert reward(1.0, 1.0, 4.0) == reward(1.0, 4.0, 1.0) == pytest.approx(-0.02)
+    assert reward(1.0, 1.2, 4.0) == pytest.approx(reward(1.0, 1.2))
+
+
+def test_the_papers_form_rewards_near_views_does_not_wrap_and_knows_only_the_last():
+    assert reward(1.0, 3.0, paper_distance=True) == pytest.approx(0.25)
+    assert reward(1.0, 1.0, 3.0, paper_distance=True) == pytest.approx(0.25)
+    assert reward(1.1, 1.0, paper_distance=True) > reward(2.0, 1.0, paper_distance=True)
+    assert reward(0.1, 6.2, paper_distance=True) == pytest.approx(1 / 6.1 ** 2, rel=1e-4)
+    assert math.isfinite(reward(1.0, 1.0, paper_distance=True))
+
+
+def test_a_return_to_go_sums_what_is_still_to_come():
+    rewards = torch.tensor([[1.0, 10.0], [2.0, 20.0], [4.0, 40.0]])
+    assert_close(returns_to_go(rewards), torch.tensor([[7.0, 70.0], [6.0, 60.0], [4.0, 40.0]]))
+
+
+def an_episode(log_probability, baseline, reward_3d):
+    nothing = torch.zeros_like(reward_3d)
+    return Episode(log_probability, baseline, reward_3d, nothing, nothing)
+
+
+def test_a_choice_answers_for_what_follows_it_and_the_baseline_for_the_return():
+    logs = torch.zeros(2, 1, requires_grad=True)
+    baseline = torch.tensor([[1.0], [5.0]], requires_grad=True)
+    objective, error = policy_loss(an_episode(logs, baseline, torch.tensor([[2.0], [3.0]])))
+    assert error.item() == pytest.approx((16 + 4) / 2)
+    (objective + error).backward()
+    assert_close(logs.grad, torch.tensor([[-4.0], [2.0]]))  # minus the advantage
+    assert_close(baseline.grad, torch.tensor([[-4.0], [2.0]]))  # of the error alone
+
+
+def test_the_objective_sums_over_the_steps_and_averages_over_the_episodes():
+    logs, rewards = torch.tensor([[-1.0, -2.0], [-3.0, -4.0]]), torch.zeros(2, 2)
+    baseline = torch.full((2, 2), -1.0)
+    objective, _ = policy_loss(an_episode(logs, baseline, rewards))
+    assert objective.item() == pytest.approx((1 + 2 + 3 + 4) / 2)
+
+
+def some_episodes(network, attention, views, length=4, seed=0, rewards=None):
+    return run_episodes(network, attention, views, torch.tensor([0, 3, 5]),
+                        torch.tensor([2, 9, 23]), length, 0.1, rewards or RewardConfig(),
+                        np.random.default_rng(seed))
+
+
+def test_the_first_view_was_not_chosen_and_earns_nothing(network, attention, views):
+    episode = some_episodes(network, attention, views)
+    for part in (episode.log_probability, episode.baseline, episode.reward_3d, episode.reward_2d,
+                 episode.reward_distance, episode.reward):
+        assert part.shape == (3, 3)  # T - 1 choices of three episodes
+    assert_close(episode.reward,
+                 episode.reward_3d + episode.reward_2d + episode.reward_distance)
+    assert (episode.log_probability <= 0).all()
+    assert ((episode.reward_distance >= -0.0201) & (episode.reward_distance <= 0)).all()
+
+
+def test_the_gains_of_an_episode_add_up_to_last_minus_first(network, attention, views):
+    seen = []
+    network.register_forward_hook(lambda *call: seen.append(call[2][0].logits.sigmoid() > 0.1))
+    episode = some_episodes(network, attention, views)
+    truth = views.voxels[[0, 3, 5]]
+    quality = torch.stack([iou(occupied, truth) for occupied in seen])
+    assert_close(episode.reward_3d, quality.diff(dim=0))
+    assert_close(episode.reward_3d.sum(0), quality[-1] - quality[0])
+
+
+def test_the_same_generator_runs_the_same_episodes(network, attention, views):
+    first, again, other = (some_episodes(network, attention, views, seed=seed)
+                           for seed in (0, 0, 1))
+    assert_close(again.log_probability, first.log_probability, rtol=0, atol=0)
+    assert_close(again.reward, first.reward, rtol=0, atol=0)
+    assert (other.log_probability != first.log_probability).any()
+
+
+def test_only_the_attention_learns_from_an_episode(network, attention, views):
+    objective, error = policy_loss(some_episodes(network, attention, views))
+    (objective + error).backward()
+    assert all(parameter.grad is None for parameter in network.parameters())
+    assert all(parameter.grad is not None for parameter in attention.parameters())
+
+
+class Bandit(nn.Module):
+    """An episode's IoU depends on the azimuth of the view alone, which the image's red tells."""
+
+    def __init__(self, best: float) -> None:
+        super().__init__()
+        worth = (1 + torch.tensor(AZIMUTHS - best).cos()) / 2
+        self.filled = (32 * worth).round()  # of 32 layers, by view
+
+    def forward(self, images, hidden=None):
+        view = (images[:, 0, 0, 0] * 255 / 10).round().long()
+        layers = torch.arange(32)[None, :, None, None] < self.filled[view][:, None, None, None]
+        logits = torch.where(layers.expand(-1, -1, 32, 32), 9.0, -9.0)
+        return Reconstructed(logits, torch.ones(len(images), 4, 4, 4)), hidden
+
+
+@pytest.fixture(scope='module')
+def bandit_views(tmp_path_factory):
+    """Return one full cube, each of its images a plain red that tells the view's number."""
+    images = torch.zeros(1, 24, 64, 64, 4, dtype=torch.uint8)
+    images[..., 0] = (10 * torch.arange(24))[None, :, None, None]
+    images[..., 3] = 255
+    folder = ObjectFolder(tmp_path_factory.mktemp('none'), 'cube', 'cube')
+    return ViewSet(images, torch.tensor(AZIMUTHS, dtype=torch.float32)[None],
+                   torch.ones(1, 32, 32, 32, dtype=torch.bool), (folder,))
+
+
+@torch.no_grad()
+def mean_direction(attention):
+    """Return where the policy looks after one view, averaged over the 24 first views."""
+    proposal, _ = attention(torch.ones(24, 4, 4, 4),
+                            torch.tensor(AZIMUTHS, dtype=torch.float32))
+    mean = proposal.mean_azimuth
+    return math.atan2(mean.sin().mean(), mean.cos().mean())
+
+
+def test_reinforce_finds_the_azimuth_that_pays(bandit_views, tmp_path, monkeypatch):
+    # Seen from above the cube's layers show as well as in perspective, and at once
+    monkeypatch.setattr(policy_gradient, 'project', lambda occupancy, _: occupancy.amax(dim=3))
+    torch.manual_seed(0)
+    attention = AttentionModel(latent_channels=1, hidden_channels=8)
+    best = mean_direction(attention) + 2.0
+    returns = []
+    config = TrainingConfig(steps=60, batch_size=24, learning_rate=3e-2, max_views=2)
+    train_policy(Bandit(best), attention, bandit_views, 0.5, config,
+                 RewardConfig(distance_weight=0.0), tmp_path / 'policy.safetensors',
+                 lambda model: {}, lambda step, told: returns.append(told['return']))
+    after = abs(azimuth_difference(mean_direction(attention), best))
+    assert after < math.radians(20)
+    assert np.mean(returns[-10:]) > np.mean(returns[:10]) + 0.3
+
+
+class CutError(Exception):
+    """A training that is cut off."""
+
+
+def train(network, views, tiny, path, cut_after=None, seed=0, threshold=0.1, resume=False):
+    torch.manual_seed(seed)
+    attention = AttentionModel.from_config(tiny)
+    told = []
+
+    def report(step, measured):
+        told.append((step, measured))
+        if step == cut_after:
+            raise CutError
+
+    train_policy(network, attention, views, threshold, CONFIG, RewardConfig(), path,
+                 lambda model: {'validation': 1.0}, report, resume)
+    return attention, told
+
+
+def test_a_policys_training_cut_off_and_resumed_ends_in_the_very_same_weights(
+        network, views, tiny, tmp_path):
+    before = {name: tensor.clone() for name, tensor in network.state_dict().items()}
+    whole, told = train(network, views, tiny, tmp_path / 'whole.safetensors')
+    path = tmp_path / 'cut.safetensors'
+    with pytest.raises(CutError):
+        train(network, views, tiny, path, cut_after=3)
+    resumed, later = train(network, views, tiny, path, seed=9, resume=True)
+    assert_close(resumed.state_dict(), whole.state_dict(), rtol=0, atol=0)
+    assert later == told[2:]
+    assert [step for step, measured in told if 'validation' in measured] == [2, 4, 5]
+    assert_close(network.state_dict(), before, rtol=0, atol=0)  # frozen throughout
+    with pytest.raises(ConfigError, match='expected a checkpoint of the same settings'):
+        train(network, views, tiny, path, threshold=0.2, resume=True)
+
+
+def test_a_policys_loss_that_is_not_finite_names_its_batch(network, views, tiny, tmp_path):
+    network.encoder.to_latent[0].bias.data.fill_(torch.nan)
+    with pytest.raises(TrainingDivergedError, match='step 0: the loss is nan on the batch'):
+        train(network, views, tiny, tmp_path / 'policy.safetensors')

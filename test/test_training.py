@@ -1,0 +1,163 @@
+"""The first stage of training: it learns, repeats, goes on after a cut, says what went wrong."""
+
+from dataclasses import replace
+
+from active_recon.config import LossConfig
+from active_recon.errors import ConfigError
+from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.training.supervised import (
+    learning_rate_share,
+    train_reconstruction,
+    TrainingConfig,
+    TrainingDivergedError,
+    unroll,
+)
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+CONFIG = TrainingConfig(steps=7, batch_size=3, max_views=3, bfloat16=False, checkpoint_every=3,
+                        validate_every=4)
+
+
+class CutError(Exception):
+    """A training that is cut off."""
+
+
+def train(config, views, tiny, path, cut_after=None, loss=None, seed=0, **options):
+    """Train a fresh network; return it and what was reported."""
+    torch.manual_seed(seed)
+    network = ReconstructionNetwork.from_config(tiny)
+    told = []
+
+    def report(step, measured):
+        told.append((step, measured))
+        if step == cut_after:
+            raise CutError
+
+    train_reconstruction(network, views, config, loss or LossConfig(), path,
+                         lambda model: {'validation': float(model.training)}, report, **options)
+    return network, told
+
+
+def assert_same(a, b):
+    assert_close(a.state_dict(), b.state_dict(), rtol=0, atol=0)
+
+
+@pytest.fixture(scope='module')
+def whole(views, tiny, tmp_path_factory):
+    """Return a training that nobody cut off."""
+    return train(CONFIG, views, tiny, tmp_path_factory.mktemp('whole') / 'run.safetensors')
+
+
+def test_the_same_seed_walks_the_same_path(whole, views, tiny, tmp_path):
+    again, told = train(CONFIG, views, tiny, tmp_path / 'run.safetensors')
+    assert_same(again, whole[0])
+    assert told == whole[1]
+
+
+def test_another_seed_walks_another(whole, views, tiny, tmp_path):
+    config = TrainingConfig(**(CONFIG.to_dict() | {'seed': 1}))
+    _, told = train(config, views, tiny, tmp_path / 'run.safetensors')
+    assert told[0][1]['loss'] != whole[1][0][1]['loss']
+
+
+def test_a_training_cut_off_and_resumed_ends_in_the_very_same_weights(
+        whole, views, tiny, tmp_path):
+    path = tmp_path / 'run.safetensors'
+    with pytest.raises(CutError):
+        train(CONFIG, views, tiny, path, cut_after=5)  # the last checkpoint is of step 3
+    resumed, told = train(CONFIG, views, tiny, path, seed=9, resume=True)
+    assert_same(resumed, whole[0])
+    assert told == whole[1][3:]
+
+
+def test_a_training_stopped_early_and_resumed_does_too(whole, views, tiny, tmp_path):
+    path = tmp_path / 'run.safetensors'
+    _, told = train(CONFIG, views, tiny, path, until=6)
+    assert told == whole[1][:6]
+    resumed, _ = train(CONFIG, views, tiny, path, seed=9, resume=True)
+    assert_same(resumed, whole[0])
+
+
+def test_a_finished_training_that_is_resumed_does_nothing(whole, views, tiny, tmp_path):
+    path = tmp_path / 'run.safetensors'
+    train(CONFIG, views, tiny, path)
+    resumed, told = train(CONFIG, views, tiny, path, seed=9, resume=True)
+    assert told == []
+    assert_same(resumed, whole[0])
+    assert not resumed.training
+
+
+@pytest.mark.parametrize(('config', 'loss'), [
+    (TrainingConfig(**(CONFIG.to_dict() | {'learning_rate': 2e-3})), LossConfig()),
+    (CONFIG, LossConfig(volume_loss='bce'))])
+def test_a_checkpoint_of_other_settings_is_refused(views, tiny, tmp_path, config, loss):
+    path = tmp_path / 'run.safetensors'
+    train(CONFIG, views, tiny, path, until=3)
+    with pytest.raises(ConfigError, match='expected a checkpoint of the same settings.*got'):
+        train(config, views, tiny, path, loss=loss, resume=True)
+
+
+def test_every_step_is_reported_and_validation_now_and_then_in_evaluation_mode(whole):
+    network, told = whole
+    assert [step for step, _ in told] == list(range(1, 8))
+    assert all({'loss', 'volume', 'silhouette'} <= set(measured) for _, measured in told)
+    validated = {step: measured['validation'] for step, measured in told
+                 if 'validation' in measured}
+    assert validated == {4: 0.0, 7: 0.0}  # not in training mode
+    assert not network.training
+
+
+def test_a_loss_that_is_not_finite_names_its_batch_and_leaves_the_checkpoint(
+        views, tiny, tmp_path):
+    path = tmp_path / 'run.safetensors'
+    train(CONFIG, views, tiny, path, until=3)
+    before = path.read_bytes()
+    config = CONFIG
+    torch.manual_seed(0)
+    network = ReconstructionNetwork.from_config(tiny)
+
+    def poison(step, measured):
+        network.decoder.grow[0].weight.data.fill_(torch.nan)
+
+    with pytest.raises(TrainingDivergedError,
+                       match=r'step 4: the loss is nan on the batch (lamp|table)-0.*, .*rate'):
+        train_reconstruction(network, views, config, LossConfig(), path, lambda model: {}, poison,
+                             resume=True)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize('bfloat16', [False, True])
+def test_the_loss_falls(views, tiny, tmp_path, bfloat16):
+    one = replace(views, images=views.images[:1], azimuths=views.azimuths[:1],
+                  voxels=views.voxels[:1], folders=views.folders[:1])
+    config = TrainingConfig(steps=60, batch_size=4, learning_rate=3e-2, max_views=2,
+                            bfloat16=bfloat16)
+    _, told = train(config, one, tiny, tmp_path / 'run.safetensors',
+                    loss=LossConfig(1.0, 0.0, 'bce'))
+    losses = [measured['loss'] for _, measured in told]
+    assert np.isfinite(losses).all()
+    assert np.mean(losses[-10:]) < 0.9 * np.mean(losses[:10])
+
+
+def test_an_unrolled_sequence_answers_after_every_view(network, views):
+    from active_recon.training.batches import draw_batch
+    batch = draw_batch(views, 2, 3, np.random.default_rng(0))
+    sequence = unroll(network, batch)
+    assert [logits.shape for logits in sequence] == [(2, 32, 32, 32)] * 3
+    first, hidden = network(batch.images[0])
+    second, _ = network(batch.images[1], hidden)
+    assert_close(sequence[:2], [first.logits, second.logits])
+
+
+def test_the_learning_rate_rises_in_a_line_and_falls_as_half_a_cosine():
+    shares = np.array([learning_rate_share(step, 10_000) for step in range(10_000)])
+    assert shares[0] == pytest.approx(1 / 200)
+    assert shares[99] == pytest.approx(0.5, abs=1e-3)
+    assert shares.max() == pytest.approx(1, abs=1e-3)
+    assert (np.diff(shares[:199]) > 0).all()
+    assert (np.diff(shares[200:]) < 0).all()
+    assert shares[5000] == pytest.approx(0.5)
+    assert 0 < shares[-1] < 1e-6

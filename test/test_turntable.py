@@ -1,0 +1,89 @@
+"""The simulated turntable's motion, and what it shows."""
+
+import math
+
+from active_recon.cameras import azimuth_difference, CANONICAL_DISTANCE
+from active_recon.errors import ConfigError, DataError, MeshError, ViewError
+from active_recon.shown_object import rendered_object
+from active_recon.turntable import Turntable
+import numpy as np
+import pytest
+import trimesh
+
+
+def test_it_stands_where_it_starts_until_it_is_given_a_goal():
+    turntable = Turntable(azimuth=-1.0)
+    assert turntable.azimuth_at(100.0) == pytest.approx(math.tau - 1.0)
+
+
+@pytest.mark.parametrize('goal', np.linspace(-7, 7, 29))
+def test_it_turns_the_shortest_way_at_its_speed_and_stays(goal):
+    turntable = Turntable(azimuth=1.0, speed=0.5, time_scale=2.0)  # 1 rad a second
+    turntable.turn_to(goal, now=10.0)
+    way = abs(azimuth_difference(goal, 1.0))
+    times = np.linspace(10.0, 14.0, 401)
+    azimuths = [turntable.azimuth_at(time) for time in times]
+    moved = np.abs(azimuth_difference(azimuths, 1.0))
+    np.testing.assert_allclose(moved, np.minimum(times - 10.0, way), atol=1e-9)
+    assert azimuth_difference(azimuths[-1], goal) == pytest.approx(0, abs=1e-9)
+    assert all(0 <= azimuth < math.tau for azimuth in azimuths)
+
+
+def test_a_new_goal_is_left_for_from_where_the_camera_is():
+    turntable = Turntable()
+    turntable.turn_to(2.0, now=0.0)
+    turntable.turn_to(0.0, now=1.5)
+    assert turntable.azimuth_at(1.5) == pytest.approx(1.5)
+    assert turntable.azimuth_at(2.5) == pytest.approx(0.5)
+
+
+def test_the_same_goal_again_changes_nothing():
+    once, twice = Turntable(), Turntable()
+    once.turn_to(2.0, now=0.0)
+    twice.turn_to(2.0, now=0.0)
+    twice.turn_to(2.0, now=0.7)
+    assert twice.azimuth_at(1.3) == pytest.approx(once.azimuth_at(1.3))
+
+
+@pytest.mark.parametrize('goal', [math.nan, math.inf, -math.inf])
+def test_a_goal_that_is_not_finite_is_refused_and_the_last_one_stays(goal):
+    turntable = Turntable()
+    turntable.turn_to(1.0, now=0.0)
+    with pytest.raises(ViewError, match='finite, got -?(nan|inf)'):
+        turntable.turn_to(goal, now=0.5)
+    assert turntable.azimuth_at(2.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize('settings', [{'speed': 0.0}, {'time_scale': -1.0}, {'azimuth': math.nan}])
+def test_a_turntable_that_cannot_turn_is_refused(settings):
+    with pytest.raises(ConfigError, match='expected a finite azimuth'):
+        Turntable(**settings)
+
+
+@pytest.fixture(scope='module')
+def shown(tmp_path_factory):
+    path = tmp_path_factory.mktemp('mesh') / 'box.ply'
+    trimesh.creation.box((2, 1, 1)).export(path)
+    return rendered_object(path, object_size=0.5, background=10)
+
+
+def test_an_object_is_shown_by_the_nearest_of_its_views_and_says_which_it_is(shown):
+    for azimuth in (0.0, 0.12, 6.2, 3.0):
+        image, camera = shown.seen_from(azimuth)
+        assert image.shape == (137, 137, 3)
+        assert abs(azimuth_difference(camera.azimuth, azimuth)) <= math.radians(7.5)
+        assert camera.distance == pytest.approx(CANONICAL_DISTANCE * 0.5)
+    assert shown.seen_from(0.12)[0] is shown.seen_from(0.0)[0]
+
+
+def test_the_background_shows_around_the_object(shown):
+    image, _ = shown.seen_from(0.0)
+    assert (image[0] == 10).all()
+    assert not (image == 10).all()
+
+
+def test_what_is_no_mesh_is_refused(tmp_path):
+    (tmp_path / 'text.ply').write_text('no mesh')
+    with pytest.raises(MeshError, match='expected a mesh'):
+        rendered_object(tmp_path / 'text.ply')
+    assert issubclass(MeshError, DataError)

@@ -1,0 +1,94 @@
+"""Which images become views."""
+
+import math
+
+from active_recon.cameras import orbit_camera
+from active_recon.errors import ConfigError
+from active_recon.view_gate import ViewGate
+import pytest
+
+PERIOD = 100_000_000  # nanoseconds
+
+
+def offer(gate, azimuths, goals_expected=False, start=0):
+    """Offer images at 10 Hz; return the indices of those that became views."""
+    taken = []
+    for index, azimuth in enumerate(azimuths):
+        camera = orbit_camera(azimuth)
+        if gate.wants(camera, start + index * PERIOD, goals_expected):
+            gate.took(camera)
+            taken.append(index)
+    return taken
+
+
+def test_all_takes_every_image_of_a_moving_camera():
+    assert offer(ViewGate('all'), [0, 1, 2, 2]) == [0, 1, 2, 3]
+
+
+def test_by_separation_waits_until_the_camera_is_still():
+    gate = ViewGate('by_separation', min_view_separation=0.2)
+    assert offer(gate, [0, 0, 0, 0.1, 0.1, 0.5, 0.8, 0.8, 0.8]) == [1, 7]
+
+
+def test_separation_is_the_short_way_round():
+    gate = ViewGate('by_separation', min_view_separation=0.2)
+    assert offer(gate, [0.05, 0.05, math.tau - 0.05, math.tau - 0.05]) == [1]
+
+
+def test_a_goal_is_taken_once_and_only_near_it():
+    gate = ViewGate('at_goal', goal_tolerance=0.14)
+    assert offer(gate, [0, 0, 0]) == []
+    gate.set_goal(1.0, stamp=1)
+    assert offer(gate, [0.85, 0.85, 0.87, 0.87, 0.87, 1.0, 1.0], start=10 * PERIOD) == [3]
+
+
+def test_the_same_azimuth_under_a_new_stamp_is_a_new_goal_and_under_the_old_one_is_not():
+    gate = ViewGate('at_goal')
+    gate.set_goal(1.0, stamp=1)
+    assert offer(gate, [1, 1, 1]) == [1]
+    gate.set_goal(1.0, stamp=1)
+    assert offer(gate, [1, 1], start=10 * PERIOD) == []
+    gate.set_goal(1.0, stamp=2)
+    assert offer(gate, [1, 1], start=20 * PERIOD) == [0]
+
+
+def test_auto_goes_by_separation_until_goals_are_given_or_expected():
+    gate = ViewGate('auto')
+    assert offer(gate, [0, 0]) == [1]
+    assert offer(gate, [1, 1], goals_expected=True, start=10 * PERIOD) == []
+    assert offer(gate, [2, 2], start=20 * PERIOD) == [1]
+    gate.set_goal(0.0, stamp=1)
+    assert offer(gate, [3, 3, 0, 0], start=30 * PERIOD) == [3]
+
+
+def test_a_view_that_was_not_used_leaves_its_goal_open():
+    gate = ViewGate('at_goal')
+    gate.set_goal(0.0, stamp=1)
+    offer(gate, [0.5])
+    camera = orbit_camera(0.0)
+    assert not gate.wants(camera, PERIOD)
+    assert gate.wants(camera, 2 * PERIOD)
+    assert gate.wants(camera, 3 * PERIOD)
+
+
+def test_a_camera_that_turns_in_place_is_not_still():
+    gate = ViewGate('by_separation')
+    camera = orbit_camera(0.0)
+    turned = orbit_camera(0.0)
+    turned.pose[:3, :3] = turned.pose[:3, :3] @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    assert not gate.wants(camera, 0)
+    assert not gate.wants(turned, PERIOD)
+    assert gate.wants(turned, 2 * PERIOD)
+
+
+def test_an_episode_begins_without_goal_and_view():
+    gate = ViewGate('auto')
+    gate.set_goal(2.0, stamp=1)
+    assert offer(gate, [2, 2]) == [1]
+    gate.reset()
+    assert offer(gate, [2, 2], start=10 * PERIOD) == [1]
+
+
+def test_an_unknown_way_to_take_views_is_refused():
+    with pytest.raises(ConfigError, match="expected one of auto.*got 'sometimes'"):
+        ViewGate('sometimes')

@@ -1,0 +1,148 @@
+"""Weights on disk: what was saved is loaded, and everything else is refused in words."""
+
+import json
+from pathlib import Path
+
+from active_recon.errors import WeightsError
+from active_recon.models.weights import Bundle, load_weights, MODEL, save_weights, weights_hash
+import numpy as np
+import pytest
+from safetensors.torch import load_file, save_file
+import torch
+from torch.testing import assert_close
+
+
+@pytest.fixture
+def saved(tmp_path, network, attention, tiny) -> Path:
+    path = tmp_path / 'run' / 'weights.safetensors'
+    save_weights(path, Bundle(network, attention, tiny, 0.35, {'command': 'made by a test'}))
+    return path
+
+
+def rewritten(path, tiny, tensors=None, **metadata):
+    """Write the file again with other tensors or metadata; None leaves a key out."""
+    told = {'model': MODEL, 'config': json.dumps(tiny.to_dict()), 'threshold': '0.35'} | metadata
+    save_file(load_file(path) if tensors is None else tensors, path,
+              {key: value for key, value in told.items() if value is not None})
+
+
+def test_what_was_saved_is_loaded_to_half_precision(saved, network, attention, tiny):
+    bundle = load_weights(saved)
+    assert (bundle.config, bundle.threshold) == (tiny, 0.35)
+    for loaded, module in ((bundle.reconstruction, network), (bundle.attention, attention)):
+        for name, tensor in module.state_dict().items():
+            assert_close(loaded.state_dict()[name], tensor, rtol=1e-3, atol=1e-6)
+
+
+def test_a_loaded_network_answers_as_the_one_that_was_saved(saved, network):
+    images = torch.rand(2, 3, 64, 64)
+    with torch.no_grad():
+        expected, _ = network(images)
+    found, _ = load_weights(saved).reconstruction(images)
+    assert_close(found.logits, expected.logits, rtol=0, atol=0.01)
+
+
+def test_loaded_networks_are_frozen_and_in_float32(saved):
+    bundle = load_weights(saved)
+    for module in (bundle.reconstruction, bundle.attention):
+        assert not module.training
+        for parameter in module.parameters():
+            assert not parameter.requires_grad
+            assert parameter.dtype == torch.float32
+            assert parameter.device.type == 'cpu'
+
+
+def test_a_second_saving_of_what_was_loaded_loses_nothing(saved, tmp_path):
+    again = tmp_path / 'again.safetensors'
+    save_weights(again, load_weights(saved))
+    assert_close(load_file(again), load_file(saved), rtol=0, atol=0)
+
+
+def test_the_card_beside_tells_where_the_weights_come_from(saved, tiny):
+    card = json.loads(saved.with_suffix('.json').read_text())
+    assert card['command'] == 'made by a test'
+    assert card['sha256'] == weights_hash(saved)
+    assert card['threshold'] == 0.35
+    assert card['config'] == json.loads(json.dumps(tiny.to_dict()))
+
+
+def test_nothing_in_the_file_is_a_pickle(saved):
+    raw = saved.read_bytes()
+    header = int.from_bytes(raw[:8], 'little')
+    assert json.loads(raw[8:8 + header])['__metadata__']['model'] == MODEL
+    numbers = sum(tensor.nbytes for tensor in load_file(saved).values())
+    assert len(raw) == 8 + header + numbers  # a header in JSON, and numbers
+
+
+def test_the_weights_that_ship_load_and_know_their_hash():
+    bundle = load_weights()
+    assert 0 < bundle.threshold < 1
+    assert weights_hash() == bundle_card()['sha256']
+
+
+def bundle_card():
+    import active_recon
+    return json.loads(
+        (Path(active_recon.__file__).parent / 'weights' / f'{MODEL}.json').read_text())
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(WeightsError, match=r'nothing\.safetensors: expected a weights file .* no'):
+        load_weights(tmp_path / 'nothing.safetensors')
+
+
+@pytest.mark.parametrize('share', [0.0, 0.01, 0.5, 0.999])
+def test_a_truncated_file_is_refused(saved, share):
+    raw = saved.read_bytes()
+    saved.write_bytes(raw[:int(share * len(raw))])
+    with pytest.raises(WeightsError, match='expected a whole safetensors file'):
+        load_weights(saved)
+
+
+def test_a_pickle_is_refused_and_never_run(tmp_path):
+    torch.save({'weights': torch.zeros(3)}, tmp_path / 'model.safetensors')
+    with pytest.raises(WeightsError, match='expected a whole safetensors file'):
+        load_weights(tmp_path / 'model.safetensors')
+
+
+@pytest.mark.parametrize('model', ['3d-r2n2', None])
+def test_another_model_is_refused(saved, tiny, model):
+    rewritten(saved, tiny, model=model)
+    with pytest.raises(WeightsError, match=f'model {MODEL}, got ({model}|a file that names no)'):
+        load_weights(saved)
+
+
+@pytest.mark.parametrize('config', [
+    None, 'no json', '{"depth": 3}', '{"stem_channels": 0}', '{"decoder_channels": [8]}',
+    '{"stem_channels": "many"}', '[1]'])
+def test_a_config_that_makes_no_network_is_refused(saved, tiny, config):
+    rewritten(saved, tiny, config=config)
+    with pytest.raises(WeightsError, match='its config cannot be read'):
+        load_weights(saved)
+
+
+@pytest.mark.parametrize('threshold', [None, 'high'])
+def test_a_threshold_that_is_no_number_is_refused(saved, tiny, threshold):
+    rewritten(saved, tiny, threshold=threshold)
+    with pytest.raises(WeightsError, match='its config cannot be read'):
+        load_weights(saved)
+
+
+def test_tensors_of_other_sizes_than_the_config_are_refused(saved, tiny):
+    other = json.dumps(tiny.to_dict() | {'recurrent_channels': 16})
+    rewritten(saved, tiny, config=other)
+    with pytest.raises(WeightsError, match='(?s)tensors do not fit its config.*size mismatch'):
+        load_weights(saved)
+
+
+def test_a_tensor_that_is_lacking_is_named(saved, tiny):
+    tensors = load_file(saved)
+    del tensors['attention.location.bias']
+    rewritten(saved, tiny, tensors)
+    with pytest.raises(WeightsError, match=r'(?s)do not fit its config.*location\.bias'):
+        load_weights(saved)
+
+
+def test_half_precision_is_what_the_file_holds(saved):
+    assert {tensor.dtype for tensor in load_file(saved).values()} == {torch.float16}
+    assert np.isfinite([tensor.float().abs().max() for tensor in load_file(saved).values()]).all()
