@@ -37,7 +37,7 @@ def reconstruct_and_plan() -> Figure:
 
 
 def rendering(samples: int, goal: float) -> Figure:
-    """Render the models that ship to measure on (under 20,000 faces), on one core: views a second."""
+    """Render the real models that ship (under 20,000 faces), on one core: views a second."""
     rates = []
     for path in sorted(MODELS.glob('*/*.glb')):
         mesh = load_mesh(path)

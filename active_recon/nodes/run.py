@@ -1,6 +1,7 @@
 """Start, spin and stop a node: the part every executable shares."""
 
 from collections.abc import Callable
+import faulthandler
 import signal
 
 from active_recon.errors import ActiveReconError
@@ -11,6 +12,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 _NOTICED_WITHIN_S = 0.1
+_CLOSED_WITHIN_S = 15.0
 
 
 def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> None:
@@ -18,7 +20,7 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
     Spin the node until the process is asked to stop, by SIGINT or SIGTERM.
 
     A node that cannot start (a parameter out of range, a weights file that is missing) says why
-    in one line and the process exits with code 1.
+    in one line and the process exits with code 1, as does one that cannot be closed in time.
     """
     # rclpy's own handlers tear its context down wherever the signal finds it, which while a node
     # starts or closes its files ends in a traceback, or is not heard at all.
@@ -37,6 +39,9 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
         get_logger('active_recon').fatal(one_line(error))
         raise SystemExit(1) from None
     finally:
+        # Whoever supervises the node must not wait for ever for a middleware that does not let
+        # go: after that time the process says where each thread stands, and ends with code 1.
+        faulthandler.dump_traceback_later(_CLOSED_WITHIN_S, exit=True)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()

@@ -138,6 +138,14 @@ def test_every_executable_publishes_and_ends_when_asked(install, tmp_path, monke
             assert process.wait(STOP_BUDGET_S) == 0, said(tmp_path, node)
 
 
+def test_the_installed_demo_leaves_a_bag_a_mesh_and_a_picture(install, tmp_path):
+    run([install.executables / 'active-recon', 'demo', '--views', '2', '--policy', 'farthest'],
+        env=install.environment, cwd=tmp_path)
+    folder, = (tmp_path / 'bags').iterdir()
+    left = {path.suffix for path in folder.iterdir()}
+    assert left == {'.mcap', '.yaml', '.ply', '.png'}
+
+
 @contextmanager
 def started(commands: dict[str, list], environment: dict[str, str],
             folder: Path) -> Iterator[dict[str, subprocess.Popen]]:
