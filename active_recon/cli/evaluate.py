@@ -40,7 +40,13 @@ def evaluate(
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.views import read_views
-    from active_recon.evaluation.measure import blindness, iou_by_yaw, run_policy, summary
+    from active_recon.evaluation.measure import (
+        blindness,
+        interval,
+        iou_by_yaw,
+        run_policy,
+        summary,
+    )
     from active_recon.evaluation.metrics import episodes
     from active_recon.models.weights import load_weights, weights_hash
     from active_recon.policies import load_policy
@@ -65,13 +71,21 @@ def evaluate(
         'model': bundle.card.get('model', '2d3d-attention'), 'weights': weights_hash(weights),
         'threshold': threshold, 'objects': len(held_out), 'episodes': len(objects),
         'unreadable': list(held_out.unreadable), 'policies': {}}
+    areas = {}
     for name, chosen in policies.items():
         with progress_bar(name, len(objects)) as advance:
             run = run_policy(network, chosen, held_out, objects, first, threshold, views,
                              progress=lambda done: advance(done, ''))
         result['policies'][name] = summary(run, held_out, objects)
+        areas[name] = run.auc
         typer.echo(_line(name, result['policies'][name]['iou'])
                    + f'   area {result["policies"][name]["auc"]["mean"]:.4f}')
+    if 'random' in areas:
+        result['auc_above_random'] = {
+            name: interval(area - areas['random'], objects.numpy())
+            for name, area in areas.items() if name != 'random'}
+        typer.echo("area above random's: " + ', '.join(
+            f'{name} {_spread(gain, 4)}' for name, gain in result['auc_above_random'].items()))
     result['yaw'] = iou_by_yaw(network, held_out, objects, first, threshold)
     typer.echo("IoU by the front's yaw: " + ', '.join(
         f'{yaw} deg {values["mean"]:.3f}' for yaw, values in result['yaw'].items()))
