@@ -76,6 +76,14 @@ def test_a_training_of_other_settings_is_not_resumed(run, dataset, monkeypatch, 
     assert 'expected a checkpoint of the same settings' in line
 
 
+def test_a_new_training_never_overwrites_the_checkpoints_of_another(
+        run, dataset, monkeypatch, capsys):
+    before = (run / 'reconstruction.safetensors').read_bytes()
+    line = refusal(monkeypatch, capsys, *training(dataset, run))
+    assert 'go on with --resume' in line
+    assert (run / 'reconstruction.safetensors').read_bytes() == before
+
+
 def test_a_training_is_told_as_it_goes(dataset, tmp_path, monkeypatch, capsys):
     assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0,
                                           '--silhouette-weight', 0)) == 0

@@ -6,6 +6,7 @@ import sys
 from typing import Annotated
 
 from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
 import typer
 
 
@@ -51,6 +52,12 @@ def train(
     from active_recon.training.supervised import train_reconstruction, TrainingConfig
     import torch
 
+    checkpoints = {stage: out / f'{stage}.safetensors' for stage in ('reconstruction', 'policy')}
+    if not resume and any(path.exists() for path in checkpoints.values()):
+        raise ConfigError(f'{out}: expected a new run folder, but it holds checkpoints; go on '
+                          'with --resume, or name another folder by --out')
+    loss = LossConfig(volume_weight, silhouette_weight, volume_loss)
+    first = TrainingConfig(steps, batch_size, learning_rate, seed=seed, bfloat16=bf16)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
 
@@ -66,9 +73,7 @@ def train(
     network_config = NetworkConfig()
     network = ReconstructionNetwork.from_config(network_config)
     attention = AttentionModel.from_config(network_config)
-    loss = LossConfig(volume_weight, silhouette_weight, volume_loss)
-    first = TrainingConfig(steps, batch_size, learning_rate, seed=seed, bfloat16=bf16)
-    checkpoint = out / 'reconstruction.safetensors'
+    checkpoint = checkpoints['reconstruction']
     with _reporting('reconstruction', steps, out) as report:
         train_reconstruction(network, training, first, loss, checkpoint,
                              lambda model: reconstruction_iou(model, held_out), report,
@@ -79,7 +84,7 @@ def train(
     second = TrainingConfig(max(policy_steps, 1), policy_batch_size, policy_learning_rate,
                             seed=seed, checkpoint_every=50, validate_every=250)
     if policy_steps:
-        checkpoint = out / 'policy.safetensors'
+        checkpoint = checkpoints['policy']
         with _reporting('policy', policy_steps, out) as report:
             train_policy(network, attention, training, threshold, second, rewards, checkpoint,
                          lambda model: policy_auc(network, model, held_out, threshold), report,

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from active_recon.errors import DataError
+from active_recon.errors import ConfigError, DataError
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import nn, Tensor
@@ -57,3 +57,13 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
             if stored_name in tensors:
                 optimizer.state[parameter][key] = tensors[stored_name]
     return Checkpoint(meta['step'], meta['settings'], meta['log'])
+
+
+def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
+                      settings: dict[str, Any]) -> Checkpoint:
+    """Restore as `load_checkpoint`; raises ConfigError where it was made under other settings."""
+    stored = load_checkpoint(path, module, optimizer)
+    if stored.settings != settings:
+        raise ConfigError(f'{path}: expected a checkpoint of the same settings ({settings}), '
+                          f'got {stored.settings}')
+    return stored

@@ -8,12 +8,11 @@ from pathlib import Path
 from active_recon.cameras import AZIMUTHS, orbit_camera, TURN
 from active_recon.config import RewardConfig
 from active_recon.datasets.views import ViewSet
-from active_recon.errors import ConfigError
 from active_recon.evaluation.rollouts import nearest_views
 from active_recon.models.attention import AttentionModel
 from active_recon.models.reconstruction import ReconstructionNetwork
 from active_recon.silhouettes import frustum, project
-from active_recon.training.checkpoints import Checkpoint, load_checkpoint, save_checkpoint
+from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
 from active_recon.training.supervised import (
     learning_rate_share,
     refuse_divergence,
@@ -131,15 +130,12 @@ def train_policy(
     optimizer = torch.optim.AdamW(attention.parameters(), config.learning_rate,
                                   betas=(0.9, 0.99), weight_decay=0.0)
     settings = {'training': config.to_dict(), 'reward': rewards.to_dict(), 'threshold': threshold}
-    done, log = 0, []
+    begun = Checkpoint(0, settings, [])
     if resume:
-        stored = load_checkpoint(checkpoint_path, attention, optimizer)
-        if stored.settings != settings:
-            raise ConfigError(f'{checkpoint_path}: expected a checkpoint of the same settings '
-                              f'({settings}), got {stored.settings}')
-        done, log = stored.step, stored.log
+        begun = resume_checkpoint(checkpoint_path, attention, optimizer, settings)
+    log = begun.log
     network.eval()
-    for step in range(done, config.steps):
+    for step in range(begun.step, config.steps):
         rng = np.random.default_rng([config.seed, 1, step])
         objects = torch.from_numpy(rng.integers(len(views), size=config.batch_size))
         starts = torch.from_numpy(rng.integers(views.images.shape[1], size=config.batch_size))

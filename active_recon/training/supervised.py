@@ -12,7 +12,7 @@ from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.models.reconstruction import Hidden, ReconstructionNetwork
 from active_recon.silhouettes import frustum
 from active_recon.training.batches import Batch, draw_batch
-from active_recon.training.checkpoints import Checkpoint, load_checkpoint, save_checkpoint
+from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
 from active_recon.training.losses import reconstruction_loss
 import numpy as np
 import torch
@@ -66,16 +66,13 @@ def train_reconstruction(
     optimizer = torch.optim.AdamW(network.parameters(), config.learning_rate, betas=(0.9, 0.99),
                                   weight_decay=0.01)
     settings = {'training': config.to_dict(), 'loss': loss.to_dict()}
-    done, log = 0, []
+    begun = Checkpoint(0, settings, [])
     if resume:
-        stored = load_checkpoint(checkpoint_path, network, optimizer)
-        if stored.settings != settings:
-            raise ConfigError(f'{checkpoint_path}: expected a checkpoint of the same settings '
-                              f'({settings}), got {stored.settings}')
-        done, log = stored.step, stored.log
+        begun = resume_checkpoint(checkpoint_path, network, optimizer, settings)
+    log = begun.log
     frusta = frustum([orbit_camera(azimuth) for azimuth in AZIMUTHS])
     network.train()
-    for step in range(done, min(config.steps, until or config.steps)):
+    for step in range(begun.step, min(config.steps, until or config.steps)):
         rng = np.random.default_rng([config.seed, step])
         length = int(rng.integers(1, config.max_views + 1))
         batch = draw_batch(views, config.batch_size, length, rng)
