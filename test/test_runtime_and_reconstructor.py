@@ -45,8 +45,8 @@ def test_a_step_answers_as_the_network_itself(runtime, network, views):
         expected, _ = network(image)
     pixels = (image[0].permute(1, 2, 0) * 255).round().byte().numpy()
     occupancy, latent, _ = runtime.step(pixels, None)
-    np.testing.assert_allclose(occupancy, expected.logits[0].sigmoid(), atol=1e-5)
-    np.testing.assert_allclose(latent, expected.latent[0], atol=1e-5)
+    np.testing.assert_allclose(occupancy, expected.logits[0].sigmoid(), atol=1e-4)
+    np.testing.assert_allclose(latent, expected.latent[0], atol=1e-4)
 
 
 def test_a_reset_reconstructor_is_as_good_as_new(runtime):
