@@ -31,6 +31,7 @@ ROOT = Path(__file__).parents[2]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM = QoSProfile(depth=100)
 BUDGET_S = 30.0  # for what takes a second on an idle machine
+SEND_AGAIN_S = 5.0
 _PIXELS = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
 
 
@@ -124,9 +125,14 @@ class Bench:
 
     def until(self, condition: Callable[[], Any], what: str, budget_s: float = BUDGET_S) -> Any:
         """Spin until the condition holds; return what it returned."""
+        value = self.within(budget_s, condition)
+        assert value, f'waited {budget_s} s in vain for {what}'
+        return value
+
+    def within(self, budget_s: float, condition: Callable[[], Any]) -> Any:
+        """Spin until the condition holds or the time is over; return what it returned last."""
         deadline = time.monotonic() + budget_s
-        while not (value := condition()):
-            assert time.monotonic() < deadline, f'waited {budget_s} s in vain for {what}'
+        while not (value := condition()) and time.monotonic() < deadline:
             self._executor.spin_once(timeout_sec=0.02)
         return value
 
@@ -197,12 +203,19 @@ class FakeCamera:
 
     def show(self) -> int:
         """Send a good view and wait for its occupancy; return its stamp."""
-        image, info, pose = self.messages()
-        self.send(image, info, pose)
-        self._bench.until(
-            lambda: any(msg.header.stamp == image.header.stamp for msg in self.occupancy),
-            'the occupancy after a good view')
-        return nanoseconds_from_stamp(image.header.stamp)
+        stamps = []
+
+        def heard() -> list[int]:
+            return [nanoseconds_from_stamp(msg.header.stamp) for msg in self.occupancy
+                    if nanoseconds_from_stamp(msg.header.stamp) in stamps]
+
+        for _ in range(round(BUDGET_S / SEND_AGAIN_S)):  # best effort may lose one
+            messages = self.messages()
+            stamps.append(nanoseconds_from_stamp(messages[0].header.stamp))
+            self.send(*messages)
+            if found := self._bench.within(SEND_AGAIN_S, heard):
+                return found[-1]
+        raise AssertionError('no occupancy after a good view')
 
 
 def _started(folder: Path) -> Iterator[Callable[..., NodeProcess]]:
