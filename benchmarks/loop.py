@@ -18,6 +18,7 @@ from benchmarks.figures import Figure
 
 _READY_STARTS = 5
 _VIEWS = 200
+_DEMOS = 3
 _BUDGET_S = 30.0
 
 
@@ -40,12 +41,15 @@ def reconstructor_figures() -> list[Figure]:
 
 def demo_figure() -> Figure:
     """Run the whole demo, as a user starts it, with the attention policy."""
-    with TemporaryDirectory() as folder:
-        start = time.monotonic()
-        subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'demo'], check=True,
-                       cwd=folder, stdout=subprocess.DEVNULL,
-                       env={**os.environ, 'PYTHONPATH': str(Path(__file__).parents[1])})
-        return Figure('the whole demo', 's', [time.monotonic() - start], 60)
+    spent = []
+    for _ in range(_DEMOS):
+        with TemporaryDirectory() as folder:
+            start = time.monotonic()
+            subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'demo'], check=True,
+                           cwd=folder, stdout=subprocess.DEVNULL,
+                           env={**os.environ, 'PYTHONPATH': str(Path(__file__).parents[1])})
+            spent.append(time.monotonic() - start)
+    return Figure('the whole demo', 's', spent, 60)
 
 
 @contextmanager
