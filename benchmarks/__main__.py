@@ -39,8 +39,12 @@ def _row(figure: Figure, reference: float) -> str:
     goal = f'{"at least" if figure.more_is_better else "at most"} {figure.goal:g} {figure.unit}'
     milliseconds = {'ms': 1.0, 's': 1e3}.get(figure.unit)
     ratio = '' if milliseconds is None else f'{figure.value * milliseconds / reference:.1f}'
-    return (f'| {figure.name} | {figure.value:.3g} {figure.unit} | {low:.3g} to {high:.3g} '
-            f'| {goal} | {ratio} |')
+    return (f'| {figure.name} | {_digits(figure.value)} {figure.unit} '
+            f'| {_digits(low)} to {_digits(high)} | {goal} | {ratio} |')
+
+
+def _digits(value: float) -> str:
+    return f'{value:.0f}' if value >= 100 else f'{value:.3g}'
 
 
 if __name__ == '__main__':

@@ -80,7 +80,7 @@ def evaluate(
         areas[name] = run.auc
         typer.echo(_line(name, result['policies'][name]['iou'])
                    + f'   area {result["policies"][name]["auc"]["mean"]:.4f}')
-    if 'random' in areas:
+    if 'random' in areas and len(areas) > 1:
         result['auc_above_random'] = {
             name: interval(area - areas['random'], objects.numpy())
             for name, area in areas.items() if name != 'random'}
