@@ -76,7 +76,8 @@ def run_demo(demo: Demo, console: Console) -> Path:
 
 def _start_loop(nodes: NodeProcesses, demo: Demo, folder: Path) -> None:
     nodes.start('turntable_camera', {'mesh': demo.mesh, 'start_azimuth': _start_azimuth(demo)})
-    nodes.start('reconstructor', {'output_dir': folder})
+    # Goals only: `auto` takes views of its own accord while it has not yet met the planner.
+    nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal'})
     # A tolerance of 0 keeps an early end away: as many views as were asked for are shown.
     nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
                                  'max_views': demo.views, 'entropy_tolerance': 0.0})
