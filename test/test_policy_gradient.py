@@ -169,7 +169,8 @@ def mean_direction(attention):
 
 def test_reinforce_finds_the_azimuth_that_pays(bandit_views, tmp_path, monkeypatch):
     # Seen from above the cube's layers show as well as in perspective, and at once
-    monkeypatch.setattr(policy_gradient, 'project', lambda occupancy, _: occupancy.amax(dim=3))
+    monkeypatch.setattr(policy_gradient, 'project_all', lambda occupancy, frusta: (
+        occupancy.amax(dim=3)[:, None].expand(-1, len(frusta), -1, -1)))
     torch.manual_seed(0)
     attention = AttentionModel(latent_channels=1, hidden_channels=8)
     best = mean_direction(attention) + 2.0

@@ -11,7 +11,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.rollouts import nearest_views
 from active_recon.models.attention import AttentionModel
 from active_recon.models.reconstruction import ReconstructionNetwork
-from active_recon.silhouettes import frustum, project
+from active_recon.silhouettes import frustum, project_all
 from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
 from active_recon.training.supervised import (
     learning_rate_share,
@@ -77,8 +77,8 @@ def run_episodes(
     rows = torch.arange(len(objects))
     cameras = [orbit_camera(azimuth)
                for azimuth in rng.choice(AZIMUTHS, _SILHOUETTES, replace=False)]
-    frusta = frustum(cameras)[:, None].expand(-1, len(objects), -1, -1, -1, -1)
-    true_outlines = [project(truth.float(), samples) > 0.5 for samples in frusta]
+    frusta = frustum(cameras)
+    true_outlines = project_all(truth.float(), frusta) > 0.5  # (B, cameras, S, S)
     chosen, hidden, state = starts, None, None
     taken = torch.empty(len(objects), 0)
     quality: list[tuple[Tensor, Tensor]] = []
@@ -88,10 +88,9 @@ def run_episodes(
         with torch.inference_mode():
             seen, hidden = network(views.white(objects, chosen), hidden)
             occupied = seen.logits.sigmoid() > threshold
-            outlines = torch.stack([
-                iou(project(occupied.float(), samples) > 0.5, outline, (-2, -1))
-                for samples, outline in zip(frusta, true_outlines, strict=True)])
-            quality.append((iou(occupied, truth), outlines.mean(dim=0)))
+            outlines = project_all(occupied.float(), frusta) > 0.5
+            quality.append((iou(occupied, truth),
+                            iou(outlines, true_outlines, (-2, -1)).mean(dim=1)))
         if t + 1 == length:
             break
         proposal, state = attention(seen.latent.clone(), taken[:, -1], state)
@@ -102,9 +101,9 @@ def run_episodes(
         steps['baseline'].append(proposal.baseline)
         chosen = nearest_views(azimuths.numpy(), sample.double().numpy())
         steps['distance'].append(distance_reward(azimuths[rows, chosen], taken, config))
-    volumes, outlines = (torch.stack(part).clone() for part in zip(*quality, strict=True))
+    volumes, silhouettes = (torch.stack(part).clone() for part in zip(*quality, strict=True))
     return Episode(torch.stack(steps['log']), torch.stack(steps['baseline']),
-                   volumes.diff(dim=0), outlines.diff(dim=0), torch.stack(steps['distance']))
+                   volumes.diff(dim=0), silhouettes.diff(dim=0), torch.stack(steps['distance']))
 
 
 def policy_loss(episode: Episode) -> tuple[Tensor, Tensor]:
