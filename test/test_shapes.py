@@ -4,7 +4,7 @@ from pathlib import Path
 
 from active_recon import shapes
 from active_recon.errors import ConfigError
-from active_recon.shapes import CATEGORIES, generators_hash, make_shape
+from active_recon.shapes import ALL_CATEGORIES, generators_hash, make_shape
 from active_recon.voxelise import voxelise
 import numpy as np
 import pytest
@@ -15,10 +15,11 @@ SEEDS = range(6)
 
 @pytest.fixture(scope='module')
 def drawn():
-    return {category: [make_shape(category, seed) for seed in SEEDS] for category in CATEGORIES}
+    return {category: [make_shape(category, seed) for seed in SEEDS]
+            for category in ALL_CATEGORIES}
 
 
-@pytest.mark.parametrize('category', CATEGORIES)
+@pytest.mark.parametrize('category', ALL_CATEGORIES)
 def test_a_seed_gives_the_same_object_again(category, drawn):
     again, first = make_shape(category, 2), drawn[category][2]
     np.testing.assert_array_equal(again.vertices, first.vertices)
@@ -26,13 +27,13 @@ def test_a_seed_gives_the_same_object_again(category, drawn):
     np.testing.assert_array_equal(again.visual.face_colors, first.visual.face_colors)
 
 
-@pytest.mark.parametrize('category', CATEGORIES)
+@pytest.mark.parametrize('category', ALL_CATEGORIES)
 def test_seeds_differ_in_structure_and_not_only_in_size(category, drawn):
     assert len({len(mesh.faces) for mesh in drawn[category]}) >= 4
     assert len({mesh.body_count for mesh in drawn[category]}) >= 3
 
 
-@pytest.mark.parametrize('category', CATEGORIES)
+@pytest.mark.parametrize('category', ALL_CATEGORIES)
 def test_a_shape_fits_the_grid_and_is_finite(category, drawn):
     for mesh in drawn[category]:
         assert np.isfinite(mesh.vertices).all()
@@ -41,7 +42,7 @@ def test_a_shape_fits_the_grid_and_is_finite(category, drawn):
         assert mesh.area > 0
 
 
-@pytest.mark.parametrize('category', CATEGORIES)
+@pytest.mark.parametrize('category', ALL_CATEGORIES)
 def test_shapes_are_coloured_each_in_its_own_way(category, drawn):
     assert {mesh.visual.kind for mesh in drawn[category]} == {'face'}
     colors = {tuple(mesh.visual.face_colors.mean(axis=0)) for mesh in drawn[category]}
@@ -55,13 +56,13 @@ def loose_share(mesh):
     return 1 - sizes.max() / sizes.sum()
 
 
-@pytest.mark.parametrize('category', CATEGORIES)
+@pytest.mark.parametrize('category', ALL_CATEGORIES)
 def test_no_part_of_a_shape_floats(category, drawn):
     assert max(map(loose_share, drawn[category])) < 0.005
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('category', CATEGORIES)
+@pytest.mark.parametrize('category', ALL_CATEGORIES)
 def test_at_most_two_in_a_hundred_shapes_have_a_part_that_floats(category):
     loose = [loose_share(make_shape(category, seed)) > 0.005 for seed in range(1000, 1200)]
     assert np.mean(loose) <= 0.02

@@ -10,7 +10,11 @@ from active_recon.meshes import fit_to_grid
 import numpy as np
 import trimesh
 
-CATEGORIES = ('airplane', 'car', 'chair', 'lamp', 'sofa', 'table')
+# The paper's thirteen, and the three that are never trained on
+CATEGORIES = ('airplane', 'bench', 'cabinet', 'car', 'cellphone', 'chair', 'firearm', 'lamp',
+              'monitor', 'sofa', 'speaker', 'table', 'watercraft')
+UNSEEN_CATEGORIES = ('bed', 'bookshelf', 'motorbike')
+ALL_CATEGORIES = CATEGORIES + UNSEEN_CATEGORIES
 
 
 def make_shape(category: str, seed: int) -> trimesh.Trimesh:
@@ -20,8 +24,9 @@ def make_shape(category: str, seed: int) -> trimesh.Trimesh:
     Each category is a module of this package with a function of its own name,
     `(rng) -> Trimesh`, that draws structure, proportions and materials.
     """
-    if category not in CATEGORIES:
-        raise ConfigError(f'expected a category out of {", ".join(CATEGORIES)}, got {category!r}')
+    if category not in ALL_CATEGORIES:
+        raise ConfigError('expected a category out of '
+                          f'{", ".join(ALL_CATEGORIES)}, got {category!r}')
     generate: Callable[[np.random.Generator], trimesh.Trimesh] = getattr(
         import_module(f'{__name__}.{category}'), category)
     salt = int.from_bytes(hashlib.sha256(category.encode()).digest()[:4], 'big')
