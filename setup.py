@@ -40,6 +40,8 @@ setup(
         f'{name} = {module}:main' for name, module in EXECUTABLES.items()]},
     install_requires=[
         'embreex>=2.17.7.post6,<5',
+        'lightning-fabric>=2.4,<3',
+        'matplotlib>=3.9,<4',
         'mcap>=1.5,<2',
         'numpy>=1.26,<3',
         'opencv-python-headless>=4.9,<6',

@@ -5,6 +5,8 @@ from typing import Any, Self
 
 from active_recon.errors import ConfigError
 
+VOLUME_LOSSES = ('mse', 'bce', 'dice', 'mse+dice')
+
 
 @dataclass(frozen=True)
 class Config:
@@ -34,10 +36,10 @@ class NetworkConfig(Config):
     stem_channels: int = 32
     block_channels: tuple[int, int, int] = (48, 96, 128)
     recurrent_channels: int = 128
-    bottleneck_channels: int = 320
+    bottleneck_channels: int = 352
     latent_channels: int = 24
-    volume_channels: int = 48
-    decoder_channels: tuple[int, int] = (40, 20)
+    volume_channels: int = 64
+    decoder_channels: tuple[int, int] = (64, 24)
     glimpse_channels: int = 128
 
     def __post_init__(self) -> None:
@@ -54,7 +56,7 @@ class LossConfig(Config):
 
     volume_weight: float = 0.4
     silhouette_weight: float = 0.6
-    volume_loss: str = 'mse'  # mse (the paper), bce, dice
+    volume_loss: str = 'mse'  # mse (the paper), bce, dice, mse+dice
 
     def __post_init__(self) -> None:
         """Refuse weights that train nothing."""
@@ -62,8 +64,9 @@ class LossConfig(Config):
                 self.volume_weight + self.silhouette_weight > 0):
             raise ConfigError('LossConfig: expected weights of 0 or more, not both 0, got '
                               f'{self.volume_weight} and {self.silhouette_weight}')
-        if self.volume_loss not in ('mse', 'bce', 'dice'):
-            raise ConfigError(f'LossConfig: expected mse, bce or dice, got {self.volume_loss!r}')
+        if self.volume_loss not in VOLUME_LOSSES:
+            raise ConfigError(f'LossConfig: expected a volume loss out of '
+                              f'{", ".join(VOLUME_LOSSES)}, got {self.volume_loss!r}')
 
 
 @dataclass(frozen=True)

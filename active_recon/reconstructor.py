@@ -71,7 +71,8 @@ class Reconstructor:
         Raises ViewError, and then nothing has changed.
         """
         network_image = canonical_image(image, camera, self.object_size)
-        occupancy, latent, self._state = self._runtime.step(network_image, self._state)
+        occupancy, latent, self._state = self._runtime.step(
+            network_image, camera.azimuth - self.object_yaw, self._state)
         self._view_count += 1
         return Reconstruction(VoxelGrid(turned(occupancy, self.object_yaw), self.object_size),
                               latent)

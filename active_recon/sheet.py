@@ -1,4 +1,4 @@
-"""Contact sheets: many objects on one picture, for people to look at."""
+"""Contact sheets: many objects or training images on one picture, for people to look at."""
 
 from collections.abc import Sequence
 import math
@@ -7,6 +7,7 @@ from active_recon.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.rendering import composite, Renderer
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 import trimesh
 
 
@@ -22,3 +23,10 @@ def contact_sheet(meshes: Sequence[trimesh.Trimesh], columns: int = 8, azimuth: 
         image = Renderer(mesh).render(camera)
         sheet[top:top + tile, left:left + tile] = composite(image, background)
     return sheet
+
+
+def sequence_sheet(images: Tensor) -> NDArray[np.uint8]:
+    """Return sequences of views (T, B, 3, S, S) in [0, 1], a row each, (B x S, T x S, 3) RGB."""
+    length, count, _, side, _ = images.shape
+    rows = images.permute(1, 3, 0, 4, 2).reshape(count * side, length * side, 3)
+    return np.asarray((rows * 255).round().byte())

@@ -7,12 +7,13 @@ from typing import Any, TYPE_CHECKING
 from active_recon.errors import ConfigError, DataError
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import entr, xlogy
+from scipy.special import xlogy
 
 if TYPE_CHECKING:
     import trimesh
 
 RESOLUTION = 32
+FINE_RESOLUTION = 64
 MESH_FORMATS = ('ply', 'obj', 'stl')
 
 
@@ -23,10 +24,31 @@ def iou(predicted: Any, truth: Any, axes: tuple[int, ...] = (-3, -2, -1)) -> Any
     The measure of the paper's section 3.3, over the last three axes (voxels) or those given
     (silhouettes: the last two); the other axes stay. Two empty shapes are alike: 1.
     """
-    intersection = (predicted & truth).sum(axes)
-    union = (predicted | truth).sum(axes)
+    intersection, union = _count(predicted & truth, axes), _count(predicted | truth, axes)
     empty = union == 0
     return (intersection + empty) / (union + empty)
+
+
+def entropy(occupancy: Any) -> Any:
+    """
+    Return the entropy in nats, -sum(p log p + (1 - p) log(1 - p)), of occupancies in [0, 1].
+
+    Arrays or tensors, (..., X, Y, Z) to (...).
+    """
+    return paper_entropy(occupancy) + paper_entropy(1 - occupancy)
+
+
+def paper_entropy(occupancy: Any) -> Any:
+    """Return -sum(p log p) in nats, as section 4.6 writes it, without `entropy`'s second term."""
+    if isinstance(occupancy, np.ndarray):
+        return -xlogy(occupancy, occupancy).sum((-3, -2, -1))
+    return -occupancy.xlogy(occupancy).sum((-3, -2, -1))
+
+
+def _count(cells: Any, axes: tuple[int, ...]) -> Any:
+    if isinstance(cells, np.ndarray):
+        return cells.sum(axes)
+    return cells.float().sum(axes)  # torch is ten times slower at booleans; exact up to 256^3
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +83,11 @@ class VoxelGrid:
 
     def entropy(self) -> float:
         """Return the entropy of all cells in nats: -sum(p log p + (1 - p) log(1 - p))."""
-        p = self.occupancy.astype(np.float64)
-        return float((entr(p) + entr(1 - p)).sum())
+        return float(entropy(self.occupancy.astype(np.float64)))
 
     def paper_entropy(self) -> float:
         """Return -sum(p log p) in nats, as section 4.6 writes it, without the second term."""
-        p = self.occupancy.astype(np.float64)
-        return float(-xlogy(p, p).sum())
+        return float(paper_entropy(self.occupancy.astype(np.float64)))
 
     def points(self, threshold: float) -> NDArray[np.float32]:
         """Return x, y, z (metres, object frame) and occupancy of the cells above, (N, 4)."""

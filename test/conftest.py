@@ -7,7 +7,8 @@ from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.models.attention import AttentionModel
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.network_2d3d import Network2d3d
 import pytest
 import torch
 
@@ -39,7 +40,7 @@ def tiny() -> NetworkConfig:
 def network(tiny: NetworkConfig) -> ReconstructionNetwork:
     """Return a small reconstruction network with the same fresh weights every time."""
     torch.manual_seed(0)
-    return ReconstructionNetwork.from_config(tiny).eval()
+    return Network2d3d.from_config(tiny).eval()
 
 
 @pytest.fixture

@@ -17,7 +17,8 @@ MAY_IMPORT = {  # beside itself; what is not named here is part of the core
     'demo': {'core', 'bags', 'nodes'},
     'evaluation': {'core'},
     'training': {'core', 'evaluation'},
-    'cli': {'core', 'bags', 'demo', 'evaluation', 'training'},
+    'paper': {'core', 'evaluation', 'training'},
+    'cli': {'core', 'bags', 'demo', 'evaluation', 'training', 'paper'},
 }
 KNOW_ROS = {'nodes', 'msg_tools'}
 ROS = re.compile(r'(rclpy|rosidl_\w+|rmw_\w+|ament_\w+|tf2_\w+|launch(_\w+)?|cv_bridge|'

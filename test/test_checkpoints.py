@@ -4,7 +4,7 @@ import pickletools
 
 from active_recon.errors import DataError
 from active_recon.models.attention import AttentionModel
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.models.network_2d3d import Network2d3d
 from active_recon.training import checkpoints
 from active_recon.training.checkpoints import Checkpoint, load_checkpoint, save_checkpoint
 import pytest
@@ -93,7 +93,7 @@ def test_a_truncated_checkpoint_is_refused(trained, saved, share):
 def test_a_missing_checkpoint_and_another_models_are_refused(trained, saved, tiny):
     with pytest.raises(DataError, match='nothing.*expected a whole checkpoint'):
         load_checkpoint(saved.with_name('nothing'), *trained)
-    other = ReconstructionNetwork.from_config(tiny)
+    other = Network2d3d.from_config(tiny)
     with pytest.raises(DataError, match='(?s)checkpoint of this model.*Missing key'):
         load_checkpoint(saved, other, optimizer_of(other))
 

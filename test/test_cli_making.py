@@ -1,4 +1,4 @@
-"""`active-recon render` and `active-recon dataset`, as they are typed."""
+"""`active-recon render` and `active-recon dataset build`, as they are typed."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ import sys
 from active_recon.cli.main import app
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import ConfigError, DataError
-from active_recon.shapes import CATEGORIES, generators_hash
+from active_recon.shapes import CATEGORIES, generators_hash, UNSEEN_CATEGORIES
 import pytest
 import trimesh
 from typer.testing import CliRunner
@@ -100,7 +100,7 @@ def test_render_takes_the_rows_of_a_manifest_that_are_asked_for(meshes, tmp_path
 
 def test_dataset_makes_three_splits_that_share_no_object(tmp_path):
     counts = ('--train', 2, '--val', 1, '--test', 1)
-    result = run('dataset', tmp_path, *counts, '--category', 'lamp', *ONE_WORKER)
+    result = run('dataset', 'build', tmp_path, *counts, '--category', 'lamp', *ONE_WORKER)
     assert '4 objects of 4 are there' in result.stdout
     names = {split: [folder.name for folder in list_objects(tmp_path / split)]
              for split in ('train', 'val', 'test')}
@@ -110,22 +110,44 @@ def test_dataset_makes_three_splits_that_share_no_object(tmp_path):
 
 
 def test_dataset_makes_every_category_unless_told(tmp_path):
-    run('dataset', tmp_path, '--train', 0, '--val', 1, '--test', 0, *ONE_WORKER)
-    categories = tuple(folder.category for folder in list_objects(tmp_path / 'val'))
-    assert categories == CATEGORIES
+    counts = ('--train', 0, '--val', 1, '--test', 0, '--unseen', 1)
+    run('dataset', 'build', tmp_path, *counts, *ONE_WORKER)
+    for split, expected in (('val', CATEGORIES), ('unseen', UNSEEN_CATEGORIES)):
+        categories = tuple(folder.category for folder in list_objects(tmp_path / split))
+        assert categories == expected
+
+
+def test_dataset_keeps_unseen_categories_out_of_the_splits(tmp_path):
+    asked = ('--category', 'bookshelf', '--unseen', 2, '--fine')
+    result = run('dataset', 'build', tmp_path, *asked, *ONE_WORKER)
+    assert '2 objects of 2 are there' in result.stdout
+    objects = list_objects(tmp_path / 'unseen')
+    assert [folder.category for folder in objects] == ['bookshelf'] * 2
+    assert all(folder.voxels(64).occupancy.any() for folder in objects)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['generators.sha256', 'unseen']
+
+
+def test_the_same_seeds_make_the_same_files(tmp_path):
+    asked = ('--category', 'lamp', '--train', 1, '--val', 0, '--test', 0, *ONE_WORKER)
+    for name in ('one', 'two'):
+        run('dataset', 'build', tmp_path / name, *asked)
+    files = [path.relative_to(tmp_path / 'one') for path in (tmp_path / 'one').rglob('*.*')]
+    assert len(files) == 28
+    for file in files:
+        assert (tmp_path / 'one' / file).read_bytes() == (tmp_path / 'two' / file).read_bytes()
 
 
 def test_dataset_does_not_go_on_with_objects_of_other_generators(tmp_path):
     (tmp_path / 'generators.sha256').write_text('0123456789abcdef\n')
     with pytest.raises(DataError, match='was made by others .*choose another folder'):
-        run('dataset', tmp_path, '--train', 1, '--val', 0, '--test', 0)
+        run('dataset', 'build', tmp_path, '--train', 1, '--val', 0, '--test', 0)
 
 
 def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp_path):
     with pytest.raises(ConfigError, match="expected a category out of .*, got 'castle'"):
-        run('dataset', tmp_path, '--category', 'castle')
+        run('dataset', 'build', tmp_path, '--category', 'castle')
     with pytest.raises(DataError, match='expected objects to make'):
-        run('dataset', tmp_path, '--train', 0, '--val', 0, '--test', 0)
+        run('dataset', 'build', tmp_path, '--train', 0, '--val', 0, '--test', 0, '--unseen', 0)
 
 
 def command(*arguments):

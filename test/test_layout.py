@@ -3,9 +3,9 @@
 import math
 
 from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
-from active_recon.datasets.layout import list_objects, ObjectFolder, write_object
+from active_recon.datasets.layout import list_objects, ObjectFolder, write_object, write_voxels
 from active_recon.errors import DataError
-from active_recon.voxels import VoxelGrid
+from active_recon.voxels import VoxelGrid, write_binvox
 import cv2
 import numpy as np
 import pytest
@@ -46,6 +46,22 @@ def test_the_azimuths_of_a_turntable_come_back_in_their_order(tmp_path):
     np.testing.assert_allclose(azimuth_difference(azimuths, AZIMUTHS), 0, atol=1e-7)
 
 
+def test_finer_voxels_stand_beside_and_are_read_where_asked_for(folder):
+    fine = VoxelGrid((RNG.random((64, 64, 64)) > 0.5).astype(np.float32))
+    with pytest.raises(DataError, match='64 cells a side, found no file; make them with `--fine`'):
+        folder.voxels(64)
+    write_voxels(folder, fine)
+    assert (folder.root / 'ShapeNetVox64/chair/one/model.binvox').is_file()
+    np.testing.assert_array_equal(folder.voxels(64).occupancy, fine.occupancy)
+    np.testing.assert_array_equal(folder.voxels().occupancy, GRID.occupancy)
+
+
+def test_voxels_of_another_resolution_than_their_folder_s_are_refused(folder):
+    write_binvox(GRID, folder.voxels_path(64))
+    with pytest.raises(DataError, match=r'expected 64 cells a side, got \(32, 32, 32\)'):
+        folder.voxels(64)
+
+
 def test_files_stand_where_r2n2_has_them(folder):
     names = {str(path.relative_to(folder.root)) for path in folder.root.rglob('*.*')}
     rendering = 'ShapeNetRendering/chair/one/rendering'
@@ -54,7 +70,7 @@ def test_files_stand_where_r2n2_has_them(folder):
 
 
 def test_an_object_without_voxels_is_not_complete(folder):
-    folder.voxels_path.unlink()
+    folder.voxels_path().unlink()
     assert not folder.complete
     assert list_objects(folder.root) == [folder]
 

@@ -68,36 +68,36 @@ def test_each_object_is_seen_from_its_own_camera(voxels, frusta):
     assert abs(alone[0] - alone[1]) > 1e-4
 
 
-def test_the_losses_are_weighted_and_the_volume_averaged_over_the_views(voxels, frusta):
-    sequence = [torch.zeros_like(voxels), certain(voxels)]
-    total, parts = reconstruction_loss(sequence, voxels, frusta, 0, LossConfig())
-    assert parts['volume'] == pytest.approx(0.125)
-    assert parts['silhouette'] == pytest.approx(
-        silhouette_loss(sequence[0], voxels, frusta).item())
-    assert total.item() == pytest.approx(0.4 * 0.125 + 0.6 * parts['silhouette'], rel=1e-5)
-    _, later = reconstruction_loss(sequence, voxels, frusta, 1, LossConfig())
-    assert later['silhouette'] == pytest.approx(0, abs=1e-6)
+def test_the_losses_are_weighted(voxels, frusta):
+    logits = torch.zeros_like(voxels)
+    total, parts = reconstruction_loss(logits, voxels, frusta, LossConfig())
+    assert parts['volume'].item() == pytest.approx(0.25)
+    assert parts['silhouette'].item() == pytest.approx(
+        silhouette_loss(logits, voxels, frusta).item())
+    assert total.item() == pytest.approx(0.4 * 0.25 + 0.6 * parts['silhouette'].item(), rel=1e-5)
+    right, _ = reconstruction_loss(certain(voxels), voxels, frusta, LossConfig())
+    assert right.item() == pytest.approx(0, abs=1e-6)
+
+
+def test_squared_error_and_dice_may_be_joined(voxels):
+    logits = torch.randn_like(voxels)
+    assert_close(volume_loss(logits, voxels, 'mse+dice'),
+                 volume_loss(logits, voxels, 'mse') + volume_loss(logits, voxels, 'dice') / 2)
 
 
 def test_silhouettes_of_no_weight_are_not_computed(voxels):
     no_frusta = torch.empty(0)  # nothing could be projected with these
-    total, parts = reconstruction_loss([torch.zeros_like(voxels)], voxels, no_frusta, 0,
+    total, parts = reconstruction_loss(torch.zeros_like(voxels), voxels, no_frusta,
                                        LossConfig(1.0, 0.0))
     assert set(parts) == {'volume'}
     assert total.item() == pytest.approx(0.25)
 
 
-@pytest.mark.parametrize('kind', ['mse', 'bce', 'dice'])
+@pytest.mark.parametrize('kind', ['mse', 'bce', 'dice', 'mse+dice'])
 def test_a_step_down_the_gradient_costs_less(voxels, frusta, kind):
     logits = torch.zeros_like(voxels, requires_grad=True)
-    before, _ = reconstruction_loss([logits], voxels, frusta, 0, LossConfig(volume_loss=kind))
+    before, _ = reconstruction_loss(logits, voxels, frusta, LossConfig(volume_loss=kind))
     before.backward()
     step = logits - 0.1 * logits.grad / logits.grad.abs().max()
-    after, _ = reconstruction_loss([step], voxels, frusta, 0, LossConfig(volume_loss=kind))
+    after, _ = reconstruction_loss(step, voxels, frusta, LossConfig(volume_loss=kind))
     assert after < before
-
-
-def test_half_precision_logits_are_compared_in_full(voxels, frusta):
-    total, _ = reconstruction_loss([torch.zeros_like(voxels).bfloat16()], voxels, frusta, 0,
-                                   LossConfig())
-    assert total.dtype == torch.float32

@@ -83,13 +83,30 @@ def test_what_is_there_is_not_made_again_and_what_was_broken_off_is(tmp_path):
     done, broken = shape_jobs('lamp', [7, 8], tmp_path)
     for job in (done, broken):
         make_object(job, samples=1)
-    broken.folder.voxels_path.unlink()
+    broken.folder.voxels_path().unlink()
     (broken.folder.images_folder / '20.png').unlink()
     (done.folder.images_folder / '20.png').unlink()
     assert len([*make_dataset([done, broken], samples=1)]) == 2
     assert broken.folder.complete
     assert (broken.folder.images_folder / '20.png').is_file()
     assert not (done.folder.images_folder / '20.png').is_file()
+
+
+def test_fine_voxels_are_made_where_asked_for(tmp_path):
+    (job,) = shape_jobs('lamp', [7], tmp_path)
+    assert not make_object(job, samples=1, fine=True).refusal
+    mesh = job.make_mesh()
+    np.testing.assert_array_equal(job.folder.voxels().occupancy, voxelise(mesh).occupancy)
+    np.testing.assert_array_equal(job.folder.voxels(64).occupancy, voxelise(mesh, 64).occupancy)
+
+
+def test_an_object_that_lacks_just_its_fine_voxels_gets_just_these(tmp_path):
+    (job,) = shape_jobs('lamp', [7], tmp_path)
+    make_object(job, samples=1)
+    written = {path: path.stat().st_mtime_ns for path in tmp_path.rglob('*.*')}
+    assert not make_object(job, samples=1, fine=True).refusal
+    assert job.folder.voxels(64).occupancy.any()
+    assert {path: path.stat().st_mtime_ns for path in written} == written
 
 
 def test_what_cannot_be_read_or_written_is_told_and_the_rest_is_made(tmp_path):

@@ -1,4 +1,4 @@
-"""Episodes, IoU view by view, intervals, and the latents of other objects."""
+"""Episodes, IoU view by view, and the latents of other objects."""
 
 from active_recon.cameras import azimuth_difference, AZIMUTHS
 from active_recon.errors import DataError
@@ -6,7 +6,6 @@ from active_recon.evaluation.metrics import (
     episodes,
     half_the_set_away,
     iou_per_view,
-    object_bootstrap,
     THRESHOLDS,
 )
 from active_recon.evaluation.rollouts import nearest_views, roll_out
@@ -43,34 +42,6 @@ def test_no_object_stands_in_for_itself_and_each_does_so_once(count, starts):
 def test_a_single_object_has_no_stand_in():
     with pytest.raises(DataError, match='two objects or more.*got 1'):
         half_the_set_away(torch.zeros(4, dtype=torch.int64), 1)
-
-
-def test_the_mean_is_over_objects_and_not_over_episodes():
-    mean, low, high = object_bootstrap(np.array([1.0, 1.0, 1.0, 0.0]), np.array([5, 5, 5, 2]))
-    assert mean == 0.5
-    assert (low, high) == (0.0, 1.0)
-
-
-def test_alike_objects_leave_no_doubt():
-    assert object_bootstrap(np.full(6, 0.7), np.arange(6) // 2) == pytest.approx((0.7, 0.7, 0.7))
-
-
-def test_the_interval_covers_the_truth_about_as_often_as_it_says():
-    rng = np.random.default_rng(0)
-    rounds, hits = 200, 0
-    for _ in range(rounds):
-        # Objects differ by 1, episodes of one object by 0.1: alone they would promise too much
-        values = np.repeat(rng.normal(size=40), 4) + 0.1 * rng.normal(size=160)
-        _, low, high = object_bootstrap(values, np.repeat(np.arange(40), 4), rounds=400)
-        hits += low <= 0 <= high
-    assert 0.88 <= hits / rounds <= 0.99
-
-
-def test_more_episodes_of_the_same_objects_narrow_nothing():
-    values = np.random.default_rng(0).random(10)
-    once = object_bootstrap(values, np.arange(10))
-    many = object_bootstrap(np.repeat(values, 8), np.repeat(np.arange(10), 8))
-    assert many == pytest.approx(once)
 
 
 def test_the_nearest_view_is_the_short_way_round():
@@ -112,7 +83,8 @@ def test_a_rollout_knows_what_the_network_knows(network, views):
     for t, step in enumerate(steps):
         index = (torch.tensor([23, 4, 9]) + 3 * t) % 24
         with torch.no_grad():
-            seen, hidden = network(views.white(torch.tensor([0, 3, 5]), index), hidden)
+            seen, hidden = network(views.white(torch.tensor([0, 3, 5]), index),
+                                   views.azimuths[[0, 3, 5], index], hidden)
         assert_close(step.occupancy, seen.logits.sigmoid())
 
 

@@ -1,7 +1,7 @@
 """Encoder, decoder and the network of both: shapes, memory, and that it can learn."""
 
 from active_recon.config import NetworkConfig
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.models.network_2d3d import Network2d3d
 from active_recon.training.losses import volume_loss
 from active_recon.voxels import iou
 import pytest
@@ -14,12 +14,17 @@ def some_views(count, batch):
     return torch.rand(count, batch, 3, 64, 64)
 
 
+def at_any_azimuth(images):
+    """Return azimuths for images (B, ...): this network does not look at them."""
+    return torch.rand(len(images)) * 6
+
+
 @torch.no_grad()
 def folded(network, images):
     """Return what is known after views (T, B, ...)."""
     hidden = None
     for view in images:
-        seen, hidden = network(view, hidden)
+        seen, hidden = network(view, at_any_azimuth(view), hidden)
     return seen
 
 
@@ -32,7 +37,7 @@ def one_thread():
 
 
 def test_images_become_a_latent_unit_and_occupancy(network, tiny):
-    seen, hidden = network(some_views(1, 3)[0])
+    seen, hidden = network(some_views(1, 3)[0], torch.zeros(3))
     assert seen.logits.shape == (3, 32, 32, 32)
     assert seen.latent.shape == (3, 4 * tiny.latent_channels, 4, 4)
     assert hidden.encoder.memory.shape == (3, tiny.recurrent_channels, 4, 4)
@@ -43,14 +48,14 @@ def test_the_latent_unit_is_read_as_a_volume_without_loss(network, tiny):
     latent = torch.randn(2, 4 * tiny.latent_channels, 4, 4)
     seen = []
     network.decoder.memory.register_forward_hook(lambda _, inputs, __: seen.append(inputs[0]))
-    network.decoder(latent, None)
+    network.decoder.remember(latent, None)
     assert seen[0].shape == (2, tiny.latent_channels, 4, 4, 4)
     assert_close(seen[0].flatten(), latent.flatten())
 
 
 def test_the_default_network_fits_the_budget_of_parameters():
     count = sum(part.numel() for part in
-                ReconstructionNetwork.from_config(NetworkConfig()).parameters())
+                Network2d3d.from_config(NetworkConfig()).parameters())
     assert 1_500_000 <= count <= 6_000_000
 
 
@@ -62,11 +67,12 @@ def test_most_of_the_grid_is_empty_before_any_training(network):
 @torch.no_grad()
 def test_the_state_is_passed_and_not_kept(network):
     first, second = some_views(2, 2)
-    _, hidden = network(first)
+    at = torch.zeros(2)
+    _, hidden = network(first, at)
     before = [part.clone() for state in hidden for part in state]
-    once, _ = network(second, hidden)
-    network(first, hidden)
-    again, _ = network(second, hidden)
+    once, _ = network(second, at, hidden)
+    network(first, at, hidden)
+    again, _ = network(second, at, hidden)
     assert_close(again, once, rtol=0, atol=0)
     assert_close([part for state in hidden for part in state], before, rtol=0, atol=0)
 
@@ -100,8 +106,9 @@ def test_the_order_of_the_batch_does_not(network):
 def test_every_parameter_learns_from_two_views(network):
     images = some_views(2, 2)
     torch.nn.init.normal_(network.encoder.memory.peepholes)
-    _, hidden = network(images[0])
-    network(images[1], hidden)[0].logits.square().mean().backward()
+    at = torch.zeros(2)
+    _, hidden = network(images[0], at)
+    network(images[1], at, hidden)[0].logits.square().mean().backward()
     for name, parameter in network.named_parameters():
         assert parameter.grad is not None, name
         assert parameter.grad.any(), name
@@ -109,7 +116,7 @@ def test_every_parameter_learns_from_two_views(network):
 
 def test_a_small_network_learns_one_object_by_heart(views):
     torch.manual_seed(0)
-    network = ReconstructionNetwork.from_config(NetworkConfig(
+    network = Network2d3d.from_config(NetworkConfig(
         stem_channels=8, block_channels=(8, 16, 16), recurrent_channels=16,
         bottleneck_channels=32, latent_channels=4, volume_channels=16, decoder_channels=(16, 8)))
     optimizer = torch.optim.Adam(network.parameters(), 5e-3)
@@ -117,7 +124,7 @@ def test_a_small_network_learns_one_object_by_heart(views):
     images, truth = views.white(objects, chosen), views.voxels[objects]
     best = 0.0
     for _ in range(300):
-        seen, _ = network(images)
+        seen, _ = network(images, views.azimuths[objects, chosen])
         best = iou(seen.logits > 0, truth).min().item()
         if best > 0.9:
             break
@@ -125,3 +132,19 @@ def test_a_small_network_learns_one_object_by_heart(views):
         volume_loss(seen.logits, truth.float(), 'bce').backward()
         optimizer.step()
     assert best > 0.9
+
+
+@torch.no_grad()
+def test_the_azimuth_changes_nothing(network):
+    images = some_views(1, 2)[0]
+    assert_close(network(images, torch.zeros(2))[0], network(images, torch.ones(2))[0],
+                 rtol=0, atol=0)
+
+
+@torch.no_grad()
+def test_folding_in_and_decoding_are_the_whole(network):
+    images, at = some_views(1, 2)[0], torch.zeros(2)
+    folded_in, _ = network.fold(images, at)
+    seen, _ = network(images, at)
+    assert_close(network.decode(folded_in.features), seen.logits, rtol=0, atol=0)
+    assert_close(folded_in.latent, seen.latent, rtol=0, atol=0)

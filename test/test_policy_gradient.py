@@ -8,25 +8,26 @@ from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
 from active_recon.models.attention import AttentionModel
-from active_recon.models.reconstruction import Reconstructed
+from active_recon.models.network import Folded, ReconstructionNetwork
 from active_recon.training import policy_gradient
+from active_recon.training.loop import make_fabric, Run, TrainingConfig, TrainingDivergedError
 from active_recon.training.policy_gradient import (
+    azimuth_entropy,
     distance_reward,
     Episode,
-    policy_loss,
+    policy_losses,
     returns_to_go,
     run_episodes,
     train_policy,
 )
-from active_recon.training.supervised import TrainingConfig, TrainingDivergedError
 from active_recon.voxels import iou
 import numpy as np
 import pytest
 import torch
-from torch import nn
 from torch.testing import assert_close
 
-CONFIG = TrainingConfig(steps=5, batch_size=4, max_views=3, checkpoint_every=2, validate_every=2)
+CONFIG = TrainingConfig(steps=5, batch_size=4, max_views=3, bfloat16=False, checkpoint_every=2,
+                        validate_every=2)
 
 
 def reward(azimuth, *taken, **config):
@@ -70,15 +71,15 @@ def test_a_return_to_go_sums_what_is_still_to_come():
 
 def an_episode(log_probability, baseline, reward_3d):
     nothing = torch.zeros_like(reward_3d)
-    return Episode(log_probability, baseline, reward_3d, nothing, nothing)
+    return Episode(log_probability, baseline, reward_3d, nothing, nothing, nothing, [])
 
 
 def test_a_choice_answers_for_what_follows_it_and_the_baseline_for_the_return():
     logs = torch.zeros(2, 1, requires_grad=True)
     baseline = torch.tensor([[1.0], [5.0]], requires_grad=True)
-    objective, error = policy_loss(an_episode(logs, baseline, torch.tensor([[2.0], [3.0]])))
-    assert error.item() == pytest.approx((16 + 4) / 2)
-    (objective + error).backward()
+    losses = policy_losses(an_episode(logs, baseline, torch.tensor([[2.0], [3.0]])))
+    assert losses['baseline_error'].item() == pytest.approx((16 + 4) / 2)
+    losses['loss'].backward()
     assert_close(logs.grad, torch.tensor([[-4.0], [2.0]]))  # minus the advantage
     assert_close(baseline.grad, torch.tensor([[-4.0], [2.0]]))  # of the error alone
 
@@ -86,8 +87,8 @@ def test_a_choice_answers_for_what_follows_it_and_the_baseline_for_the_return():
 def test_the_objective_sums_over_the_steps_and_averages_over_the_episodes():
     logs, rewards = torch.tensor([[-1.0, -2.0], [-3.0, -4.0]]), torch.zeros(2, 2)
     baseline = torch.full((2, 2), -1.0)
-    objective, _ = policy_loss(an_episode(logs, baseline, rewards))
-    assert objective.item() == pytest.approx((1 + 2 + 3 + 4) / 2)
+    losses = policy_losses(an_episode(logs, baseline, rewards))
+    assert losses['loss'].item() == pytest.approx((1 + 2 + 3 + 4) / 2 + 1)  # and the baseline's
 
 
 def some_episodes(network, attention, views, length=4, seed=0, rewards=None):
@@ -109,7 +110,8 @@ def test_the_first_view_was_not_chosen_and_earns_nothing(network, attention, vie
 
 def test_the_gains_of_an_episode_add_up_to_last_minus_first(network, attention, views):
     seen = []
-    network.register_forward_hook(lambda *call: seen.append(call[2][0].logits.sigmoid() > 0.1))
+    network.decoder.register_forward_hook(
+        lambda *call: seen.append(call[2].sigmoid() > 0.1))
     episode = some_episodes(network, attention, views)
     truth = views.voxels[[0, 3, 5]]
     quality = torch.stack([iou(occupied, truth) for occupied in seen])
@@ -126,13 +128,19 @@ def test_the_same_generator_runs_the_same_episodes(network, attention, views):
 
 
 def test_only_the_attention_learns_from_an_episode(network, attention, views):
-    objective, error = policy_loss(some_episodes(network, attention, views))
-    (objective + error).backward()
+    network.requires_grad_(False)
+    policy_losses(some_episodes(network, attention, views))['loss'].backward()
     assert all(parameter.grad is None for parameter in network.parameters())
     assert all(parameter.grad is not None for parameter in attention.parameters())
 
 
-class Bandit(nn.Module):
+def test_proposals_one_way_have_no_entropy_and_proposals_every_way_the_most():
+    assert azimuth_entropy(torch.full((3, 8), -0.1)).item() == pytest.approx(0)
+    everywhere = torch.tensor(AZIMUTHS, dtype=torch.float32) - math.pi
+    assert azimuth_entropy(everywhere).item() == pytest.approx(math.log(24), abs=1e-5)
+
+
+class Bandit(ReconstructionNetwork):
     """An episode's IoU depends on the azimuth of the view alone, which the image's red tells."""
 
     def __init__(self, best: float) -> None:
@@ -140,11 +148,13 @@ class Bandit(nn.Module):
         worth = (1 + torch.tensor(AZIMUTHS - best).cos()) / 2
         self.filled = (32 * worth).round()  # of 32 layers, by view
 
-    def forward(self, images, hidden=None):
+    def fold(self, images, azimuths, hidden=None):
         view = (images[:, 0, 0, 0] * 255 / 10).round().long()
-        layers = torch.arange(32)[None, :, None, None] < self.filled[view][:, None, None, None]
-        logits = torch.where(layers.expand(-1, -1, 32, 32), 9.0, -9.0)
-        return Reconstructed(logits, torch.ones(len(images), 4, 4, 4)), hidden
+        return Folded(torch.ones(len(images), 4, 4, 4), self.filled[view]), hidden
+
+    def decode(self, features):
+        layers = torch.arange(32)[None, :, None, None] < features[:, None, None, None]
+        return torch.where(layers.expand(-1, -1, 32, 32), 9.0, -9.0)
 
 
 @pytest.fixture(scope='module')
@@ -175,10 +185,12 @@ def test_reinforce_finds_the_azimuth_that_pays(bandit_views, tmp_path, monkeypat
     attention = AttentionModel(latent_channels=1, hidden_channels=8)
     best = mean_direction(attention) + 2.0
     returns = []
-    config = TrainingConfig(steps=60, batch_size=24, learning_rate=3e-2, max_views=2)
+    config = TrainingConfig(steps=60, batch_size=24, learning_rate=3e-2, max_views=2,
+                            bfloat16=False, warm_up=20)
+    run = Run(make_fabric(False), tmp_path / 'policy.safetensors',
+              lambda step, told: returns.append(told['return']))
     train_policy(Bandit(best), attention, bandit_views, 0.5, config,
-                 RewardConfig(distance_weight=0.0), tmp_path / 'policy.safetensors',
-                 lambda model: {}, lambda step, told: returns.append(told['return']))
+                 RewardConfig(distance_weight=0.0), run, lambda model: {})
     after = abs(azimuth_difference(mean_direction(attention), best))
     assert after < math.radians(20)
     assert np.mean(returns[-10:]) > np.mean(returns[:10]) + 0.3
@@ -198,8 +210,9 @@ def train(network, views, tiny, path, cut_after=None, seed=0, threshold=0.1, res
         if step == cut_after:
             raise CutError
 
-    train_policy(network, attention, views, threshold, CONFIG, RewardConfig(), path,
-                 lambda model: {'validation': 1.0}, report, resume)
+    train_policy(network, attention, views, threshold, CONFIG, RewardConfig(),
+                 Run(make_fabric(False), path, report, resume),
+                 lambda model: {'validation': 1.0})
     return attention, told
 
 
@@ -217,6 +230,9 @@ def test_a_policys_training_cut_off_and_resumed_ends_in_the_very_same_weights(
     assert_close(network.state_dict(), before, rtol=0, atol=0)  # frozen throughout
     with pytest.raises(ConfigError, match='expected a checkpoint of the same settings'):
         train(network, views, tiny, path, threshold=0.2, resume=True)
+    network.decoder.grow[0].weight.data += 1
+    with pytest.raises(ConfigError, match='expected a checkpoint of the same settings'):
+        train(network, views, tiny, path, resume=True)  # another network was frozen
 
 
 def test_a_policys_loss_that_is_not_finite_names_its_batch(network, views, tiny, tmp_path):

@@ -1,10 +1,15 @@
 """R2N2's own images and voxels: seen by our cameras, the one falls onto the other."""
 
+import json
 import os
 from pathlib import Path
+import shutil
 
 from active_recon.cameras import orbit_camera
 from active_recon.datasets.layout import list_objects
+from active_recon.datasets.splits import list_split
+from active_recon.datasets.views import read_views
+from active_recon.shapes import CATEGORIES
 from active_recon.silhouettes import frustum, project_all
 from active_recon.voxels import iou
 import cv2
@@ -60,3 +65,37 @@ def test_they_do_not_where_the_azimuth_runs_the_other_way(objects):
 def test_the_cameras_look_down_by_about_thirty_degrees(objects):
     elevations = np.degrees([camera.elevation for _, cameras, _ in objects for camera in cameras])
     assert ((elevations > 24) & (elevations < 31)).all()
+
+
+def test_they_are_read_into_memory_as_they_are(objects):
+    folders = list_objects(SAMPLE)[:3]
+    views = read_views(folders)
+    assert not views.unreadable
+    assert views.images.shape == (3, 24, 64, 64, 4)
+    assert set(views.categories) <= set(CATEGORIES)
+    for index, (grid, cameras, alphas) in enumerate(objects):
+        np.testing.assert_array_equal(views.voxels[index], grid.occupied(0.5))
+        np.testing.assert_allclose(
+            views.azimuths[index], [camera.azimuth for camera in cameras], atol=1e-6)
+        assert (np.diff(np.sort(views.azimuths[index])) > 0).all()  # irregular, all different
+        np.testing.assert_array_equal(views.images[index, ..., 3] > 127, alphas)
+
+
+def test_a_split_that_names_more_than_the_sample_tells_what_it_lacks(tmp_path):
+    first = list_objects(SAMPLE)[0]
+    path = tmp_path / 'ShapeNet.json'
+    path.write_text(json.dumps([{'taxonomy_id': first.category, 'taxonomy_name': 'chair',
+                                 'train': [], 'val': [], 'test': [first.name, 'ffff']}]))
+    found, missing = list_split(SAMPLE, path, 'test')
+    assert found == [first]
+    assert len(missing) == 1
+
+
+def test_an_image_that_was_cut_off_leaves_its_object_out_and_is_told(tmp_path):
+    shutil.copytree(SAMPLE, tmp_path / 'copy')
+    folders = list_objects(tmp_path / 'copy')[:2]
+    path = folders[0].images_folder / '17.png'
+    path.write_bytes(path.read_bytes()[:-9])
+    views = read_views(folders)
+    assert views.folders == (folders[1],)
+    assert '17.png: expected an image, found no whole PNG' in views.unreadable[0]

@@ -27,14 +27,14 @@ def add(reconstructor, seed, size=1.0):
 
 def test_a_step_answers_with_occupancy_latent_and_state(runtime, tiny):
     image = np.zeros((64, 64, 3), np.uint8)
-    occupancy, latent, state = runtime.step(image, runtime.initial_state())
+    occupancy, latent, state = runtime.step(image, 0.0, runtime.initial_state())
     assert occupancy.shape == (32, 32, 32)
     assert latent.shape == (4 * tiny.latent_channels, 4, 4)
     assert occupancy.dtype == latent.dtype == np.float32
     assert 0 <= occupancy.min() <= occupancy.max() <= 1
-    again, _, _ = runtime.step(image, runtime.initial_state())
+    again, _, _ = runtime.step(image, 0.0, runtime.initial_state())
     np.testing.assert_array_equal(again, occupancy)
-    later, _, _ = runtime.step(image, state)
+    later, _, _ = runtime.step(image, 0.0, state)
     assert np.abs(later - occupancy).max() > 1e-6
 
 
@@ -43,8 +43,8 @@ def test_a_step_answers_as_the_network_itself(runtime, network):
     pixels = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
     image = torch.from_numpy(pixels).permute(2, 0, 1)[None] / 255
     with torch.no_grad():
-        expected, _ = network(image)
-    occupancy, latent, _ = runtime.step(pixels, None)
+        expected, _ = network(image, torch.zeros(1))
+    occupancy, latent, _ = runtime.step(pixels, 0.0, None)
     np.testing.assert_allclose(occupancy, expected.logits[0].sigmoid(), atol=1e-5)
     np.testing.assert_allclose(latent, expected.latent[0], atol=1e-5)
 

@@ -4,14 +4,15 @@ from dataclasses import replace
 
 from active_recon.config import LossConfig
 from active_recon.errors import ConfigError
-from active_recon.models.reconstruction import ReconstructionNetwork
-from active_recon.training.supervised import (
+from active_recon.models.network_2d3d import Network2d3d
+from active_recon.training.loop import (
     learning_rate_share,
-    train_reconstruction,
+    make_fabric,
+    Run,
     TrainingConfig,
     TrainingDivergedError,
-    unroll,
 )
+from active_recon.training.supervised import longest_sequence, steps_for, train_reconstruction
 import numpy as np
 import pytest
 import torch
@@ -28,7 +29,7 @@ class CutError(Exception):
 def train(config, views, tiny, path, cut_after=None, loss=None, seed=0, **options):
     """Train a fresh network; return it and what was reported."""
     torch.manual_seed(seed)
-    network = ReconstructionNetwork.from_config(tiny)
+    network = Network2d3d.from_config(tiny)
     told = []
 
     def report(step, measured):
@@ -36,8 +37,9 @@ def train(config, views, tiny, path, cut_after=None, loss=None, seed=0, **option
         if step == cut_after:
             raise CutError
 
-    train_reconstruction(network, views, config, loss or LossConfig(), path,
-                         lambda model: {'validation': float(model.training)}, report, **options)
+    run = Run(make_fabric(config.bfloat16), path, report, **options)
+    train_reconstruction(network, views, config, loss or LossConfig(), run,
+                         lambda model: {'validation': float(model.training)})
     return network, told
 
 
@@ -117,15 +119,15 @@ def test_a_loss_that_is_not_finite_names_its_batch_and_leaves_the_checkpoint(
     before = path.read_bytes()
     config = CONFIG
     torch.manual_seed(0)
-    network = ReconstructionNetwork.from_config(tiny)
+    network = Network2d3d.from_config(tiny)
 
     def poison(step, measured):
         network.decoder.grow[0].weight.data.fill_(torch.nan)
 
     with pytest.raises(TrainingDivergedError,
                        match=r'step 4: the loss is nan on the batch (lamp|table)-0.*, .*rate'):
-        train_reconstruction(network, views, config, LossConfig(), path, lambda model: {}, poison,
-                             resume=True)
+        train_reconstruction(network, views, config, LossConfig(),
+                             Run(make_fabric(False), path, poison, resume=True), lambda model: {})
     assert path.read_bytes() == before
 
 
@@ -142,16 +144,6 @@ def test_the_loss_falls(views, tiny, tmp_path, bfloat16):
     assert np.mean(losses[-10:]) < 0.9 * np.mean(losses[:10])
 
 
-def test_an_unrolled_sequence_answers_after_every_view(network, views):
-    from active_recon.training.batches import draw_batch
-    batch = draw_batch(views, 2, 3, np.random.default_rng(0))
-    sequence = unroll(network, batch)
-    assert [logits.shape for logits in sequence] == [(2, 32, 32, 32)] * 3
-    first, hidden = network(batch.images[0])
-    second, _ = network(batch.images[1], hidden)
-    assert_close(sequence[:2], [first.logits, second.logits])
-
-
 def test_the_learning_rate_rises_in_a_line_and_falls_as_half_a_cosine():
     shares = np.array([learning_rate_share(step, 10_000) for step in range(10_000)])
     assert shares[0] == pytest.approx(1 / 200)
@@ -161,3 +153,12 @@ def test_the_learning_rate_rises_in_a_line_and_falls_as_half_a_cosine():
     assert (np.diff(shares[200:]) < 0).all()
     assert shares[5000] == pytest.approx(0.5)
     assert 0 < shares[-1] < 1e-6
+
+
+def test_sequences_are_short_in_the_first_half_and_the_samples_are_counted_so():
+    config = TrainingConfig(steps=1000, batch_size=8)
+    longest = [longest_sequence(step, config) for step in range(1000)]
+    assert longest == [2] * 500 + [5] * 500
+    seen = sum(8 * (most + 1) / 2 for most in longest)
+    assert steps_for(seen, 8, 5) == 1000
+    assert longest_sequence(0, TrainingConfig(steps=9, max_views=1)) == 1

@@ -4,10 +4,11 @@ import re
 import shutil
 
 from active_recon.cameras import azimuth_difference, AZIMUTHS
-from active_recon.datasets.layout import list_objects
+from active_recon.datasets.layout import list_objects, write_voxels
 from active_recon.datasets.views import on_background, read_views
 from active_recon.errors import DataError
 from active_recon.rendering import composite
+from active_recon.voxels import VoxelGrid
 import cv2
 import numpy as np
 import pytest
@@ -36,6 +37,20 @@ def test_the_azimuths_and_voxels_are_those_on_disk(views):
     for folder, voxels in zip(views.folders, views.voxels, strict=True):
         np.testing.assert_array_equal(voxels, folder.voxels().occupied(0.5))
         assert voxels.any()
+
+
+def test_finer_voxels_are_read_where_asked_for_and_listed_where_they_lack(copied):
+    for folder in copied[:5]:
+        grid = VoxelGrid(folder.voxels().occupancy.repeat(2, 0).repeat(2, 1).repeat(2, 2))
+        write_voxels(folder, grid)
+    views = read_views(copied, resolution=64)
+    assert views.voxels.shape == (5, 64, 64, 64)
+    assert views.voxels.dtype == torch.bool
+    assert views.folders == tuple(copied[:5])
+    for folder, voxels in zip(views.folders, views.voxels, strict=True):
+        np.testing.assert_array_equal(voxels[::2, 1::2, ::2], folder.voxels().occupied(0.5))
+    assert len(views.unreadable) == 1
+    assert 'ShapeNetVox64' in views.unreadable[0]
 
 
 @pytest.mark.parametrize('grey', [0, 100, 255])
@@ -71,7 +86,7 @@ def drop_view(folder):
 
 
 def drop_voxels(folder):
-    folder.voxels_path.unlink()
+    folder.voxels_path().unlink()
 
 
 @pytest.mark.parametrize(('spoil', 'reason'), [

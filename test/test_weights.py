@@ -4,7 +4,15 @@ import json
 from pathlib import Path
 
 from active_recon.errors import WeightsError
-from active_recon.models.weights import Bundle, load_weights, MODEL, save_weights, weights_hash
+from active_recon.models.registry import DEFAULT_MODEL
+from active_recon.models.weights import (
+    Bundle,
+    find_weights,
+    load_weights,
+    save_weights,
+    SHIPPED,
+    weights_hash,
+)
 import numpy as np
 import pytest
 from safetensors.torch import load_file, save_file
@@ -21,7 +29,8 @@ def saved(tmp_path, network, attention, tiny) -> Path:
 
 def rewritten(path, tiny, tensors=None, **metadata):
     """Write the file again with other tensors or metadata; None leaves a key out."""
-    told = {'model': MODEL, 'config': json.dumps(tiny.to_dict()), 'threshold': '0.35'} | metadata
+    told = {'model': DEFAULT_MODEL, 'config': json.dumps(tiny.to_dict()),
+            'threshold': '0.35'} | metadata
     save_file(load_file(path) if tensors is None else tensors, path,
               {key: value for key, value in told.items() if value is not None})
 
@@ -37,8 +46,8 @@ def test_what_was_saved_is_loaded_to_half_precision(saved, network, attention, t
 def test_a_loaded_network_answers_as_the_one_that_was_saved(saved, network):
     images = torch.rand(2, 3, 64, 64)
     with torch.no_grad():
-        expected, _ = network(images)
-    found, _ = load_weights(saved).reconstruction(images)
+        expected, _ = network(images, torch.zeros(2))
+    found, _ = load_weights(saved).reconstruction(images, torch.zeros(2))
     assert_close(found.logits, expected.logits, rtol=0, atol=0.01)
 
 
@@ -69,7 +78,7 @@ def test_the_card_beside_tells_where_the_weights_come_from(saved, tiny):
 def test_nothing_in_the_file_is_a_pickle(saved):
     raw = saved.read_bytes()
     header = int.from_bytes(raw[:8], 'little')
-    assert json.loads(raw[8:8 + header])['__metadata__']['model'] == MODEL
+    assert json.loads(raw[8:8 + header])['__metadata__']['model'] == DEFAULT_MODEL
     numbers = sum(tensor.nbytes for tensor in load_file(saved).values())
     assert len(raw) == 8 + header + numbers  # a header in JSON, and numbers
 
@@ -83,7 +92,7 @@ def test_the_weights_that_ship_load_and_know_their_hash():
 def bundle_card():
     import active_recon
     return json.loads(
-        (Path(active_recon.__file__).parent / 'weights' / f'{MODEL}.json').read_text())
+        (Path(active_recon.__file__).parent / 'weights' / f'{DEFAULT_MODEL}.json').read_text())
 
 
 def test_a_missing_file_is_refused(tmp_path):
@@ -105,11 +114,29 @@ def test_a_pickle_is_refused_and_never_run(tmp_path):
         load_weights(tmp_path / 'model.safetensors')
 
 
-@pytest.mark.parametrize('model', ['3d-r2n2', None])
-def test_another_model_is_refused(saved, tiny, model):
+@pytest.mark.parametrize(('model', 'said'), [
+    ('3d-r2n3', "expected one of 2d3d-attention, .*got '3d-r2n3'"),
+    (None, 'got a file that names no model')])
+def test_a_model_that_is_not_in_the_registry_is_refused(saved, tiny, model, said):
     rewritten(saved, tiny, model=model)
-    with pytest.raises(WeightsError, match=f'model {MODEL}, got ({model}|a file that names no)'):
+    with pytest.raises(WeightsError, match=said):
         load_weights(saved)
+
+
+def test_weights_without_a_view_policy_are_weights_too(tmp_path, network, tiny):
+    path = tmp_path / 'weights.safetensors'
+    save_weights(path, Bundle(network, None, tiny, 0.35, model='2d3d'))
+    bundle = load_weights(path)
+    assert bundle.attention is None
+    assert bundle.model == '2d3d'
+
+
+def test_weights_are_found_by_the_name_of_a_model_or_by_their_path(tmp_path):
+    assert find_weights() == find_weights(DEFAULT_MODEL) == SHIPPED
+    assert find_weights(tmp_path / 'a.safetensors') == tmp_path / 'a.safetensors'
+    assert find_weights('runs/mine') == Path('runs/mine')
+    with pytest.raises(WeightsError, match=f'whose weights ship .*{DEFAULT_MODEL}.*got 2d4d'):
+        find_weights('2d4d')
 
 
 @pytest.mark.parametrize('config', [

@@ -5,6 +5,7 @@ import sys
 from active_recon.cli.demo import demo
 from active_recon.cli.evaluate import evaluate
 from active_recon.cli.making import dataset, render
+from active_recon.cli.paper import paper
 from active_recon.cli.sheet import sheet
 from active_recon.cli.train import train
 from active_recon.errors import ActiveReconError
@@ -13,8 +14,9 @@ import typer
 app = typer.Typer(
     help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, render, dataset, train, evaluate, sheet):
+for command in (demo, render, train, evaluate, paper, sheet):
     app.command()(command)
+app.add_typer(dataset, name='dataset')
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""`active-recon render` and `active-recon dataset`: meshes and parametric shapes to datasets."""
+"""`active-recon render` and `active-recon dataset build`: meshes and shapes to datasets."""
 
 import os
 from pathlib import Path
@@ -15,9 +15,15 @@ Workers = Annotated[int, typer.Option(min=1, help='Processes; default: one for e
 Samples = Annotated[int, typer.Option(
     min=1, max=4, help='Rays in each pixel, N x N: 1 is flat and fast, 2 smooths the edges.')]
 
+Fine = Annotated[bool, typer.Option(
+    '--fine', help='Voxelise with 64 cells a side too; what is there gets just these.')]
+
+dataset = typer.Typer(help='Datasets that nothing needs to be downloaded for.',
+                      no_args_is_help=True)
+
 _CORES = os.cpu_count() or 1
 _SEEDS = 1_000_000  # for each split
-_SPLIT_SEEDS = {'train': 0, 'val': _SEEDS, 'test': 2 * _SEEDS}
+_SPLIT_SEEDS = {'train': 0, 'val': _SEEDS, 'test': 2 * _SEEDS, 'unseen': 3 * _SEEDS}
 
 
 def render(
@@ -34,6 +40,7 @@ def render(
     explicit_licence: Annotated[bool, typer.Option(
         help='Of a manifest: only rows whose licence is explicit for the models.')] = False,
     samples: Samples = 2,
+    fine: Fine = False,
     workers: Workers = _CORES,
 ) -> None:
     """
@@ -58,34 +65,41 @@ def render(
                           f'got {meshes}')
     else:
         jobs = mesh_jobs(meshes, out, up, front)
-    _make('rendering', jobs, samples, workers)
+    _make('rendering', jobs, samples, workers, fine)
 
 
-def dataset(
-    out: Annotated[Path, typer.Argument(help='Folder for train/, val/ and test/.')],
+@dataset.command()
+def build(
+    out: Annotated[Path, typer.Argument(help='Folder for train/, val/, test/ and unseen/.')],
     train: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Training objects in each category.')] = 500,
+        min=0, max=_SEEDS, help='Training objects in each category.')] = 400,
     val: Annotated[int, typer.Option(
         min=0, max=_SEEDS, help='Validation objects in each category.')] = 50,
     test: Annotated[int, typer.Option(
         min=0, max=_SEEDS, help='Test objects in each category.')] = 100,
+    unseen: Annotated[int, typer.Option(
+        min=0, max=_SEEDS, help='Objects in each category that is never trained on.')] = 100,
     category: Annotated[list[str] | None, typer.Option(
         help='Only these categories (may be given several times).')] = None,
     samples: Samples = 2,
+    fine: Fine = False,
     workers: Workers = _CORES,
 ) -> None:
     """
     Make a dataset of parametric shapes, so that nothing needs a download.
 
     Each object is drawn from a seed of its own, so the same numbers give the same objects; the
-    splits' seeds never meet. The hash of the generators' code is written beside.
+    splits' seeds never meet. The categories that are never trained on stand apart, in unseen/.
+    The hash of the generators' code is written beside. A run that was broken off goes on where it
+    stopped.
     """
     from active_recon.datasets.making import shape_jobs
-    from active_recon.shapes import CATEGORIES, generators_hash
+    from active_recon.shapes import ALL_CATEGORIES, generators_hash, UNSEEN_CATEGORIES
 
-    counts = {'train': train, 'val': val, 'test': test}
-    jobs = [job for name in dict.fromkeys(category or CATEGORIES)
+    counts = {'train': train, 'val': val, 'test': test, 'unseen': unseen}
+    jobs = [job for name in dict.fromkeys(category or ALL_CATEGORIES)
             for split, count in counts.items()
+            if (split == 'unseen') == (name in UNSEEN_CATEGORIES)
             for job in shape_jobs(name, range(_SPLIT_SEEDS[split], _SPLIT_SEEDS[split] + count),
                                   out / split)]
     made_by, code = out / 'generators.sha256', generators_hash()
@@ -94,17 +108,17 @@ def dataset(
                         f'there was made by others ({made_by}); choose another folder')
     out.mkdir(parents=True, exist_ok=True)
     made_by.write_text(code + '\n')
-    _make('making', jobs, samples, workers)
+    _make('making', jobs, samples, workers, fine)
 
 
-def _make(title: str, jobs: 'list[Job]', samples: int, workers: int) -> None:
+def _make(title: str, jobs: 'list[Job]', samples: int, workers: int, fine: bool) -> None:
     from active_recon.datasets.making import make_dataset
 
     if not jobs:
         raise DataError('expected objects to make; what was asked for leaves none')
     refused = []
     with progress_bar(title, len(jobs)) as advance:
-        for outcome in make_dataset(jobs, samples, workers):
+        for outcome in make_dataset(jobs, samples, workers, fine):
             if outcome.refusal:
                 refused.append(outcome)
             advance(1, f'{len(refused)} refused' if refused else '')

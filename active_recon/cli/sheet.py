@@ -1,10 +1,16 @@
-"""`active-recon sheet`: what a category looks like, on one picture."""
+"""`active-recon sheet`: what a category, or a training on it, looks like, on one picture."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TYPE_CHECKING
 
 from active_recon.errors import DataError
 import typer
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_TRAINING_VIEWS = 8
 
 
 def sheet(
@@ -13,17 +19,32 @@ def sheet(
         help='A parametric category (may be given several times); default: all.')] = None,
     meshes: Annotated[Path | None, typer.Option(
         help='A folder of mesh files to draw instead.')] = None,
-    count: Annotated[int, typer.Option(min=1, help='Objects of each category.')] = 8,
+    training: Annotated[Path | None, typer.Option(
+        help="A dataset of which to draw training images instead, a row for each of a batch's "
+             'sequences of views.')] = None,
+    count: Annotated[int, typer.Option(
+        min=1, help='Objects of each category; with --training, rows.')] = 8,
     azimuth_deg: Annotated[float, typer.Option(help='Seen from; 0 is the front.')] = 35.0,
 ) -> None:
     """Draw many objects on one picture, to look at and to compare with real ones."""
+    import cv2
+
+    picture = _objects(category, meshes, count, azimuth_deg) if training is None else (
+        _training(training, count))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(out), picture[..., ::-1]):
+        raise DataError(f'{out}: cannot be written')
+    typer.echo(f'wrote {out}')
+
+
+def _objects(category: list[str] | None, meshes: Path | None, count: int,
+             azimuth_deg: float) -> 'NDArray[np.uint8]':
     import math
 
     from active_recon.datasets.making import MESH_SUFFIXES
     from active_recon.meshes import load_mesh
     from active_recon.shapes import CATEGORIES, make_shape
     from active_recon.sheet import contact_sheet
-    import cv2
 
     if meshes is None:
         objects = [make_shape(name, seed)
@@ -33,8 +54,17 @@ def sheet(
                    if path.suffix.lower() in MESH_SUFFIXES]
     if not objects:
         raise DataError(f'{meshes}: expected mesh files, found none')
-    picture = contact_sheet(objects, azimuth=math.radians(azimuth_deg))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(out), picture[..., ::-1]):
-        raise DataError(f'{out}: cannot be written')
-    typer.echo(f'wrote {out}: {len(objects)} objects')
+    return contact_sheet(objects, azimuth=math.radians(azimuth_deg))
+
+
+def _training(root: Path, rows: int) -> 'NDArray[np.uint8]':
+    from active_recon.datasets.layout import list_objects
+    from active_recon.datasets.views import read_views
+    from active_recon.sheet import sequence_sheet
+    from active_recon.training.batches import draw_batch
+    import numpy as np
+
+    rng = np.random.default_rng(0)
+    folders = list_objects(root)
+    some = [folders[index] for index in rng.permutation(len(folders))[:4 * rows]]
+    return sequence_sheet(draw_batch(read_views(some), rows, _TRAINING_VIEWS, rng).images)

@@ -1,4 +1,4 @@
-"""`active-recon train`: the two stages, with a progress bar, checkpoints and a log."""
+"""`active-recon train`: the schemes and stages, with a progress bar, checkpoints and a log."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,100 +6,109 @@ import sys
 from typing import Annotated
 
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.reading import read_objects, Split
 from active_recon.errors import ConfigError
 import typer
 
 
 def train(
     data: Annotated[list[Path], typer.Argument(
-        help="Folders of training objects in R2N2's layout (see `active-recon dataset`).")],
+        help="Folders of training objects in R2N2's layout (see `active-recon dataset build`).")],
     validation: Annotated[Path, typer.Option(
         help='Folder of validation objects: chooses the threshold, and nothing else does.')],
+    split_file: Split = None,
     out: Annotated[Path, typer.Option(
         help='Run folder: checkpoints, TensorBoard log, weights.')] = Path('runs/default'),
+    model: Annotated[str, typer.Option(
+        help='A network of the registry: 2d3d-attention, 2d3d, r2n2, ptn, ptn-combined, ogn, '
+             'shape-basis.')] = '2d3d-attention',
+    size: Annotated[str, typer.Option(
+        help="'small' (two CPU cores within an hour), 'published' (its paper's own); of ogn "
+             "also 'small-64' and 'published-64'.")] = 'small',
+    scheme: Annotated[str, typer.Option(
+        help="'two-stage': reconstruction on random views, then the policy on it, frozen; "
+             "'joint': both together on the policy's views, as in the paper.")] = 'two-stage',
+    begin_from: Annotated[str | None, typer.Option(
+        '--from', help='Weights (or the name of a model that ships) whose reconstruction is '
+                       'taken as it is: only a policy is trained on it.')] = None,
     steps: Annotated[int, typer.Option(min=1, help='Steps of the reconstruction.')] = 12000,
     policy_steps: Annotated[int, typer.Option(
-        min=0, help='Steps of the view policy; 0 leaves it out.')] = 1500,
-    batch_size: Annotated[int, typer.Option(min=1, help='Objects in a batch.')] = 16,
+        min=0, help='Steps of the view policy; 0 leaves it out.')] = 800,
+    batch_size: Annotated[int, typer.Option(min=1, help='Objects in a batch.')] = 32,
     policy_batch_size: Annotated[int, typer.Option(min=2, help='Episodes in a batch.')] = 48,
     learning_rate: Annotated[float, typer.Option(help='At its peak; then half a cosine.')] = 1e-3,
     policy_learning_rate: Annotated[float, typer.Option(help='The same, of the policy.')] = 5e-4,
-    volume_loss: Annotated[str, typer.Option(help='mse (the paper), bce or dice.')] = 'mse',
-    volume_weight: Annotated[float, typer.Option(help='lambda_V of section 3.2.')] = 0.4,
-    silhouette_weight: Annotated[float, typer.Option(help='lambda_S of section 3.2.')] = 0.6,
+    max_views: Annotated[int, typer.Option(
+        min=1, max=24, help='Longest sequence of views that is learned from.')] = 5,
+    volume_loss: Annotated[str | None, typer.Option(
+        help="mse (the paper), bce, dice, mse+dice; default: the network's own.")] = None,
+    volume_weight: Annotated[float | None, typer.Option(
+        help="lambda_V of section 3.2; default: the network's own.")] = None,
+    silhouette_weight: Annotated[float | None, typer.Option(help='lambda_S, the same.')] = None,
+    varied: Annotated[bool, typer.Option(
+        help="Varied backgrounds, light, shift and scale; --no-varied is the paper's plain "
+             'white.')] = True,
     seed: Annotated[int, typer.Option(help='The same seed draws the same batches.')] = 0,
     bf16: Annotated[bool, typer.Option(help='Half precision where it is safe.')] = True,
-    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
+    devices: Annotated[int, typer.Option(min=1, help='Processes, or cards, of a machine.')] = 1,
+    nodes: Annotated[int, typer.Option(
+        min=1, help="Machines; start the command on each, with Lightning Fabric's MASTER_ADDR, "
+                    'MASTER_PORT and NODE_RANK set.')] = 1,
     resume: Annotated[bool, typer.Option(
         help='Go on from the checkpoints in the run folder.')] = False,
 ) -> None:
     """
-    Train the reconstruction network, then the view policy on it; write weights that load.
+    Train a reconstruction network, and a view policy for it; write weights that load.
 
     The reconstruction learns from random views under the weighted volume and silhouette losses;
-    the policy then learns by policy gradient, with the reconstruction frozen. A training that was
-    cut off goes on with --resume. The weights and their card land in OUT/weights.safetensors.
+    the policy then learns by policy gradient, with the reconstruction frozen, or both learn
+    together (--scheme joint). A training that was cut off goes on with --resume. The weights and
+    their card land in OUT/weights.safetensors.
     """
-    from active_recon.config import LossConfig, NetworkConfig, RewardConfig
-    from active_recon.datasets.layout import list_objects
-    from active_recon.datasets.views import read_views, ViewSet
-    from active_recon.evaluation.validation import best_threshold, policy_auc, reconstruction_iou
-    from active_recon.models.attention import AttentionModel
-    from active_recon.models.reconstruction import ReconstructionNetwork
-    from active_recon.models.weights import Bundle, save_weights
+    from active_recon.config import LossConfig
+    from active_recon.models.registry import network_entry
+    from active_recon.models.weights import find_weights, load_weights, save_weights
     from active_recon.shapes import generators_hash
-    from active_recon.training.policy_gradient import train_policy
-    from active_recon.training.supervised import train_reconstruction, TrainingConfig
+    from active_recon.training.loop import make_fabric, TrainingConfig
+    from active_recon.training.plan import Plan, train_plan
     import torch
 
-    checkpoints = {stage: out / f'{stage}.safetensors' for stage in ('reconstruction', 'policy')}
-    if not resume and any(path.exists() for path in checkpoints.values()):
+    if scheme not in ('two-stage', 'joint'):
+        raise ConfigError(f"--scheme: expected 'two-stage' or 'joint', got {scheme!r}")
+    stages = ('reconstruction', 'policy', 'joint')
+    if not resume and any((out / f'{stage}.safetensors').exists() for stage in stages):
         raise ConfigError(f'{out}: expected a new run folder, but it holds checkpoints; go on '
                           'with --resume, or name another folder by --out')
-    loss = LossConfig(volume_weight, silhouette_weight, volume_loss)
-    first = TrainingConfig(steps, batch_size, learning_rate, seed=seed, bfloat16=bf16)
+    entry = network_entry(model)
+    loss = LossConfig(
+        entry.loss.volume_weight if volume_weight is None else volume_weight,
+        entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
+        volume_loss or entry.loss.volume_loss)
+    first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, varied)
+    second = TrainingConfig(
+        max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed,
+        bfloat16=False, varied=False, warm_up=20, checkpoint_every=50, validate_every=250)
+    with_policy = entry.attentive and scheme == 'two-stage' and policy_steps > 0
+    plan = Plan(model, size, loss, first, second if with_policy else None,
+                joint=scheme == 'joint',
+                begun=load_weights(find_weights(begin_from)) if begin_from else None)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
-
-    def read(roots: list[Path], name: str) -> ViewSet:
-        folders = [folder for root in roots for folder in list_objects(root)]
-        with progress_bar(f'reading {name}', len(folders)) as advance:
-            views = read_views(folders, lambda: advance(1, ''))
-        for refusal in views.unreadable:
-            typer.echo(f'left out: {refusal}', err=True)
-        return views
-
-    training, held_out = read(data, 'training data'), read([validation], 'validation data')
-    network_config = NetworkConfig()
-    network = ReconstructionNetwork.from_config(network_config)
-    attention = AttentionModel.from_config(network_config)
-    checkpoint = checkpoints['reconstruction']
-    with _reporting('reconstruction', steps, out) as report:
-        train_reconstruction(network, training, first, loss, checkpoint,
-                             lambda model: reconstruction_iou(model, held_out), report,
-                             resume and checkpoint.is_file())
-    threshold = best_threshold(network, held_out)
-    typer.echo(f'threshold {threshold:.2f}, chosen on validation')
-    rewards = RewardConfig()
-    second = TrainingConfig(max(policy_steps, 1), policy_batch_size, policy_learning_rate,
-                            seed=seed, checkpoint_every=50, validate_every=250)
-    if policy_steps:
-        checkpoint = checkpoints['policy']
-        with _reporting('policy', policy_steps, out) as report:
-            train_policy(network, attention, training, threshold, second, rewards, checkpoint,
-                         lambda model: policy_auc(network, model, held_out, threshold), report,
-                         resume and checkpoint.is_file())
-    card = {
-        'command': ' '.join(['active-recon', *sys.argv[1:]]),
-        'data': {str(root): sum(folder.root == root for folder in training.folders)
-                 for root in data},
-        'generators_sha256': generators_hash(),
-        'reconstruction': first.to_dict() | loss.to_dict(),
-        'policy': second.to_dict() | rewards.to_dict() if policy_steps else None,
-    }
-    weights = out / 'weights.safetensors'
-    save_weights(weights, Bundle(network, attention, network_config, threshold, card))
-    typer.echo(f'wrote {weights} and its card')
+    fabric = make_fabric(bf16, devices, nodes)
+    fabric.launch()
+    cells = entry.build(plan.config).resolution
+    training = read_objects(data, 'training data', cells, split_file, 'train')
+    held_out = read_objects([validation], 'validation data', cells, split_file, 'val')
+    bundle = train_plan(plan, training, held_out, out,
+                        lambda stage, count: _reporting(stage, count, out), fabric, resume)
+    if fabric.is_global_zero:
+        bundle.card.update(command=' '.join(['active-recon', *sys.argv[1:]]),
+                           generators_sha256=generators_hash())
+        weights = out / 'weights.safetensors'
+        save_weights(weights, bundle)
+        typer.echo(f'threshold {bundle.threshold:.2f}, chosen on validation\n'
+                   f'wrote {weights} and its card')
 
 
 class _reporting:  # noqa: N801  (a context manager that reads as one)

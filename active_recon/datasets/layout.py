@@ -5,6 +5,7 @@ R2N2's layout on disk, read and written: one reader for real ShapeNet and for wh
                                                       /rendering_metadata.txt
                                                       /renderings.txt
     <root>/ShapeNetVox32/<category>/<id>/model.binvox
+    <root>/ShapeNetVox64/<category>/<id>/model.binvox, where finer ones were asked for
 
 A row of the metadata holds azimuth, elevation and in-plane rotation in degrees, distance, and a
 field of view that is not to be used. Its azimuth runs clockwise, so it is negated, and its
@@ -18,12 +19,12 @@ from pathlib import Path
 
 from active_recon.cameras import Camera, orbit_camera
 from active_recon.errors import DataError, ViewError
-from active_recon.voxels import read_binvox, VoxelGrid, write_binvox
+from active_recon.voxels import read_binvox, RESOLUTION, VoxelGrid, write_binvox
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-RENDERING, VOXELS = 'ShapeNetRendering', 'ShapeNetVox32'
+RENDERING, VOXELS = 'ShapeNetRendering', 'ShapeNetVox'
 _DISTANCE_UNIT = 1.75
 _FIELD_OF_VIEW_COLUMN = 25.0  # what R2N2 writes; it is not the lens's
 
@@ -41,10 +42,9 @@ class ObjectFolder:
         """Where the images and their metadata lie."""
         return self.root / RENDERING / self.category / self.name / 'rendering'
 
-    @property
-    def voxels_path(self) -> Path:
-        """Where the voxels lie."""
-        return self.root / VOXELS / self.category / self.name / 'model.binvox'
+    def voxels_path(self, resolution: int = RESOLUTION) -> Path:
+        """Where the voxels of so many cells a side lie."""
+        return self.root / f'{VOXELS}{resolution}' / self.category / self.name / 'model.binvox'
 
     def cameras(self) -> list[Camera]:
         """Return the camera of every image; positions count in metres, the grid as in the file."""
@@ -71,14 +71,22 @@ class ObjectFolder:
                             f'{bgra.shape} {bgra.dtype}')
         return np.asarray(cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA), np.uint8)
 
-    def voxels(self) -> VoxelGrid:
-        """Return the true voxels."""
-        return read_binvox(self.voxels_path)
+    def voxels(self, resolution: int = RESOLUTION) -> VoxelGrid:
+        """Return the true voxels; raises DataError where there are none so fine."""
+        path = self.voxels_path(resolution)
+        if resolution != RESOLUTION and not path.is_file():
+            raise DataError(f'{path}: expected voxels of {resolution} cells a side, found no '
+                            'file; make them with `--fine`')
+        grid = read_binvox(path)
+        if grid.occupancy.shape != (resolution,) * 3:
+            raise DataError(f'{path}: expected {resolution} cells a side, '
+                            f'got {grid.occupancy.shape}')
+        return grid
 
     @property
     def complete(self) -> bool:
         """Whether the object was written to its end: its voxels come last."""
-        return self.voxels_path.is_file()
+        return self.voxels_path().is_file()
 
 
 def list_objects(root: Path) -> list[ObjectFolder]:
@@ -86,7 +94,7 @@ def list_objects(root: Path) -> list[ObjectFolder]:
     top = root / RENDERING
     if not top.is_dir():
         raise DataError(f"{root}: expected a dataset in R2N2's layout, but it has no folder "
-                        f'{RENDERING}; make one with `active-recon render` or `dataset`')
+                        f'{RENDERING}; make one with `active-recon render` or `dataset build`')
     return [ObjectFolder(root, folder.parent.name, folder.name)
             for folder in sorted(top.glob('*/*')) if folder.is_dir()]
 
@@ -107,6 +115,12 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
                     f'{camera.distance / _DISTANCE_UNIT:.9g} {_FIELD_OF_VIEW_COLUMN:g}')
     (folder.images_folder / 'rendering_metadata.txt').write_text('\n'.join(rows) + '\n')
     (folder.images_folder / 'renderings.txt').write_text('\n'.join(names) + '\n')
-    unfinished = folder.voxels_path.with_suffix('.part')
+    write_voxels(folder, grid)
+
+
+def write_voxels(folder: ObjectFolder, grid: VoxelGrid) -> None:
+    """Write the voxels of one object, at once, where those of their resolution lie."""
+    path = folder.voxels_path(len(grid.occupancy))
+    unfinished = path.with_suffix('.part')
     write_binvox(grid, unfinished)
-    unfinished.replace(folder.voxels_path)
+    unfinished.replace(path)

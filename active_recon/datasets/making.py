@@ -10,12 +10,13 @@ import multiprocessing
 from pathlib import Path
 
 from active_recon.cameras import AZIMUTHS, orbit_camera
-from active_recon.datasets.layout import ObjectFolder, write_object
+from active_recon.datasets.layout import ObjectFolder, write_object, write_voxels
 from active_recon.errors import ActiveReconError, ConfigError, DataError
 from active_recon.meshes import file_rotation, fit_to_grid, load_mesh
 from active_recon.rendering import Renderer
-from active_recon.shapes import CATEGORIES, make_shape
+from active_recon.shapes import ALL_CATEGORIES, make_shape
 from active_recon.voxelise import voxelise
+from active_recon.voxels import FINE_RESOLUTION
 import numpy as np
 import trimesh
 
@@ -84,30 +85,40 @@ def _mesh_folder(out: Path, top: Path, path: Path) -> ObjectFolder:
 
 def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
     """Return a job for each seed of a parametric category; ConfigError if there is none such."""
-    if category not in CATEGORIES:
-        raise ConfigError(f'expected a category out of {", ".join(CATEGORIES)}, got {category!r}')
+    if category not in ALL_CATEGORIES:
+        raise ConfigError('expected a category out of '
+                          f'{", ".join(ALL_CATEGORIES)}, got {category!r}')
     return [Job(ObjectFolder(out, category, f'{category}-{seed:06d}'),
                 partial(make_shape, category, seed)) for seed in seeds]
 
 
-def make_object(job: Job, samples: int) -> Outcome:
-    """Render and voxelise one object, unless it is already there."""
-    if job.folder.complete:
+def make_object(job: Job, samples: int, fine: bool = False) -> Outcome:
+    """Render and voxelise one object, `fine` also at 64 cells a side; what is there stays."""
+    lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
+    if job.folder.complete and not lacks_fine:
         return Outcome(job.folder)
     try:
         mesh = job.make_mesh()
-        renderer = Renderer(mesh)
-        cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
-        images = [renderer.render(camera, samples) for camera in cameras]
-        if not np.any(images):
-            raise DataError('expected a surface, but none of it is seen from any azimuth')
-        write_object(job.folder, images, cameras, voxelise(mesh))
+        if not job.folder.complete:
+            _render(job.folder, mesh, samples)
+        if lacks_fine:
+            write_voxels(job.folder, voxelise(mesh, FINE_RESOLUTION))
     except (ActiveReconError, OSError) as error:
         return Outcome(job.folder, str(error))
     return Outcome(job.folder)
 
 
-def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1) -> Iterator[Outcome]:
+def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int) -> None:
+    renderer = Renderer(mesh)
+    cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+    images = [renderer.render(camera, samples) for camera in cameras]
+    if not np.any(images):
+        raise DataError('expected a surface, but none of it is seen from any azimuth')
+    write_object(folder, images, cameras, voxelise(mesh))
+
+
+def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1,
+                 fine: bool = False) -> Iterator[Outcome]:
     """
     Make all objects, yielding what became of each as it is done.
 
@@ -118,10 +129,10 @@ def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1) -> Iterato
             raise DataError(f'expected each object once, but {count} would become '
                             f'{folder.category}/{folder.name}; rename their files')
     if workers == 1:
-        yield from (make_object(job, samples) for job in jobs)
+        yield from (make_object(job, samples, fine) for job in jobs)
         return
     # spawn, because a fork of a process that has threads (torch, embree, ROS) may hang
     with ProcessPoolExecutor(workers, multiprocessing.get_context('spawn')) as pool:
-        futures = [pool.submit(make_object, job, samples) for job in jobs]
+        futures = [pool.submit(make_object, job, samples, fine) for job in jobs]
         for future in as_completed(futures):
             yield future.result()

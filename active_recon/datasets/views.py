@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from active_recon.cameras import VIEW_COUNT
 from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.splits import SYNSETS
 from active_recon.errors import DataError
 from active_recon.models.encoder import IMAGE_SIZE
 from active_recon.voxels import RESOLUTION
@@ -23,7 +24,7 @@ class ViewSet:
 
     - images: (N, V, 64, 64, 4) uint8, RGB multiplied by alpha, and alpha
     - azimuths: (N, V) float32, radians
-    - voxels: (N, 32, 32, 32) bool
+    - voxels: (N, R, R, R) bool, R 32 or 64
     - folders: where each came from; unreadable: what was left out, and why
     """
 
@@ -39,8 +40,9 @@ class ViewSet:
 
     @property
     def categories(self) -> NDArray[np.str_]:
-        """Category of each object, (N,)."""
-        return np.array([folder.category for folder in self.folders])
+        """Category of each object, (N,); a synset's id of ShapeNet becomes its name."""
+        return np.array([SYNSETS.get(folder.category, folder.category)
+                         for folder in self.folders])
 
     def white(self, objects: Tensor, views: Tensor) -> Tensor:
         """Return views (B,) of objects (B,) on white, (B, 3, 64, 64) float32 in [0, 1]."""
@@ -53,44 +55,52 @@ def on_background(images: Tensor, colors: Tensor) -> Tensor:
     return planes[:, :3] + (1 - planes[:, 3:]) * colors[:, :, None, None].to(planes.device)
 
 
-def read_views(folders: Sequence[ObjectFolder],
-               progress: Callable[[], None] = lambda: None) -> ViewSet:
-    """Read objects; what cannot be read is left out and listed. Raises DataError if none can."""
-    def read(folder: ObjectFolder) -> tuple[ObjectFolder, _Object | str]:
+def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = lambda: None,
+               resolution: int = RESOLUTION) -> ViewSet:
+    """
+    Read objects, with voxels of 32 or 64 cells a side.
+
+    What cannot be read is left out and listed. Raises DataError if none can.
+    """
+    count = len(folders)
+    # Filled in place: gathered and then stacked, a large set would take its memory twice
+    images = np.empty((count, VIEW_COUNT, IMAGE_SIZE, IMAGE_SIZE, 4), np.uint8)
+    azimuths = np.empty((count, VIEW_COUNT), np.float32)
+    voxels = np.empty((count, *(resolution,) * 3), np.bool_)
+
+    def read(index: int) -> str:
         try:
-            return folder, _read_object(folder)
+            _read_object(folders[index], images[index], azimuths[index], voxels[index])
+            return ''
         except DataError as error:
-            return folder, str(error)
+            return str(error)
         finally:
             progress()
 
     with ThreadPoolExecutor() as pool:
-        results = list(pool.map(read, folders))
-    good = [(folder, found) for folder, found in results if not isinstance(found, str)]
-    refusals = tuple(found for _, found in results if isinstance(found, str))
+        refusals = list(pool.map(read, range(count)))
+    good = [index for index in range(count) if not refusals[index]]
+    unreadable = tuple(filter(None, refusals))
     if not good:
         raise DataError('expected objects in the dataset, none can be read'
-                        + ''.join(f'\n  {refusal}' for refusal in refusals[:5]))
-    images, azimuths, voxels = zip(*(found for _, found in good), strict=True)
-    return ViewSet(torch.from_numpy(np.stack(images)), torch.from_numpy(np.stack(azimuths)),
-                   torch.from_numpy(np.stack(voxels)), tuple(folder for folder, _ in good),
-                   refusals)
+                        + ''.join(f'\n  {refusal}' for refusal in unreadable[:5]))
+    kept = slice(None) if len(good) == count else good
+    return ViewSet(torch.from_numpy(images[kept]), torch.from_numpy(azimuths[kept]),
+                   torch.from_numpy(voxels[kept]), tuple(folders[index] for index in good),
+                   unreadable)
 
 
-_Object = tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.bool_]]
-
-
-def _read_object(folder: ObjectFolder) -> _Object:
+def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
+                 azimuths: NDArray[np.float32], voxels: NDArray[np.bool_]) -> None:
+    """Read one object into (V, 64, 64, 4), (V,) and (R, R, R)."""
     cameras = folder.cameras()
-    if len(cameras) != VIEW_COUNT:
-        raise DataError(f'{folder.images_folder}: expected {VIEW_COUNT} views, '
+    if len(cameras) != len(images):
+        raise DataError(f'{folder.images_folder}: expected {len(images)} views, '
                         f'got {len(cameras)}')
-    images = np.stack([_premultiplied(folder.image(index)) for index in range(len(cameras))])
-    voxels = folder.voxels().occupied(0.5)
-    if voxels.shape != (RESOLUTION,) * 3:
-        raise DataError(f'{folder.voxels_path}: expected {RESOLUTION} cells a side, '
-                        f'got {voxels.shape}')
-    return images, np.array([camera.azimuth for camera in cameras], np.float32), voxels
+    voxels[:] = folder.voxels(len(voxels)).occupied(0.5)
+    azimuths[:] = [camera.azimuth for camera in cameras]
+    for index, image in enumerate(images):
+        image[:] = _premultiplied(folder.image(index))
 
 
 def _premultiplied(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -11,9 +11,9 @@ from active_recon.cameras import (
     orbit_camera,
 )
 from active_recon.demo.drawing import centred, PAPER, paste, QUIET, text, view_color
-from active_recon.demo.voxel_boxes import height_range, voxel_boxes
 from active_recon.rendering import composite, Renderer
 from active_recon.seen_view import SeenView
+from active_recon.voxel_boxes import height_range, voxel_picture
 from active_recon.voxels import VoxelGrid
 import cv2
 import numpy as np
@@ -120,14 +120,15 @@ def _draw_truth(picture: NDArray[np.uint8], left: int, top: int, mesh: trimesh.T
 
 
 def _seen_voxels(grid: VoxelGrid, heights: tuple[int, int]) -> NDArray[np.uint8]:
-    """Return the occupied cells as boxes, an empty tile where there are none."""
-    boxes = voxel_boxes(grid, heights)
-    return np.full((TILE, TILE, 3), PAPER, np.uint8) if boxes is None else _rendered(boxes)
+    return voxel_picture(grid, heights, _tile_camera(), PAPER)
 
 
 def _rendered(mesh: trimesh.Trimesh) -> NDArray[np.uint8]:
-    camera = _camera(_LOOK_FROM, math.radians(25), 1.9, TILE)
-    return composite(Renderer(mesh).render(camera, samples=3), np.array(PAPER, np.uint8))
+    return composite(Renderer(mesh).render(_tile_camera(), samples=3), np.array(PAPER, np.uint8))
+
+
+def _tile_camera() -> Camera:
+    return _camera(_LOOK_FROM, math.radians(25), 1.9, TILE)
 
 
 def _camera(azimuth: float, elevation: float, distance: float, side: int) -> Camera:

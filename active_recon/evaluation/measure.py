@@ -1,25 +1,34 @@
 """Everything that is said of a network and its policies on held-out objects, measured."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, field, fields
 import math
 from typing import Any
 
 from active_recon.cameras import azimuth_difference
 from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.metrics import half_the_set_away, object_bootstrap
-from active_recon.evaluation.rollouts import nearest_views, roll_out
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.evaluation.metrics import half_the_set_away
+from active_recon.evaluation.oracle import oracle_batch, roll_out_oracle
+from active_recon.evaluation.rollouts import (
+    batches,
+    fold_views,
+    logits_of,
+    nearest_views,
+    roll_out,
+    Step,
+)
+from active_recon.evaluation.statistics import by_object, mean_interval
+from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Policy
-from active_recon.voxels import iou, turned, VoxelGrid
+from active_recon.voxels import entropy, iou, paper_entropy, turned
 import numpy as np
 from numpy.typing import NDArray
 import torch
 from torch import Tensor
 
 YAWS_DEG = (0, 5, 15, 30, 90, 180)
-_BATCH = 64
+_BATCH = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,72 +56,111 @@ class Episodes:
         return np.asarray(np.abs(steps).sum(axis=1))
 
 
+def joined(parts: Sequence[Episodes]) -> Episodes:
+    """Return the episodes of all parts, one part after the other."""
+    return Episodes(*(np.concatenate([getattr(part, name.name) for part in parts])
+                      for name in fields(Episodes)))
+
+
+def record(steps: Iterable[Step], truth: Tensor, threshold: float) -> Episodes:
+    """Measure episodes (B,) view by view against their truth, (B, X, Y, Z) bool."""
+    measured: list[tuple[Tensor, ...]] = []
+    taken = np.empty((len(truth), 0))
+    for step in steps:
+        occupancy, taken = step.occupancy, step.taken
+        measured.append((iou(occupancy > threshold, truth.to(occupancy.device)),
+                         entropy(occupancy), paper_entropy(occupancy)))
+    found, full, paper = (torch.stack(each, dim=1).double().cpu().numpy()
+                          for each in zip(*measured, strict=True))
+    return Episodes(found, full, paper, taken)
+
+
 def run_policy(network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
                starts: Tensor, threshold: float, count: int = 5,
-               stand_ins: Tensor | None = None,
+               stand_ins: Tensor | None = None, bfloat16: bool = False,
                progress: Callable[[int], None] = lambda done: None) -> Episodes:
     """Run all episodes (E,) under a policy, which is shown the stand-ins (E,) if there are any."""
-    parts: list[Episodes] = []
-    for low in range(0, len(objects), _BATCH):
-        part = slice(low, low + _BATCH)
+    parts = []
+    for part in batches(len(objects), _BATCH):
+        steps = roll_out(network, policy, views, objects[part], starts[part], count,
+                         None if stand_ins is None else stand_ins[part], bfloat16)
+        parts.append(record(steps, views.voxels[objects[part]], threshold))
+        progress(len(part))
+    return joined(parts)
+
+
+def run_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Tensor, starts: Tensor,
+               threshold: float, count: int = 5, bfloat16: bool = False,
+               progress: Callable[[int], None] = lambda done: None) -> Episodes:
+    """Run all episodes (E,) under the greedy oracle, which sees the truth."""
+    parts = []
+    for part in batches(len(objects), oracle_batch(views)):
         own = objects[part]
-        steps = list(roll_out(network, policy, views, own, starts[part], count,
-                              None if stand_ins is None else stand_ins[part]))
-        truth = views.voxels[own]
-        grids = [[VoxelGrid(grid) for grid in step.occupancy.numpy()] for step in steps]
-        parts.append(Episodes(
-            np.stack([iou(step.occupancy > threshold, truth).numpy() for step in steps], axis=1),
-            np.array([[grid.entropy() for grid in row] for row in grids]).T,
-            np.array([[grid.paper_entropy() for grid in row] for row in grids]).T,
-            steps[-1].taken))
-        progress(len(own))
-    return Episodes(*(np.concatenate([getattr(part, name) for part in parts])
-                      for name in ('iou', 'entropy', 'paper_entropy', 'azimuths')))
+        steps = roll_out_oracle(network, views, own, starts[part], count, threshold, bfloat16)
+        parts.append(record(steps, views.voxels[own], threshold))
+        progress(len(part))
+    return joined(parts)
 
 
-def summary(episodes: Episodes, views: ViewSet, objects: Tensor) -> dict[str, Any]:
-    """Return means with 95 % intervals over objects, and per category, ready for JSON."""
-    index = objects.numpy()
-    names = views.categories[index]
+def summary(runs: Sequence[Episodes], views: ViewSet, objects: Tensor) -> dict[str, Any]:
+    """
+    Return means with 95 % intervals, and per category, ready for JSON.
+
+    `runs` are the same episodes under each seed of a policy.
+    """
+    def stacked(name: str) -> NDArray[np.float64]:
+        """Return (T, objects, starts, seeds), or without T."""
+        values = np.stack([by_object(getattr(run, name), objects.numpy()) for run in runs], 2)
+        return np.moveaxis(values, 3, 0) if values.ndim == 4 else values
+
+    categories = views.categories[np.unique(objects.numpy())]
+    ious = stacked('iou')
     return {
-        'iou': [interval(episodes.iou[:, t], index) for t in range(episodes.iou.shape[1])],
-        'auc': interval(episodes.auc, index),
-        'entropy': episodes.entropy.mean(axis=0).tolist(),
-        'paper_entropy': episodes.paper_entropy.mean(axis=0).tolist(),
-        'rotation': interval(episodes.rotation, index),
-        'per_category_iou': {str(name): episodes.iou[names == name].mean(axis=0).tolist()
-                             for name in np.unique(names)},
+        'seeds': len(runs),
+        'iou': [asdict(mean_interval(values)) for values in ious],
+        'auc': asdict(mean_interval(stacked('auc'))),
+        'entropy': [asdict(mean_interval(values)) for values in stacked('entropy')],
+        'paper_entropy': [asdict(mean_interval(values)) for values in stacked('paper_entropy')],
+        'rotation': asdict(mean_interval(stacked('rotation'))),
+        'per_category_iou': {
+            str(name): [asdict(mean_interval(values[categories == name])) for values in ious]
+            for name in np.unique(categories)},
     }
 
 
-def interval(values: NDArray[np.float64], objects: NDArray[np.int64]) -> dict[str, float]:
-    """Return mean, low and high (95 %, objects drawn anew) of values (E,)."""
-    mean, low, high = object_bootstrap(values, objects)
-    return {'mean': mean, 'low': low, 'high': high}
+def interval(values: NDArray[np.float64], objects: Tensor) -> dict[str, float]:
+    """Return mean, low and high (95 %, over objects and starts) of values of episodes (E,)."""
+    return asdict(mean_interval(by_object(values, objects.numpy())))
 
 
 @torch.inference_mode()
-def iou_by_yaw(network: ReconstructionNetwork, views: ViewSet, objects: Tensor, starts: Tensor,
-               threshold: float) -> dict[str, dict[str, float]]:
+def iou_by_yaw(
+    network: ReconstructionNetwork, views: ViewSet, objects: Tensor, starts: Tensor,
+    threshold: float, progress: Callable[[int], None] = lambda done: None,
+) -> dict[str, dict[str, float]]:
     """
-    Return the single-view IoU against a front that stands turned by each of YAWS_DEG.
+    Return the single-view IoU where the front stands turned by each of YAWS_DEG.
 
-    The network never sees the pose, so a front turned by a yaw leaves its answer as it is; what
-    turns is the truth, by as much to the left as to the right.
+    Every other episode's is turned to the right. The images stay as they are; the truth turns,
+    and so does the azimuth that the network is told, if it listens.
     """
     found: dict[int, list[float]] = {yaw: [] for yaw in YAWS_DEG}
-    for low in range(0, len(objects), _BATCH):
-        own = objects[low:low + _BATCH]
-        seen, _ = network(views.white(own, starts[low:low + _BATCH]))
-        predicted = (seen.logits.sigmoid() > threshold).numpy()
-        for row, (grid, item) in enumerate(zip(predicted, own.tolist(), strict=True)):
-            sign = 1 if row % 2 else -1
-            truth = views.voxels[item].numpy().astype(np.float32)
-            for yaw in YAWS_DEG:
-                at_yaw = turned(truth, sign * math.radians(yaw)) > 0.5
-                found[yaw].append(float(iou(grid, at_yaw)))
-    return {str(yaw): interval(np.array(values), objects.numpy())
-            for yaw, values in found.items()}
+    signs = 1 - 2 * (torch.arange(len(objects)) % 2)
+    for part in batches(len(objects), _BATCH):
+        own = objects[part]
+        turns = list(zip(own.tolist(), signs[part].tolist(), strict=True))
+        for yaw in YAWS_DEG:
+            angle = math.radians(yaw)
+            folded, _ = fold_views(network, views, own, starts[part], yaws=signs[part] * angle)
+            predicted = (logits_of(network, folded).sigmoid() > threshold).cpu()
+            truths = {turn: _turned_truth(views, turn[0], turn[1] * angle) for turn in set(turns)}
+            found[yaw] += iou(predicted, torch.stack([truths[turn] for turn in turns])).tolist()
+        progress(len(part))
+    return {str(yaw): interval(np.array(values), objects) for yaw, values in found.items()}
+
+
+def _turned_truth(views: ViewSet, item: int, yaw: float) -> Tensor:
+    return torch.from_numpy(turned(views.voxels[item].numpy().astype(np.float32), yaw) > 0.5)
 
 
 @dataclass(frozen=True)
@@ -127,7 +175,8 @@ class Blindness:
 
 @torch.inference_mode()
 def blindness(network: ReconstructionNetwork, policy: AttentionPolicy, views: ViewSet,
-              objects: Tensor, starts: Tensor, threshold: float, count: int = 5) -> Blindness:
+              objects: Tensor, starts: Tensor, threshold: float, count: int = 5,
+              progress: Callable[[int], None] = lambda done: None) -> Blindness:
     """
     Swap every latent for another object's, seen from the same azimuths; measure what changes.
 
@@ -137,17 +186,16 @@ def blindness(network: ReconstructionNetwork, policy: AttentionPolicy, views: Vi
     """
     stand_ins = half_the_set_away(objects, len(views))
     moved = []
-    for low in range(0, len(objects), _BATCH):
-        part = slice(low, low + _BATCH)
+    for part in batches(len(objects), _BATCH):
         taken = views.azimuths[objects[part], starts[part]].double().numpy()
         goals = []
         for shown in (objects[part], stand_ins[part]):
             alike = nearest_views(views.azimuths[shown].numpy(), taken)
-            seen, _ = network(views.white(shown, alike))
-            goals.append(policy.choose(seen.latent.numpy(), taken[:, None])[0].azimuth)
+            folded, _ = fold_views(network, views, shown, alike)
+            goals.append(policy.choose(folded.latent.cpu().numpy(), taken[:, None])[0].azimuth)
         moved.append(np.degrees(np.abs(azimuth_difference(*goals))))
-    seeing = run_policy(network, policy, views, objects, starts, threshold, count)
-    swapped = run_policy(network, policy, views, objects, starts, threshold, count, stand_ins)
-    index = objects.numpy()
-    return Blindness(interval(np.concatenate(moved), index), interval(seeing.auc, index),
-                     interval(swapped.auc, index), interval(seeing.auc - swapped.auc, index))
+    seeing, swapped = (
+        run_policy(network, policy, views, objects, starts, threshold, count, shown,
+                   progress=progress) for shown in (None, stand_ins))
+    return Blindness(interval(np.concatenate(moved), objects), interval(seeing.auc, objects),
+                     interval(swapped.auc, objects), interval(seeing.auc - swapped.auc, objects))

@@ -1,10 +1,9 @@
-"""IoU over views, thresholds, and means with their spread."""
+"""Episodes to measure, and the IoU over their views at several thresholds."""
 
-from active_recon.cameras import VIEW_COUNT
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import DataError
 from active_recon.evaluation.rollouts import roll_out
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies.base import Policy
 from active_recon.voxels import iou
 import numpy as np
@@ -21,24 +20,24 @@ def episodes(views: ViewSet, starts: int, seed: int = 0) -> tuple[Tensor, Tensor
 
     Each object starts from `starts` different views; 24 starts are all of them.
     """
-    order = np.random.default_rng(seed).random((len(views), VIEW_COUNT)).argsort(axis=1)
+    order = np.random.default_rng(seed).random(views.azimuths.shape).argsort(axis=1)
     objects = np.repeat(np.arange(len(views)), starts)
     return torch.from_numpy(objects), torch.from_numpy(order[:, :starts].reshape(-1))
 
 
 def iou_per_view(
     network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
-    starts: Tensor, thresholds: NDArray[np.float64], count: int = 5, batch: int = 64,
+    starts: Tensor, thresholds: NDArray[np.float64], count: int = 5, batch: int = 128,
 ) -> NDArray[np.float64]:
     """Return the IoU of every episode after every view at every threshold, (E, count, K)."""
     result = np.empty((len(objects), count, len(thresholds)))
     for low in range(0, len(objects), batch):
         part = slice(low, low + batch)
         rollout = roll_out(network, policy, views, objects[part], starts[part], count)
-        truth = views.voxels[objects[part]]
         for t, step in enumerate(rollout):
+            truth = views.voxels[objects[part]].to(step.occupancy.device)
             for k, threshold in enumerate(thresholds):
-                result[part, t, k] = iou(step.occupancy > threshold, truth).numpy()
+                result[part, t, k] = iou(step.occupancy > threshold, truth).cpu().numpy()
     return result
 
 
@@ -53,18 +52,3 @@ def half_the_set_away(objects: Tensor, count: int) -> Tensor:
         raise DataError(f'expected two objects or more, so that one can stand in for another, '
                         f'got {count}')
     return (objects + count // 2) % count
-
-
-def object_bootstrap(values: NDArray[np.float64], objects: NDArray[np.int64], rounds: int = 2000,
-                     seed: int = 0) -> tuple[float, float, float]:
-    """
-    Return the mean of values (E,) and its 95 % interval, by resampling the objects (E,).
-
-    Episodes of one object are alike, so objects, not episodes, are drawn anew.
-    """
-    _, index = np.unique(objects, return_inverse=True)
-    per_object = np.bincount(index, values) / np.bincount(index)
-    rng = np.random.default_rng(seed)
-    draws = rng.integers(len(per_object), size=(rounds, len(per_object)))
-    low, high = np.percentile(per_object[draws].mean(axis=1), [2.5, 97.5])
-    return float(per_object.mean()), float(low), float(high)

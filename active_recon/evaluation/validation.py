@@ -3,7 +3,7 @@
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.metrics import episodes, iou_per_view, THRESHOLDS
 from active_recon.models.attention import AttentionModel
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Policy
 from active_recon.policies.geometric import RandomPolicy

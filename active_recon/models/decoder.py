@@ -9,7 +9,7 @@ class Decoder(nn.Module):
     """
     A 3D ConvLSTM and three (transposed) convolutions, each doubling the grid.
 
-    - latent A_t: (B, 4 C, 4, 4), read as (B, C, 4, 4, 4)
+    - latent A_t: (B, 4 C, 4, 4), read as (B, C, 4, 4, 4) by the memory of V channels
     - logits of the occupancy: (B, 32, 32, 32), indexed [x, y, z]
     """
 
@@ -30,9 +30,14 @@ class Decoder(nn.Module):
         assert to_logits.bias is not None
         nn.init.constant_(to_logits.bias, -2.2)
 
-    def forward(self, latent: Tensor, state: LstmState | None) -> tuple[Tensor, LstmState]:
-        """Return the logits and the next state; a state of None is that of no view yet."""
+    def remember(self, latent: Tensor, state: LstmState | None) -> LstmState:
+        """Return the next state; a state of None is that of no view yet."""
         volume = latent.reshape(
             len(latent), self.latent_channels, LATENT_GRID, LATENT_GRID, LATENT_GRID)
-        state = self.memory(volume, state or self.memory.initial_state(volume))
-        return self.grow(state.hidden)[:, 0], state
+        remembered: LstmState = self.memory(volume, state or self.memory.initial_state(volume))
+        return remembered
+
+    def forward(self, remembered: Tensor) -> Tensor:
+        """Return the logits of what is remembered, (B, V, 4, 4, 4) to (B, 32, 32, 32)."""
+        logits: Tensor = self.grow(remembered)[:, 0]
+        return logits

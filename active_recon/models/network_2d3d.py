@@ -5,8 +5,9 @@ from typing import NamedTuple
 from active_recon.config import NetworkConfig
 from active_recon.models.decoder import Decoder
 from active_recon.models.encoder import Encoder
+from active_recon.models.network import Folded, ReconstructionNetwork
 from active_recon.models.recurrent import LstmState
-from torch import nn, Tensor
+from torch import Tensor
 
 
 class Hidden(NamedTuple):
@@ -16,15 +17,13 @@ class Hidden(NamedTuple):
     decoder: LstmState
 
 
-class Reconstructed(NamedTuple):
-    """What is known after a view: occupancy logits (B, 32, 32, 32) and A_t (B, 4 C, 4, 4)."""
+class Network2d3d(ReconstructionNetwork):
+    """
+    The 2D-3D network of figure 2; with the attentive model beside it, 2D-3D-attention.
 
-    logits: Tensor
-    latent: Tensor
-
-
-class ReconstructionNetwork(nn.Module):
-    """The 2D-3D network of figure 2. The hidden state is passed in and handed back."""
+    "Object Reconstruction Based on Attentive Recurrent Network from Single and Multiple Images",
+    sections 3.1 and 3.2. It predicts in the object's own frame and does not look at the azimuth.
+    """
 
     def __init__(self, encoder: Encoder, decoder: Decoder) -> None:
         super().__init__()
@@ -32,16 +31,21 @@ class ReconstructionNetwork(nn.Module):
         self.decoder = decoder
 
     @classmethod
-    def from_config(cls, config: NetworkConfig) -> 'ReconstructionNetwork':
+    def from_config(cls, config: NetworkConfig) -> 'Network2d3d':
         """Build the network of a configuration, with fresh weights."""
         return cls(
             Encoder(config.stem_channels, config.block_channels, config.recurrent_channels,
                     config.bottleneck_channels, config.latent_channels),
             Decoder(config.latent_channels, config.volume_channels, config.decoder_channels))
 
-    def forward(self, images: Tensor,
-                hidden: Hidden | None = None) -> tuple[Reconstructed, Hidden]:
-        """Fold in one view of each object: images (B, 3, 64, 64) in [0, 1]."""
+    def fold(self, images: Tensor, azimuths: Tensor,
+             hidden: Hidden | None = None) -> tuple[Folded, Hidden]:
+        """Fold in one view of each object; the features are the decoder's memory."""
         latent, encoder = self.encoder(images, hidden and hidden.encoder)
-        logits, decoder = self.decoder(latent, hidden and hidden.decoder)
-        return Reconstructed(logits, latent), Hidden(encoder, decoder)
+        decoder = self.decoder.remember(latent, hidden and hidden.decoder)
+        return Folded(latent, decoder.hidden), Hidden(encoder, decoder)
+
+    def decode(self, features: Tensor) -> Tensor:
+        """Return the occupancy's logits, (B, 32, 32, 32)."""
+        logits: Tensor = self.decoder(features)
+        return logits

@@ -2,7 +2,7 @@
 
 from typing import Any, Protocol
 
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.models.network import ReconstructionNetwork
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -17,9 +17,10 @@ class Runtime(Protocol):
         """Return the state before any view."""
         ...
 
-    def step(self, image: NDArray[np.uint8], state: Any) -> tuple[_Array, _Array, Any]:
+    def step(self, image: NDArray[np.uint8], azimuth: float,
+             state: Any) -> tuple[_Array, _Array, Any]:
         """
-        Fold in an image of the canonical camera, (64, 64, 3) uint8 RGB.
+        Fold in an image of the canonical camera, (64, 64, 3) uint8 RGB, at an azimuth, radians.
 
         Returns the occupancy (X, Y, Z) in [0, 1], A_t (C, h, w), and the next state.
         """
@@ -37,8 +38,10 @@ class TorchRuntime:
         """Return the state before any view: none."""
 
     @torch.inference_mode()
-    def step(self, image: NDArray[np.uint8], state: Any) -> tuple[_Array, _Array, Any]:
+    def step(self, image: NDArray[np.uint8], azimuth: float,
+             state: Any) -> tuple[_Array, _Array, Any]:
         """Fold in an image; see Runtime."""
         batch = torch.from_numpy(image).to(self._device).permute(2, 0, 1)[None].float() / 255
-        seen, state = self._network(batch, state)
+        at = torch.tensor([azimuth], dtype=torch.float32, device=self._device)
+        seen, state = self._network(batch, at, state)
         return (seen.logits[0].sigmoid().cpu().numpy(), seen.latent[0].cpu().numpy(), state)

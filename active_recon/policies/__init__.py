@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, WeightsError
 from active_recon.policies.base import Choice, Policy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 import numpy as np
@@ -30,5 +30,10 @@ def load_policy(name: str, weights: Path | None = None, rng: np.random.Generator
         case 'attention':  # the only one that needs a network, and so the seconds to load torch
             from active_recon.models.weights import load_weights
             from active_recon.policies.attention import AttentionPolicy
-            return AttentionPolicy(load_weights(weights, device).attention)
+            model = load_weights(weights, device).attention
+            if model is None:
+                raise WeightsError(f'{weights}: expected weights with a view policy in them, as '
+                                   '`active-recon train --model 2d3d-attention` makes; there is '
+                                   'none')
+            return AttentionPolicy(model)
     raise ConfigError(f'policy: expected one of {", ".join(POLICIES)}, got {name!r}')

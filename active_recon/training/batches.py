@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from active_recon.datasets.views import on_background, ViewSet
+from active_recon.training.variation import vary
 import numpy as np
 import torch
 from torch import Tensor
@@ -15,7 +16,7 @@ class Batch:
 
     - images: (T, B, 3, 64, 64) in [0, 1]
     - azimuths: (T, B) radians
-    - voxels: (B, 32, 32, 32) in {0, 1} float32
+    - voxels: (B, R, R, R) in {0, 1} float32, R as in the set
     - objects: (B,) indices into the set
     """
 
@@ -25,27 +26,26 @@ class Batch:
     objects: Tensor
 
 
-def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator) -> Batch:
+def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
+               varied: bool = True) -> Batch:
     """
     Draw objects with different random views of each, varied as a camera would vary them.
 
-    Half of the sequences stand on white, half on a plain random colour; light and colour change
-    by up to a fifth; half are mirrored in the object's plane y = 0, voxels and azimuths with the
-    images.
+    Half of the sequences are mirrored in the object's plane y = 0, voxels and azimuths with the
+    images. Not `varied`, the same views of the same objects stand on plain white.
     """
     objects = torch.from_numpy(rng.integers(len(views), size=size))
     order = rng.random((size, views.images.shape[1])).argsort(axis=1)
     chosen = torch.from_numpy(order[:, :length].T.copy())  # (T, B)
-    colors = np.where(rng.random((size, 1)) < 0.5, 1.0, rng.random((size, 3)))
-    gains = rng.uniform(0.8, 1.2, (size, 3))
     mirrored = torch.from_numpy(rng.random(size) < 0.5)
-    background = torch.from_numpy(colors.astype(np.float32))
-    gain = torch.from_numpy(gains.astype(np.float32))[:, :, None, None]
-    images = torch.stack([
-        (on_background(views.images[objects, view], background) * gain).clamp(0, 1)
-        for view in chosen])
-    azimuths = torch.stack([views.azimuths[objects, view] for view in chosen])
+    images = views.images[objects, chosen]
+    images[:, mirrored] = images[:, mirrored].flip(-2)
+    if varied:
+        pictures = vary(images, views, rng)
+    else:
+        flat = on_background(images.flatten(0, 1), torch.ones(length * size, 3))
+        pictures = flat.reshape(length, size, *flat.shape[1:])
+    azimuths = views.azimuths[objects, chosen]
     voxels = views.voxels[objects].float()
-    return Batch(torch.where(mirrored[:, None, None, None], images.flip(-1), images),
-                 torch.where(mirrored, -azimuths, azimuths),
-                 torch.where(mirrored[:, None, None, None], voxels.flip(2), voxels), objects)
+    voxels[mirrored] = voxels[mirrored].flip(2)
+    return Batch(pictures, torch.where(mirrored, -azimuths, azimuths), voxels, objects)

@@ -1,6 +1,7 @@
 """Training checkpoints: safetensors for the numbers, JSON for the rest; never pickle."""
 
 from dataclasses import dataclass
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -55,7 +56,9 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
         for key in ('step', 'exp_avg', 'exp_avg_sq'):
             stored_name = f'optimizer.{key}.{name}'
             if stored_name in tensors:
-                optimizer.state[parameter][key] = tensors[stored_name]
+                # AdamW counts its steps on the CPU, wherever the parameter lies
+                device = 'cpu' if key == 'step' else parameter.device
+                optimizer.state[parameter][key] = tensors[stored_name].to(device)
     return Checkpoint(meta['step'], meta['settings'], meta['log'])
 
 
@@ -67,3 +70,12 @@ def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
         raise ConfigError(f'{path}: expected a checkpoint of the same settings ({settings}), '
                           f'got {stored.settings}')
     return stored
+
+
+def parameters_hash(module: nn.Module) -> str:
+    """Return the SHA-256 of a module's parameters: a checkpoint built on others is refused."""
+    digest = hashlib.sha256()
+    for name, parameter in sorted(module.named_parameters()):
+        digest.update(name.encode() + b'\0')
+        digest.update(parameter.detach().cpu().contiguous().numpy().tobytes())
+    return digest.hexdigest()

@@ -8,14 +8,21 @@ from torch.nn import functional
 
 
 def volume_loss(logits: Tensor, voxels: Tensor, kind: str) -> Tensor:
-    """Return L(V), a scalar: logits and voxels (B, X, Y, Z); kind is mse, bce or dice."""
+    """
+    Return L(V), a scalar: logits and voxels (B, R, R, R); kind is one of VOLUME_LOSSES.
+
+    Squared error (mse, the paper's) weighs every voxel alike, and most are empty; Dice looks at
+    the share of the object that is met, so that thin objects count as much as solid ones.
+    """
     if kind == 'bce':
         return functional.binary_cross_entropy_with_logits(logits, voxels)
     occupancy = logits.sigmoid()
-    if kind == 'dice':
-        shared = 2 * (occupancy * voxels).sum((1, 2, 3)) + 1
-        return (1 - shared / (occupancy.sum((1, 2, 3)) + voxels.sum((1, 2, 3)) + 1)).mean()
-    return functional.mse_loss(occupancy, voxels)
+    squared = functional.mse_loss(occupancy, voxels)
+    if kind == 'mse':
+        return squared
+    shared = 2 * (occupancy * voxels).sum((1, 2, 3)) + 1
+    dice = (1 - shared / (occupancy.sum((1, 2, 3)) + voxels.sum((1, 2, 3)) + 1)).mean()
+    return dice if kind == 'dice' else squared + dice / 2
 
 
 def silhouette_loss(logits: Tensor, voxels: Tensor, frusta: Tensor) -> Tensor:
@@ -25,20 +32,18 @@ def silhouette_loss(logits: Tensor, voxels: Tensor, frusta: Tensor) -> Tensor:
     return functional.mse_loss(project(logits.sigmoid(), frusta), truth)
 
 
-def reconstruction_loss(sequence: list[Tensor], voxels: Tensor, frusta: Tensor, seen_at: int,
-                        config: LossConfig) -> tuple[Tensor, dict[str, float]]:
+def reconstruction_loss(logits: Tensor, voxels: Tensor, frusta: Tensor,
+                        config: LossConfig) -> tuple[Tensor, dict[str, Tensor]]:
     """
-    Return lambda_V L(V) + lambda_S L(S) of a sequence of logits (B, X, Y, Z), and its parts.
+    Return lambda_V L(V) + lambda_S L(S) of logits (B, R, R, R), and its parts.
 
-    The volume loss is the mean over the views; the silhouettes, which cost more than the network
-    itself, are compared after the one view `seen_at`, from one camera for each object.
+    Silhouettes are compared from one camera for each object, frusta (B, D, S, S, 3).
     """
-    volume = torch.stack(
-        [volume_loss(logits.float(), voxels, config.volume_loss) for logits in sequence]).mean()
+    volume = volume_loss(logits, voxels, config.volume_loss)
     total = config.volume_weight * volume
-    parts = {'volume': volume.item()}
+    parts = {'volume': volume.detach()}
     if config.silhouette_weight > 0:
-        silhouette = silhouette_loss(sequence[seen_at].float(), voxels, frusta)
+        silhouette = silhouette_loss(logits, voxels, frusta)
         total = total + config.silhouette_weight * silhouette
-        parts['silhouette'] = silhouette.item()
+        parts['silhouette'] = silhouette.detach()
     return total, parts

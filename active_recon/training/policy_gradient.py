@@ -3,25 +3,27 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
-from pathlib import Path
 
-from active_recon.cameras import AZIMUTHS, orbit_camera, TURN
+from active_recon.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.config import RewardConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.rollouts import nearest_views
 from active_recon.models.attention import AttentionModel
-from active_recon.models.reconstruction import ReconstructionNetwork
+from active_recon.models.network import ReconstructionNetwork
 from active_recon.silhouettes import frustum, project_all
-from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
-from active_recon.training.supervised import (
-    learning_rate_share,
-    refuse_divergence,
+from active_recon.training.checkpoints import parameters_hash
+from active_recon.training.loop import (
+    Draw,
+    Measured,
+    Run,
+    share_of_batch,
+    train_steps,
     TrainingConfig,
 )
 from active_recon.voxels import iou
 import numpy as np
 import torch
-from torch import Tensor
+from torch import nn, Tensor
 
 _SILHOUETTES = 2  # random cameras that a step's r_2D is measured from
 
@@ -48,13 +50,20 @@ def returns_to_go(rewards: Tensor) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """What T - 1 choices of B episodes brought, (T - 1, B) each."""
+    """
+    What T - 1 choices of B episodes brought, (T - 1, B) each.
+
+    `azimuth` are the means that the policy proposed, radians; `features` what the network knew
+    after each of the T views, (B, ...), for who learns from it.
+    """
 
     log_probability: Tensor
     baseline: Tensor
     reward_3d: Tensor
     reward_2d: Tensor
     reward_distance: Tensor
+    azimuth: Tensor
+    features: list[Tensor]
 
     @property
     def reward(self) -> Tensor:
@@ -65,100 +74,127 @@ class Episode:
 def run_episodes(
     network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet, objects: Tensor,
     starts: Tensor, length: int, threshold: float, config: RewardConfig,
-    rng: np.random.Generator,
+    rng: np.random.Generator, show: Callable[[Tensor, Tensor], Tensor] | None = None,
 ) -> Episode:
     """
     Run an episode for each object (B,), sampling every azimuth from the policy.
 
     The nearest rendered view is taken, and log pi is that of the sample before. The first view
-    was not chosen and earns nothing. r_2D compares silhouettes from two random cameras.
+    was not chosen and earns nothing. r_2D compares silhouettes from two random cameras. The
+    network's gradients are kept where it has any; the policy's do not reach into it. `show` makes
+    images (B, 3, 64, 64) of objects and views (B,); by default they stand on white.
     """
-    truth, azimuths = views.voxels[objects], views.azimuths[objects]
+    device = next(attention.parameters()).device
+    show = show or views.white
+    truth, azimuths = views.voxels[objects].to(device), views.azimuths[objects]
     rows = torch.arange(len(objects))
     cameras = [orbit_camera(azimuth)
                for azimuth in rng.choice(AZIMUTHS, _SILHOUETTES, replace=False)]
-    frusta = frustum(cameras)
+    frusta = frustum(cameras).to(device)
     true_outlines = project_all(truth.float(), frusta) > 0.5  # (B, cameras, S, S)
     chosen, hidden, state = starts, None, None
     taken = torch.empty(len(objects), 0)
     quality: list[tuple[Tensor, Tensor]] = []
-    steps: dict[str, list[Tensor]] = {'log': [], 'baseline': [], 'distance': []}
+    features: list[Tensor] = []
+    steps: dict[str, list[Tensor]] = {
+        'log': [], 'baseline': [], 'distance': [], 'azimuth': []}
     for t in range(length):
-        taken = torch.column_stack([taken, azimuths[rows, chosen]])
-        with torch.inference_mode():
-            seen, hidden = network(views.white(objects, chosen), hidden)
-            occupied = seen.logits.sigmoid() > threshold
+        at = azimuths[rows, chosen]
+        taken = torch.column_stack([taken, at])
+        folded, hidden = network.fold(
+            show(objects, chosen).to(device), at.to(device), hidden)
+        features.append(folded.features)
+        with torch.no_grad():
+            occupied = network.decode(folded.features).sigmoid() > threshold
             outlines = project_all(occupied.float(), frusta) > 0.5
             quality.append((iou(occupied, truth),
                             iou(outlines, true_outlines, (-2, -1)).mean(dim=1)))
         if t + 1 == length:
             break
-        proposal, state = attention(seen.latent.clone(), taken[:, -1], state)
+        with torch.autocast(device.type, enabled=False):
+            proposal, state = attention(folded.latent.detach().float(), at.to(device), state)
         mean = proposal.mean_azimuth
         noise = torch.from_numpy(rng.normal(0, config.policy_sigma, len(objects)))
-        sample = (mean.detach() + noise.float())
+        sample = (mean.detach() + noise.float().to(device))
         steps['log'].append(-((sample - mean) / config.policy_sigma).square() / 2)
         steps['baseline'].append(proposal.baseline)
-        chosen = nearest_views(azimuths.numpy(), sample.double().numpy())
+        steps['azimuth'].append(mean.detach())
+        chosen = nearest_views(azimuths.numpy(), sample.double().cpu().numpy())
         steps['distance'].append(distance_reward(azimuths[rows, chosen], taken, config))
-    volumes, silhouettes = (torch.stack(part).clone() for part in zip(*quality, strict=True))
-    return Episode(torch.stack(steps['log']), torch.stack(steps['baseline']),
-                   volumes.diff(dim=0), silhouettes.diff(dim=0), torch.stack(steps['distance']))
+    volumes, silhouettes = (torch.stack(part) for part in zip(*quality, strict=True))
+    return Episode(
+        torch.stack(steps['log']), torch.stack(steps['baseline']), volumes.diff(dim=0),
+        silhouettes.diff(dim=0), torch.stack(steps['distance']).to(device),
+        torch.stack(steps['azimuth']), features)
 
 
-def policy_loss(episode: Episode) -> tuple[Tensor, Tensor]:
+def policy_losses(episode: Episode) -> dict[str, Tensor]:
     """
-    Return J(theta) of section 3.3 and the baseline's squared error, scalars.
+    Return J(theta) of section 3.3 and the baseline's squared error, summed as `loss`; and a log.
 
     J sums -log pi (R_t - b_t) over the steps, R_t the reward to go: a choice answers for what
-    follows it.
+    follows it. The log: the return of an episode and its three parts, the baseline of the first
+    choice, and how widely the proposals of the batch are spread: the entropy of their histogram
+    over 24 azimuths, nats (a policy that always goes one way has 0, one that goes anywhere 3.18).
     """
     returns = returns_to_go(episode.reward.detach())
     advantage = returns - episode.baseline.detach()
-    return (-(episode.log_probability * advantage).sum(0).mean(),
-            (returns - episode.baseline).square().mean())
+    objective = -(episode.log_probability * advantage).sum(0).mean()
+    error = (returns - episode.baseline).square().mean()
+    return {
+        'loss': objective + error, 'baseline_error': error.detach(),
+        'return': episode.reward.sum(0).mean(), 'reward_3d': episode.reward_3d.sum(0).mean(),
+        'reward_2d': episode.reward_2d.sum(0).mean(),
+        'reward_distance': episode.reward_distance.sum(0).mean(),
+        'baseline': episode.baseline[0].mean().detach(),
+        'azimuth_entropy': azimuth_entropy(episode.azimuth)}
+
+
+def azimuth_entropy(azimuths: Tensor) -> Tensor:
+    """Return the entropy, nats, of the histogram of azimuths (any shape) over the 24."""
+    bins = (azimuths / TURN * VIEW_COUNT).round().long() % VIEW_COUNT
+    share = torch.bincount(bins.flatten(), minlength=VIEW_COUNT) / bins.numel()
+    return -torch.xlogy(share, share).sum()
+
+
+class PolicyLearner(nn.Module):
+    """Episodes on a frozen reconstruction network to the policy's losses."""
+
+    def __init__(self, network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet,
+                 threshold: float, length: int, rewards: RewardConfig) -> None:
+        super().__init__()
+        self.network = network.requires_grad_(False)
+        self.attention = attention
+        self._views, self._threshold, self._length = views, threshold, length
+        self._rewards = rewards
+
+    def forward(self, objects: Tensor, starts: Tensor,
+                rng: np.random.Generator) -> dict[str, Tensor]:
+        """Run an episode of each object (B,) from the view it starts at (B,)."""
+        return policy_losses(run_episodes(
+            self.network, self.attention, self._views, objects.cpu(), starts.cpu(), self._length,
+            self._threshold, self._rewards, rng))
+
+
+def draw_episodes(views: ViewSet, size: int, key: list[int]) -> Draw:
+    """Return what episodes start from: objects and views (size,), and the generator after."""
+    rng = np.random.default_rng(key)
+    objects = torch.from_numpy(rng.integers(len(views), size=size))
+    starts = torch.from_numpy(rng.integers(views.images.shape[1], size=size))
+    return Draw((objects, starts, rng), objects)
 
 
 def train_policy(
     network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet, threshold: float,
-    config: TrainingConfig, rewards: RewardConfig, checkpoint_path: Path,
-    validate: Callable[[AttentionModel], dict[str, float]],
-    report: Callable[[int, dict[str, float]], None], resume: bool = False,
+    config: TrainingConfig, rewards: RewardConfig, run: Run,
+    validate: Callable[[AttentionModel], Measured],
 ) -> None:
-    """Train the attention model in place; see train_reconstruction for what is shared."""
-    optimizer = torch.optim.AdamW(attention.parameters(), config.learning_rate,
-                                  betas=(0.9, 0.99), weight_decay=0.0)
-    settings = {'training': config.to_dict(), 'reward': rewards.to_dict(), 'threshold': threshold}
-    begun = Checkpoint(0, settings, [])
-    if resume:
-        begun = resume_checkpoint(checkpoint_path, attention, optimizer, settings)
-    log = begun.log
-    network.eval()
-    for step in range(begun.step, config.steps):
-        rng = np.random.default_rng([config.seed, 1, step])
-        objects = torch.from_numpy(rng.integers(len(views), size=config.batch_size))
-        starts = torch.from_numpy(rng.integers(views.images.shape[1], size=config.batch_size))
-        for group in optimizer.param_groups:
-            group['lr'] = config.learning_rate * learning_rate_share(step, config.steps, 20)
-        episode = run_episodes(network, attention, views, objects, starts, config.max_views,
-                               threshold, rewards, rng)
-        objective, error = policy_loss(episode)
-        refuse_divergence(step, objective + error, views, objects)
-        optimizer.zero_grad(set_to_none=True)
-        (objective + error).backward()  # type: ignore[no-untyped-call]
-        optimizer.step()
-        measured = {
-            'return': episode.reward.sum(0).mean().item(),
-            'reward_3d': episode.reward_3d.sum(0).mean().item(),
-            'reward_2d': episode.reward_2d.sum(0).mean().item(),
-            'reward_distance': episode.reward_distance.sum(0).mean().item(),
-            'baseline': episode.baseline[0].mean().item(), 'baseline_error': error.item()}
-        last = step + 1 == config.steps
-        if last or (step + 1) % config.validate_every == 0:
-            measured |= validate(attention)
-            log.append({'step': step + 1, **measured})
-        report(step + 1, measured)
-        if last or (step + 1) % config.checkpoint_every == 0:
-            save_checkpoint(checkpoint_path, attention, optimizer,
-                            Checkpoint(step + 1, settings, log))
-    attention.eval()
+    """Train the attention model in place on a frozen network; see `train_steps`."""
+    size = share_of_batch(config, run.fabric)
+    settings = {'training': config.to_dict(), 'reward': rewards.to_dict(), 'threshold': threshold,
+                'network': parameters_hash(network)}
+    train_steps(
+        run, PolicyLearner(network, attention, views, threshold, config.max_views, rewards),
+        attention, config, settings, views,
+        lambda step: draw_episodes(views, size, [config.seed, 1, step, run.fabric.global_rank]),
+        lambda: validate(attention), weight_decay=0.0)

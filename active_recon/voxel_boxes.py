@@ -1,8 +1,11 @@
 """Voxels as boxes that a renderer can show."""
 
+from active_recon.cameras import Camera
+from active_recon.rendering import composite, Renderer
 from active_recon.voxels import VoxelGrid
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 import trimesh
 
 _GAP = 0.93  # of a cell: the seams let the single voxels be told apart
@@ -36,3 +39,11 @@ def voxel_boxes(grid: VoxelGrid, heights: tuple[int, int]) -> trimesh.Trimesh | 
     rgb = cv2.applyColorMap(shades, cv2.COLORMAP_VIRIDIS).reshape(-1, 3)[:, ::-1]
     return trimesh.Trimesh(vertices, faces, face_colors=np.repeat(rgb, len(box.faces), axis=0),
                            process=False)
+
+
+def voxel_picture(grid: VoxelGrid, heights: tuple[int, int], camera: Camera,
+                  background: tuple[int, int, int]) -> NDArray[np.uint8]:
+    """Return what a camera sees of the cells above 0, (H, W, 3) RGB; see `voxel_boxes`."""
+    ground = np.full((camera.intrinsics.height, camera.intrinsics.width, 3), background, np.uint8)
+    boxes = voxel_boxes(grid, heights)
+    return ground if boxes is None else composite(Renderer(boxes).render(camera, 3), ground)

@@ -1,0 +1,135 @@
+"""Photographs as objects of one view: cut out, laid on white, at the canonical camera's scale."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from active_recon.cameras import orbit_camera, wrap_azimuth
+from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.views import ViewSet
+from active_recon.errors import ActiveReconError, DataError
+from active_recon.meshes import load_mesh
+from active_recon.models.encoder import IMAGE_SIZE
+from active_recon.voxelise import voxelise
+from active_recon.voxels import RESOLUTION
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+import torch
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """
+    One object on one photograph.
+
+    - item: what it is called
+    - box: left, top, right, bottom, pixels from the image's corner
+    - azimuth, elevation: radians, of the camera in the object frame
+    - cad: a model of it, and the axes of that file that point up and to the front
+    """
+
+    item: ObjectFolder
+    image: Path
+    box: Box
+    azimuth: float
+    elevation: float
+    cad: Path
+    up: str
+    front: str
+
+
+def read_photographs(photographs: Sequence[Photograph], left_out: Sequence[str] = (),
+                     progress: Callable[[], None] = lambda: None,
+                     resolution: int = RESOLUTION) -> ViewSet:
+    """
+    Read photographs as objects of one view each, V = 1; the voxels are those of the CAD model.
+
+    Each is cut out along its box and laid on white, as large as the canonical camera would show
+    its CAD model from the annotated direction, and there. What cannot be read is added to
+    `left_out`, as the set's `unreadable`. Raises DataError if none can.
+    """
+    models: dict[Path, _Model | str] = {}
+    images, voxels, good, unreadable = [], [], [], list(left_out)
+    for photograph in photographs:
+        try:
+            if photograph.cad not in models:
+                models[photograph.cad] = _read_model(photograph, resolution)
+            model = models[photograph.cad]
+            if isinstance(model, str):
+                raise DataError(model)
+            images.append(_cut_out(_read_picture(photograph.image), photograph.box,
+                                   _shown_at(model.corners, photograph)))
+            voxels.append(model.voxels)
+            good.append(photograph)
+        except ActiveReconError as error:
+            unreadable.append(f'{photograph.item.name}: {error}')
+        progress()
+    if not good:
+        raise DataError('expected photographs, none can be read'
+                        + ''.join(f'\n  {reason}' for reason in unreadable[:5]))
+    azimuths = torch.tensor([[wrap_azimuth(photograph.azimuth)] for photograph in good])
+    return ViewSet(torch.from_numpy(np.stack(images))[:, None], azimuths,
+                   torch.from_numpy(np.stack(voxels)),
+                   tuple(photograph.item for photograph in good), tuple(unreadable))
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    corners: NDArray[np.float64]
+    voxels: NDArray[np.bool_]
+
+
+def _read_model(photograph: Photograph, resolution: int) -> _Model | str:
+    """Return a CAD model, or why it cannot be read: once for all photographs of it."""
+    try:
+        mesh = load_mesh(photograph.cad, photograph.up, photograph.front)
+    except DataError as error:
+        return str(error)
+    return _Model(np.asarray(mesh.vertices), voxelise(mesh, resolution).occupied(0.5))
+
+
+def _read_picture(path: Path) -> NDArray[np.uint8]:
+    """Return an image, (H, W, 3) RGB; unlike OpenCV, Pillow tells where it ends too early."""
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image.convert('RGB'))
+    except (OSError, SyntaxError) as error:
+        raise DataError(f'{path}: expected a whole image: {error}') from error
+
+
+def _shown_at(corners: NDArray[np.float64], photograph: Photograph) -> Box:
+    """Return the box of a model on the canonical camera's image, in the network's pixels."""
+    camera = orbit_camera(photograph.azimuth, photograph.elevation)
+    pixels = camera.project(corners)[0] * IMAGE_SIZE / camera.intrinsics.width
+    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    return float(left), float(top), float(right), float(bottom)
+
+
+def _cut_out(picture: NDArray[np.uint8], box: Box, place: Box) -> NDArray[np.uint8]:
+    """
+    Return what is in the box, laid about the middle of its place: (64, 64, 4), premultiplied.
+
+    Height and width keep their ratio; the diagonal becomes the place's.
+    """
+    height, width = picture.shape[:2]
+    left, right = (min(max(round(at), 0), width) for at in box[::2])
+    top, bottom = (min(max(round(at), 0), height) for at in box[1::2])
+    if left >= right or top >= bottom:
+        raise DataError(f'expected a box within the image of {width} x {height}, got {box}')
+    across, down = right - left, bottom - top
+    scale = math.hypot(place[2] - place[0], place[3] - place[1]) / math.hypot(across, down)
+    scale = min(scale, IMAGE_SIZE / max(across, down))
+    size = max(round(across * scale), 1), max(round(down * scale), 1)
+    small = cv2.resize(picture[top:bottom, left:right], size,
+                       interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    x, y = (min(max(round((place[axis] + place[axis + 2] - size[axis]) / 2), 0),
+                IMAGE_SIZE - size[axis]) for axis in (0, 1))
+    image = np.zeros((IMAGE_SIZE, IMAGE_SIZE, 4), np.uint8)
+    image[y:y + size[1], x:x + size[0], :3] = small
+    image[y:y + size[1], x:x + size[0], 3] = 255
+    return image

@@ -1,0 +1,87 @@
+"""ShapeNet as people have it: R2N2's download, its categories, and which objects are tested on."""
+
+from collections.abc import Iterator
+import json
+from pathlib import Path
+from typing import Any
+
+from active_recon.datasets.layout import list_objects, ObjectFolder
+from active_recon.errors import ConfigError, DataError
+
+SYNSETS = {
+    '02691156': 'airplane', '02828884': 'bench', '02933112': 'cabinet', '02958343': 'car',
+    '03001627': 'chair', '03211117': 'monitor', '03636649': 'lamp', '03691459': 'speaker',
+    '04090263': 'firearm', '04256520': 'sofa', '04379243': 'table', '04401088': 'cellphone',
+    '04530566': 'watercraft'}
+"""R2N2's thirteen folders of ShapeNet, and what the categories are called here."""
+SORTED = 'sorted'
+PORTIONS = {'train': (0.0, 0.7), 'val': (0.7, 0.8), 'test': (0.8, 1.0)}
+"""
+Which share of a category's sorted ids is in each part where no file says so.
+
+3D-R2N2's own code trains on the first 80 percent, a part of which is `val` here, and tests on the
+last 20.
+"""
+
+Listed = tuple[list[ObjectFolder], list[str]]
+
+
+def list_split(root: Path, split: Path | str, part: str) -> Listed:
+    """
+    Return the objects of a part of a dataset, and what the split names but the disk lacks.
+
+    `split` is a published split file or 'sorted', which cuts every category's sorted ids by
+    `PORTIONS`; `part` is train, val or test. A file holds, for each category, a record of
+    `taxonomy_id` (the folder's name) and of lists of ids `train`, `val` and `test`: a list of
+    records, or an object of them by their id. Each object that is missing is told in a line of
+    its own. Raises DataError where the file is none such or none of its objects is there,
+    ConfigError on another part.
+    """
+    if part not in PORTIONS:
+        raise ConfigError(f'part: expected one of {", ".join(PORTIONS)}, got {part!r}')
+    there = list_objects(root)
+    if str(split) == SORTED:
+        return list(_sorted_part(there, part)), []
+    wanted = [(category, name) for category, names in _read_split(Path(split), part).items()
+              for name in names]
+    by_name = {(folder.category, folder.name): folder for folder in there}
+    found = [by_name[key] for key in wanted if key in by_name]
+    if not found:
+        raise DataError(f'{root}: expected the {len(wanted)} objects that {split} names for '
+                        f'{part}, found none of them; are its folders named as the file does, by '
+                        'their synset?')
+    return found, [f'{root}: expected {category}/{name} of {part}, found no such folder'
+                   for category, name in wanted if (category, name) not in by_name]
+
+
+def _sorted_part(folders: list[ObjectFolder], part: str) -> Iterator[ObjectFolder]:
+    first, last = PORTIONS[part]
+    for category in dict.fromkeys(folder.category for folder in folders):
+        alike = [folder for folder in folders if folder.category == category]
+        yield from alike[int(len(alike) * first):int(len(alike) * last)]
+
+
+def _read_split(path: Path, part: str) -> dict[str, list[str]]:
+    """Return the ids of a part by the category's folder."""
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise DataError(f'{path}: expected a split file (JSON): {error}') from error
+    if isinstance(content, dict):
+        content = [{'taxonomy_id': key, **record} if isinstance(record, dict) else record
+                   for key, record in content.items()]
+    if not isinstance(content, list) or not content:
+        raise DataError(f'{path}: expected a record for each category, got {content!r:.80}')
+    split = {}
+    for record in content:
+        category, names = _fields(record, part)
+        if not isinstance(category, str) or not isinstance(names, list) or not all(
+                isinstance(name, str) for name in names):
+            raise DataError(f'{path}: expected records of a taxonomy_id and a list of ids '
+                            f'{part!r}, got {record!r:.80}')
+        split[category] = names
+    return split
+
+
+def _fields(record: Any, part: str) -> tuple[Any, Any]:
+    return (record.get('taxonomy_id'), record.get(part)) if isinstance(record, dict) else (0, 0)

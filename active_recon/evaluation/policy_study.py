@@ -1,0 +1,203 @@
+"""What each view policy is worth on one frozen network, beside chance and beside an oracle."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+import time
+from typing import Any
+
+from active_recon.errors import ConfigError, WeightsError
+from active_recon.evaluation.measure import Episodes, summary
+from active_recon.evaluation.rollouts import batches, roll_out
+from active_recon.evaluation.statistics import (
+    by_object,
+    difference,
+    gap_closed,
+    headroom_sentence,
+    Values,
+)
+from active_recon.evaluation.subsets import best_subsets
+from active_recon.evaluation.trial import Contender, state_hash, Trial
+from active_recon.models.attention import AttentionModel
+from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.weights import load_weights
+from active_recon.policies.attention import AttentionPolicy
+from active_recon.policies.base import Choice, Policy
+from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+import numpy as np
+from numpy.typing import NDArray
+
+CONTENDERS = ('random', 'uniform', 'farthest', 'attention', 'oracle')
+_BLIND = ('random', 'uniform', 'farthest')
+_TIMED_EPISODES = 8
+
+Runs = Mapping[str, Sequence[Episodes]]
+"""The same episodes under each seed of each policy."""
+Reporting = Callable[[str, int], AbstractContextManager[Callable[[int, str], None]]]
+"""Opens a report of what is done, given a title and how many steps: `advance(steps, note)`."""
+
+
+@contextmanager
+def silent(title: str, total: int) -> Iterator[Callable[[int, str], None]]:
+    """Report to nobody."""
+    yield lambda steps, note: None
+
+
+def contenders(names: Sequence[str], attentions: Sequence[AttentionModel] = (), count: int = 5,
+               seeds: int = 5, seed: int = 0) -> list[Contender]:
+    """
+    Return the policies named, under all of their seeds.
+
+    - attentions: the attentive models, one for each seed it was trained under
+    - count: views of an episode, which uniform divides the turn by
+    - seeds: how often random is drawn, from `seed` on
+
+    Raises ConfigError on other names, WeightsError where attention has no model.
+    """
+    made: list[Contender] = []
+    for name in names:
+        match name:
+            case 'random':
+                made += [Contender(name, f'random-{each}', RandomPolicy)
+                         for each in range(seed, seed + seeds)]
+            case 'uniform':
+                made.append(Contender(name, name, lambda rng: UniformPolicy(count)))
+            case 'farthest':
+                made.append(Contender(name, name, lambda rng: FarthestPolicy()))
+            case 'attention':
+                if not attentions:
+                    raise WeightsError('attention: expected weights with a view policy in them, '
+                                       'as `active-recon train --model 2d3d-attention` makes; '
+                                       'there is none')
+                made += [Contender(name, f'attention-{state_hash(model)[:16]}',
+                                   partial(_attentive, model)) for model in attentions]
+            case 'oracle':
+                made.append(Contender(name, name, None))
+            case _:
+                raise ConfigError(f'policy: expected some of {", ".join(CONTENDERS)}, '
+                                  f'got {name!r}')
+    return made
+
+
+def load_attentions(files: Sequence[Path], network: ReconstructionNetwork) -> list[AttentionModel]:
+    """
+    Return the attentive models of weights files, trained on this very network.
+
+    Raises WeightsError where one has none, or was trained on another network: what it has learned
+    to read are that one's latents.
+    """
+    models = []
+    for file in files:
+        bundle = load_weights(file)
+        if bundle.attention is None:
+            raise WeightsError(f'{file}: expected weights with a view policy in them, got none')
+        if state_hash(bundle.reconstruction) != state_hash(network):
+            raise WeightsError(f'{file}: expected a view policy trained on the network that is '
+                               'measured, got one trained on another; train it with '
+                               '`active-recon train --from` that network')
+        models.append(bundle.attention)
+    return models
+
+
+def run_all(trial: Trial, every: Sequence[Contender], reporting: Reporting = silent) -> Runs:
+    """Run the episodes of all contenders; gathered by policy."""
+    runs: dict[str, list[Episodes]] = {}
+    for contender in every:
+        with reporting(contender.key, len(trial.objects)) as advance:
+            run = trial.run(contender, partial(_advance, advance))
+        runs.setdefault(contender.policy, []).append(run)
+    return runs
+
+
+def compare(trial: Trial, runs: Runs) -> dict[str, Any]:
+    """
+    Return the figures of every policy and of what is between them, ready for JSON.
+
+    - policies: see `measure.summary`; `auc_above` what the area under the IoU curve is above those
+      of random, uniform and farthest, paired; `gap_closed` the share of the gap between random
+      and the oracle, None where there is none
+    - headroom: of the areas, the oracle's above random's; headroom_sentence says it
+
+    All intervals are of 95 %, over objects, starts and seeds.
+    """
+    areas = {name: _areas(trial, seeds) for name, seeds in runs.items()}
+    policies = {name: summary(seeds, trial.views, trial.objects) for name, seeds in runs.items()}
+    for name, figures in policies.items():
+        figures['auc_above'] = {other: asdict(difference(areas[name], areas[other]))
+                                for other in _BLIND if other in areas and other != name}
+    found: dict[str, Any] = {'policies': policies}
+    if 'random' in areas and 'oracle' in areas:
+        for name, figures in policies.items():
+            share = gap_closed(areas[name], areas['random'], areas['oracle'])
+            figures['gap_closed'] = share and asdict(share)
+        headroom = difference(areas['oracle'], areas['random'])
+        found |= {'headroom': asdict(headroom), 'headroom_sentence': headroom_sentence(headroom)}
+    return found
+
+
+def decision_ms(trial: Trial, contender: Contender) -> float | None:
+    """Return the median time of a decision of a single episode, milliseconds; None: the oracle."""
+    if contender.make is None:
+        return None
+    watch = _Stopwatch(contender.make(np.random.default_rng(0)))
+    for row in batches(min(len(trial.objects), _TIMED_EPISODES), 1):
+        for _ in roll_out(trial.network, watch, trial.views, trial.objects[row],
+                          trial.starts[row], max(trial.count, 2)):
+            pass
+    return float(np.median(watch.milliseconds))
+
+
+def policy_study(trial: Trial, attentions: Sequence[AttentionModel] = (), seeds: int = 5,
+                 subset_objects: int = 60, reporting: Reporting = silent) -> dict[str, Any]:
+    """
+    Compare all policies, ready for JSON: `compare`, and `identity`, `decision_ms`, `best_subset`.
+
+    - attentions: one for each seed that the policy was trained under, on this very network
+    - seeds: how often random is drawn
+    - subset_objects: objects, drawn over the categories, of which every sequence of three views
+      is tried; 0 leaves it out
+    """
+    names = CONTENDERS if attentions else [name for name in CONTENDERS if name != 'attention']
+    every = contenders(names, attentions, trial.count, seeds)
+    runs = run_all(trial, every, reporting)
+    found: dict[str, Any] = {
+        'identity': trial.identity, 'objects': len(trial.views),
+        'episodes': len(trial.objects), **compare(trial, runs)}
+    first = {contender.policy: contender for contender in reversed(every)}
+    for name, figures in found['policies'].items():
+        figures['decision_ms'] = decision_ms(trial, first[name])
+    if subset_objects:
+        with reporting('sequences of three views', subset_objects) as advance:
+            found['best_subset'] = best_subsets(
+                trial, runs, subset_objects, lambda: advance(1, ''))
+    return found
+
+
+def _attentive(model: AttentionModel, rng: np.random.Generator) -> Policy:
+    return AttentionPolicy(model)
+
+
+def _advance(advance: Callable[[int, str], None], done: int) -> None:
+    advance(done, '')
+
+
+def _areas(trial: Trial, seeds: Sequence[Episodes]) -> Values:
+    return np.stack([by_object(run.auc, trial.objects.numpy()) for run in seeds], axis=2)
+
+
+class _Stopwatch:
+    """A policy whose decisions are timed."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+        self.milliseconds: list[float] = []
+
+    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
+               state: Any = None) -> tuple[Choice, Any]:
+        """Let the policy choose."""
+        begun = time.perf_counter()
+        chosen = self._policy.choose(latent, taken, state)
+        self.milliseconds.append(1e3 * (time.perf_counter() - begun))
+        return chosen

@@ -1,0 +1,80 @@
+"""All reconstruction networks by their names, each in its published size and in a small one."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from active_recon.config import Config, LossConfig, NetworkConfig
+from active_recon.errors import ConfigError
+from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.network_2d3d import Network2d3d
+from active_recon.models.ogn import Ogn, OgnConfig
+from active_recon.models.ogn import SIZES as SIZES_OGN
+from active_recon.models.ptn import PerspectiveTransformerNet, PtnConfig
+from active_recon.models.ptn import SIZES as SIZES_PTN
+from active_recon.models.r2n2 import R2n2, R2n2Config
+from active_recon.models.r2n2 import SIZES as SIZES_R2N2
+from active_recon.models.shape_basis import fit_shapes, ShapeBasis, ShapeBasisConfig
+from active_recon.models.shape_basis import SIZES as SIZES_SHAPE_BASIS
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+DEFAULT_MODEL = '2d3d-attention'
+
+
+@dataclass(frozen=True)
+class NetworkEntry:
+    """
+    How a network is built, in which sizes, and from which losses it learns.
+
+    `small` is what two CPU cores train within an hour. `attentive`: a view policy's model is
+    trained beside it. `fit` stands for training where a network is fitted in one go, to voxels
+    (N, R, R, R) and categories (N,).
+    """
+
+    config: type[Config]
+    build: Callable[[Any], ReconstructionNetwork]
+    sizes: Mapping[str, Config]
+    loss: LossConfig = LossConfig()
+    attentive: bool = False
+    fit: Callable[[Any, Tensor, NDArray[np.str_]], None] | None = None
+
+
+_SIZES_2D3D = {
+    'small': NetworkConfig(),
+    'published': NetworkConfig(
+        stem_channels=64, block_channels=(128, 256, 256), recurrent_channels=256,
+        bottleneck_channels=1024, latent_channels=64, volume_channels=128,
+        decoder_channels=(128, 64), glimpse_channels=256),
+}
+
+NETWORKS: Mapping[str, NetworkEntry] = {
+    '2d3d-attention': NetworkEntry(
+        NetworkConfig, Network2d3d.from_config, _SIZES_2D3D, attentive=True),
+    '2d3d': NetworkEntry(NetworkConfig, Network2d3d.from_config, _SIZES_2D3D),
+    'r2n2': NetworkEntry(R2n2Config, R2n2.from_config, SIZES_R2N2,
+                         LossConfig(volume_weight=1, silhouette_weight=0, volume_loss='bce')),
+    'ptn': NetworkEntry(PtnConfig, PerspectiveTransformerNet.from_config, SIZES_PTN,
+                        LossConfig(volume_weight=0, silhouette_weight=1)),
+    'ptn-combined': NetworkEntry(PtnConfig, PerspectiveTransformerNet.from_config, SIZES_PTN,
+                                 LossConfig(volume_weight=0.5, silhouette_weight=0.5)),
+    'ogn': NetworkEntry(OgnConfig, Ogn.from_config, SIZES_OGN),  # learns from its own objective
+    'shape-basis': NetworkEntry(ShapeBasisConfig, ShapeBasis.from_config, SIZES_SHAPE_BASIS,
+                                fit=fit_shapes),
+}
+
+
+def network_entry(name: str) -> NetworkEntry:
+    """Return a network's entry; raises ConfigError naming those there are."""
+    if name not in NETWORKS:
+        raise ConfigError(f'model: expected one of {", ".join(NETWORKS)}, got {name!r}')
+    return NETWORKS[name]
+
+
+def network_config(name: str, size: str) -> Config:
+    """Return a network's configuration of a size; raises ConfigError naming those there are."""
+    sizes = network_entry(name).sizes
+    if size not in sizes:
+        raise ConfigError(f'size: expected one of {", ".join(sizes)} for {name}, got {size!r}')
+    return sizes[size]

@@ -1,0 +1,1 @@
+"""The paper's tables and figures, measured here; the paper's own figures stand beside ours."""

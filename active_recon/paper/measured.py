@@ -1,0 +1,109 @@
+"""What a network and a policy do on a set of objects; what was run before is kept on disk."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.config import LossConfig
+from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.measure import Episodes
+from active_recon.evaluation.policy_study import contenders
+from active_recon.evaluation.rollouts import batches, roll_out
+from active_recon.evaluation.statistics import Values
+from active_recon.evaluation.trial import read_arrays, Trial, write_arrays
+from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.weights import load_weights
+from active_recon.paper.study import Objects, Study
+from active_recon.policies.base import Choice
+from active_recon.silhouettes import frustum, project_all
+import numpy as np
+from numpy.typing import NDArray
+import torch
+from torch import Tensor
+
+_BATCH = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """
+    Episodes of N objects from S starts, after each of T views.
+
+    - iou, entropy, paper_entropy (nats): (N, S, T)
+    - categories: (N,)
+    """
+
+    iou: Values
+    entropy: Values
+    paper_entropy: Values
+    categories: NDArray[np.str_]
+
+
+def measure(study: Study, weights: Path, policy: str, objects: Objects) -> Measured:
+    """Run a policy on every object from the study's starts."""
+    trial, _, run = _run(study, weights, policy, objects)
+    shape = len(trial.views), study.starts, study.views
+    return Measured(run.iou.reshape(shape), run.entropy.reshape(shape),
+                    run.paper_entropy.reshape(shape), trial.views.categories)
+
+
+def measure_loss(study: Study, weights: Path, policy: str, objects: Objects,
+                 loss: LossConfig) -> Values:
+    """Return lambda_V L(V) + lambda_S L(S), over 24 silhouettes, after every view, (N, S, T)."""
+    trial, key, run = _run(study, weights, policy, objects)
+    assert trial.folder is not None
+    path = trial.folder / f'loss-{loss.volume_weight}-{loss.silhouette_weight}-{key}.npz'
+    if path.is_file():
+        losses = read_arrays(path, {'loss'})['loss']
+    else:
+        with study.progress(f'losses, {weights.parent.name}, {policy}',
+                            len(trial.objects)) as advance:
+            parts = []
+            for part in batches(len(trial.objects), _BATCH):
+                parts.append(_losses(trial.network, trial.views, trial.objects[part],
+                                     trial.starts[part], run.azimuths[part], loss))
+                advance(len(part), '')
+        losses = np.concatenate(parts)
+        write_arrays(path, loss=losses)
+    return losses.reshape(len(trial.views), study.starts, study.views)
+
+
+def _run(study: Study, weights: Path, policy: str,
+         objects: Objects) -> tuple[Trial, str, Episodes]:
+    bundle = load_weights(weights, study.device)
+    trial = Trial(bundle.reconstruction, bundle.threshold, study.read(objects), study.starts,
+                  study.views, study.seed, cache=study.models / 'measured')
+    models = [bundle.attention] if bundle.attention is not None else []
+    [contender] = contenders([policy], models, study.views, seeds=1, seed=study.seed)
+    title = f'{weights.parent.name}, {policy}, {objects.root.name}'
+    with study.progress(title, len(trial.objects)) as advance:
+        return trial, contender.key, trial.run(contender, lambda done: advance(done, ''))
+
+
+class Retaken:
+    """A policy that takes known azimuths (B, T) again."""
+
+    def __init__(self, azimuths: Values) -> None:
+        self._azimuths = azimuths
+
+    def choose(self, latent: NDArray[np.float32], taken: Values,
+               state: None = None) -> tuple[Choice, None]:
+        """Go where the known episode went next; see Policy."""
+        goals = self._azimuths[:, taken.shape[1]]
+        return Choice(goals, np.zeros((len(goals), len(AZIMUTHS)), np.float32)), None
+
+
+@torch.inference_mode()
+def _losses(network: ReconstructionNetwork, views: ViewSet, items: Tensor, starts: Tensor,
+            azimuths: Values, loss: LossConfig) -> Values:
+    """Return the loss after every view of known episodes, (B, T)."""
+    frusta = frustum([orbit_camera(azimuth) for azimuth in AZIMUTHS])
+    truth = views.voxels[items].float()
+    outlines = project_all(truth, frusta)
+    steps = []
+    for step in roll_out(network, Retaken(azimuths), views, items, starts, azimuths.shape[1]):
+        occupancy = step.occupancy.cpu()
+        volume = (occupancy - truth).square().mean(dim=(1, 2, 3))
+        silhouettes = (project_all(occupancy, frusta) - outlines).square().mean(dim=(1, 2, 3))
+        steps.append(loss.volume_weight * volume + loss.silhouette_weight * silhouettes)
+    return np.asarray(torch.stack(steps, dim=1).double().numpy())

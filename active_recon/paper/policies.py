@@ -1,0 +1,169 @@
+"""The view policies on one frozen network: what each is worth, beside chance and an oracle."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from active_recon.config import LossConfig, RewardConfig
+from active_recon.evaluation.policy_study import policy_study
+from active_recon.evaluation.statistics import Interval
+from active_recon.evaluation.trial import Trial
+from active_recon.models.weights import load_weights, weights_hash
+from active_recon.paper.claims import all_larger, headroom, larger
+from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
+from active_recon.paper.results import Cell, Claim, Column, Result, Table
+from active_recon.paper.study import Study
+from active_recon.paper.systems import (
+    MODEL,
+    policy_training,
+    run_plan,
+    training_plan,
+    TWO_STAGE,
+    weights_card,
+)
+from active_recon.paper.writing import provenance
+from active_recon.training.loop import TrainingConfig
+from active_recon.training.plan import Plan
+
+SUBSET_OBJECTS = 60
+_OWN = 'attention'
+_BLIND = ('random', 'uniform', 'farthest')
+
+
+def weights(study: Study) -> list[Path]:
+    """
+    Return policies of several seeds on one frozen reconstruction, the first its own.
+
+    Those that are missing are trained, as the first was.
+    """
+    first = study.weights
+    folder = study.models / 'policies' / weights_hash(first)[:12]
+    found = [first]
+    for seed in range(1, study.policy_seeds):
+        found.append(run_plan(_plan(study, first), study.training_sets(), study.objects('val'),
+                              folder / f'seed-{seed}', study, seed))
+    return found
+
+
+def _plan(study: Study, first: Path) -> Plan:
+    card = weights_card(first).get('policy') or {}
+    told = {each.name: card[each.name] for each in fields(TrainingConfig) if each.name in card}
+    rewards = {each.name: card[each.name] for each in fields(RewardConfig) if each.name in card}
+    policy = TrainingConfig(**told) if 'steps' in told else policy_training(study.samples)
+    return Plan(MODEL, TWO_STAGE.size, LossConfig(),
+                training_plan(TWO_STAGE, study.samples).reconstruction, policy,
+                RewardConfig(**rewards), begun=load_weights(first))
+
+
+def inputs(study: Study) -> dict[str, Any]:
+    """Return what the study is made from."""
+    return provenance(
+        study, {'test': study.objects('test')},
+        {f'seed {seed}': path for seed, path in enumerate(weights(study))},
+        policy_starts=study.policy_starts, policy_seeds=study.policy_seeds,
+        subset_objects=SUBSET_OBJECTS)
+
+
+def make(study: Study) -> Result:
+    """Run all policies from the same starts."""
+    bundle = load_weights(study.weights, study.device)
+    trial = Trial(bundle.reconstruction, bundle.threshold, study.read(study.objects('test')),
+                  study.policy_starts, study.views, study.seed, cache=study.models / 'measured')
+    attentions = [load_weights(path, study.device).attention for path in weights(study)]
+    found = policy_study(trial, [model for model in attentions if model is not None],
+                         study.policy_seeds, SUBSET_OBJECTS, study.progress)
+    text = (
+        f'All policies on one frozen network, from {study.policy_starts} first views of each of '
+        f'{found["objects"]} parametric test objects. Attention was trained under '
+        f'{len(attentions)} seeds, random drawn under {study.policy_seeds}. The greedy oracle '
+        'sees the truth and takes, one step ahead, the view after which the IoU is highest: no '
+        'policy can be built so, it shows what there is to be gained. `area` is the mean IoU '
+        'over the views; differences are paired by object, start and, where both have as many, '
+        f'seed. Brackets are 95 % intervals over objects, starts and seeds. '
+        f'{found["headroom_sentence"]}')
+    return Result('View policies on one frozen network', text, _tables(found), claims(found),
+                  _picture(found['policies']), found)
+
+
+def claims(found: Mapping[str, Any]) -> list[Claim]:
+    """Return what follows from the study's figures."""
+    told = [headroom(Interval(**found['headroom']))]
+    if _OWN in found['policies']:
+        above = {name: Interval(**value)
+                 for name, value in found['policies'][_OWN]['auc_above'].items()}
+        told.append(larger('The attention policy is ahead of random selection', above['random'],
+                           'area, attention minus random'))
+        told.append(all_larger(
+            'The attention policy is ahead of policies that see nothing',
+            {name: value for name, value in above.items() if name != 'random'},
+            'area, attention minus the other'))
+    lack = found.get('best_subset', {}).get('oracle_lacks')
+    if lack:
+        told.append(larger('Three views chosen together are better than three chosen greedily',
+                           Interval(**lack), 'IoU of the best sequence of three from the same '
+                           "start minus the greedy oracle's"))
+    return told
+
+
+def _tables(found: Mapping[str, Any]) -> list[Table]:
+    policies = found['policies']
+    names = list(policies)
+    views = range(len(policies[names[0]]['iou']))
+    tables = [Table('IoU over the views', 'policy', names, [
+        *(_column(policies, str(view + 1), 'iou', view) for view in views),
+        _column(policies, 'area', 'auc')], digits=4)]
+    tables.append(Table('What a policy gains, and what it costs', 'policy', names, [
+        *(Column(f'area above {other}',
+                 [_cell(policies[name]['auc_above'].get(other)) for name in names])
+          for other in _BLIND),
+        Column('share of the gap to the oracle',
+               [_cell(policies[name].get('gap_closed')) for name in names]),
+        _column(policies, 'rotation, rad', 'rotation'),
+        Column('ms to decide', [policies[name]['decision_ms'] for name in names]),
+        Column('seeds', [policies[name]['seeds'] for name in names])], digits=4))
+    tables += [Table(f'{title} over the views, nats', 'policy', names, [
+        _column(policies, str(view + 1), key, view) for view in views], digits=0)
+        for title, key in (('Entropy', 'entropy'), ("The paper's entropy", 'paper_entropy'))]
+    categories = list(policies[names[0]]['per_category_iou'])
+    tables.append(Table('IoU after the last view by category', 'category', categories, [
+        Column(name, [_cell(policies[name]['per_category_iou'][category][-1])
+                      for category in categories]) for name in names]))
+    if 'best_subset' in found:
+        tables.append(subset_table(found['best_subset']))
+    return tables
+
+
+def subset_table(subset: Mapping[str, Any]) -> Table:
+    """Return the IoU that the best of all sequences of three views reach, beside the policies'."""
+    rows = {'the best sequence of three': subset['best'],
+            'the best from the same start': subset['best_from_start'],
+            **subset.get('policies', {}),
+            'expected at random': subset['expected_at_random']}
+    return Table(f'IoU after three views, {subset["objects"]} objects, every sequence tried',
+                 'views', list(rows), [Column('IoU', [_cell(value) for value in rows.values()])],
+                 digits=4)
+
+
+def _column(policies: Mapping[str, Any], heading: str, key: str,
+            view: int | None = None) -> Column:
+    values = [figures[key] if view is None else figures[key][view]
+              for figures in policies.values()]
+    return Column(heading, [_cell(value) for value in values])
+
+
+def _cell(value: Mapping[str, float] | None) -> Cell:
+    return None if value is None else Interval(**value)
+
+
+def _picture(policies: Mapping[str, Any]) -> Picture:
+    shares = {name: Interval(**figures['gap_closed']) for name, figures in policies.items()
+              if figures.get('gap_closed')}
+    with canvas(10, 3.6, columns=2 if shares else 1) as (figure, axes):
+        lines = {name: [Interval(**value) for value in figures['iou']]
+                 for name, figures in policies.items()}
+        curves(axes[0][0], range(1, len(next(iter(lines.values()))) + 1), lines, 'views', 'IoU')
+        if shares:
+            bars(axes[0][1], list(shares), {'share': list(shares.values())},
+                 'share of the gap between random and oracle')
+        return drawn(figure)

@@ -1,0 +1,129 @@
+"""What a part of the paper comes to: tables, what follows from them, and a picture."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from active_recon.errors import ConfigError
+from active_recon.evaluation.statistics import Interval
+import numpy as np
+from numpy.typing import NDArray
+
+PUBLISHED = 'published, ShapeNet'
+Cell = Interval | float | int | str | None
+
+
+@dataclass(frozen=True)
+class Column:
+    """
+    A column of a table; None is a cell that was not measured.
+
+    `published` marks the paper's own figures. Its heading then says so, and what is measured here
+    cannot stand under it.
+    """
+
+    heading: str
+    cells: Sequence[Cell]
+    published: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse figures of ours under the heading of the published, and the other way round."""
+        intervals = any(isinstance(cell, Interval) for cell in self.cells)
+        if self.heading.startswith(PUBLISHED) or (self.published and intervals):
+            raise ConfigError(f'{self.heading}: expected published figures and measured ones in '
+                              'columns of their own')
+
+    @property
+    def title(self) -> str:
+        """What stands above the column."""
+        return ': '.join(filter(None, (PUBLISHED, self.heading))) if self.published else (
+            self.heading)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; its first column, headed `key`, names the rows. Figures get so many digits."""
+
+    title: str
+    key: str
+    rows: Sequence[str]
+    columns: Sequence[Column]
+    digits: int = 3
+
+    def __post_init__(self) -> None:
+        """Refuse columns of another length."""
+        for column in self.columns:
+            if len(column.cells) != len(self.rows):
+                raise ConfigError(f'{self.title}: expected {len(self.rows)} cells in the column '
+                                  f'{column.heading!r}, got {len(column.cells)}')
+
+    def markdown(self) -> str:
+        """Return the table in Markdown."""
+        lines = [[self.key, *(column.title for column in self.columns)],
+                 ['---'] + ['---:'] * len(self.columns)]
+        lines += [[name, *(self._told(column.cells[row]) for column in self.columns)]
+                  for row, name in enumerate(self.rows)]
+        return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON can hold."""
+        return {'title': self.title, 'rows': list(self.rows), 'columns': [
+            {'heading': column.title, 'published': column.published,
+             'cells': [plain(cell) for cell in column.cells]} for column in self.columns]}
+
+    def _told(self, cell: Cell) -> str:
+        match cell:
+            case None:
+                return '–'
+            case str():
+                return cell
+            case Interval():
+                return told(cell, self.digits)
+            case int():
+                return f'{cell:,}'
+        return f'{cell:.{self.digits}f}'
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something said by the paper or wanted of us: whether it holds here, and by which figures."""
+
+    claim: str
+    verdict: str
+    because: str
+
+    def markdown(self) -> str:
+        """Return the claim as an item of a list."""
+        return f'- {self.claim}: **{self.verdict}**. {self.because}'
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """
+    What a part found.
+
+    `text` says what was measured and how; `figures` is what other parts build upon, ready for
+    JSON; `picture` is (H, W, 3) uint8 RGB.
+    """
+
+    title: str
+    text: str
+    tables: Sequence[Table]
+    claims: Sequence[Claim]
+    picture: NDArray[np.uint8]
+    figures: Mapping[str, Any] = field(default_factory=dict)
+
+
+def told(spread: Interval, digits: int = 3) -> str:
+    """Return a mean with its interval, for people to read."""
+    return f'{spread.mean:.{digits}f} [{spread.low:.{digits}f}, {spread.high:.{digits}f}]'
+
+
+def counted(views: int) -> str:
+    """Return a number of views in words."""
+    return f'{views} view{"s" * (views > 1)}'
+
+
+def plain(cell: Cell) -> Any:
+    """Return a cell as JSON holds it."""
+    return asdict(cell) if isinstance(cell, Interval) else cell

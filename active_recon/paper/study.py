@@ -1,0 +1,146 @@
+"""What is measured, on what, and how: the settings that all parts share."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from active_recon.datasets.layout import list_objects, ObjectFolder
+from active_recon.datasets.splits import SYNSETS
+from active_recon.datasets.views import read_views, ViewSet
+from active_recon.errors import DataError, WeightsError
+from active_recon.models.weights import find_weights
+from active_recon.voxels import RESOLUTION
+
+Progress = Callable[[str, int], AbstractContextManager[Callable[[int, str], None]]]
+"""Opens a bar, given its title and its number of steps; what it yields takes steps and a note."""
+SAMPLES = 150_000
+REAL = {'real_val': 'real models, `val`', 'real_cc0': 'real models that ship (CC0)',
+        'real_unseen': 'real models of unseen categories'}
+"""Folders of real models, rendered, which are measured where they are present."""
+
+
+@contextmanager
+def silent(title: str, total: int) -> Iterator[Callable[[int, str], None]]:
+    """Show no progress."""
+    yield lambda steps, note: None
+
+
+@dataclass(frozen=True)
+class Objects:
+    """Objects of a dataset on disk, of one category or of all, with so fine a truth."""
+
+    root: Path
+    category: str = ''
+    resolution: int = RESOLUTION
+
+    def folders(self) -> list[ObjectFolder]:
+        """Return where they lie; raises DataError where there is none."""
+        folders = [folder for folder in list_objects(self.root)
+                   if self.category in ('', SYNSETS.get(folder.category, folder.category))]
+        if not folders:
+            raise DataError(f'{self.root}: expected objects of the category {self.category}, '
+                            'found none; `active-recon dataset build` makes them')
+        return folders
+
+    @property
+    def present(self) -> bool:
+        """Whether there are any, with a truth as fine as it is asked for."""
+        return any(folder.voxels_path(self.resolution).is_file()
+                   for folder in (list_objects(self.root) if self.root.is_dir() else ()))
+
+    def identity(self) -> dict[str, Any]:
+        """Return the folder, the number of objects and the hash of their names and voxels."""
+        digest, folders = hashlib.sha256(), self.folders()
+        for folder in folders:
+            digest.update(f'{folder.category}/{folder.name}'.encode() + b'\0')
+            path = folder.voxels_path()
+            digest.update(path.read_bytes() if path.is_file() else b'')
+        return {'folder': str(self.root), 'objects': len(folders), 'sha256': digest.hexdigest()}
+
+
+@dataclass(frozen=True)
+class Study:
+    """
+    Where data, weights and results lie, and the settings of all measurements.
+
+    - data: a folder with train, val, test and unseen, as `active-recon dataset build` makes it,
+      and folders of rendered real models (REAL) where there are any
+    - models: where the compared systems are trained, and what was measured is kept
+    - model: weights of the paper's network for what is not a comparison; None: those that ship
+    - training: the folders of `data` that all systems learn from
+    - samples: views that each system sees in training
+    - starts: first views of each object, out of 24; policy_starts: the same where policies are
+      compared; seed: draws them, and the random policy
+    - device: where IoU is measured; table 4 and figure 10 always time a CPU
+    - policy_seeds: trainings of the view policy, and draws of the random one
+    """
+
+    data: Path = Path('data')
+    models: Path = Path('runs/paper')
+    out: Path = Path('docs/results')
+    model: str | None = None
+    pascal3d: Path | None = None
+    training: tuple[str, ...] = ('train',)
+    samples: int = SAMPLES
+    starts: int = 4
+    seed: int = 0
+    threads: int = 2
+    policy_seeds: int = 5
+    policy_starts: int = 24
+    device: str = 'cpu'
+    views: int = 5
+    progress: Progress = field(default=silent, compare=False)
+
+    def objects(self, name: str, category: str = '', resolution: int = RESOLUTION) -> Objects:
+        """Return the objects of a folder of the data."""
+        return Objects(self.data / name, category, resolution)
+
+    def real(self) -> list[str]:
+        """Return the folders of real models that are there."""
+        return [name for name in REAL if self.objects(name).present]
+
+    @property
+    def weights(self) -> Path:
+        """Where the weights of the paper's network lie; raises WeightsError if there are none."""
+        path = find_weights(self.model)
+        if not path.is_file():
+            raise WeightsError(f"{path}: expected weights of the paper's network, found no file; "
+                               'name some by --model, or train them with `active-recon train`')
+        return path
+
+    def command(self, part: str) -> str:
+        """Return the command that makes a part under these settings."""
+        told = ['active-recon', 'paper', part]
+        usual = Study()
+        for option in ('data', 'models', 'out', 'model', 'pascal3d', 'samples', 'starts', 'seed',
+                       'threads', 'policy_seeds', 'policy_starts', 'device'):
+            if (value := getattr(self, option)) != getattr(usual, option):
+                told += [f'--{option.replace("_", "-")}', str(value)]
+        if self.training != usual.training:
+            told += [word for name in self.training for word in ('--training', name)]
+        return ' '.join(told)
+
+    def training_sets(self, category: str = '', resolution: int = RESOLUTION) -> list[Objects]:
+        """Return what the systems learn from."""
+        return [self.objects(name, category, resolution) for name in self.training]
+
+    def read(self, *sets: Objects) -> ViewSet:
+        """Read sets of objects as one; the two that were asked for last are kept in memory."""
+        return _read(sets, self)
+
+    def generators(self) -> str | None:
+        """Return the hash of the generators that made the data, where it is known."""
+        path = self.data / 'generators.sha256'
+        return path.read_text().strip() if path.is_file() else None
+
+
+@lru_cache(maxsize=2)
+def _read(sets: tuple[Objects, ...], study: Study) -> ViewSet:
+    folders = [folder for objects in sets for folder in objects.folders()]
+    title = ', '.join(str(objects.root) for objects in sets)
+    with study.progress(f'reading {title}', len(folders)) as advance:
+        return read_views(folders, lambda: advance(1, ''), sets[0].resolution)

@@ -1,0 +1,170 @@
+"""The systems that are compared, each trained on the same objects with as many views."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+from active_recon.config import LossConfig
+from active_recon.errors import WeightsError
+from active_recon.models.registry import network_entry, NETWORKS
+from active_recon.models.weights import find_weights, save_weights
+from active_recon.paper.study import Objects, Study
+from active_recon.training.loop import make_fabric, Measured, TrainingConfig
+from active_recon.training.plan import Plan, Report, seeded, train_plan
+from active_recon.training.supervised import mean_length, steps_for
+from active_recon.voxels import FINE_RESOLUTION, RESOLUTION
+
+BATCH, POLICY_BATCH = 32, 48
+LEARNING_RATE, POLICY_LEARNING_RATE = 6e-4, 5e-4
+MAX_VIEWS = 5
+POLICY_SHARE = 0.4  # views that a policy sees, of those that its reconstruction saw before
+MODEL = '2d3d-attention'
+
+
+@dataclass(frozen=True)
+class System:
+    """
+    A system to compare: its name on disk, its label in tables, and how it is trained.
+
+    `model` and `size` are the registry's; `loss` None is the network's own.
+    """
+
+    name: str
+    label: str
+    model: str
+    size: str = 'small'
+    joint: bool = False
+    policy: bool = False
+    loss: LossConfig | None = None
+
+    @property
+    def resolution(self) -> int:
+        """Cells a side of what it predicts."""
+        return FINE_RESOLUTION if self.size.endswith('64') else RESOLUTION
+
+
+TWO_STAGE = System(MODEL, '2D-3D-attention, two-stage', MODEL, policy=True)
+DICE = System('2d3d-dice', '2D-3D, squared error and Dice', MODEL,
+              loss=LossConfig(volume_loss='mse+dice'))
+JOINT = System('joint', '2D-3D-attention, joint', MODEL, joint=True)
+R2N2 = System('r2n2', '3D-R2N2', 'r2n2')
+SHAPE_BASIS = System('shape-basis', 'shape basis', 'shape-basis')
+SYSTEMS = (
+    TWO_STAGE, JOINT, DICE, R2N2, System('ptn', 'PTN', 'ptn'),
+    System('ptn-combined', 'PTN, combined', 'ptn-combined'), System('ogn', 'OGN', 'ogn'),
+    System('ogn-64', 'OGN at 64', 'ogn', 'small-64'), SHAPE_BASIS)
+
+
+def systems(study: Study) -> list[System]:
+    """Return the systems whose truth is there: those of 64 cells need data made with --fine."""
+    return [system for system in SYSTEMS if system.model in NETWORKS
+            and all(objects.present for objects in (
+                *study.training_sets(resolution=system.resolution),
+                study.objects('val', resolution=system.resolution),
+                study.objects('test', resolution=system.resolution)))]
+
+
+def find_system(study: Study, system: System) -> Path | None:
+    """
+    Return a system's weights: those in the study's folder, else those that ship.
+
+    Those that ship are taken only where they saw about as many views as the study gives.
+    """
+    own = study.models / system.name / 'weights.safetensors'
+    if own.is_file():
+        return own
+    try:
+        shipped = find_weights(system.name)
+    except WeightsError:
+        return None
+    seen = views_seen(weights_card(shipped)) if shipped.is_file() else None
+    return shipped if seen and abs(seen / study.samples - 1) < 0.1 else None
+
+
+def have_systems(study: Study, wanted: Sequence[System]) -> dict[System, Path]:
+    """Return the weights of systems, training those that are missing."""
+    return {system: find_system(study, system) or train_system(
+        system, study.training_sets(resolution=system.resolution),
+        study.objects('val', resolution=system.resolution), study.models / system.name,
+        study.samples, study) for system in wanted}
+
+
+def train_system(system: System, training: Sequence[Objects], validation: Objects, out: Path,
+                 samples: int, study: Study) -> Path:
+    """Train a system on so many views, unless it is there; return its weights."""
+    return run_plan(training_plan(system, samples), training, validation, out, study, study.seed)
+
+
+def run_plan(plan: Plan, training: Sequence[Objects], validation: Objects, out: Path,
+             study: Study, seed: int) -> Path:
+    """
+    Train as planned, unless the weights are there; return them.
+
+    A training that was cut off goes on from its checkpoints in `out`.
+    """
+    weights = out / 'weights.safetensors'
+    if weights.is_file():
+        return weights
+
+    @contextmanager
+    def reporting(stage: str, steps: int) -> Iterator[Report]:
+        with study.progress(f'{out.name}: {stage}', steps) as advance:
+            done = 0
+
+            def report(step: int, measured: Measured) -> None:
+                nonlocal done
+                advance(step - done, f'loss {measured["loss"]:.4f}')
+                done = step
+
+            yield report
+
+    bundle = train_plan(seeded(plan, seed), study.read(*training), study.read(validation), out,
+                        reporting, make_fabric(bfloat16=True), resume=True)
+    bundle.card.update(
+        command=study.command('systems'), generators_sha256=study.generators(), seed=seed,
+        objects=[objects.identity() for objects in training],
+        views_seen=views_seen({'model': plan.model} | bundle.card))
+    save_weights(weights, bundle)
+    return weights
+
+
+def training_plan(system: System, samples: int) -> Plan:
+    """Return the plan under which a system sees about so many views."""
+    # The joint scheme's sequences are all the longest
+    steps = (max(1, round(samples / (BATCH * MAX_VIEWS))) if system.joint
+             else steps_for(samples, BATCH, MAX_VIEWS))
+    first = TrainingConfig(steps, BATCH, LEARNING_RATE, MAX_VIEWS,
+                           warm_up=min(200, max(1, steps // 10)))
+    policy = policy_training(samples) if system.policy else None
+    return Plan(system.model, system.size, system.loss or network_entry(system.model).loss, first,
+                policy, joint=system.joint)
+
+
+def policy_training(samples: int) -> TrainingConfig:
+    """Return how a view policy is trained beside a reconstruction that saw so many views."""
+    steps = max(1, round(POLICY_SHARE * samples / (POLICY_BATCH * MAX_VIEWS)))
+    return TrainingConfig(steps, POLICY_BATCH, POLICY_LEARNING_RATE, MAX_VIEWS, bfloat16=False,
+                          varied=False, warm_up=min(20, steps), checkpoint_every=50,
+                          validate_every=250)
+
+
+def views_seen(card: Mapping[str, Any]) -> int | None:
+    """Return how many views a reconstruction saw in training, by its card; None if unknown."""
+    if 'model' in card and network_entry(card['model']).fit:
+        return None
+    training = card.get('reconstruction') or {}
+    if not {'steps', 'batch_size', 'max_views'} <= set(training):
+        return None
+    length = (training['max_views'] if card.get('scheme') == 'joint'
+              else mean_length(training['max_views']))
+    return int(training['steps'] * training['batch_size'] * length)
+
+
+def weights_card(weights: Path) -> dict[str, Any]:
+    """Return the card beside weights; empty where there is none."""
+    path = weights.with_suffix('.json')
+    card: dict[str, Any] = json.loads(path.read_text()) if path.is_file() else {}
+    return card

@@ -1,0 +1,114 @@
+"""A part's result on disk: Markdown, JSON and PNG, each with where it came from."""
+
+from collections.abc import Mapping
+import json
+from pathlib import Path
+from typing import Any
+
+from active_recon.errors import DataError
+from active_recon.models.weights import weights_hash
+from active_recon.paper.claims import sentences
+from active_recon.paper.results import Claim, Result
+from active_recon.paper.study import Objects, Study
+from active_recon.paper.systems import views_seen, weights_card
+from PIL import Image
+
+Inputs = Mapping[str, Any]
+_MADE_BY = 'Made by'
+_SUFFIXES = ('.json', '.md', '.png')
+
+
+def provenance(study: Study, sets: Mapping[str, Objects], weights: Mapping[str, Path],
+               **more: Any) -> dict[str, Any]:
+    """Return what a result is made from: it is made again when any of this changes."""
+    return {
+        'data': {name: objects.identity() for name, objects in sets.items()},
+        'generators': study.generators(), 'seed': study.seed, 'starts': study.starts,
+        'weights': {name: _origin(path) for name, path in weights.items()}, **more}
+
+
+def _origin(weights: Path) -> dict[str, Any]:
+    card = weights_card(weights)
+    return {'file': str(weights), 'sha256': weights_hash(weights),
+            'threshold': card.get('threshold'), 'views seen in training': views_seen(card)}
+
+
+def read_result(study: Study, name: str) -> dict[str, Any]:
+    """Return what a part wrote as JSON; raises DataError where it is not there."""
+    path = study.out / f'{name}.json'
+    try:
+        found: dict[str, Any] = json.loads(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise DataError(f'{path}: expected the result of `active-recon paper {name}`, got: '
+                        f'{error}') from error
+    return found
+
+
+def is_current(study: Study, name: str, inputs: Inputs) -> bool:
+    """Return whether a part's three files are there, made from the same inputs."""
+    if not all((study.out / f'{name}{suffix}').is_file() for suffix in _SUFFIXES):
+        return False
+    try:
+        return bool(read_result(study, name).get('inputs') == _as_json(inputs))
+    except DataError:
+        return False
+
+
+def write_result(study: Study, name: str, inputs: Inputs, result: Result) -> None:
+    """Write a part's three files, JSON last: a part that was cut off is made again."""
+    study.out.mkdir(parents=True, exist_ok=True)
+    command = study.command(name)
+    Image.fromarray(result.picture).save(study.out / f'{name}.png', optimize=True)
+    (study.out / f'{name}.md').write_text(_markdown(name, command, inputs, result))
+    content = {'title': result.title, 'command': command, 'inputs': dict(inputs),
+               'tables': [table.to_dict() for table in result.tables],
+               'claims': [{'claim': claim.claim, 'verdict': claim.verdict,
+                           'because': claim.because} for claim in result.claims],
+               'figures': dict(result.figures)}
+    (study.out / f'{name}.json').write_text(json.dumps(content, indent=1) + '\n')
+
+
+def body(study: Study, name: str) -> str:
+    """Return a part's Markdown without how it came about."""
+    return (study.out / f'{name}.md').read_text().partition(f'\n\n{_MADE_BY}\n')[0]
+
+
+def claims_of(found: Mapping[str, Any]) -> list[Claim]:
+    """Return the claims of a result that was read."""
+    return [Claim(**claim) for claim in found['claims']]
+
+
+def _markdown(name: str, command: str, inputs: Inputs, result: Result) -> str:
+    blocks = [f'# {result.title}', result.text, f'![{result.title}]({name}.png)']
+    for table in result.tables:
+        blocks += [f'**{table.title}**', table.markdown()]
+    if result.claims:
+        blocks += ['What the paper says, or what was aimed at, and what is measured here:',
+                   sentences(result.claims)]
+    blocks.append(_provenance(command, inputs))
+    return '\n\n'.join(blocks) + '\n'
+
+
+def _provenance(command: str, inputs: Inputs) -> str:
+    """Return how the figures come about again: command, data, seed and weights."""
+    lines = [f'- command: `{command}`']
+    for key, value in inputs.items():
+        if isinstance(value, Mapping):
+            lines += [f'- {key} {name}: {_short(entry)}' for name, entry in value.items()]
+        elif value is not None:
+            lines.append(f'- {key}: {_short(value)}')
+    return '\n'.join([_MADE_BY, '', *lines])
+
+
+def _short(value: Any) -> str:
+    """Return a value for people: hashes by their first digits; the JSON has them whole."""
+    if isinstance(value, Mapping):
+        return ', '.join(f'{key} {_short(entry)}' for key, entry in value.items())
+    text = str(value)
+    is_hash = len(text) == 64 and set(text) <= set('0123456789abcdef')
+    return f'`{text[:12]}`' if is_hash else text
+
+
+def _as_json(inputs: Inputs) -> Any:
+    return json.loads(json.dumps(dict(inputs)))
+

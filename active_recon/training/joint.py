@@ -1,0 +1,91 @@
+"""The paper's joint scheme: reconstruction and policy together, views chosen by the policy."""
+
+from collections.abc import Callable
+
+from active_recon.cameras import AZIMUTHS
+from active_recon.config import LossConfig, RewardConfig
+from active_recon.datasets.views import ViewSet
+from active_recon.models.attention import AttentionModel
+from active_recon.models.network import ReconstructionNetwork
+from active_recon.training.loop import (
+    Draw,
+    Measured,
+    Run,
+    share_of_batch,
+    train_steps,
+    TrainingConfig,
+)
+from active_recon.training.policy_gradient import draw_episodes, policy_losses, run_episodes
+from active_recon.training.supervised import ReconstructionLearner
+from active_recon.training.variation import vary
+import numpy as np
+import torch
+from torch import nn, Tensor
+
+_THRESHOLD = 0.4  # of the rewards' IoU: the one that is chosen on validation comes after training
+
+
+class JointLearner(nn.Module):
+    """
+    Episodes under the policy's own choices to the losses of both.
+
+    The reconstruction learns from its losses after one random view of each episode (section 3.2),
+    the policy from its rewards (section 3.3); neither's gradients reach into the other.
+    """
+
+    def __init__(self, network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet,
+                 loss: LossConfig, rewards: RewardConfig, length: int, varied: bool) -> None:
+        super().__init__()
+        self.reconstruction = ReconstructionLearner(network, loss)
+        self.attention = attention
+        self._views, self._rewards = views, rewards
+        self._length, self._varied = length, varied
+
+    def forward(self, objects: Tensor, starts: Tensor,
+                rng: np.random.Generator) -> dict[str, Tensor]:
+        """Run an episode of each object (B,) from the view it starts at (B,)."""
+        objects, device = objects.cpu(), next(self.attention.parameters()).device
+        scene = int(rng.integers(2 ** 32))
+
+        def show(objects: Tensor, chosen: Tensor) -> Tensor:
+            # Views come one by one: the same generator for each keeps the scene as it is
+            images = self._views.images[objects, chosen]
+            return vary(images[None], self._views, np.random.default_rng(scene))[0]
+
+        episode = run_episodes(
+            self.reconstruction.network, self.attention, self._views, objects, starts.cpu(),
+            self._length, _THRESHOLD, self._rewards, rng, show if self._varied else None)
+        seen_from = torch.from_numpy(rng.integers(len(AZIMUTHS), size=len(objects))).to(device)
+        losses = self.reconstruction.losses(
+            episode.features[rng.integers(self._length)],
+            self._views.voxels[objects].float().to(device), seen_from)
+        chosen = policy_losses(episode)
+        return losses | chosen | {'loss': losses['loss'] + chosen['loss']}
+
+
+class JointModel(nn.Module):
+    """The two networks as one, for the checkpoints."""
+
+    def __init__(self, reconstruction: ReconstructionNetwork, attention: AttentionModel) -> None:
+        super().__init__()
+        self.reconstruction = reconstruction
+        self.attention = attention
+
+
+def train_jointly(
+    network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet,
+    config: TrainingConfig, loss: LossConfig, rewards: RewardConfig, run: Run,
+    validate: Callable[[ReconstructionNetwork, AttentionModel], Measured],
+) -> None:
+    """Train both in place, from fresh weights or any others; see `train_steps`."""
+    size = share_of_batch(config, run.fabric)
+    settings = {'training': config.to_dict(), 'loss': loss.to_dict(), 'reward': rewards.to_dict()}
+
+    def draw(step: int) -> Draw:
+        return draw_episodes(views, size, [config.seed, 2, step, run.fabric.global_rank])
+
+    train_steps(
+        run, JointLearner(network, attention, views, loss, rewards, config.max_views,
+                          config.varied),
+        JointModel(network, attention), config, settings, views, draw,
+        lambda: validate(network, attention), weight_decay=0.01)

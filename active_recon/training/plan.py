@@ -1,0 +1,119 @@
+"""A whole training from its plan: reconstruction, threshold, policy; weights with their card."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from active_recon.config import Config, LossConfig, NetworkConfig, RewardConfig
+from active_recon.datasets.views import ViewSet
+from active_recon.errors import ConfigError
+from active_recon.evaluation.validation import best_threshold, policy_auc, reconstruction_iou
+from active_recon.models.attention import AttentionModel
+from active_recon.models.registry import network_config, network_entry
+from active_recon.models.weights import Bundle
+from active_recon.training.joint import train_jointly
+from active_recon.training.loop import Measured, Run, TrainingConfig
+from active_recon.training.policy_gradient import train_policy
+from active_recon.training.supervised import train_reconstruction
+from lightning_fabric import Fabric
+import torch
+
+Report = Callable[[int, Measured], None]
+Reporting = Callable[[str, int], AbstractContextManager[Report]]
+"""Opens the report of a stage, given its name and its number of steps."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """
+    What is trained, and how.
+
+    `policy` None leaves the view policy out; `joint` trains both together, as `reconstruction`
+    says. `begun` are weights whose reconstruction network is taken as it is.
+    """
+
+    model: str
+    size: str
+    loss: LossConfig
+    reconstruction: TrainingConfig
+    policy: TrainingConfig | None
+    rewards: RewardConfig = RewardConfig()
+    joint: bool = False
+    begun: Bundle | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be trained together."""
+        attentive = network_entry(self.model).attentive
+        if not attentive and (self.joint or self.policy):
+            raise ConfigError(f'{self.model}: expected a model with an attentive part for a view '
+                              'policy; leave the policy out, or train 2d3d-attention')
+        if self.joint and self.policy:
+            raise ConfigError('expected the joint scheme or a policy stage, got both')
+
+    @property
+    def config(self) -> Config:
+        """Return the sizes of the network."""
+        return self.begun.config if self.begun else network_config(self.model, self.size)
+
+
+def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
+               reporting: Reporting, fabric: Fabric, resume: bool = False) -> Bundle:
+    """
+    Train as planned, with checkpoints of every stage in `out`; return what is to be saved.
+
+    The threshold is chosen on validation. A stage whose checkpoint is there goes on with it if
+    `resume` is set.
+    """
+    entry = network_entry(plan.model)
+    config = plan.config
+    network = plan.begun.reconstruction if plan.begun else entry.build(config)
+    attention = AttentionModel.from_config(config) if isinstance(
+        config, NetworkConfig) and (plan.joint or plan.policy) else None
+
+    def run(stage: str, report: Report) -> Run:
+        path = out / f'{stage}.safetensors'
+        return Run(fabric, path, report, resume and path.is_file())
+
+    if plan.joint and attention is not None:
+        with reporting('joint', plan.reconstruction.steps) as report:
+            train_jointly(network, attention, training, plan.reconstruction, plan.loss,
+                          plan.rewards, run('joint', report),
+                          lambda model, _: reconstruction_iou(model, validation))
+    elif entry.fit is not None:
+        entry.fit(network, training.voxels, training.categories)
+    elif not plan.begun:
+        with reporting('reconstruction', plan.reconstruction.steps) as report:
+            train_reconstruction(network, training, plan.reconstruction, plan.loss,
+                                 run('reconstruction', report),
+                                 lambda model: reconstruction_iou(model, validation))
+    threshold = plan.begun.threshold if plan.begun else best_threshold(network, validation)
+    if plan.policy and attention is not None:
+        with reporting('policy', plan.policy.steps) as report:
+            train_policy(network, attention, training, threshold, plan.policy, plan.rewards,
+                         run('policy', report),
+                         lambda model: policy_auc(network, model, validation, threshold))
+    return Bundle(network.cpu(), attention and attention.cpu(), config, threshold,
+                  _card(plan, training), plan.model)
+
+
+def _card(plan: Plan, training: ViewSet) -> dict[str, Any]:
+    roots = sorted({str(folder.root) for folder in training.folders})
+    card = {
+        'data': {root: sum(str(folder.root) == root for folder in training.folders)
+                 for root in roots},
+        'reconstruction': plan.reconstruction.to_dict() | plan.loss.to_dict(),
+        'scheme': 'joint' if plan.joint else 'two-stage',
+        'policy': plan.policy.to_dict() | plan.rewards.to_dict() if plan.policy else None,
+    }
+    if plan.begun:
+        card['reconstruction'] = plan.begun.card.get('reconstruction', {})
+    return card
+
+
+def seeded(plan: Plan, seed: int) -> Plan:
+    """Return the plan under another seed, and seed torch's fresh weights with it."""
+    torch.manual_seed(seed)
+    policy = replace(plan.policy, seed=seed) if plan.policy else None
+    return replace(plan, reconstruction=replace(plan.reconstruction, seed=seed), policy=policy)

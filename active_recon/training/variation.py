@@ -1,0 +1,173 @@
+"""What a camera would vary and a renderer does not: background, light, colours and aim."""
+
+from collections.abc import Callable
+
+from active_recon.datasets.views import on_background, ViewSet
+from active_recon.models.encoder import IMAGE_SIZE
+import numpy as np
+from numpy.typing import NDArray
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+MOST_SHIFT = 2.0  # pixels
+MOST_SCALE = 0.04
+_MOSAIC_MARGIN = IMAGE_SIZE // 4  # no crop of a mosaic shows an object whole
+_SHAPES = 8  # painted over each other on a cluttered canvas
+_LUMA = torch.tensor([0.299, 0.587, 0.114])
+_ACROSS = (torch.arange(IMAGE_SIZE) + 0.5) / IMAGE_SIZE * 2 - 1  # pixels' centres in [-1, 1]
+
+
+def vary(images: Tensor, views: ViewSet, rng: np.random.Generator) -> Tensor:
+    """
+    Return premultiplied images (T, B, 64, 64, 4) uint8 as pictures (T, B, 3, 64, 64) in [0, 1].
+
+    Half of the sequences stay where they are, on white; the others, in the shares of `SHARES`,
+    stand before another background, are moved and scaled a little in each view, and lit unevenly.
+    Every object's colours change. What is random comes from `rng` alone.
+    """
+    length, size = images.shape[:2]
+    planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
+    planes[:, :, :3] = _recolored(planes, rng)
+    kinds = draw_kinds(size, rng)
+    away = torch.from_numpy(np.flatnonzero(kinds != 'white'))
+    if len(away):
+        shown = planes[:, away]
+        planes[:, away] = moved(shown.flatten(0, 1), rng).view_as(shown)
+    behind = torch.ones(length, size, 3, IMAGE_SIZE, IMAGE_SIZE)
+    for kind, draw in BACKGROUNDS.items():
+        rows = torch.from_numpy(np.flatnonzero(kinds == kind))
+        if len(rows):
+            behind[:, rows] = draw(views, length, len(rows), rng).expand(
+                length, -1, -1, IMAGE_SIZE, IMAGE_SIZE)
+    pictures = behind.mul_(1 - planes[:, :, 3:]).add_(planes[:, :, :3])
+    pictures[:, away] *= _light(len(away), rng)
+    return pictures.clamp_(0, 1)
+
+
+def draw_kinds(size: int, rng: np.random.Generator) -> NDArray[np.str_]:
+    """Return the background's kind of each of `size` sequences, (size,)."""
+    return rng.choice(list(SHARES), size, p=list(SHARES.values()))
+
+
+def moved(planes: Tensor, rng: np.random.Generator) -> Tensor:
+    """
+    Return premultiplied planes (N, 4, 64, 64), each shifted and scaled about its middle.
+
+    By up to two pixels each way and 4 %; the object's alpha moves with its colours, and what
+    comes in at the border is empty.
+    """
+    scale = 1 / rng.uniform(1 - MOST_SCALE, 1 + MOST_SCALE, len(planes))
+    shift = rng.uniform(-1, 1, (len(planes), 2)) * MOST_SHIFT / (IMAGE_SIZE / 2)
+    to_source = np.zeros((len(planes), 2, 3), np.float32)
+    to_source[:, [0, 1], [0, 1]] = scale[:, None]
+    to_source[:, :, 2] = -shift * scale[:, None]
+    grid = functional.affine_grid(torch.from_numpy(to_source), list(planes.shape),
+                                  align_corners=False)
+    return functional.grid_sample(planes, grid, align_corners=False)
+
+
+def _recolored(planes: Tensor, rng: np.random.Generator) -> Tensor:
+    """Return the colours of planes (T, B, 4, 64, 64) under a gain and a saturation of each b."""
+    size = planes.shape[1]
+    gains = rng.uniform(0.75, 1.25, (size, 1)) * rng.uniform(0.85, 1.15, (size, 3))
+    saturation = _tensor(rng.uniform(0.5, 1.4, (size, 1, 1)))
+    grey = _LUMA.expand(3, 3)
+    matrices = _tensor(gains)[:, :, None] * (saturation * torch.eye(3) + (1 - saturation) * grey)
+    colors = torch.matmul(matrices, planes[:, :, :3].flatten(-2))
+    return torch.minimum(colors.clamp_(min=0).view_as(planes[:, :, :3]), planes[:, :, 3:])
+
+
+def _light(count: int, rng: np.random.Generator) -> Tensor:
+    """Return a coloured light that falls off across the image, (count, 3, 64, 64) about 1."""
+    gains = _tensor(rng.uniform(0.8, 1.2, (count, 3, 1, 1)))
+    slopes = _tensor(rng.uniform(-0.2, 0.2, (2, count, 1, 1, 1)))
+    return gains * (1 + slopes[0] * _ACROSS + slopes[1] * _ACROSS[:, None])
+
+
+# The backgrounds of n sequences of T views: what gives (n, ...) is the same in all views
+
+
+def _plain(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> Tensor:
+    """Return plain colours, (count, 3, 1, 1)."""
+    return _colors(rng, count)
+
+
+def _gradient(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> Tensor:
+    """Return one colour that becomes another along a line, (count, 3, 64, 64)."""
+    angle = _tensor(rng.uniform(0, 2 * np.pi, (count, 1, 1, 1)))
+    along = angle.cos() * _ACROSS + angle.sin() * _ACROSS[:, None]
+    share = (along / 2 ** 0.5 + 1) / 2
+    return torch.lerp(_colors(rng, count), _colors(rng, count), share)
+
+
+def _noise(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> Tensor:
+    """Return coarse, middling and fine noise in random shares, (T, count, 3, 64, 64)."""
+    weights = _tensor(rng.dirichlet([1, 1, 1], count).T)[..., None, None, None]
+    total = torch.zeros(())
+    for weight, side in zip(weights, (4, 16, IMAGE_SIZE), strict=True):
+        cells = torch.from_numpy(rng.random((length * count, 3, side, side), np.float32))
+        smooth = functional.interpolate(cells, size=(IMAGE_SIZE, IMAGE_SIZE), mode='bilinear')
+        total = total + weight * smooth.reshape(length, count, 3, IMAGE_SIZE, IMAGE_SIZE)
+    saturation = _tensor(rng.random((count, 1, 1, 1)))
+    return torch.lerp(total.mean(dim=2, keepdim=True), total, saturation)
+
+
+def _clutter(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> Tensor:
+    """Return crops of a canvas painted with boxes and ellipses, (T, count, 3, 64, 64)."""
+    side = IMAGE_SIZE + IMAGE_SIZE // 2
+    across = torch.linspace(-1, 1, side)
+    canvas = _colors(rng, count).repeat(1, 1, side, side)
+    for _ in range(_SHAPES):
+        x, y = _tensor(rng.uniform(-1, 1, (2, count, 1, 1)))
+        angle = _tensor(rng.uniform(0, np.pi, (count, 1, 1)))
+        half_sides = _tensor(rng.uniform(0.05, 0.6, (2, count, 1, 1)))
+        right, down = across - x, across[:, None] - y
+        u = (angle.cos() * right + angle.sin() * down) / half_sides[0]
+        v = (angle.cos() * down - angle.sin() * right) / half_sides[1]
+        box = torch.from_numpy(rng.random((count, 1, 1)) < 0.5)
+        inside = torch.where(box, torch.maximum(u.abs(), v.abs()), u * u + v * v) < 1
+        canvas = torch.where(inside[:, None], _colors(rng, count), canvas)
+    return _crops(canvas, length, 0, rng)
+
+
+def _pieces(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> Tensor:
+    """Return crops across the seams of four other images of the set, (T, count, 3, 64, 64)."""
+    objects, chosen = (torch.from_numpy(rng.integers(most, size=count * 4))
+                       for most in views.images.shape[:2])
+    colors = _colors(rng, count).flatten(1).repeat_interleave(4, dim=0)
+    tiles = on_background(views.images[objects, chosen], colors)
+    square = tiles.reshape(count, 2, 2, 3, IMAGE_SIZE, IMAGE_SIZE).permute(0, 3, 1, 4, 2, 5)
+    mosaic = square.reshape(count, 3, 2 * IMAGE_SIZE, 2 * IMAGE_SIZE)
+    return _crops(mosaic, length, _MOSAIC_MARGIN, rng)
+
+
+def _crops(canvases: Tensor, length: int, margin: int, rng: np.random.Generator) -> Tensor:
+    """Return a crop of each canvas (n, 3, S, S) for each view, (T, n, 3, 64, 64)."""
+    count, _, side, _ = canvases.shape
+    corners = rng.integers(margin, side - IMAGE_SIZE - margin + 1, (2, length, count))
+    windows = canvases.unfold(2, IMAGE_SIZE, 1).unfold(3, IMAGE_SIZE, 1)  # a view, no copy
+    top, left = torch.from_numpy(corners)
+    return windows[torch.arange(count), :, top, left]
+
+
+def _colors(rng: np.random.Generator, count: int) -> Tensor:
+    """Return colours of any saturation, (count, 3, 1, 1): most of the world is rather grey."""
+    grey, saturation = rng.random((2, count, 1, 1, 1))
+    return _tensor(grey + saturation * (rng.random((count, 3, 1, 1)) - grey))
+
+
+def _tensor(numbers: NDArray[np.float64]) -> Tensor:
+    return torch.from_numpy(numbers.astype(np.float32))
+
+
+BACKGROUNDS: dict[str, Callable[[ViewSet, int, int, np.random.Generator], Tensor]] = {
+    'plain': _plain, 'gradient': _gradient, 'noise': _noise, 'clutter': _clutter,
+    'pieces': _pieces}
+"""
+What draws a background for T views of n sequences, `(views, T, n, rng)`: colours in [0, 1] that
+expand to (T, n, 3, 64, 64).
+"""
+SHARES = {'white': 0.5, 'plain': 0.15, 'gradient': 0.08, 'noise': 0.07, 'clutter': 0.1,
+          'pieces': 0.1}
+"""The share of the sequences that stand before each kind of background."""

@@ -1,0 +1,176 @@
+"""What holds for every network that the paper's is compared with, whatever is inside."""
+
+from dataclasses import replace
+
+from active_recon.errors import ConfigError
+from active_recon.models.ogn import OgnConfig
+from active_recon.models.ptn import PtnConfig
+from active_recon.models.r2n2 import R2n2Config
+from active_recon.models.registry import network_config, network_entry
+from active_recon.models.runtime import TorchRuntime
+from active_recon.models.shape_basis import ShapeBasisConfig
+from active_recon.models.weights import Bundle, load_weights, save_weights
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+TINY = {
+    'r2n2': R2n2Config(encoder_channels=(4, 4, 4, 8, 8, 8), code_channels=16, hidden_channels=4,
+                       decoder_channels=(8, 4)),
+    'ptn': PtnConfig(image_channels=(4, 8, 8), code_channels=(16, 16, 16),
+                     volume_channels=(8, 8, 4)),
+    'ogn': OgnConfig(image_channels=(4, 8, 8), code_channels=(16, 16), level_channels=(8, 6, 4)),
+    'shape-basis': ShapeBasisConfig(categories=('box', 'none'), modes=2),
+}
+TINY |= {'ptn-combined': TINY['ptn']}
+AT_64 = replace(TINY['ogn'], level_channels=(8, 6, 4, 4), resolution=64)
+CASES = [*TINY.items(), ('ogn', AT_64)]
+LEARNED = [case for case in CASES if network_entry(case[0]).fit is None]
+
+
+def name_of(case):
+    return f'{case[0]}-{getattr(case[1], "resolution", 32)}'
+
+
+def built(case):
+    """Return the network of a case; what is fitted in one go is fitted to boxes."""
+    torch.manual_seed(0)
+    model, config = case
+    entry = network_entry(model)
+    network = entry.build(config).eval()
+    if entry.fit:
+        boxes = torch.zeros(6, 32, 32, 32, dtype=torch.bool)
+        for index, box in enumerate(boxes):
+            box[8 - index:24 + index, 4 + index:28 - index, 6 + index:20] = True
+        entry.fit(network, boxes, np.array(['box'] * 6))
+    return network
+
+
+@pytest.fixture(params=CASES, ids=name_of)
+def case(request):
+    return request.param
+
+
+@pytest.fixture
+def tiny_network(case):
+    return built(case)
+
+
+def some_views(count, batch):
+    """Return views (T, B, 3, 64, 64): rectangles of noise on white, no two alike."""
+    torch.manual_seed(1)
+    views = torch.ones(count, batch, 3, 64, 64)
+    for t in range(count):
+        for index in range(batch):
+            high, wide = 20 + 9 * t, 16 + 8 * index
+            views[t, index, :, 10:10 + high, 12:12 + wide] = torch.rand(3, high, wide)
+    return views
+
+
+@torch.no_grad()
+def folded(network, images):
+    """Return what is known after views (T, B, ...)."""
+    hidden = None
+    for t, view in enumerate(images):
+        seen, hidden = network(view, torch.full((len(view),), 0.5 * t), hidden)
+    return seen
+
+
+def test_a_sequence_is_answered_after_every_view(tiny_network):
+    resolution, hidden = tiny_network.resolution, None
+    for view in some_views(3, 2):
+        with torch.no_grad():
+            seen, hidden = tiny_network(view, torch.zeros(2), hidden)
+        assert seen.logits.shape == (2, *(resolution,) * 3)
+        assert seen.logits.isfinite().all()
+        assert seen.latent.ndim == 4
+        assert len(seen.latent) == 2
+
+
+def test_the_runtime_answers_as_the_network_does(tiny_network):
+    images = (some_views(2, 1)[:, 0] * 255).byte()
+    runtime = TorchRuntime(tiny_network)
+    state = runtime.initial_state()
+    for t, image in enumerate(images):
+        occupancy, latent, state = runtime.step(image.permute(1, 2, 0).numpy(), 0.5 * t, state)
+    expected = folded(tiny_network, images[:, None].float() / 255)
+    assert_close(torch.from_numpy(occupancy), expected.logits[0].sigmoid())
+    assert_close(torch.from_numpy(latent), expected.latent[0])
+
+
+def test_a_view_more_changes_what_is_known(tiny_network):
+    images = some_views(2, 1)
+    once, twice = folded(tiny_network, images[:1]), folded(tiny_network, images)
+    assert (twice.latent - once.latent).abs().max() > 1e-4
+
+
+def test_the_state_is_passed_and_not_kept(tiny_network):
+    first, second = some_views(2, 2)
+    azimuths = torch.zeros(2)
+    with torch.no_grad():
+        _, hidden = tiny_network(first, azimuths)
+        once, _ = tiny_network(second, azimuths, hidden)
+        tiny_network(first, azimuths, hidden)
+        again, _ = tiny_network(second, azimuths, hidden)
+    assert_close(again.logits, once.logits, rtol=0, atol=0)
+    assert_close(again.latent, once.latent, rtol=0, atol=0)
+
+
+def test_an_object_is_reconstructed_alike_alone_and_among_others(tiny_network):
+    images = some_views(2, 3)
+    together = folded(tiny_network, images)
+    for index in range(3):
+        alone = folded(tiny_network, images[:, index:index + 1])
+        assert_close(together.logits[index:index + 1], alone.logits, rtol=1e-4, atol=1e-4)
+        assert_close(together.latent[index:index + 1], alone.latent, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize('learned', LEARNED, ids=name_of)
+def test_every_parameter_learns_from_two_views(learned):
+    network = built(learned)
+    hidden, voxels = None, torch.zeros(2, *(network.resolution,) * 3)
+    voxels[:, 9:23, 9:23, 9:23] = 1
+    for view in some_views(2, 2):
+        seen, hidden = network.fold(view, torch.zeros(2), hidden)
+    loss = network.objective(seen.features, voxels)
+    if loss is None:
+        loss = network.decode(seen.features).square().mean()
+    loss.backward()
+    for name, parameter in network.named_parameters():
+        assert parameter.grad is not None, name
+        assert parameter.grad.any(), name
+
+
+def test_what_was_saved_answers_as_before(case, tiny_network, tmp_path):
+    model, config = case
+    path = tmp_path / 'weights.safetensors'
+    save_weights(path, Bundle(tiny_network, None, config, 0.4, model=model))
+    loaded = load_weights(path)
+    assert (loaded.config, loaded.model, loaded.attention) == (config, model, None)
+    expected, found = (folded(part, some_views(2, 2))
+                       for part in (tiny_network, loaded.reconstruction))
+    assert_close(found.latent, expected.latent, rtol=0, atol=0.02)
+
+
+def parameters_of(model, size):
+    with torch.device('meta'):
+        network = network_entry(model).build(network_config(model, size))
+    return sum(part.numel() for part in network.parameters())
+
+
+@pytest.mark.parametrize('model', ['r2n2', 'ptn', 'ptn-combined', 'ogn'])
+def test_the_small_size_has_a_few_million_parameters_and_the_published_one_many(model):
+    assert 2_000_000 <= parameters_of(model, 'small') <= 4_000_000
+    assert parameters_of(model, 'published') > 20_000_000
+
+
+@pytest.mark.parametrize(('model', 'wrong'), [
+    ('r2n2', {'hidden_channels': 0}), ('r2n2', {'encoder_channels': (8, 8)}),
+    ('r2n2', {'decoder_channels': (8,)}), ('ptn', {'volume_channels': (8, 8)}),
+    ('ptn', {'code_channels': (8, 8, 0)}), ('ogn', {'resolution': 64}),
+    ('ogn', {'level_channels': (8, 0, 8)}), ('ogn', {'image_channels': ()}),
+    ('shape-basis', {'modes': 0}), ('shape-basis', {'categories': ('box', 'box')})])
+def test_sizes_that_make_no_network_are_refused(model, wrong):
+    with pytest.raises(ConfigError, match='expected'):
+        replace(TINY[model], **wrong)

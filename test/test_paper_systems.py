@@ -1,0 +1,108 @@
+"""The compared systems: the same objects, as many views, trained once."""
+
+import json
+
+from active_recon.errors import WeightsError
+from active_recon.models import weights as weights_module
+from active_recon.models.weights import load_weights
+from active_recon.paper import systems
+from active_recon.paper.study import Study
+from active_recon.paper.systems import (
+    find_system,
+    have_systems,
+    JOINT,
+    R2N2,
+    System,
+    SYSTEMS,
+    training_plan,
+    TWO_STAGE,
+    views_seen,
+)
+from paper_study import untrained
+import pytest
+
+
+@pytest.fixture
+def study(dataset, tmp_path):
+    """Return a study whose sets are all the same six objects, and that has no weights yet."""
+    data = tmp_path / 'data'
+    data.mkdir()
+    for name in ('train', 'val', 'test'):
+        (data / name).symlink_to(dataset)
+    return Study(data, tmp_path / 'models', tmp_path / 'results', samples=9)
+
+
+@pytest.fixture
+def small_batches(monkeypatch):
+    monkeypatch.setattr(systems, 'BATCH', 2)
+    monkeypatch.setattr(systems, 'POLICY_BATCH', 2)
+
+
+@pytest.mark.parametrize('system', SYSTEMS, ids=lambda system: system.name)
+@pytest.mark.parametrize('samples', [30_000, 150_000])
+def test_every_system_sees_as_many_views(system, samples):
+    if system.model not in systems.NETWORKS:
+        pytest.fail(f'{system.model} is not in the registry')
+    plan = training_plan(system, samples)
+    card = {'scheme': 'joint' if plan.joint else 'two-stage',
+            'reconstruction': plan.reconstruction.to_dict()}
+    assert views_seen(card) == pytest.approx(samples, rel=0.01)
+
+
+def test_what_is_fitted_in_one_go_sees_no_views():
+    assert views_seen({'model': 'shape-basis', 'reconstruction': {
+        'steps': 1, 'batch_size': 2, 'max_views': 5}}) is None
+    assert views_seen({}) is None
+
+
+def test_a_missing_system_is_trained_and_then_found(study, small_batches):
+    [path] = have_systems(study, [TWO_STAGE]).values()
+    assert path == study.models / '2d3d-attention' / 'weights.safetensors'
+    bundle, card = load_weights(path), json.loads(path.with_suffix('.json').read_text())
+    assert bundle.attention is not None
+    assert card['views_seen'] == 9
+    assert card['objects'][0]['objects'] == 6
+    assert card['command'].startswith('active-recon paper systems ')
+    before = path.read_bytes()
+    assert have_systems(study, [TWO_STAGE]) == {TWO_STAGE: path}
+    assert path.read_bytes() == before
+
+
+def test_a_training_is_told_as_it_goes(study, small_batches):
+    from contextlib import contextmanager
+    from dataclasses import replace
+    told = []
+
+    @contextmanager
+    def progress(title, total):
+        done = []
+        yield lambda steps, note: done.append(steps)
+        told.append((title, total, sum(done)))
+
+    have_systems(replace(study, progress=progress), [System('plain', 'plain', '2d3d')])
+    assert ('plain: reconstruction', 2, 2) in told
+
+
+def test_weights_that_ship_are_taken_only_if_they_saw_as_many_views(
+        study, tiny, tmp_path, monkeypatch):
+    shipped = untrained(tmp_path / 'shipped', tiny, 0)
+    monkeypatch.setattr(weights_module, 'FOLDER', shipped.parent)
+    shipped.rename(shipped.with_name('r2n2.safetensors'))
+    shipped.with_suffix('.json').rename(shipped.with_name('r2n2.json'))
+    assert find_system(study, R2N2) is None  # 72 views, not 9
+    same = Study(study.data, study.models, study.out, samples=72)
+    assert find_system(same, R2N2) == shipped.with_name('r2n2.safetensors')
+    own = untrained(study.models / 'r2n2', tiny, 1)
+    assert find_system(same, R2N2) == own
+    assert find_system(same, JOINT) is None
+
+
+def test_a_system_of_64_cells_needs_a_truth_as_fine(study):
+    names = [system.name for system in systems.systems(study)]
+    assert 'ogn' in names
+    assert 'ogn-64' not in names
+
+
+def test_a_study_without_its_weights_says_how_to_get_some(tmp_path):
+    with pytest.raises(WeightsError, match='--model'):
+        _ = Study(model=str(tmp_path / 'none.safetensors')).weights

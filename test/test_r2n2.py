@@ -1,0 +1,74 @@
+"""3D-R2N2: its memory, its last doubling, and that it can learn."""
+
+from active_recon.models.r2n2 import ConvGRUCell, DoublingConv3d, R2n2, R2n2Config, SIZES
+from active_recon.training.losses import volume_loss
+from active_recon.voxels import iou
+import torch
+from torch import nn
+from torch.nn import functional
+from torch.testing import assert_close
+
+
+def test_the_latent_is_the_memory_laid_flat():
+    network = R2n2.from_config(SIZES['small'])
+    folded, hidden = network.fold(torch.rand(2, 3, 64, 64), torch.zeros(2))
+    assert hidden.shape == (2, 32, 4, 4, 4)
+    assert folded.latent.shape == (2, 128, 4, 4)
+    assert_close(folded.latent.flatten(), hidden.flatten())
+
+
+def test_the_memory_keeps_what_an_update_gate_of_1_tells_it_to_keep():
+    cell = ConvGRUCell(3, 2)
+    nn.init.constant_(cell.from_code.bias, 1e4)
+    hidden = torch.rand(1, 2, 4, 4, 4)
+    assert_close(cell(torch.zeros(1, 3), hidden), hidden)
+
+
+def test_the_memory_stays_between_minus_1_and_1():
+    cell, hidden = ConvGRUCell(3, 2), torch.zeros(1, 2, 4, 4, 4)
+    for code in 50 * torch.randn(20, 1, 3):
+        hidden = cell(code, hidden)
+        assert hidden.abs().max() <= 1
+
+
+def test_the_last_doubling_can_say_what_unpooling_and_a_convolution_say():
+    coarse, fine = torch.rand(2, 3, 4, 4, 4), nn.Conv3d(3, 1, 3, padding=1)
+    doubling = DoublingConv3d(3)
+    # A child at 0 sees its parent by two taps and the parent before by one; at 1 the reverse
+    taps = {0: ((0,), (1, 2), ()), 1: ((), (0, 1), (2,))}
+    with torch.no_grad():
+        for index, corner in enumerate(torch.cartesian_prod(*(torch.arange(2),) * 3).tolist()):
+            for cell in torch.cartesian_prod(*(torch.arange(3),) * 3).tolist():
+                x, y, z = (list(taps[c][t]) for c, t in zip(corner, cell, strict=True))
+                doubling.to_eight.weight[index, :, *cell] = (
+                    fine.weight[0][:, x][:, :, y][:, :, :, z].sum((1, 2, 3)))
+            doubling.to_eight.bias[index] = fine.bias[0]
+    assert_close(doubling(coarse), fine(functional.interpolate(coarse, scale_factor=2)))
+
+
+def test_the_published_decoder_doubles_three_times_and_the_small_one_too():
+    for config in (SIZES['small'], SIZES['published']):
+        with torch.device('meta'):
+            logits = R2n2.from_config(config).decode(
+                torch.empty(1, config.hidden_channels, 4, 4, 4))
+        assert logits.shape == (1, 32, 32, 32)
+
+
+def test_a_small_network_learns_one_object_by_heart(views):
+    torch.manual_seed(0)
+    network = R2n2.from_config(R2n2Config(
+        encoder_channels=(8, 8, 8, 16, 16, 16), code_channels=32, hidden_channels=16,
+        decoder_channels=(16, 16)))
+    optimizer = torch.optim.Adam(network.parameters(), 5e-3)
+    objects, chosen = torch.tensor([3, 3, 3]), torch.tensor([0, 7, 15])
+    images, truth = views.white(objects, chosen), views.voxels[objects]
+    best = 0.0
+    for _ in range(300):
+        seen, _ = network(images, views.azimuths[objects, chosen])
+        best = iou(seen.logits > 0, truth).min().item()
+        if best > 0.9:
+            break
+        optimizer.zero_grad()
+        volume_loss(seen.logits, truth.float(), 'bce').backward()
+        optimizer.step()
+    assert best > 0.9

@@ -1,0 +1,54 @@
+"""Training on two processes: one set of weights, and the loss curve of one process."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from active_recon.models.weights import load_weights
+import numpy as np
+import pytest
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+ROOT = Path(__file__).parents[1]
+
+
+def train(dataset, out, devices, steps, *more):
+    """Train by the command, in a process of its own; return the losses, step by step."""
+    environment = os.environ | {'OMP_NUM_THREADS': '1', 'PYTHONPATH': str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, '-m', 'active_recon.cli.main', 'train', dataset, '--validation', dataset,
+         '--out', out, '--steps', str(steps), '--threads', '1', '--devices', str(devices),
+         '--model', '2d3d', *more],
+        env=environment, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    events = EventAccumulator(str(out / 'tensorboard'))
+    events.Reload()
+    return np.array([event.value for event in events.Scalars('reconstruction/loss')]), done
+
+
+def test_two_processes_write_one_set_of_weights_and_one_log(dataset, tmp_path):
+    losses, done = train(dataset, tmp_path / 'run', 2, 2, '--batch-size', '4')
+    assert len(losses) == 2
+    assert np.isfinite(losses).all()
+    assert done.stdout.count('wrote ') == 1
+    assert load_weights(tmp_path / 'run' / 'weights.safetensors').model == '2d3d'
+
+
+def test_a_batch_that_cannot_be_shared_is_refused(dataset, tmp_path):
+    with pytest.raises(AssertionError, match='batch_size: expected a multiple of the 2 processes'):
+        train(dataset, tmp_path / 'run', 2, 1, '--batch-size', '3')
+
+
+@pytest.mark.slow
+def test_two_processes_give_the_loss_curve_of_one_within_noise(dataset, tmp_path):
+    def curve(name, devices, seed):
+        losses, _ = train(dataset, tmp_path / name, devices, 60, '--batch-size', '8', '--seed',
+                          str(seed))
+        return losses.reshape(6, 10).mean(axis=1)  # means of ten steps
+
+    alone = np.stack([curve(f'one-{seed}', 1, seed) for seed in range(4)])
+    together = np.stack([curve(f'two-{seed}', 2, seed) for seed in range(4)])
+    error = np.sqrt((alone.var(axis=0, ddof=1) + together.var(axis=0, ddof=1)) / 4)
+    assert (np.abs(alone.mean(axis=0) - together.mean(axis=0)) < 4 * error).all()
+    assert together.mean(axis=0)[-1] < 0.8 * together.mean(axis=0)[0]

@@ -1,0 +1,50 @@
+"""Contact sheets: what is drawn stands where it should, and the command writes it."""
+
+from active_recon.cli.main import app
+from active_recon.errors import DataError
+from active_recon.sheet import contact_sheet, sequence_sheet
+import cv2
+import numpy as np
+import pytest
+import torch
+import trimesh
+from typer.testing import CliRunner
+
+
+def run(*arguments):
+    """Run the command in this process; what the package refuses is raised."""
+    result = CliRunner().invoke(app, ['sheet', *map(str, arguments)])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def test_a_sequence_is_a_row_of_its_views():
+    images = torch.rand(3, 2, 3, 8, 8)
+    sheet = sequence_sheet(images)
+    assert sheet.shape == (16, 24, 3)
+    for t in range(3):
+        for b in range(2):
+            tile = sheet[b * 8:b * 8 + 8, t * 8:t * 8 + 8]
+            np.testing.assert_allclose(tile / 255, images[t, b].permute(1, 2, 0), atol=0.51 / 255)
+
+
+def test_objects_stand_row_by_row_and_what_is_left_over_is_background():
+    sheet = contact_sheet([trimesh.creation.box((1, 1, 1))] * 3, columns=2, tile=20)
+    assert sheet.shape == (40, 40, 3)
+    dark = (sheet < 255).any(axis=2).reshape(2, 20, 2, 20).any(axis=(1, 3))
+    assert dark.tolist() == [[True, True], [True, False]]
+
+
+def test_the_command_draws_a_category_or_the_training_images_of_a_dataset(dataset, tmp_path):
+    run(tmp_path / 'lamps.png', '--category', 'lamp', '--count', 2)
+    assert cv2.imread(str(tmp_path / 'lamps.png')).shape == (160, 8 * 160, 3)
+    run(tmp_path / 'new' / 'batch.png', '--training', dataset, '--count', 3)
+    assert cv2.imread(str(tmp_path / 'new' / 'batch.png')).shape == (3 * 64, 8 * 64, 3)
+
+
+def test_a_folder_without_meshes_or_objects_is_refused(tmp_path):
+    with pytest.raises(DataError, match='expected mesh files, found none'):
+        run(tmp_path / 'none.png', '--meshes', tmp_path)
+    with pytest.raises(DataError, match='has no folder ShapeNetRendering'):
+        run(tmp_path / 'none.png', '--training', tmp_path)
