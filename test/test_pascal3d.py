@@ -1,5 +1,6 @@
 """PASCAL3D+ in its own form: boxes, viewpoints and CAD models become objects of one view."""
 
+import json
 import math
 import re
 
@@ -243,3 +244,22 @@ def test_every_photograph_is_told_to_the_progress_once(root):
     told = []
     read_photographs(*list_photographs(root), progress=lambda: told.append(1))
     assert len(told) == 2
+
+
+def test_photographs_are_evaluated_at_their_single_view(root, tmp_path, monkeypatch, capsys):
+    from active_recon.cli.main import main
+    annotate(root, 'car_imagenet/two', annotated(truncated=1))
+    monkeypatch.setattr('torch.set_num_threads', lambda threads: None)
+    out = tmp_path / 'found.json'
+    monkeypatch.setattr('sys.argv', ['active-recon', 'evaluate', str(root), '--json', str(out),
+                                     '--threads', '1'])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert not end.value.code
+    found = json.loads(out.read_text())
+    assert found['objects'] == found['episodes'] == 1
+    assert [len(figures['iou']) for figures in found['policies'].values()] == [1] * 4
+    assert len(found['unreadable']) == 1
+    told = capsys.readouterr().err
+    assert 'objects of 1 views: 1 views from 1 starts' in told
+    assert 'objects: 1 read, 0 missing, 1 left out' in told

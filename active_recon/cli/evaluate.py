@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    data: Annotated[Path, typer.Argument(help="Folder of objects in R2N2's layout.")],
+    data: Annotated[Path, typer.Argument(
+        help="Folder of objects in R2N2's layout, or PASCAL3D+'s, whose photographs are measured "
+             'at a single view.')],
     model: Annotated[str | None, typer.Option(
         help='A model that ships, by its name, or a .safetensors file; default: '
              '2d3d-attention.')] = None,
@@ -71,8 +73,13 @@ def evaluate(
     attentions = [bundle.attention] if bundle.attention else []
     names = policy.split(',') if policy else [
         'random', 'uniform', 'farthest', *(['attention'] if attentions else [])]
-    every = contenders(names, attentions, views, seeds, seed)
     held_out = read_objects([data], 'objects', network.resolution, split_file, 'test')
+    shown = held_out.azimuths.shape[1]
+    if max(views, starts) > shown:
+        typer.echo(f'objects of {shown} views: {min(views, shown)} views from '
+                   f'{min(starts, shown)} starts are measured', err=True)
+    views, starts = min(views, shown), min(starts, shown)
+    every = contenders(names, attentions, views, seeds, seed)
     trial = Trial(network, threshold, held_out, starts, views, seed, bf16, cache)
     result: dict[str, Any] = {
         'command': ' '.join(['active-recon', *sys.argv[1:]]),
@@ -88,7 +95,7 @@ def evaluate(
                                    lambda done: advance(done, ''))
     typer.echo("IoU by the front's yaw: " + ', '.join(
         f'{yaw} deg {values["mean"]:.3f}' for yaw, values in result['yaw'].items()))
-    if bundle.attention and 'attention' in names and len(held_out) > 1:
+    if bundle.attention and 'attention' in names and len(held_out) > 1 and views > 1:
         with progress_bar("other objects' latents", 2 * len(objects)) as advance:
             seeing = blindness(network, AttentionPolicy(bundle.attention), held_out, objects,
                                first, threshold, views, lambda done: advance(done, ''))

@@ -20,12 +20,15 @@ def read_objects(roots: Sequence[Path], title: str, resolution: int = 32,
     """
     Read the objects of some datasets into memory, their truth with so many cells a side.
 
-    With a `split`, only those of its `part` (train, val or test).
+    With a `split`, only those of its `part` (train, val or test). A single root may be PASCAL3D+'s
+    folder, whose photographs are objects of one view each.
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.splits import list_split
     from active_recon.datasets.views import read_views
 
+    if len(roots) == 1 and (roots[0] / 'Annotations').is_dir():
+        return _read_photographs(roots[0], title, resolution)
     folders, missing = [], []
     for root in roots:
         found, lacking = list_split(root, split, part) if split else (list_objects(root), [])
@@ -33,9 +36,25 @@ def read_objects(roots: Sequence[Path], title: str, resolution: int = 32,
         missing += lacking
     with progress_bar(f'reading {title}', len(folders)) as advance:
         views = read_views(folders, lambda: advance(1, ''), resolution)
-    for refusal in (*missing, *views.unreadable):
-        typer.echo(f'left out: {refusal}', err=True)
-    if missing or views.unreadable:
-        typer.echo(f'{title}: {len(views)} objects read, {len(missing)} missing, '
-                   f'{len(views.unreadable)} unreadable', err=True)
+    _tell_left_out(title, len(views), missing, views.unreadable)
     return views
+
+
+def _read_photographs(root: Path, title: str, resolution: int) -> 'ViewSet':
+    from active_recon.datasets.pascal3d import list_photographs
+    from active_recon.datasets.photographs import read_photographs
+
+    photographs, left_out = list_photographs(root)
+    with progress_bar(f'reading {title}', len(photographs)) as advance:
+        views = read_photographs(photographs, left_out, lambda: advance(1, ''), resolution)
+    _tell_left_out(title, len(views), (), views.unreadable)
+    return views
+
+
+def _tell_left_out(title: str, count: int, missing: Sequence[str],
+                   unreadable: Sequence[str]) -> None:
+    for refusal in (*missing, *unreadable):
+        typer.echo(f'left out: {refusal}', err=True)
+    if missing or unreadable:
+        typer.echo(f'{title}: {count} read, {len(missing)} missing, {len(unreadable)} left out',
+                   err=True)

@@ -43,12 +43,12 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
 
     from active_recon.datasets.making import MESH_SUFFIXES
     from active_recon.meshes import load_mesh
-    from active_recon.shapes import CATEGORIES, make_shape
+    from active_recon.shapes import ALL_CATEGORIES, make_shape
     from active_recon.sheet import contact_sheet
 
     if meshes is None:
         objects = [make_shape(name, seed)
-                   for name in category or CATEGORIES for seed in range(count)]
+                   for name in category or ALL_CATEGORIES for seed in range(count)]
     else:
         objects = [load_mesh(path) for path in sorted(meshes.rglob('*'))
                    if path.suffix.lower() in MESH_SUFFIXES]
