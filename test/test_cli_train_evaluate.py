@@ -204,3 +204,31 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
 def test_settings_that_train_nothing_are_refused(
         dataset, tmp_path, monkeypatch, capsys, option, value, words):
     assert words in refusal(monkeypatch, capsys, *training(dataset, tmp_path, option, value))
+
+
+def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given(
+        run, dataset, tmp_path, monkeypatch, capsys):
+    out = tmp_path / 'further'
+    given = load_file(run / 'weights.safetensors')
+    assert command(monkeypatch, *training(
+        dataset, out, '--begin-with', run / 'weights.safetensors', '--learning-rate', 1e-9,
+        '--policy-steps', 0)) == 0
+    name = 'reconstruction.encoder.memory.gates.weight'
+    after = load_file(out / 'weights.safetensors')
+    assert_close(after[name].float(), given[name].float(), rtol=2e-3, atol=1e-4)
+    card = json.loads((out / 'weights.json').read_text())
+    assert card['begun_with']['sha256'] == weights_hash(run / 'weights.safetensors')
+    assert 'got both' in refusal(monkeypatch, capsys, *training(
+        dataset, tmp_path / 'none', '--begin-with', run / 'weights.safetensors', '--from',
+        run / 'weights.safetensors'))
+
+
+def test_a_policy_alone_leaves_its_reconstruction_as_it_was(run, dataset, tmp_path, monkeypatch):
+    out = tmp_path / 'policy'
+    assert command(monkeypatch, *training(
+        dataset, out, '--from', run / 'weights.safetensors', '--seed', 3)) == 0
+    before, after = (load_file(folder / 'weights.safetensors') for folder in (run, out))
+    for name, tensor in before.items():
+        same = bool((after[name] == tensor).all())
+        assert same == name.startswith('reconstruction.') or not tensor.any(), name
+    assert not (out / 'reconstruction.safetensors').exists()

@@ -1,14 +1,18 @@
 """`active-recon train`: the schemes and stages, with a progress bar, checkpoints and a log."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 import sys
-from typing import Annotated
+from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import read_objects, Split
 from active_recon.errors import ConfigError
 import typer
+
+if TYPE_CHECKING:
+    from active_recon.models.weights import Bundle
 
 
 def train(
@@ -31,6 +35,8 @@ def train(
     begin_from: Annotated[str | None, typer.Option(
         '--from', help='Weights (or the name of a model that ships) whose reconstruction is '
                        'taken as it is: only a policy is trained on it.')] = None,
+    begin_with: Annotated[str | None, typer.Option(
+        help='The same, but the reconstruction is trained further.')] = None,
     steps: Annotated[int, typer.Option(min=1, help='Steps of the reconstruction.')] = 12000,
     policy_steps: Annotated[int, typer.Option(
         min=0, help='Steps of the view policy; 0 leaves it out.')] = 800,
@@ -40,6 +46,8 @@ def train(
     policy_learning_rate: Annotated[float, typer.Option(help='The same, of the policy.')] = 5e-4,
     max_views: Annotated[int, typer.Option(
         min=1, max=24, help='Longest sequence of views that is learned from.')] = 5,
+    short_share: Annotated[float, typer.Option(
+        help='Share of the steps, from the first on, with sequences of two views at most.')] = 0.5,
     volume_loss: Annotated[str | None, typer.Option(
         help="mse (the paper), bce, dice, mse+dice; default: the network's own.")] = None,
     volume_weight: Annotated[float | None, typer.Option(
@@ -68,7 +76,7 @@ def train(
     """
     from active_recon.config import LossConfig
     from active_recon.models.registry import network_entry
-    from active_recon.models.weights import find_weights, load_weights, save_weights
+    from active_recon.models.weights import find_weights, save_weights
     from active_recon.shapes import generators_hash
     from active_recon.training.loop import make_fabric, TrainingConfig
     from active_recon.training.plan import Plan, train_plan
@@ -80,19 +88,24 @@ def train(
     if not resume and any((out / f'{stage}.safetensors').exists() for stage in stages):
         raise ConfigError(f'{out}: expected a new run folder, but it holds checkpoints; go on '
                           'with --resume, or name another folder by --out')
+    if begin_from and begin_with:
+        raise ConfigError('expected --from or --begin-with, got both')
+    begun = begin_from or begin_with
     entry = network_entry(model)
     loss = LossConfig(
         entry.loss.volume_weight if volume_weight is None else volume_weight,
         entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
         volume_loss or entry.loss.volume_loss)
-    first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, varied)
+    first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, varied,
+                           short_share)
     second = TrainingConfig(
         max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed,
         bfloat16=False, varied=False, warm_up=20, checkpoint_every=50, validate_every=250)
     with_policy = entry.attentive and scheme == 'two-stage' and policy_steps > 0
     plan = Plan(model, size, loss, first, second if with_policy else None,
                 joint=scheme == 'joint',
-                begun=load_weights(find_weights(begin_from)) if begin_from else None)
+                begun=_begun(find_weights(begun)) if begun else None,
+                frozen=begin_with is None)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
     fabric = make_fabric(bf16, devices, nodes)
@@ -109,6 +122,12 @@ def train(
         save_weights(weights, bundle)
         typer.echo(f'threshold {bundle.threshold:.2f}, chosen on validation\n'
                    f'wrote {weights} and its card')
+
+
+def _begun(path: Path) -> 'Bundle':
+    from active_recon.models.weights import load_weights, read_card
+
+    return replace(load_weights(path), card=read_card(path))
 
 
 class _reporting:  # noqa: N801  (a context manager that reads as one)

@@ -111,6 +111,13 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
     return bundle
 
 
+def read_card(path: Path) -> dict[str, Any]:
+    """Return the card beside weights; empty where there is none."""
+    beside = path.with_suffix('.json')
+    card: dict[str, Any] = json.loads(beside.read_text()) if beside.is_file() else {}
+    return card
+
+
 def weights_hash(path: Path | None = None) -> str:
     """Return the SHA-256 of a weights file; None is the one that ships."""
     return hashlib.sha256((path or SHIPPED).read_bytes()).hexdigest()

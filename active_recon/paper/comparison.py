@@ -17,7 +17,7 @@ from active_recon.evaluation.metrics import episodes, THRESHOLDS
 from active_recon.evaluation.statistics import Interval, Values
 from active_recon.models.ogn import octree_report, Ogn
 from active_recon.models.registry import network_entry
-from active_recon.models.weights import find_weights, load_weights, weights_hash
+from active_recon.models.weights import find_weights, load_weights, read_card, weights_hash
 from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.measured import measure, Measured
 from active_recon.paper.results import Claim, Column, Table
@@ -27,7 +27,6 @@ from active_recon.paper.systems import (
     MODEL,
     systems,
     views_seen,
-    weights_card,
 )
 from active_recon.voxels import RESOLUTION
 import torch
@@ -141,7 +140,7 @@ def cost_table(study: Study, rows: list[Compared]) -> Table:
     """Return how large every system is, what a view costs, and what it was trained on."""
     costs: dict[str, list[Any]] = {}
     for row in rows:
-        bundle, card = load_weights(row.weights), weights_card(row.weights)
+        bundle, card = load_weights(row.weights), read_card(row.weights)
         parameters = sum(part.numel() for part in bundle.reconstruction.parameters())
         costs[row.label] = [
             parameters or None, _million_operations(study, row), views_seen(card) or 'fitted',

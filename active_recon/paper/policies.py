@@ -9,7 +9,7 @@ from active_recon.config import LossConfig, RewardConfig
 from active_recon.evaluation.policy_study import policy_study
 from active_recon.evaluation.statistics import Interval
 from active_recon.evaluation.trial import Trial
-from active_recon.models.weights import load_weights, weights_hash
+from active_recon.models.weights import load_weights, read_card, weights_hash
 from active_recon.paper.claims import all_larger, headroom, larger
 from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
 from active_recon.paper.results import Cell, Claim, Column, Result, Table
@@ -20,7 +20,6 @@ from active_recon.paper.systems import (
     run_plan,
     training_plan,
     TWO_STAGE,
-    weights_card,
 )
 from active_recon.paper.writing import provenance
 from active_recon.training.loop import TrainingConfig
@@ -47,7 +46,7 @@ def weights(study: Study) -> list[Path]:
 
 
 def _plan(study: Study, first: Path) -> Plan:
-    card = weights_card(first).get('policy') or {}
+    card = read_card(first).get('policy') or {}
     told = {each.name: card[each.name] for each in fields(TrainingConfig) if each.name in card}
     rewards = {each.name: card[each.name] for each in fields(RewardConfig) if each.name in card}
     policy = TrainingConfig(**told) if 'steps' in told else policy_training(study.samples)

@@ -3,14 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-import json
 from pathlib import Path
 from typing import Any
 
 from active_recon.config import LossConfig
 from active_recon.errors import WeightsError
 from active_recon.models.registry import network_entry, NETWORKS
-from active_recon.models.weights import find_weights, save_weights
+from active_recon.models.weights import find_weights, read_card, save_weights
 from active_recon.paper.study import Objects, Study
 from active_recon.training.loop import make_fabric, Measured, TrainingConfig
 from active_recon.training.plan import Plan, Report, seeded, train_plan
@@ -80,7 +79,7 @@ def find_system(study: Study, system: System) -> Path | None:
         shipped = find_weights(system.name)
     except WeightsError:
         return None
-    seen = views_seen(weights_card(shipped)) if shipped.is_file() else None
+    seen = views_seen(read_card(shipped)) if shipped.is_file() else None
     return shipped if seen and abs(seen / study.samples - 1) < 0.1 else None
 
 
@@ -159,12 +158,5 @@ def views_seen(card: Mapping[str, Any]) -> int | None:
     if not {'steps', 'batch_size', 'max_views'} <= set(training):
         return None
     length = (training['max_views'] if card.get('scheme') == 'joint'
-              else mean_length(training['max_views']))
+              else mean_length(training['max_views'], training.get('short_share', 0.5)))
     return int(training['steps'] * training['batch_size'] * length)
-
-
-def weights_card(weights: Path) -> dict[str, Any]:
-    """Return the card beside weights; empty where there is none."""
-    path = weights.with_suffix('.json')
-    card: dict[str, Any] = json.loads(path.read_text()) if path.is_file() else {}
-    return card

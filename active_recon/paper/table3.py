@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from active_recon.evaluation.statistics import Interval, mean_interval, Values
+from active_recon.models.weights import read_card
 from active_recon.paper import published
 from active_recon.paper.claims import all_larger, FAILS, HOLDS, larger, OPEN
 from active_recon.paper.comparison import (
@@ -23,7 +24,7 @@ from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
 from active_recon.paper.results import Claim, Column, plain, Result, Table
 from active_recon.paper.spreads import per_view, unweighted
 from active_recon.paper.study import REAL, Study
-from active_recon.paper.systems import JOINT, TWO_STAGE, weights_card
+from active_recon.paper.systems import JOINT, TWO_STAGE
 from active_recon.paper.writing import provenance
 from active_recon.shapes import CATEGORIES
 import numpy as np
@@ -59,7 +60,7 @@ def make(study: Study) -> Result:
     tables += [yaw_table(study, rows), cost_table(study, rows)]
     octree = octree_table(study, rows)
     tables += [octree] if octree else []
-    told = [same_training({row.label: weights_card(row.weights) for row in rows
+    told = [same_training({row.label: read_card(row.weights) for row in rows
                            if row.rival or row.label in (_OWN, JOINT.label)}),
             *claims(rows, found)]
     text = (

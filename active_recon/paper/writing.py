@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import DataError
-from active_recon.models.weights import weights_hash
+from active_recon.models.weights import read_card, weights_hash
 from active_recon.paper.claims import sentences
 from active_recon.paper.results import Claim, Result
 from active_recon.paper.study import Objects, Study
-from active_recon.paper.systems import views_seen, weights_card
+from active_recon.paper.systems import views_seen
 from PIL import Image
 
 Inputs = Mapping[str, Any]
@@ -28,7 +28,7 @@ def provenance(study: Study, sets: Mapping[str, Objects], weights: Mapping[str, 
 
 
 def _origin(weights: Path) -> dict[str, Any]:
-    card = weights_card(weights)
+    card = read_card(weights)
     return {'file': str(weights), 'sha256': weights_hash(weights),
             'threshold': card.get('threshold'), 'views seen in training': views_seen(card)}
 

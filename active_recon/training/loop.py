@@ -19,7 +19,12 @@ Measured = dict[str, float]
 
 @dataclass(frozen=True)
 class TrainingConfig(Config):
-    """How a stage is trained; what it is trained on and the sizes stand elsewhere."""
+    """
+    How a stage is trained; what it is trained on and the sizes stand elsewhere.
+
+    `short_share` is the share of the steps, from the first on, in which a reconstruction learns
+    from sequences of two views at most.
+    """
 
     steps: int
     batch_size: int = 16
@@ -28,6 +33,7 @@ class TrainingConfig(Config):
     seed: int = 0
     bfloat16: bool = True
     varied: bool = True
+    short_share: float = 0.5
     warm_up: int = 200
     checkpoint_every: int = 200
     validate_every: int = 500
@@ -37,6 +43,9 @@ class TrainingConfig(Config):
         if min(self.steps, self.batch_size, self.max_views, self.warm_up, self.checkpoint_every,
                self.validate_every) < 1 or not self.learning_rate > 0:
             raise ConfigError(f'TrainingConfig: expected numbers above 0, got {self.to_dict()}')
+        if not 0 <= self.short_share <= 1:
+            raise ConfigError('TrainingConfig: expected a short_share from 0 to 1, got '
+                              f'{self.short_share}')
 
 
 class TrainingDivergedError(ActiveReconError):

@@ -31,7 +31,8 @@ class Plan:
     What is trained, and how.
 
     `policy` None leaves the view policy out; `joint` trains both together, as `reconstruction`
-    says. `begun` are weights whose reconstruction network is taken as it is.
+    says. `begun` are weights whose reconstruction network is taken, as it is if `frozen`, else to
+    be trained further.
     """
 
     model: str
@@ -42,6 +43,7 @@ class Plan:
     rewards: RewardConfig = RewardConfig()
     joint: bool = False
     begun: Bundle | None = None
+    frozen: bool = True
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained together."""
@@ -51,6 +53,8 @@ class Plan:
                               'policy; leave the policy out, or train 2d3d-attention')
         if self.joint and self.policy:
             raise ConfigError('expected the joint scheme or a policy stage, got both')
+        if self.begun and self.frozen and not self.policy:
+            raise ConfigError('expected a policy stage on a frozen reconstruction, got none')
 
     @property
     def config(self) -> Config:
@@ -69,6 +73,8 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
     entry = network_entry(plan.model)
     config = plan.config
     network = plan.begun.reconstruction if plan.begun else entry.build(config)
+    frozen = plan.begun is not None and plan.frozen
+    network.requires_grad_(not frozen)
     attention = AttentionModel.from_config(config) if isinstance(
         config, NetworkConfig) and (plan.joint or plan.policy) else None
 
@@ -83,12 +89,13 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
                           lambda model, _: reconstruction_iou(model, validation))
     elif entry.fit is not None:
         entry.fit(network, training.voxels, training.categories)
-    elif not plan.begun:
+    elif not frozen:
         with reporting('reconstruction', plan.reconstruction.steps) as report:
             train_reconstruction(network, training, plan.reconstruction, plan.loss,
                                  run('reconstruction', report),
                                  lambda model: reconstruction_iou(model, validation))
-    threshold = plan.begun.threshold if plan.begun else best_threshold(network, validation)
+    threshold = (plan.begun.threshold if plan.begun and plan.frozen
+                 else best_threshold(network, validation))
     if plan.policy and attention is not None:
         with reporting('policy', plan.policy.steps) as report:
             train_policy(network, attention, training, threshold, plan.policy, plan.rewards,
@@ -107,8 +114,10 @@ def _card(plan: Plan, training: ViewSet) -> dict[str, Any]:
         'scheme': 'joint' if plan.joint else 'two-stage',
         'policy': plan.policy.to_dict() | plan.rewards.to_dict() if plan.policy else None,
     }
-    if plan.begun:
+    if plan.begun and plan.frozen:
         card['reconstruction'] = plan.begun.card.get('reconstruction', {})
+    elif plan.begun:
+        card['begun_with'] = plan.begun.card
     return card
 
 

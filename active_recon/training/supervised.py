@@ -65,21 +65,23 @@ class ReconstructionLearner(nn.Module):
 
 def longest_sequence(step: int, config: TrainingConfig) -> int:
     """
-    Return how many views a sequence has at most: two in the first half of a training.
+    Return how many views a sequence has at most: two in the first part of a training.
 
     What one view says is learned first, and learned faster where no later views are paid for.
     """
-    return min(2, config.max_views) if 2 * step < config.steps else config.max_views
+    short = step < config.short_share * config.steps
+    return min(2, config.max_views) if short else config.max_views
 
 
-def steps_for(samples: int, batch_size: int, max_views: int) -> int:
+def steps_for(samples: int, batch_size: int, max_views: int, short_share: float = 0.5) -> int:
     """Return the steps in which a training sees about so many views."""
-    return max(1, round(samples / (batch_size * mean_length(max_views))))
+    return max(1, round(samples / (batch_size * mean_length(max_views, short_share))))
 
 
-def mean_length(max_views: int) -> float:
+def mean_length(max_views: int, short_share: float = 0.5) -> float:
     """Return how many views a sequence has on average, over a whole training."""
-    return ((min(2, max_views) + 1) / 2 + (max_views + 1) / 2) / 2
+    short, long = (min(2, max_views) + 1) / 2, (max_views + 1) / 2
+    return short_share * short + (1 - short_share) * long
 
 
 def train_reconstruction(
