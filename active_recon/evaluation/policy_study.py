@@ -19,13 +19,13 @@ from active_recon.evaluation.statistics import (
     Values,
 )
 from active_recon.evaluation.subsets import best_subsets
-from active_recon.evaluation.trial import Contender, state_hash, Trial
+from active_recon.evaluation.trial import Contender, Trial
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
-from active_recon.models.weights import load_weights
+from active_recon.models.weights import load_weights, state_hash
+from active_recon.policies import load_policy
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Choice, Policy
-from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,12 +60,10 @@ def contenders(names: Sequence[str], attentions: Sequence[AttentionModel] = (), 
     for name in names:
         match name:
             case 'random':
-                made += [Contender(name, f'random-{each}', RandomPolicy)
+                made += [Contender(name, f'random-{each}', partial(_blind, name, count))
                          for each in range(seed, seed + seeds)]
-            case 'uniform':
-                made.append(Contender(name, name, lambda rng: UniformPolicy(count)))
-            case 'farthest':
-                made.append(Contender(name, name, lambda rng: FarthestPolicy()))
+            case 'uniform' | 'farthest':
+                made.append(Contender(name, name, partial(_blind, name, count)))
             case 'attention':
                 if not attentions:
                     raise WeightsError('attention: expected weights with a view policy in them, '
@@ -173,6 +171,10 @@ def policy_study(trial: Trial, attentions: Sequence[AttentionModel] = (), seeds:
             found['best_subset'] = best_subsets(
                 trial, runs, subset_objects, lambda: advance(1, ''))
     return found
+
+
+def _blind(name: str, count: int, rng: np.random.Generator) -> Policy:
+    return load_policy(name, rng=rng, views=count)
 
 
 def _attentive(model: AttentionModel, rng: np.random.Generator) -> Policy:

@@ -14,10 +14,11 @@ from active_recon.evaluation.measure import Episodes, joined, run_oracle, run_po
 from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.rollouts import batches
 from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.weights import state_hash
 from active_recon.policies.base import Policy
 import numpy as np
 from numpy.typing import NDArray
-from torch import nn, Tensor
+from torch import Tensor
 
 _BLOCK = 2400  # episodes that are kept at once: a run that was cut off loses no more
 
@@ -85,15 +86,6 @@ class Trial:
         policy = contender.make(np.random.default_rng([*contender.key.encode(), block]))
         return run_policy(self.network, policy, self.views, objects, starts, self.threshold,
                           self.count, None, self.bfloat16, progress)
-
-
-def state_hash(module: nn.Module) -> str:
-    """Return the SHA-256 of all that a module holds, parameters and buffers."""
-    digest = hashlib.sha256()
-    for name, tensor in sorted(module.state_dict().items()):
-        digest.update(name.encode() + b'\0')
-        digest.update(tensor.detach().cpu().contiguous().numpy().tobytes())
-    return digest.hexdigest()
 
 
 def data_hash(views: ViewSet) -> str:

@@ -1,6 +1,7 @@
 """The 3D convolutional LSTM decoder of section 3.2: the attentive latent unit to occupancy."""
 
 from active_recon.models.encoder import group_norm, LATENT_GRID
+from active_recon.models.network import start_empty
 from active_recon.models.recurrent import ConvLSTMCell, LstmState
 from torch import nn, Tensor
 
@@ -26,9 +27,7 @@ class Decoder(nn.Module):
             nn.ConvTranspose3d(wide, narrow, 4, stride=2, padding=1), group_norm(narrow),
             nn.LeakyReLU(0.1),
             to_logits)
-        # Most of a grid is empty: a start at p = 0.1 spares the first thousand steps
-        assert to_logits.bias is not None
-        nn.init.constant_(to_logits.bias, -2.2)
+        start_empty(to_logits.bias)
 
     def remember(self, latent: Tensor, state: LstmState | None) -> LstmState:
         """Return the next state; a state of None is that of no view yet."""

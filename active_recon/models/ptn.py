@@ -6,6 +6,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.encoder import group_norm
 from active_recon.models.mean_code import ImageEncoder, MeanCodeNetwork
+from active_recon.models.network import start_empty
 from torch import nn, Tensor
 
 _COARSEST = 3  # cells a side of the decoder's first volume
@@ -61,9 +62,7 @@ class PerspectiveTransformerNet(MeanCodeNetwork):
             nn.ConvTranspose3d(wide, middle, 4), group_norm(middle), nn.ReLU(),  # 6 cells a side
             nn.ConvTranspose3d(middle, narrow, 5, stride=2), group_norm(narrow), nn.ReLU(),  # 15
             to_logits)
-        # Most of a grid is empty: a start at p = 0.1 spares the first thousand steps
-        assert to_logits.bias is not None
-        nn.init.constant_(to_logits.bias, -2.2)
+        start_empty(to_logits.bias)
 
     @classmethod
     def from_config(cls, config: PtnConfig) -> 'PerspectiveTransformerNet':

@@ -6,7 +6,7 @@ from itertools import pairwise
 from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.encoder import group_norm, LATENT_GRID
-from active_recon.models.network import Folded, ReconstructionNetwork
+from active_recon.models.network import Folded, ReconstructionNetwork, start_empty
 from torch import nn, Tensor
 
 _DOUBLINGS = 3  # from the memory's 4 cells a side to 32
@@ -150,8 +150,7 @@ class R2n2(ReconstructionNetwork):
         self.decoder = nn.Sequential(*stages, (
             DoublingConv3d(last) if len(decoder_channels) < _DOUBLINGS
             else nn.Conv3d(last, 1, 3, padding=1)))
-        # Most of a grid is empty: a start at p = 0.1 spares the first thousand steps
-        nn.init.constant_(list(self.decoder.parameters())[-1], -2.2)
+        start_empty(list(self.decoder.parameters())[-1])
 
     @classmethod
     def from_config(cls, config: R2n2Config) -> 'R2n2':

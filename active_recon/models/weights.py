@@ -123,6 +123,15 @@ def weights_hash(path: Path | None = None) -> str:
     return hashlib.sha256((path or SHIPPED).read_bytes()).hexdigest()
 
 
+def state_hash(module: nn.Module) -> str:
+    """Return the SHA-256 of all that a module holds, parameters and buffers."""
+    digest = hashlib.sha256()
+    for name, tensor in sorted(module.state_dict().items()):
+        digest.update(name.encode() + b'\0')
+        digest.update(tensor.detach().cpu().contiguous().numpy().tobytes())
+    return digest.hexdigest()
+
+
 def _parts(bundle: Bundle) -> dict[str, nn.Module]:
     parts: dict[str, nn.Module] = {'reconstruction': bundle.reconstruction}
     return parts if bundle.attention is None else parts | {'attention': bundle.attention}

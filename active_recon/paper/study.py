@@ -1,7 +1,5 @@
 """What is measured, on what, and how: the settings that all parts share."""
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 import hashlib
@@ -12,21 +10,14 @@ from active_recon.datasets.layout import list_objects, ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.errors import DataError, WeightsError
+from active_recon.evaluation.policy_study import Reporting, silent
 from active_recon.models.weights import find_weights
 from active_recon.voxels import RESOLUTION
 
-Progress = Callable[[str, int], AbstractContextManager[Callable[[int, str], None]]]
-"""Opens a bar, given its title and its number of steps; what it yields takes steps and a note."""
 SAMPLES = 150_000
 REAL = {'real_val': 'real models, `val`', 'real_cc0': 'real models that ship (CC0)',
         'real_unseen': 'real models of unseen categories'}
 """Folders of real models, rendered, which are measured where they are present."""
-
-
-@contextmanager
-def silent(title: str, total: int) -> Iterator[Callable[[int, str], None]]:
-    """Show no progress."""
-    yield lambda steps, note: None
 
 
 @dataclass(frozen=True)
@@ -93,7 +84,7 @@ class Study:
     policy_starts: int = 24
     device: str = 'cpu'
     views: int = 5
-    progress: Progress = field(default=silent, compare=False)
+    progress: Reporting = field(default=silent, compare=False)
 
     def objects(self, name: str, category: str = '', resolution: int = RESOLUTION) -> Objects:
         """Return the objects of a folder of the data."""

@@ -67,8 +67,8 @@ def make(study: Study) -> Result:
     spreads = {part: {pair: mean_interval(one) for pair, one in found.items()}
                for part, found in values.items()}
     text = (
-        'Mean IoU over 1 to 5 random views of a {CATEGORY}, under seven pairs of the weights of '
-        f'volume and silhouette loss. Each of the seven networks saw {SHARE:.0%} of the views of '
+        f'Mean IoU over 1 to {study.views} random views of a {CATEGORY}, under seven pairs of the '
+        f'weights of volume and silhouette loss. Each of the seven networks saw {SHARE:.0%} of the views of '
         f'a compared system, on the same {COUNTS["train"]} parametric ones and from the '
         f'same seed; `test` are {COUNTS["test"]} others. There is one training for each pair, so '
         'the intervals hold the spread of objects, not that of trainings. These weights serve '

@@ -42,7 +42,6 @@ def timed_runs(study: Study) -> list[dict[str, Any]]:
     return found[1:]
 
 
-
 def over_runs(values: list[float]) -> Interval:
     """Return the mean over runs and its 95 % interval, runs drawn anew."""
     return mean_interval(np.array(values))

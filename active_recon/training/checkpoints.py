@@ -1,7 +1,6 @@
 """Training checkpoints: safetensors for the numbers, JSON for the rest; never pickle."""
 
 from dataclasses import dataclass
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -70,12 +69,3 @@ def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
         raise ConfigError(f'{path}: expected a checkpoint of the same settings ({settings}), '
                           f'got {stored.settings}')
     return stored
-
-
-def parameters_hash(module: nn.Module) -> str:
-    """Return the SHA-256 of a module's parameters: a checkpoint built on others is refused."""
-    digest = hashlib.sha256()
-    for name, parameter in sorted(module.named_parameters()):
-        digest.update(name.encode() + b'\0')
-        digest.update(parameter.detach().cpu().contiguous().numpy().tobytes())
-    return digest.hexdigest()

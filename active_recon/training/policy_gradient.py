@@ -10,8 +10,8 @@ from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.rollouts import nearest_views
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.weights import state_hash
 from active_recon.silhouettes import frustum, project_all
-from active_recon.training.checkpoints import parameters_hash
 from active_recon.training.loop import (
     Draw,
     Measured,
@@ -192,7 +192,7 @@ def train_policy(
     """Train the attention model in place on a frozen network; see `train_steps`."""
     size = share_of_batch(config, run.fabric)
     settings = {'training': config.to_dict(), 'reward': rewards.to_dict(), 'threshold': threshold,
-                'network': parameters_hash(network)}
+                'network': state_hash(network)}
     train_steps(
         run, PolicyLearner(network, attention, views, threshold, config.max_views, rewards),
         attention, config, settings, views,
