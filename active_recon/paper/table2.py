@@ -70,9 +70,9 @@ def make(study: Study) -> Result:
         f'Mean IoU over 1 to {study.views} random views of a {CATEGORY}, under seven pairs of the '
         f'weights of volume and silhouette loss. Each of the seven networks saw {SHARE:.0%} of '
         f'the views of a compared system, on the same {COUNTS["train"]} parametric ones and from '
-        f'the same seed; `test` are {COUNTS["test"]} others. There is one training for each pair, so '
-        'the intervals hold the spread of objects, not that of trainings. These weights serve '
-        'this table alone: they do not ship, and no weights that ship know the category.')
+        f'the same seed; `test` are {COUNTS["test"]} others. There is one training for each '
+        'pair, so the intervals hold the spread of objects, not that of trainings. These weights '
+        'serve this table alone: they do not ship, and no weights that ship know the category.')
     rows = {_name(pair): (spreads['train'][pair], spreads['test'][pair]) for pair in trained}
     return Result(f'Table 2: weights of the two losses, {CATEGORY}', text,
                   [_table(rows)], claims(values['test']), _picture(rows))
