@@ -99,8 +99,8 @@ def train(
     first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, varied,
                            short_share)
     second = TrainingConfig(
-        max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed,
-        bfloat16=False, varied=False, warm_up=20, checkpoint_every=50, validate_every=250)
+        max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed, bf16,
+        varied=False, warm_up=20, checkpoint_every=50, validate_every=250)
     with_policy = entry.attentive and scheme == 'two-stage' and policy_steps > 0
     plan = Plan(model, size, loss, first, second if with_policy else None,
                 joint=scheme == 'joint',

@@ -145,9 +145,8 @@ def training_plan(system: System, samples: int) -> Plan:
 def policy_training(samples: int) -> TrainingConfig:
     """Return how a view policy is trained beside a reconstruction that saw so many views."""
     steps = max(1, round(POLICY_SHARE * samples / (POLICY_BATCH * MAX_VIEWS)))
-    return TrainingConfig(steps, POLICY_BATCH, POLICY_LEARNING_RATE, MAX_VIEWS, bfloat16=False,
-                          varied=False, warm_up=min(20, steps), checkpoint_every=50,
-                          validate_every=250)
+    return TrainingConfig(steps, POLICY_BATCH, POLICY_LEARNING_RATE, MAX_VIEWS, varied=False,
+                          warm_up=min(20, steps), checkpoint_every=50, validate_every=250)
 
 
 def views_seen(card: Mapping[str, Any]) -> int | None:
