@@ -1,0 +1,94 @@
+"""A recorded run, as plain numbers: what a bag is read into, replayed from and reported on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from active_recon.cameras import Camera
+from active_recon.voxels import VoxelGrid
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class TopicSummary:
+    """A topic of a bag: its full name, its type as in 'std_msgs/msg/Header', its messages."""
+
+    name: str
+    type_name: str
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedGoal:
+    """
+    Where the planner wanted to look, and what it thought of every candidate.
+
+    - azimuth: radians, object frame; stamp: the goal's identity, nanoseconds
+    - candidates (radians) and scores: (N,) each, None where they were not recorded
+    - received: when the recorder received the goal, nanoseconds
+    """
+
+    azimuth: float
+    stamp: int
+    candidates: NDArray[np.float64] | None
+    scores: NDArray[np.float32] | None
+    received: int
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedView:
+    """
+    A view that the network took in, and what was known after it; None: not recorded.
+
+    - stamp: of the image, nanoseconds; image: (H, W, 3) uint8 RGB; camera: in the object frame
+    - reconstruction: the probabilities, 0 where they were below the floor that is published
+    - occupied: the cells above the threshold
+    - latent: A_t, (C, h, w); entropy: nats
+    - goal: decided after this view; None too where the episode was done
+    - received: when each message of the view was received, nanoseconds, by the topic's name in
+      the loop: 'camera/image_raw', 'view', 'occupancy', 'probabilities', 'entropy', ...
+    """
+
+    stamp: int
+    image: NDArray[np.uint8]
+    camera: Camera
+    reconstruction: VoxelGrid | None
+    occupied: VoxelGrid | None
+    latent: NDArray[np.float32] | None
+    entropy: float | None
+    goal: RecordedGoal | None
+    received: Mapping[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedEpisode:
+    """One object's views; `begin` in nanoseconds, `done` the reason for the end, '' if none."""
+
+    id: str
+    begin: int
+    first_goal: RecordedGoal | None
+    views: Sequence[RecordedView]
+    done: str
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRun:
+    """
+    All episodes of a bag, and what it says of itself.
+
+    - provenance: the bag's own record of versions, hashes, policy, seed and object; others' bags
+      have none
+    - parameters: by node; counters: the last of `/diagnostics`, by node
+    - begin, end: receive times of the first and the last message, nanoseconds
+    """
+
+    path: Path
+    episodes: Sequence[RecordedEpisode]
+    provenance: Mapping[str, str]
+    parameters: Mapping[str, Mapping[str, Any]]
+    counters: Mapping[str, Mapping[str, int]]
+    topics: Sequence[TopicSummary]
+    begin: int
+    end: int
