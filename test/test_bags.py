@@ -1,55 +1,24 @@
-"""Bags: what is written is what readers that we did not write read, also where the disk fills."""
+"""Bags: what is written is what readers that we did not write read."""
 
-from pathlib import Path
-import resource
-import subprocess
-import sys
-
-from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import RecordingError
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-import numpy as np
 import pytest
+from recorded_messages import (
+    announced,
+    cdr,
+    definition,
+    doctor,
+    HEADER,
+    header,
+    IMAGE,
+    image,
+    time_of,
+)
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
-from rosbags.typesys import get_typestore, Stores
-
-STORE = get_typestore(Stores.ROS2_JAZZY)
-HEADER, IMAGE = 'std_msgs/msg/Header', 'sensor_msgs/msg/Image'
-LATCHED = QosProfile(durability='transient_local')
-SENSOR = QosProfile(reliability='best_effort')
-
-
-def definition(type_name):
-    return STORE.generate_msgdef(type_name, ros_version=2)[0]
-
-
-def header(number):
-    time = STORE.types['builtin_interfaces/msg/Time'](sec=1_700_000_000 + number, nanosec=number)
-    return STORE.types[HEADER](stamp=time, frame_id=f'episode {number}')
-
-
-def image(number, side=8):
-    pixels = np.random.default_rng(number).integers(0, 256, side * side * 3, np.uint8)
-    return STORE.types[IMAGE](header=header(number), height=side, width=side, encoding='rgb8',
-                              is_bigendian=0, step=3 * side, data=pixels)
-
-
-def cdr(message):
-    return bytes(STORE.serialize_cdr(message, message.__msgtype__))
-
-
-def time_of(number):
-    return 1_700_000_000_000_000_000 + number * 1_000_000
-
-
-def announced(folder):
-    bag = BagWriter(folder)
-    bag.add_topic('/episode', HEADER, definition(HEADER), (LATCHED,))
-    bag.add_topic('/camera/image_raw', IMAGE, definition(IMAGE), (SENSOR,))
-    return bag
+import yaml
 
 
 @pytest.fixture
@@ -108,11 +77,6 @@ def test_metadata_tells_the_publishers_qos_and_the_counts(bag):
     assert counts == {'/episode': 20, '/camera/image_raw': 20}
 
 
-def doctor(path):
-    program = Path(sys.executable).with_name('pymcap-cli')
-    return subprocess.run([program, 'doctor', path], capture_output=True, text=True, timeout=60)
-
-
 def test_a_checker_of_mcap_files_finds_nothing_wrong(bag):
     report = doctor(bag.path)
     assert report.returncode == 0, report.stdout + report.stderr
@@ -149,7 +113,7 @@ def test_a_large_stream_reaches_the_disk_without_being_flushed(tmp_path):
 
 def test_no_bag_is_written_over_another(bag):
     before = bag.path.read_bytes()
-    with pytest.raises(RecordingError, match='expected to begin a new bag.*metadata.yaml'):
+    with pytest.raises(RecordingError, match='expected to begin a new bag.*exists'):
         BagWriter(bag.folder)
     (bag.folder / 'metadata.yaml').unlink()
     with pytest.raises(RecordingError, match='expected to begin a new bag.*exists'):
@@ -177,37 +141,51 @@ def test_a_closed_bag_takes_nothing_and_closes_again_in_peace(bag):
     bag.close()
 
 
-@pytest.fixture
-def small_disk():
-    """Files end at 100 kB here, and say so as a full disk does."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+def metadata_records(path):
+    with path.open('rb') as stream:
+        return [(record.name, record.metadata) for record in make_reader(stream).iter_metadata()]
 
 
-def test_a_full_disk_ends_the_bag_after_its_last_chunk(tmp_path, small_disk):
-    bag = announced(tmp_path / 'run')
-    flushed = 0
-    with pytest.raises(RecordingError, match='the disk took no more') as refusal:
-        for number in range(100):
-            bag.write('/camera/image_raw', cdr(image(number, 64)), time_of(number), 0)
-            bag.flush()
-            flushed += 1
-    assert refusal.value.kind == 'disk_full'
-    assert 5 < flushed < 9  # 12 kB each, which do not compress
-    bag.close()  # the refusal has closed it: no second error
-    for path in (bag.folder, bag.path):
-        with AnyReader([path]) as reader:
-            read = [bytes(data) for _, _, data in reader.messages()]
-        assert read == [cdr(image(number, 64)) for number in range(flushed)]
+def attachments(path):
+    with path.open('rb') as stream:
+        return {attachment.name: (attachment.media_type, yaml.safe_load(attachment.data))
+                for attachment in make_reader(stream).iter_attachments()}
+
+
+def test_provenance_and_parameters_stand_in_the_file_and_grow(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        bag.add_provenance({'version': '1'})
+        bag.attach_parameters('/arm/view_planner', {'policy': 'random', 'distance': float('nan')})
+        bag.add_provenance({'policy': 'random'})
+        bag.write('/episode', cdr(header(0)), time_of(0), time_of(0))
+    ours = [record for name, record in metadata_records(bag.path) if name == 'active_recon']
+    assert ours == [{'version': '1'}, {'version': '1', 'policy': 'random'}]
+    (media_type, parameters), = attachments(bag.path).values()
+    assert list(attachments(bag.path)) == ['parameters/arm/view_planner.yaml']
+    assert media_type == 'application/yaml'
+    assert parameters['policy'] == 'random' and parameters['distance'] != parameters['distance']
     assert doctor(bag.path).returncode == 0
 
 
-def test_a_disk_that_fills_while_the_bag_is_closed_is_told(tmp_path, small_disk):
-    bag = announced(tmp_path / 'run')
-    bag.write('/camera/image_raw', cdr(image(0, 256)), time_of(0), 0)
-    with pytest.raises(RecordingError, match='ends after 0 messages, 1 were lost'):
-        bag.close()
-    with AnyReader([bag.path]) as reader:
-        assert reader.message_count == 0
+def test_a_long_bag_is_split_by_size_and_read_as_one(tmp_path):
+    with announced(tmp_path / 'run', max_bytes=50_000) as bag:
+        bag.attach_parameters('/view_planner', {'seed': 3})
+        for number in range(20):
+            bag.write('/camera/image_raw', cdr(image(number, 64)), time_of(number), 0)
+            bag.add_provenance({'seed': '3'})
+    files = [bag.folder / f'run_{number}.mcap' for number in range(5)]
+    assert sorted(bag.folder.glob('*.mcap')) == files
+    assert all(50_000 <= file.stat().st_size < 70_000 for file in files[:-1])
+    with Reader(bag.folder) as reader:
+        assert reader.message_count == 20
+        assert [bytes(data) for _, _, data in reader.messages()] == [
+            cdr(image(number, 64)) for number in range(20)]
+    information = yaml.safe_load((bag.folder / 'metadata.yaml').read_text())
+    assert [(file['path'], file['message_count'])
+            for file in information['rosbag2_bagfile_information']['files']] == [
+        (file.name, 4) for file in files]
+    for file in files:
+        assert doctor(file).returncode == 0
+        assert attachments(file) == {
+            'parameters/view_planner.yaml': ('application/yaml', {'seed': 3})}
+        assert ('active_recon', {'seed': '3'}) in metadata_records(file)

@@ -1,12 +1,17 @@
 """rosbag2's description of a bag: what it holds, and the QoS its topics were offered with."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import yaml
 
 VERSION = 9  # of the description, as Jazzy writes it
+RELIABILITIES = ('reliable', 'best_effort')
+DURABILITIES = ('volatile', 'transient_local')
+PROVENANCE = 'active_recon'
+"""The name of the MCAP metadata record that says what made a bag; the last one of a file holds."""
 
 
 @dataclass(frozen=True)
@@ -28,23 +33,42 @@ class Topic:
     qos: tuple[QosProfile, ...] = ()
 
 
-def bag_information(file_name: str, topics: Sequence[Topic], counts: Mapping[str, int],
-                    begin: int, end: int) -> dict[str, Any]:
-    """
-    Return what metadata.yaml says of a bag of one MCAP file.
+@dataclass
+class Contents:
+    """How many messages each topic has, and the span of their receive times, nanoseconds."""
 
-    `counts` holds the messages of each topic; `begin` and `end` are the receive times of the
-    first and the last message, nanoseconds since 1970.
-    """
-    def span() -> dict[str, Any]:
-        return {'starting_time': {'nanoseconds_since_epoch': begin},
-                'duration': {'nanoseconds': end - begin},
-                'message_count': sum(counts.values())}
+    counts: Counter[str] = field(default_factory=Counter)
+    begin: int = 0
+    end: int = 0
 
+    def add(self, topic: str, time: int) -> None:
+        """Count one message."""
+        self.begin = min(self.begin, time) if self.counts else time
+        self.end = max(self.end, time)
+        self.counts[topic] += 1
+
+    def copy(self) -> 'Contents':
+        """Return what stays as it is while this goes on counting."""
+        return Contents(self.counts.copy(), self.begin, self.end)
+
+
+def total(parts: Iterable[Contents]) -> Contents:
+    """Return the contents of several files together."""
+    filled = [part for part in parts if part.counts]
+    if not filled:
+        return Contents()
+    counts = sum((part.counts for part in filled), Counter[str]())
+    return Contents(counts, min(part.begin for part in filled), max(part.end for part in filled))
+
+
+def bag_information(files: Sequence[tuple[str, Contents]],
+                    topics: Iterable[Topic]) -> dict[str, Any]:
+    """Return what metadata.yaml says of a bag of MCAP files, given by name and in their order."""
+    whole = total(contents for _, contents in files)
     return {
         'version': VERSION,
         'storage_identifier': 'mcap',
-        **span(),
+        **_span(whole),
         'topics_with_message_count': [{
             'topic_metadata': {
                 'name': topic.name,
@@ -53,15 +77,20 @@ def bag_information(file_name: str, topics: Sequence[Topic], counts: Mapping[str
                 'offered_qos_profiles': _offered(topic.qos),
                 'type_description_hash': '',
             },
-            'message_count': counts.get(topic.name, 0),
+            'message_count': whole.counts[topic.name],
         } for topic in topics],
         'compression_format': '',  # of rosbag2 itself: MCAP compresses its own chunks
         'compression_mode': '',
-        'relative_file_paths': [file_name],
-        'files': [{'path': file_name, **span()}],
+        'relative_file_paths': [name for name, _ in files],
+        'files': [{'path': name, **_span(contents)} for name, contents in files],
         'custom_data': None,
         'ros_distro': 'jazzy',
     }
+
+
+def parameters_name(node: str) -> str:
+    """Return the name of the attachment that holds a node's parameters, by its full name."""
+    return f'parameters/{node.strip("/")}.yaml'
 
 
 def metadata_yaml(information: dict[str, Any]) -> str:
@@ -77,6 +106,24 @@ def offered_qos_yaml(qos: Sequence[QosProfile]) -> str:
 def as_yaml(value: object) -> str:
     """Return the value as YAML, its keys in their order."""
     return str(yaml.safe_dump(value, sort_keys=False))
+
+
+def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
+    """Return the profiles that the channel of a topic carries; what is unknown is left out."""
+    try:
+        offered = yaml.safe_load(text) or []
+        return tuple(QosProfile(profile['reliability'], profile['durability'])
+                     for profile in offered
+                     if profile['reliability'] in RELIABILITIES
+                     and profile['durability'] in DURABILITIES)
+    except (yaml.YAMLError, TypeError, KeyError):
+        return ()
+
+
+def _span(contents: Contents) -> dict[str, Any]:
+    return {'starting_time': {'nanoseconds_since_epoch': contents.begin},
+            'duration': {'nanoseconds': contents.end - contents.begin},
+            'message_count': contents.counts.total()}
 
 
 def _offered(qos: Sequence[QosProfile]) -> list[dict[str, Any]]:

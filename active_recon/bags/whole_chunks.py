@@ -1,5 +1,6 @@
-"""The file under the MCAP writer, which a full disk does not tear in the middle of a chunk."""
+"""The file under the MCAP writer: after each flush it is one that readers open to its end."""
 
+import os
 from pathlib import Path
 
 from mcap.data_stream import RecordBuilder
@@ -11,8 +12,10 @@ class WholeChunks:
     """
     The stream under the MCAP writer: a flush reaches the file as a whole or not at all.
 
-    An ordinary buffered file would leave half a chunk behind where the disk is full, and would
-    try to write the rest again when it is closed.
+    After what was flushed stands an ending without a summary, which the next flush overwrites: a
+    file whose writer was killed needs no repair to be read, only to be indexed. An ordinary
+    buffered file would leave half a chunk behind where the disk is full, and would try to write
+    the rest again when it is closed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -36,27 +39,49 @@ class WholeChunks:
 
     def flush(self) -> None:
         """Write what waits; where that fails, OSError, and the file is as it was before."""
-        written = 0
-        try:
-            while written < len(self._pending):
-                written += self._file.write(self._pending[written:])
-        except OSError:
-            self._file.truncate(self._kept)
-            raise
-        self._kept += written
+        if not self._pending:
+            return
+        self._put(self._pending + _ENDING)
+        self._kept += len(self._pending)
         self._pending.clear()
 
+    def sync(self) -> None:
+        """Return when what was flushed would survive a power cut; OSError where it would not."""
+        os.fsync(self._file.fileno())
+
     def end(self) -> None:
-        """Drop what was not flushed and end the file without a summary: readers then scan it."""
-        self._file.truncate(self._kept)
-        self._file.seek(self._kept)
+        """Write what waits as the file's own end, and close it; OSError as `flush`."""
+        self._put(self._pending)
         self._pending.clear()
-        ending = RecordBuilder()
-        DataEnd(data_section_crc=0).write(ending)
-        Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(ending)
-        self.write(ending.end() + MCAP0_MAGIC)  # type: ignore[no-untyped-call]
-        self.flush()
+        self.sync()
+        self.close()
 
     def close(self) -> None:
         """Close the file as it is."""
         self._file.close()
+
+    def _put(self, data: bytes | bytearray) -> None:
+        """Write after what is kept, over the ending; put the ending back where that fails."""
+        try:
+            self._write_at_end(data)
+        except OSError:
+            # On the bytes that it stood on: there was room for it before.
+            self._write_at_end(_ENDING)
+            self._file.truncate(self._kept + len(_ENDING))
+            raise
+
+    def _write_at_end(self, data: bytes | bytearray) -> None:
+        self._file.seek(self._kept)
+        written = 0
+        while written < len(data):
+            written += self._file.write(data[written:])
+
+
+def _ending() -> bytes:
+    builder = RecordBuilder()
+    DataEnd(data_section_crc=0).write(builder)
+    Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(builder)
+    return bytes(builder.end()) + MCAP0_MAGIC  # type: ignore[no-untyped-call]
+
+
+_ENDING = _ending()

@@ -1,68 +1,71 @@
 """
-Bags: an MCAP file with rosbag2's metadata.yaml beside it.
+Bags: MCAP files with rosbag2's metadata.yaml beside them.
 
 The writer knows no ROS: types arrive as names, definitions as text, messages as the CDR bytes
 that went over the wire. What it writes opens in rosbag2, rosbags, mcap-ros2-support and Foxglove.
 """
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
 import errno
 from pathlib import Path
+import time
 from types import TracebackType
-from typing import Any
 
+from active_recon.bags.bag_file import BagFile
+from active_recon.bags.files import sync_folder, write_whole
 from active_recon.bags.metadata import (
     as_yaml,
     bag_information,
+    Contents,
     metadata_yaml,
-    offered_qos_yaml,
+    parameters_name,
+    PROVENANCE,
     QosProfile,
     Topic,
+    total,
 )
-from active_recon.bags.whole_chunks import WholeChunks
 from active_recon.errors import RecordingError
-from mcap.writer import Writer
 
 
 class BagWriter:
     """
-    Records messages into a folder: `<folder>/<folder's name>.mcap` and `metadata.yaml`.
+    Records messages into a folder: `<folder's name>_0.mcap`, `_1.mcap`, ..., `metadata.yaml`.
 
     The folder is made where it is missing; a folder that already holds a bag is refused, nothing
-    is ever overwritten. Messages reach the disk in chunks, by `flush` or when a chunk is full.
-    Where the disk is full (or fails) the call that noticed raises RecordingError, the unwritten
-    chunk is dropped, and the bag is closed: it stays a readable one up to its last chunk.
+    is ever overwritten. A new file is begun when the last has reached `max_bytes`. Messages reach
+    the disk in chunks, by `flush` or when a chunk is full. Where the disk is full (or fails) the
+    call that noticed raises RecordingError, the unwritten chunk is dropped, and the bag is
+    closed: it stays a readable one up to its last chunk.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, max_bytes: int | None = None) -> None:
         self.folder = folder
-        self.path = folder / f'{folder.name}.mcap'
-        self._topics: dict[str, Topic] = {}
-        self._channels: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
-        self._written = _Contents()
-        self._on_disk = _Contents()
+        self._max_bytes = max_bytes
+        self._topics: dict[str, tuple[Topic, str]] = {}
+        self._counts: Counter[str] = Counter()
+        self._provenance: dict[str, str] = {}
+        self._parameters: dict[str, bytes] = {}
+        self._done: list[tuple[str, Contents]] = []
         self._closed = False
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            if (folder / 'metadata.yaml').exists():
-                raise FileExistsError(errno.EEXIST, 'there is a metadata.yaml already')
-            self._chunks = WholeChunks(self.path)
+            if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
+                raise FileExistsError(errno.EEXIST, 'a bag exists there already')
+            self._file = self._begin_file(0)
         except OSError as error:
             raise RecordingError(f'expected to begin a new bag in {folder}, but: {error}',
                                  'bag_not_begun') from error
-        # Summary offsets as this library writes them are refused by checkers of MCAP files.
-        self._mcap = Writer(self._chunks, use_summary_offsets=False)  # type: ignore[arg-type]
-        self._mcap.start(profile='ros2', library='active_recon')
-        # Without this record rosbag2 takes a bare file for one of an older version.
-        self._mcap.add_metadata('rosbag2', {'serialized_metadata': as_yaml(self._information())})
-        self.flush()
+
+    @property
+    def path(self) -> Path:
+        """The file that is being written, or was the last."""
+        return self._file.path
 
     @property
     def message_count(self) -> int:
         """Messages taken in so far, the ones not yet on disk among them."""
-        return self._written.counts.total()
+        return self._counts.total()
 
     def add_topic(self, name: str, type_name: str, definition: str,
                   qos: tuple[QosProfile, ...] = ()) -> None:
@@ -75,18 +78,13 @@ class BagWriter:
         another type is refused.
         """
         self._require_open()
-        known = self._topics.get(name)
-        if known is not None:
-            if known.type_name != type_name:
-                raise RecordingError(f'{name}: expected messages of {known.type_name} as before, '
-                                     f'got {type_name}', 'topic_type')
+        if name not in self._topics:
+            self._topics[name] = Topic(name, type_name, qos), definition
             return
-        if type_name not in self._schemas:
-            self._schemas[type_name] = self._mcap.register_schema(
-                type_name, 'ros2msg', definition.encode())
-        self._topics[name] = Topic(name, type_name, qos)
-        self._channels[name] = self._mcap.register_channel(
-            name, 'cdr', self._schemas[type_name], {'offered_qos_profiles': offered_qos_yaml(qos)})
+        known = self._topics[name][0].type_name
+        if known != type_name:
+            raise RecordingError(f'{name}: expected messages of {known} as before, '
+                                 f'got {type_name}', 'topic_type')
 
     def write(self, topic: str, data: bytes, receive_time: int, publish_time: int) -> None:
         """
@@ -96,63 +94,113 @@ class BagWriter:
         is full.
         """
         self._require_open()
-        if topic not in self._channels:
+        if topic not in self._topics:
             raise RecordingError(f'{topic}: expected a topic announced by add_topic', 'topic')
-        self._written.add(topic, receive_time)
-        self._mcap.add_message(self._channels[topic], receive_time, data, publish_time,
-                               sequence=self._written.counts[topic])
-        if self._chunks.pending:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write the chunk begun to the disk. Raises RecordingError where the disk is full."""
-        self._require_open()
+        self._counts[topic] += 1
         try:
-            self._mcap.flush()  # type: ignore[no-untyped-call]
+            if self._max_bytes is not None and self._file.size >= self._max_bytes:
+                self._split()
+            if not self._file.has(topic):
+                self._file.add_topic(*self._topics[topic])
+            self._file.write(topic, data, receive_time, publish_time, self._counts[topic])
         except OSError as error:
             self._abandon(error)
-        self._on_disk = replace(self._written, counts=self._written.counts.copy())
+
+    def add_provenance(self, record: Mapping[str, str]) -> None:
+        """
+        Record what made the bag, on the disk at once: versions, hashes, policy, seed, object.
+
+        What is told later is added to it; each file of the bag tells all that was known. Raises
+        RecordingError as `write` does.
+        """
+        self._require_open()
+        self._provenance |= record
+        try:
+            self._file.add_metadata(PROVENANCE, self._provenance)
+        except OSError as error:
+            self._abandon(error)
+        self.flush()
+
+    def attach_parameters(self, node: str, parameters: Mapping[str, object]) -> None:
+        """Attach a node's parameters by its name, on the disk at once; raises as `write` does."""
+        self._require_open()
+        self._parameters[node] = as_yaml(dict(parameters)).encode()
+        try:
+            self._attach(self._file, node)
+        except OSError as error:
+            self._abandon(error)
+        self.flush()
+
+    def flush(self) -> None:
+        """
+        Bring all that was taken in to the disk, where it survives a power cut.
+
+        Raises RecordingError where the disk is full.
+        """
+        self._require_open()
+        try:
+            self._file.flush()
+            self._file.sync()
+        except OSError as error:
+            self._abandon(error)
 
     def close(self) -> None:
         """Complete the bag; a second call does nothing. RecordingError where the disk is full."""
         if self._closed:
             return
-        self.flush()
         try:
-            self._mcap.finish()  # type: ignore[no-untyped-call]
-            self._chunks.flush()
+            self._file.finish()
             self._write_metadata()
         except OSError as error:
             self._abandon(error)
-        self._chunks.close()
         self._closed = True
+
+    def _begin_file(self, number: int) -> BagFile:
+        """Begin a file that tells what made it, as the first does."""
+        file = BagFile(self.folder / f'{self.folder.name}_{number}.mcap')
+        if self._provenance:
+            file.add_metadata(PROVENANCE, self._provenance)
+        for node in self._parameters:
+            self._attach(file, node)
+        sync_folder(self.folder)
+        return file
+
+    def _attach(self, file: BagFile, node: str) -> None:
+        file.attach(parameters_name(node), 'application/yaml', self._parameters[node],
+                    time.time_ns())
+
+    def _split(self) -> None:
+        self._file.finish()
+        following = self._begin_file(len(self._done) + 1)
+        self._done.append((self.path.name, self._file.contents))
+        self._file = following
 
     def _require_open(self) -> None:
         if self._closed:
             raise RecordingError(f'{self.path}: expected an open bag, but it was closed', 'closed')
 
     def _abandon(self, error: OSError) -> None:
-        """End the file after its last whole chunk, and say why."""
+        """End the bag after its last whole chunk, and say why."""
         self._closed = True
-        kept = self._on_disk.counts.total()
+        kept = total(contents for _, contents in self._files()).counts.total()
         lost = self.message_count - kept
         message = (f'{self.path}: the disk took no more ({error.strerror}); the bag ends after '
                    f'{kept} messages, {lost} were lost')
+        self._file.abandon()
         try:
-            self._chunks.end()
             self._write_metadata()
         except OSError:  # not even room for that
-            message += '; it could not be completed and needs `mcap recover`'
-        self._chunks.close()
+            message += ('; its metadata.yaml could not be written: make room and run '
+                        f'`active-recon bag repair {self.folder}`')
         raise RecordingError(message, 'disk_full') from error
 
-    def _write_metadata(self) -> None:
-        (self.folder / 'metadata.yaml').write_text(metadata_yaml(self._information()))
+    def _files(self) -> list[tuple[str, Contents]]:
+        return [*self._done, (self.path.name, self._file.flushed)]
 
-    def _information(self) -> dict[str, Any]:
-        contents = self._on_disk
-        return bag_information(self.path.name, list(self._topics.values()), contents.counts,
-                               contents.begin, contents.end)
+    def _write_metadata(self) -> None:
+        topics = [topic for topic, _ in self._topics.values()]
+        write_whole(self.folder / 'metadata.yaml',
+                    metadata_yaml(bag_information(self._files(), topics)))
 
     def __enter__(self) -> 'BagWriter':
         """Close the bag where the block ends."""
@@ -162,17 +210,3 @@ class BagWriter:
                  trace: TracebackType | None) -> None:
         """Close the bag."""
         self.close()
-
-
-@dataclass
-class _Contents:
-    """How many messages each topic has, and the span of their receive times, nanoseconds."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-    begin: int = 0
-    end: int = 0
-
-    def add(self, topic: str, time: int) -> None:
-        self.begin = min(self.begin, time) if self.counts else time
-        self.end = max(self.end, time)
-        self.counts[topic] += 1

@@ -75,7 +75,7 @@ def test_what_passes_is_recorded_byte_for_byte_with_its_times(bench, recorder, t
     assert bench.call('stop').success
     (bag,) = bags(tmp_path / 'bags')
     assert read(bag) == {'/view': sent}
-    with (bag / f'{bag.name}.mcap').open('rb') as stream:
+    with (bag / f'{bag.name}_0.mcap').open('rb') as stream:
         times = [(record.publish_time, record.log_time)
                  for record in StreamReader(stream).records if isinstance(record, Message)]
     assert all(before <= published <= received <= bench.now() for published, received in times)

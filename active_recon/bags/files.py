@@ -1,0 +1,30 @@
+"""Files that are there as a whole or not at all, and stay there when the power fails."""
+
+from contextlib import suppress
+import os
+from pathlib import Path
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file in one step, over what was there; OSError where the disk is full."""
+    unfinished = path.with_name(f'.{path.name}.part')
+    try:
+        with unfinished.open('w') as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+    except OSError:
+        with suppress(OSError):
+            unfinished.unlink()
+        raise
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Return when the names in a folder would survive a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

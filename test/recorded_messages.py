@@ -1,0 +1,50 @@
+"""Messages to record, made without ROS, and a checker of MCAP files that we did not write."""
+
+from pathlib import Path
+import subprocess
+import sys
+
+from active_recon.bags.metadata import QosProfile
+from active_recon.bags.writer import BagWriter
+import numpy as np
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+HEADER, IMAGE = 'std_msgs/msg/Header', 'sensor_msgs/msg/Image'
+LATCHED = QosProfile(durability='transient_local')
+SENSOR = QosProfile(reliability='best_effort')
+
+
+def definition(type_name):
+    return STORE.generate_msgdef(type_name, ros_version=2)[0]
+
+
+def header(number):
+    time = STORE.types['builtin_interfaces/msg/Time'](sec=1_700_000_000 + number, nanosec=number)
+    return STORE.types[HEADER](stamp=time, frame_id=f'episode {number}')
+
+
+def image(number, side=8):
+    pixels = np.random.default_rng(number).integers(0, 256, side * side * 3, np.uint8)
+    return STORE.types[IMAGE](header=header(number), height=side, width=side, encoding='rgb8',
+                              is_bigendian=0, step=3 * side, data=pixels)
+
+
+def cdr(message):
+    return bytes(STORE.serialize_cdr(message, message.__msgtype__))
+
+
+def time_of(number):
+    return 1_700_000_000_000_000_000 + number * 1_000_000
+
+
+def announced(folder, max_bytes=None):
+    bag = BagWriter(folder, max_bytes)
+    bag.add_topic('/episode', HEADER, definition(HEADER), (LATCHED,))
+    bag.add_topic('/camera/image_raw', IMAGE, definition(IMAGE), (SENSOR,))
+    return bag
+
+
+def doctor(path):
+    program = Path(sys.executable).with_name('pymcap-cli')
+    return subprocess.run([program, 'doctor', path], capture_output=True, text=True, timeout=60)
