@@ -8,7 +8,7 @@ from active_recon.cameras import Camera
 from active_recon.canonical import canonical_image
 from active_recon.errors import ConfigError
 from active_recon.models.runtime import Runtime, TorchRuntime
-from active_recon.models.weights import load_weights, weights_hash
+from active_recon.models.weights import config_hash, load_weights, weights_hash
 from active_recon.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class Reconstructor:
     """
 
     def __init__(self, runtime: Runtime, threshold: float, object_size: float = 1.0,
-                 object_yaw: float = 0.0, weights_hash: str = '') -> None:
+                 object_yaw: float = 0.0, weights_hash: str = '', config_hash: str = '') -> None:
         if not object_size > 0:
             raise ConfigError(f'object_size: expected metres above 0, got {object_size}')
         if not 0 < threshold < 1:
@@ -42,6 +42,7 @@ class Reconstructor:
         self.object_size = object_size
         self.object_yaw = object_yaw
         self.weights_hash = weights_hash
+        self.config_hash = config_hash
         self._runtime = runtime
         self.reset()
 
@@ -52,7 +53,7 @@ class Reconstructor:
         bundle = load_weights(weights, device)
         return cls(TorchRuntime(bundle.reconstruction),
                    bundle.threshold if threshold is None else threshold,
-                   object_size, object_yaw, weights_hash(weights))
+                   object_size, object_yaw, weights_hash(weights), config_hash(bundle.config))
 
     @property
     def view_count(self) -> int:

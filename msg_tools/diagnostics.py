@@ -8,15 +8,17 @@ from std_msgs.msg import Header
 
 
 def diagnostics_to_msg(name: str, counts: Mapping[str, int], problem: str,
-                       stamp: Time) -> DiagnosticArray:
+                       stamp: Time, failure: str = '') -> DiagnosticArray:
     """
     Return one node's counters as one status.
 
-    `problem` is what was last found wrong, '' where nothing was: the level is then OK, else WARN.
+    `problem` is what was last found wrong and `failure` what the node does no more, each '' where
+    nothing was: the level is then OK, else WARN or ERROR.
     """
+    level = (DiagnosticStatus.ERROR if failure
+             else DiagnosticStatus.WARN if problem else DiagnosticStatus.OK)
     status = DiagnosticStatus(
-        level=DiagnosticStatus.WARN if problem else DiagnosticStatus.OK,
-        name=name, message=problem or 'ok',
+        level=level, name=name, message=failure or problem or 'ok',
         values=[KeyValue(key=key, value=str(counts[key])) for key in sorted(counts)])
     return DiagnosticArray(header=Header(stamp=stamp), status=[status])
 

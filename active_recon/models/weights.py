@@ -123,6 +123,11 @@ def weights_hash(path: Path | None = None) -> str:
     return hashlib.sha256((path or SHIPPED).read_bytes()).hexdigest()
 
 
+def config_hash(config: Config) -> str:
+    """Return the SHA-256 of a network's sizes."""
+    return hashlib.sha256(json.dumps(config.to_dict(), sort_keys=True).encode()).hexdigest()
+
+
 def state_hash(module: nn.Module) -> str:
     """Return the SHA-256 of all that a module holds, parameters and buffers."""
     digest = hashlib.sha256()

@@ -1,6 +1,7 @@
 """The text of message types, as a bag carries it: found where the types are installed."""
 
 from functools import cache
+from importlib import import_module
 import os
 from pathlib import Path
 import re
@@ -35,6 +36,13 @@ def message_definition(type_name: str) -> str:
     first, *parts = texts
     return texts[first] + ''.join(
         f'\n{_SEPARATOR}\nMSG: {part}\n{texts[part]}' for part in parts)
+
+
+def message_class(type_name: str) -> type:
+    """Return the Python class of a type, for example of 'std_msgs/msg/Header'."""
+    package, kind, name = type_name.split('/')
+    message: type = getattr(import_module(f'{package}.{kind}'), name)
+    return message
 
 
 def _message_file(package: str, name: str) -> str:

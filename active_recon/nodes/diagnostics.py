@@ -29,6 +29,7 @@ class Diagnostics:
         self._unsaid: Counter[str] = Counter()
         self._said_at: dict[str, float] = {}
         self._problem = ''
+        self._failure = ''
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         node.create_timer(1.0, self._publish)
 
@@ -43,6 +44,16 @@ class Diagnostics:
     def warn(self, kind: str, message: str) -> None:
         """Count what was used although it may do harm, and say why in one line."""
         self._say(f'warned/{kind}', message)
+
+    def fail(self, kind: str, message: str) -> None:
+        """Say as an error what the node does no more; it stays the state until `recover`."""
+        self._counts[f'refused/{kind}'] += 1
+        self._failure = message
+        self._node.get_logger().error(message)
+
+    def recover(self) -> None:
+        """Take back what `fail` said: the node does it again."""
+        self._failure = ''
 
     @contextmanager
     def refusing(self) -> Iterator[None]:
@@ -65,8 +76,9 @@ class Diagnostics:
         self._node.get_logger().warning(f'{message}{more}')
 
     def _publish(self) -> None:
-        """Publish the counters; the level is WARN where something was refused since the last."""
+        """Publish the counters; the level is WARN where something was refused since."""
         now = stamp_from_nanoseconds(self._node.get_clock().now().nanoseconds)
         name = self._node.get_fully_qualified_name()
-        self._publisher.publish(diagnostics_to_msg(name, self._counts, self._problem, now))
+        self._publisher.publish(
+            diagnostics_to_msg(name, self._counts, self._problem, now, self._failure))
         self._problem = ''

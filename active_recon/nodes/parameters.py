@@ -40,6 +40,13 @@ def declare(
     return value
 
 
+def tell(node: Node, name: str, value: str, description: str) -> None:
+    """Tell a fact about the node as a parameter that nobody can set."""
+    node.declare_parameter(
+        name, value, ParameterDescriptor(description=description, read_only=True),
+        ignore_override=True)
+
+
 def _expected(default: object, low: float | None, high: float | None,
               choices: Sequence[str]) -> str:
     if choices:

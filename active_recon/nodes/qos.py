@@ -1,6 +1,10 @@
-"""How the nodes publish, and how they hear a camera, which may be reliable or not."""
+"""How the nodes publish and hear, and how a topic's QoS is recorded and offered again."""
 
+from collections.abc import Iterable
+
+from active_recon.bags.metadata import QosProfile
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Reliable, and the last one is kept for whoever comes late."""
@@ -10,3 +14,21 @@ HEARD = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Best effort, which hears reliable and best-effort publishers alike."""
 HEARD_OFTEN = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 """The same for poses, of which a fast tracker sends many while the network runs."""
+
+
+def offered_profile(publisher: TopicEndpointInfo) -> QosProfile:
+    """Return what a publisher offers, as a bag says it."""
+    profile = publisher.qos_profile
+    return QosProfile(profile.reliability.name.lower(), profile.durability.name.lower())
+
+
+def common_profile(offered: Iterable[QosProfile], depth: int) -> QoSProfile:
+    """Return the strictest request that hears all of the publishers."""
+    offered = list(offered)
+    reliable = all(profile.reliability == 'reliable' for profile in offered)
+    latched = bool(offered) and all(
+        profile.durability == 'transient_local' for profile in offered)
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE))

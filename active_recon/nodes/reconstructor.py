@@ -14,7 +14,7 @@ from active_recon.cameras import (
 )
 from active_recon.errors import ConfigError, DataError, MessageError
 from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import declare
+from active_recon.nodes.parameters import declare, tell
 from active_recon.nodes.qos import HEARD, HEARD_OFTEN, LATCHED
 from active_recon.nodes.run import one_line, run_node
 from active_recon.reconstructor import Reconstruction, Reconstructor
@@ -95,6 +95,8 @@ class ReconstructorNode(Node):
             declare(self, 'object_yaw', 0.0, "azimuth of the object's front, rad",
                     -2 * math.pi, 2 * math.pi),
             None if math.isnan(threshold) else threshold)
+        tell(self, 'weights_sha256', reconstructor.weights_hash, 'the hash of the weights')
+        tell(self, 'config_sha256', reconstructor.config_hash, "the hash of the network's sizes")
         lens = CANONICAL_INTRINSICS
         blank = np.zeros((lens.height, lens.width, 3), np.uint8)
         distance = CANONICAL_DISTANCE * reconstructor.object_size

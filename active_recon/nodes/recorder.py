@@ -2,30 +2,33 @@
 
 from datetime import datetime
 from functools import partial
-from importlib import import_module
 from itertools import count
 from pathlib import Path
 
+from active_recon import __version__
 from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import ConfigError, RecordingError
-from active_recon.nodes.definitions import message_definition
+from active_recon.nodes.asked_parameters import AskedParameters
+from active_recon.nodes.definitions import message_class, message_definition
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import declare
+from active_recon.nodes.qos import common_profile, offered_profile
 from active_recon.nodes.run import one_line, run_node
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_srvs.srv import Trigger
 
+DIAGNOSTICS = '/diagnostics'
 TOPICS = ['camera/image_raw', 'camera/camera_info', 'camera/pose', 'view', 'occupancy',
           'probabilities', 'latent', 'entropy', 'episode', 'next_view', 'next_azimuth',
-          'azimuth_scores', 'done', '/diagnostics']
+          'azimuth_scores', 'done', DIAGNOSTICS]
+MADE_IT = ('weights_sha256', 'config_sha256', 'policy', 'seed', 'object')
+"""The parameters of the loop's nodes that say what made the bag."""
 WATCH_EVERY_S = 0.1
 FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second
-_QUEUE = 1000  # messages that may wait while the disk is slow
+QUEUE = 1000  # messages that may wait while the disk is slow
 
 
 class RecorderNode(Node):
@@ -36,11 +39,15 @@ class RecorderNode(Node):
         self._output_dir = Path(declare(
             self, 'output_dir', 'bags', 'the folder in which each recording gets its own'))
         at_start = declare(self, 'record_at_start', True, 'whether to record without being asked')
+        self._max_bytes = 1_000_000 * declare(
+            self, 'max_bag_size_mb', 1000, 'a longer recording is split into several files', 1,
+            1_000_000)
         self._topics = [self.resolve_topic_name(name) for name in self._declare_topics()]
         self._diagnostics = Diagnostics(self)
         self._bag: BagWriter | None = None
         self._offered: dict[str, tuple[QosProfile, ...]] = {}
         self._heard: dict[str, Subscription] = {}
+        self._asked = AskedParameters(self, self._on_parameters)
         self.create_service(Trigger, 'start', self._on_start)
         self.create_service(Trigger, 'stop', self._on_stop)
         self.create_timer(WATCH_EVERY_S, self._watch)
@@ -61,7 +68,14 @@ class RecorderNode(Node):
         now = datetime.now().strftime('%Y-%m-%d_%H-%M-%S')
         names = (now if again == 1 else f'{now}_{again}' for again in count(1))
         folder = next(path for name in names if not (path := self._output_dir / name).exists())
-        self._bag = BagWriter(folder)
+        bag = BagWriter(folder, self._max_bytes)
+        bag.add_provenance({'version': __version__})
+        own = self.get_parameters(list(self.get_parameters_by_prefix('')))
+        bag.attach_parameters(
+            self.get_fully_qualified_name(), {each.name: each.value for each in own})
+        self._bag = bag
+        self._asked.forget()
+        self._diagnostics.recover()
         self._diagnostics.count('recording')
         self.get_logger().info(f'recording into {folder}')
         return folder
@@ -83,12 +97,17 @@ class RecorderNode(Node):
 
     def _watch(self) -> None:
         """Listen to the publishers that have appeared, as each offers its messages."""
+        nodes = set()
         for name in self._topics if self._bag is not None else ():
             publishers = self.get_publishers_info_by_topic(name)
-            offered = tuple(sorted(map(_offered_profile, publishers), key=str))
+            offered = tuple(sorted(map(offered_profile, publishers), key=str))
             if publishers and self._offered.get(name) != offered:
                 self._offered[name] = offered
                 self._listen(name, publishers[0].topic_type, offered)
+            if name != DIAGNOSTICS:  # which whole robots publish
+                nodes |= {f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}'
+                          for publisher in publishers}
+        self._asked.ask(nodes)
 
     def _listen(self, name: str, type_name: str, offered: tuple[QosProfile, ...]) -> None:
         assert self._bag is not None
@@ -97,14 +116,14 @@ class RecorderNode(Node):
         except RecordingError as error:
             self._diagnostics.refuse(error)
             return
-        profile = _common_profile(offered)
+        profile = common_profile(offered, QUEUE)
         heard = self._heard.get(name)
         if heard is not None:
             if heard.qos_profile == profile:
                 return
             self.destroy_subscription(heard)
         self._heard[name] = self.create_subscription(
-            _message_class(type_name), name, partial(self._on_message, name), profile, raw=True)
+            message_class(type_name), name, partial(self._on_message, name), profile, raw=True)
 
     def _on_message(self, topic: str, data: bytes, info: dict[str, int]) -> None:
         if self._bag is None:
@@ -116,6 +135,17 @@ class RecorderNode(Node):
             return
         self._diagnostics.count('messages')
 
+    def _on_parameters(self, node: str, parameters: dict[str, object]) -> None:
+        if self._bag is None:
+            return
+        made_it = {name: str(parameters[name]) for name in MADE_IT if name in parameters}
+        try:
+            self._bag.attach_parameters(node, parameters)
+            if made_it:
+                self._bag.add_provenance(made_it)
+        except RecordingError as error:
+            self._fail(error)
+
     def _flush(self) -> None:
         if self._bag is None:
             return
@@ -126,8 +156,7 @@ class RecorderNode(Node):
 
     def _fail(self, error: RecordingError) -> None:
         """Say that the recording has ended by itself; the bag has closed itself already."""
-        self._diagnostics.count(f'refused/{error.kind}')
-        self.get_logger().error(f'recording stopped: {one_line(error)}')
+        self._diagnostics.fail(error.kind, f'recording stopped: {one_line(error)}')
         self._end()
 
     def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -164,27 +193,6 @@ class RecorderNode(Node):
         except RecordingError as error:
             self._fail(error)
         super().destroy_node()
-
-
-def _offered_profile(publisher: TopicEndpointInfo) -> QosProfile:
-    profile = publisher.qos_profile
-    return QosProfile(profile.reliability.name.lower(), profile.durability.name.lower())
-
-
-def _common_profile(offered: tuple[QosProfile, ...]) -> QoSProfile:
-    """Return the strictest request that hears all of the publishers."""
-    reliable = all(profile.reliability == 'reliable' for profile in offered)
-    latched = all(profile.durability == 'transient_local' for profile in offered)
-    return QoSProfile(
-        depth=_QUEUE,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE))
-
-
-def _message_class(type_name: str) -> type:
-    package, kind, name = type_name.split('/')
-    message: type = getattr(import_module(f'{package}.{kind}'), name)
-    return message
 
 
 def main(args: list[str] | None = None) -> None:

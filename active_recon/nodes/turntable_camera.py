@@ -7,7 +7,7 @@ from pathlib import Path
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import ConfigError, DataError
 from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import declare
+from active_recon.nodes.parameters import declare, tell
 from active_recon.nodes.qos import HEARD, STREAM
 from active_recon.nodes.run import one_line, run_node
 from active_recon.shown_object import rendered_object, ShownObject, stored_object
@@ -45,7 +45,9 @@ class TurntableCameraNode(Node):
         rate = declare(self, 'rate', 10.0, 'of the stream, Hz', 0.1, 1000.0)
         self._objects = self._declare_objects()
         self._index = 0
-        self._shown: ShownObject | None = self._objects[0]()
+        first = self._objects[0]()
+        self._shown: ShownObject | None = first
+        tell(self, 'object', first.name, 'the first that is shown')
         self._diagnostics = Diagnostics(self)
         self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM)
         self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM)

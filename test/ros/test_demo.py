@@ -126,7 +126,7 @@ def test_demo_leaves_a_bag_a_mesh_and_a_picture_within_a_minute(finished):
     folder, out, seconds = finished
     assert seconds < 60
     assert {path.name for path in folder.iterdir()} == {
-        f'{folder.name}.mcap', 'metadata.yaml', 'chair.ply', 'run.png'}
+        f'{folder.name}_0.mcap', 'metadata.yaml', 'chair.ply', 'run.png'}
     assert len(trimesh.load(folder / 'chair.ply').faces) > 0
     assert min(cv2.imread(str(folder / 'run.png')).shape[:2]) > 500
     assert str(folder) in out.replace('\n', '')
@@ -164,7 +164,7 @@ def test_the_whole_loop_is_in_the_bag(messages):
 
 def test_mcap_ros2_decodes_every_message(finished, messages):
     folder, _, _ = finished
-    with (folder / f'{folder.name}.mcap').open('rb') as stream:
+    with (folder / f'{folder.name}_0.mcap').open('rb') as stream:
         decoded = list(make_reader(
             stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
     assert len(decoded) == sum(map(len, messages.values()))

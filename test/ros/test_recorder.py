@@ -1,12 +1,15 @@
 """The recorder over real DDS: it writes what passed, byte for byte, also when things go wrong."""
 
 from contextlib import suppress
+import math
 from pathlib import Path
 import resource
 import signal
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from mcap.exceptions import EndOfFile
+from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 import numpy as np
@@ -16,6 +19,7 @@ from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header, String
+import yaml
 
 pytestmark = pytest.mark.ros
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -173,6 +177,7 @@ def test_a_full_disk_stops_the_recording_and_not_the_node(bench, start_node, tmp
     image = serialize_message(
         Image(height=100, width=300, step=900, encoding='rgb8', data=noise(90_000)))
     publisher = publish(bench, Image, 'camera/image_raw', STREAM)
+    diagnostics = bench.hear(DiagnosticArray, '/diagnostics')
     while not recorder.log('ERROR'):
         publisher.publish(image)
         heard = bench.counts('recorder').get('messages', 0)
@@ -180,6 +185,9 @@ def test_a_full_disk_stops_the_recording_and_not_the_node(bench, start_node, tmp
             bench.counts('recorder').get('messages', 0) > heard), 'the next message')
     bench.until(lambda: bench.counts('recorder').get('refused/disk_full') == 1, 'its count')
     assert bench.counts('recorder')['recording'] == 0
+    state = bench.until(lambda: [status for msg in diagnostics for status in msg.status
+                                 if status.level == DiagnosticStatus.ERROR], 'an error')[0]
+    assert 'recording stopped' in state.message
     (line,) = recorder.log('ERROR')
     assert 'recording stopped' in line and 'the disk took no more' in line
     (bag,) = bags(tmp_path / 'bags')
@@ -191,8 +199,45 @@ def test_a_full_disk_stops_the_recording_and_not_the_node(bench, start_node, tmp
     heard = bench.counts('recorder')['messages']
     publisher.publish(image)
     recorded(bench, heard + 1)
+    bench.until(lambda: diagnostics[-1].status[0].level == DiagnosticStatus.OK, 'an all-clear')
     assert bench.call('stop').success
     assert read(bags(tmp_path / 'bags')[-1]) == {'/camera/image_raw': [image]}
+
+
+def provenance_of(path):
+    """Return the last record of what made a bag, and the parameters of its nodes."""
+    with path.open('rb') as stream:
+        reader = make_reader(stream)
+        *_, record = [record.metadata for record in reader.iter_metadata()
+                      if record.name == 'active_recon']
+        return record, {attachment.name: yaml.safe_load(attachment.data)
+                        for attachment in reader.iter_attachments()}
+
+
+def test_a_killed_recorder_has_told_what_made_the_bag(bench, start_node, box, tmp_path):
+    recorder = start_node('recorder', output_dir=tmp_path / 'bags', max_bag_size_mb=7)
+    start_node('turntable_camera', mesh=box)
+    start_node('view_planner', policy='random', seed=12)
+    (path,) = (tmp_path / 'bags').glob('*/*.mcap')
+    bench.until(lambda: provenance_of(path)[0].keys() == {'version', 'object', 'policy', 'seed'},
+                'what made the bag')
+    recorder.stop(signal.SIGKILL)
+    record, parameters = provenance_of(path)
+    assert (record['object'], record['policy'], record['seed']) == ('box.ply', 'random', '12')
+    assert parameters.keys() == {
+        f'parameters/{node}.yaml' for node in ('recorder', 'turntable_camera', 'view_planner')}
+    assert parameters['parameters/recorder.yaml']['max_bag_size_mb'] == 7
+    assert parameters['parameters/view_planner.yaml']['max_views'] == 5
+    assert math.isnan(parameters['parameters/view_planner.yaml']['start_azimuth'])
+
+
+def test_a_node_that_comes_back_is_asked_again(bench, start_node, tmp_path):
+    start_node('recorder', output_dir=tmp_path / 'bags')
+    (path,) = (tmp_path / 'bags').glob('*/*.mcap')
+    for seed in ('1', '2'):
+        planner = start_node('view_planner', policy='random', seed=seed)
+        bench.until(lambda seed=seed: provenance_of(path)[0].get('seed') == seed, 'its seed')
+        planner.stop()
 
 
 def noise(size):

@@ -1,0 +1,61 @@
+"""The parameters of other nodes, asked for as the nodes appear."""
+
+from collections.abc import Callable, Iterable
+import time
+
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
+
+ASK_AGAIN_S = 2.0
+"""A request may go to a node that has just ended; after that time it is sent again."""
+
+
+class AskedParameters:
+    """
+    Asks each node for all its parameters, and hands them on once they are known.
+
+    `on_known` is called with the node's full name and a mapping of parameter to value. Nothing
+    waits: a node that never answers costs a request every `ASK_AGAIN_S` seconds.
+    """
+
+    def __init__(self, node: Node, on_known: Callable[[str, dict[str, object]], None]) -> None:
+        self._node = node
+        self._on_known = on_known
+        self._clients: dict[str, AsyncParameterClient] = {}
+        self._asked_at: dict[str, float] = {}
+        self._known: set[str] = set()
+
+    def forget(self) -> None:
+        """Ask every node anew."""
+        self._known.clear()
+        self._asked_at.clear()
+
+    def ask(self, names: Iterable[str]) -> None:
+        """Ask those of the nodes that are there now and not yet known; called again and again."""
+        there = set(names)
+        self._known &= there  # who goes and comes back may have changed
+        for name in there - self._known:
+            now = time.monotonic()
+            if now - self._asked_at.get(name, -ASK_AGAIN_S) < ASK_AGAIN_S:
+                continue
+            client = self._clients.setdefault(name, AsyncParameterClient(self._node, name))
+            if client.services_are_ready():
+                self._asked_at[name] = now
+                client.list_parameters(callback=lambda listed, name=name: self._get(name, listed))
+
+    def _get(self, name: str, listed: Future) -> None:
+        answer = listed.result()
+        if answer is not None and name in self._asked_at:
+            names = list(answer.result.names)
+            self._clients[name].get_parameters(
+                names, callback=lambda got: self._take(name, names, got))
+
+    def _take(self, name: str, names: list[str], got: Future) -> None:
+        answer = got.result()
+        if answer is None or self._asked_at.pop(name, None) is None:
+            return
+        self._known.add(name)
+        self._on_known(name, dict(zip(
+            names, map(parameter_value_to_python, answer.values), strict=True)))
