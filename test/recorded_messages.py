@@ -1,6 +1,8 @@
 """Messages to record, made without ROS, and a checker of MCAP files that we did not write."""
 
+from contextlib import contextmanager
 from pathlib import Path
+import resource
 import subprocess
 import sys
 
@@ -48,3 +50,14 @@ def announced(folder, max_bytes=None):
 def doctor(path):
     program = Path(sys.executable).with_name('pymcap-cli')
     return subprocess.run([program, 'doctor', path], capture_output=True, text=True, timeout=60)
+
+
+@contextmanager
+def small_disk(size):
+    """Files end at that many bytes here, and say so as a full disk does."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -1,10 +1,8 @@
 """Bags that are cut off: what was flushed is kept and read, whatever happens next."""
 
-import resource
-
 from active_recon.errors import RecordingError
 import pytest
-from recorded_messages import announced, cdr, doctor, header, image, time_of
+from recorded_messages import announced, cdr, doctor, header, image, small_disk, time_of
 from rosbags.highlevel import AnyReader
 
 
@@ -20,19 +18,11 @@ def test_what_was_flushed_is_read_from_a_bag_that_was_never_closed(tmp_path):
     bag.close()
 
 
-@pytest.fixture
-def small_disk():
-    """Files end at 100 kB here, and say so as a full disk does."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-def test_a_full_disk_ends_the_bag_after_its_last_chunk(tmp_path, small_disk):
+def test_a_full_disk_ends_the_bag_after_its_last_chunk(tmp_path):
     bag = announced(tmp_path / 'run')
     flushed = 0
-    with pytest.raises(RecordingError, match='the disk took no more') as refusal:
+    with small_disk(100_000), pytest.raises(
+            RecordingError, match='the disk took no more') as refusal:
         for number in range(100):
             bag.write('/camera/image_raw', cdr(image(number, 64)), time_of(number), 0)
             bag.flush()
@@ -47,10 +37,11 @@ def test_a_full_disk_ends_the_bag_after_its_last_chunk(tmp_path, small_disk):
     assert doctor(bag.path).returncode == 0
 
 
-def test_a_disk_that_fills_while_the_bag_is_closed_is_told(tmp_path, small_disk):
+def test_a_disk_that_fills_while_the_bag_is_closed_is_told(tmp_path):
     bag = announced(tmp_path / 'run')
     bag.write('/camera/image_raw', cdr(image(0, 256)), time_of(0), 0)
-    with pytest.raises(RecordingError, match='ends after 0 messages, 1 were lost'):
+    with small_disk(100_000), pytest.raises(
+            RecordingError, match='ends after 0 messages, 1 were lost'):
         bag.close()
     with AnyReader([bag.path]) as reader:
         assert reader.message_count == 0

@@ -1,6 +1,7 @@
 """Files that are there as a whole or not at all, and stay there when the power fails."""
 
 from contextlib import suppress
+from itertools import count
 import os
 from pathlib import Path
 
@@ -19,6 +20,12 @@ def write_whole(path: Path, text: str) -> None:
             unfinished.unlink()
         raise
     sync_folder(path.parent)
+
+
+def free_name(path: Path, ending: str) -> Path:
+    """Return the path with `.<ending>` behind, or with a number where that is taken."""
+    names = (f'{path.name}.{ending}{number if number > 1 else ""}' for number in count(1))
+    return next(free for name in names if not (free := path.with_name(name)).exists())
 
 
 def sync_folder(folder: Path) -> None:

@@ -1,5 +1,7 @@
 """The file under the MCAP writer: after each flush it is one that readers open to its end."""
 
+from contextlib import suppress
+import fcntl
 import os
 from pathlib import Path
 
@@ -20,6 +22,8 @@ class WholeChunks:
 
     def __init__(self, path: Path) -> None:
         self._file = path.open('xb', buffering=0)
+        with suppress(OSError):  # a disk that knows no locks; for who would repair the file
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._kept = 0
         self._pending = bytearray()
 

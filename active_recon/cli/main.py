@@ -2,6 +2,7 @@
 
 import sys
 
+from active_recon.cli.bag import bag
 from active_recon.cli.demo import demo
 from active_recon.cli.evaluate import evaluate
 from active_recon.cli.making import dataset, render
@@ -17,6 +18,7 @@ app = typer.Typer(
 for command in (demo, render, train, evaluate, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
+app.add_typer(bag, name='bag')
 
 
 def main() -> None:

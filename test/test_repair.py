@@ -1,0 +1,202 @@
+"""Repair: a bag that was cut off is whole again, and nothing of it is thrown away."""
+
+import hashlib
+import random
+import subprocess
+import sys
+
+from active_recon.bags.repair import repair_bag
+from active_recon.errors import DataError
+from mcap.reader import make_reader
+import pytest
+from recorded_messages import announced, cdr, doctor, header, image, small_disk, time_of
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader
+
+CHUNKS, IN_CHUNK = 8, 5
+
+
+def message(number):
+    return cdr(image(number)) if number % 2 else cdr(header(number))
+
+
+def fill(bag):
+    """Write chunks of messages in turn, and leave the bag open."""
+    bag.add_provenance({'seed': '7'})
+    bag.attach_parameters('/view_planner', {'seed': 7})
+    for number in range(CHUNKS * IN_CHUNK):
+        topic = '/camera/image_raw' if number % 2 else '/episode'
+        bag.write(topic, message(number), time_of(number), time_of(number))
+        if number % IN_CHUNK == IN_CHUNK - 1:
+            bag.flush()
+    return bag
+
+
+@pytest.fixture
+def cut_off(tmp_path):
+    """A bag whose writer ended without closing it."""
+    bag = fill(announced(tmp_path / 'run'))
+    bag._file.abandon()
+    return bag.folder
+
+
+def read(folder):
+    with Reader(folder) as reader:
+        return [bytes(data) for _, _, data in reader.messages()]
+
+
+def state(folder):
+    """Return what stands in a folder, byte for byte."""
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()}
+
+
+def assert_whole(folder):
+    for path in folder.glob('*.mcap'):
+        report = doctor(path)
+        assert report.returncode == 0, report.stdout + report.stderr
+        with path.open('rb') as stream:
+            summary = make_reader(stream).get_summary()
+        assert summary.statistics.message_count == 0 or summary.chunk_indexes
+        with AnyReader([path]) as reader:
+            assert reader.message_count == summary.statistics.message_count
+    before = state(folder)
+    repairs, described = repair_bag(folder)
+    assert not described and all(repair.kept_as is None for repair in repairs)
+    assert state(folder) == before
+
+
+def test_a_bag_that_was_cut_off_is_as_if_it_had_been_closed(cut_off, tmp_path):
+    (repair,), described = repair_bag(cut_off)
+    assert described and not repair.lost
+    assert read(cut_off) == [message(number) for number in range(CHUNKS * IN_CHUNK)]
+    closed = fill(announced(tmp_path / 'closed' / 'run'))
+    closed.close()
+    assert (cut_off / 'metadata.yaml').read_text() == (
+        closed.folder / 'metadata.yaml').read_text()
+    with (cut_off / 'run_0.mcap').open('rb') as stream:
+        reader = make_reader(stream)
+        assert [record.metadata for record in reader.iter_metadata()
+                if record.name == 'active_recon'] == [{'seed': '7'}]
+        assert [each.name for each in reader.iter_attachments()] == [
+            'parameters/view_planner.yaml']
+    assert_whole(cut_off)
+
+
+def test_the_file_as_it_was_is_kept(cut_off):
+    before = (cut_off / 'run_0.mcap').read_bytes()
+    repair_bag(cut_off)
+    assert (cut_off / 'run_0.mcap.damaged').read_bytes() == before
+    assert {path.name for path in cut_off.iterdir()} == {
+        'run_0.mcap', 'run_0.mcap.damaged', 'metadata.yaml'}
+
+
+def test_a_whole_bag_is_not_touched(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    assert_whole(bag.folder)
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_wherever_the_file_is_cut_all_chunks_before_it_are_kept(cut_off, seed):
+    path = cut_off / 'run_0.mcap'
+    whole = path.read_bytes()
+    cut = random.Random(seed).randrange(len(whole))
+    path.write_bytes(whole[:cut])
+    (repair,), _ = repair_bag(cut_off)
+    kept = read(cut_off)
+    assert kept == [message(number) for number in range(len(kept))]
+    assert len(kept) % IN_CHUNK == 0
+    assert len(kept) >= IN_CHUNK * (whole[:cut].count(b'zstd') - 1)
+    assert repair.contents.counts.total() == len(kept)
+    assert_whole(cut_off)
+
+
+def test_a_chunk_that_is_spoilt_costs_no_other(cut_off):
+    path = cut_off / 'run_0.mcap'
+    content = bytearray(path.read_bytes())
+    third = [at for at in range(len(content)) if content[at:at + 4] == b'zstd'][2]
+    content[third + 40] ^= 255
+    path.write_bytes(content)
+    (repair,), _ = repair_bag(cut_off)
+    assert len(repair.lost) == 1 and 'a chunk of' in repair.lost[0]
+    assert read(cut_off) == [message(number) for number in range(CHUNKS * IN_CHUNK)
+                             if number // IN_CHUNK != 2]
+    assert_whole(cut_off)
+
+
+def test_of_a_split_bag_only_the_file_that_was_cut_off_is_written_anew(tmp_path):
+    bag = announced(tmp_path / 'run', max_bytes=40_000)
+    sent = [cdr(image(number, 64)) for number in range(10)]
+    for number, data in enumerate(sent):
+        bag.write('/camera/image_raw', data, time_of(number), 0)
+        bag.flush()
+    bag._file.abandon()
+    repairs, described = repair_bag(bag.folder)
+    assert [repair.kept_as is None for repair in repairs] == [True, True, False]
+    assert described and read(bag.folder) == sent
+    assert_whole(bag.folder)
+
+
+def test_a_lost_metadata_yaml_comes_back_and_one_that_lies_is_replaced(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    metadata = bag.folder / 'metadata.yaml'
+    right = metadata.read_text()
+    metadata.unlink()
+    assert repair_bag(bag.folder)[1] and metadata.read_text() == right
+    for wrong in (right.replace('message_count: 20', 'message_count: 19'), '', 'a: [b', '\x00'):
+        metadata.write_text(wrong)
+        assert repair_bag(bag.folder)[1] and metadata.read_text() == right
+    assert len(list(bag.folder.glob('metadata.yaml.damaged*'))) == 4
+
+
+def test_a_bag_that_is_being_recorded_is_refused(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+        before = state(bag.folder)
+        with pytest.raises(DataError, match='still being recorded'):
+            repair_bag(bag.folder)
+        assert state(bag.folder) == before
+
+
+@pytest.mark.parametrize('content', [b'no MCAP at all', b'\0' * 1000, b'\x89MCAP1'])
+def test_what_is_no_mcap_is_refused_and_left_alone(cut_off, content):
+    (cut_off / 'run_1.mcap').write_bytes(content)
+    before = state(cut_off)
+    with pytest.raises(DataError, match='run_1.mcap: expected an MCAP file'):
+        repair_bag(cut_off)
+    assert state(cut_off) == before
+
+
+def test_a_folder_without_a_bag_is_refused(tmp_path):
+    with pytest.raises(DataError, match='expected a bag'):
+        repair_bag(tmp_path)
+    with pytest.raises(DataError, match='expected a bag'):
+        repair_bag(tmp_path / 'nowhere')
+
+
+def test_a_disk_too_full_for_the_repair_leaves_all_as_it_was(tmp_path):
+    bag = announced(tmp_path / 'run')
+    for number in range(20):
+        bag.write('/camera/image_raw', cdr(image(number, 64)), time_of(number), 0)
+    bag.flush()
+    bag._file.abandon()
+    before = state(bag.folder)
+    with small_disk(100_000), pytest.raises(DataError, match='File too large'):
+        repair_bag(bag.folder)
+    assert state(bag.folder) == before
+
+
+def test_the_command_says_what_it_did_and_refuses_in_one_line(cut_off, tmp_path):
+    def run(path):
+        return subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'bag', 'repair',
+                               str(path)], capture_output=True, text=True, timeout=60)
+
+    done = run(cut_off)
+    assert done.returncode == 0, done.stderr
+    assert 'run_0.mcap: made whole, 40 messages; kept as it was as run_0.mcap.damaged' in (
+        done.stdout)
+    assert 'run_0.mcap: whole, 40 messages' in run(cut_off).stdout
+    refused = run(tmp_path / 'nowhere')
+    assert refused.returncode == 2
+    assert refused.stderr.count('\n') == 1 and 'expected a bag' in refused.stderr
