@@ -41,6 +41,7 @@ setup(
     install_requires=[
         'embreex>=2.17.7.post6,<5',
         'lightning-fabric>=2.4,<3',
+        'lz4>=4.3,<5',
         'matplotlib>=3.9,<4',
         'mcap>=1.5,<2',
         'numpy>=1.26,<3',
@@ -48,6 +49,7 @@ setup(
         'PyYAML>=6,<7',
         'pillow>=10.1,<14',
         'rich>=13.7,<16',
+        'rosbags>=0.11,<1',
         'safetensors>=0.4.3,<1',
         'scikit-image>=0.22,<1',
         'scipy>=1.11,<2',
@@ -55,12 +57,13 @@ setup(
         'torch>=2.5,<3',
         'trimesh>=4.4,<6',
         'typer>=0.12,<1',
+        'zstandard>=0.22,<1',
         *ROS_WHEELS,
     ],
     extras_require={
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'test': [
-            'mcap-ros2-support>=0.5.5', 'pymcap-cli>=0.30', 'pytest>=8', 'rosbags>=0.10',
-            'rosless>=0.5', 'setuptools>=70.1'],
+            'mcap-ros2-support>=0.5.5', 'pymcap-cli>=0.30', 'pytest>=8', 'rosless>=0.5',
+            'setuptools>=70.1'],
     },
 )
