@@ -46,6 +46,20 @@ def azimuth_goal_from_msg(msg: JointState) -> float:
     return wrap_azimuth(azimuth)
 
 
+def joint_position_from_msg(msg: JointState, joint: str = '') -> float:
+    """
+    Return the position of the joint of that name, '' for the only one, as it is.
+
+    Raises MessageError where the message does not tell it.
+    """
+    if joint and joint in msg.name and msg.name.index(joint) < len(msg.position):
+        return float(msg.position[msg.name.index(joint)])
+    if joint or len(msg.position) != 1:
+        raise MessageError(f'expected a position of {joint or "one joint"}, got '
+                           f'{len(msg.position)} of {", ".join(msg.name)}', 'joint')
+    return float(msg.position[0])
+
+
 def azimuth_goal_to_msg(azimuth: float, header: Header) -> JointState:
     """Return an azimuth of the camera, radians, as the position of one joint, at rest there."""
     # Some readers outside ROS fail on an empty list of numbers, so none is left empty

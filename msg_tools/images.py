@@ -1,19 +1,24 @@
 """Camera images and latents to and from sensor_msgs/Image."""
 
 import array
+from io import BytesIO
 import re
 from typing import Any
 
 from active_recon.errors import MessageError
 import numpy as np
 from numpy.typing import NDArray
-from sensor_msgs.msg import Image
+import PIL.Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 _BYTE: np.dtype[Any] = np.dtype(np.uint8)
 _FLOAT: np.dtype[Any] = np.dtype(np.float32)
 ENCODINGS = {'rgb8': (_BYTE, 3), 'bgr8': (_BYTE, 3), 'rgba8': (_BYTE, 4), 'bgra8': (_BYTE, 4),
              'mono8': (_BYTE, 1), '32FC3': (_FLOAT, 3)}
+
+MOST_PIXELS = 1 << 26
+"""Compressed images of more are refused: a small file may claim any size."""
 
 
 def image_from_msg(msg: Image) -> NDArray[np.uint8]:
@@ -35,6 +40,27 @@ def image_from_msg(msg: Image) -> NDArray[np.uint8]:
         return np.repeat(pixels, 3, axis=2)
     color = pixels[..., 2::-1] if msg.encoding.startswith('bgr') else pixels[..., :3]
     return _over_white(color, pixels[..., 3:]) if channels == 4 else np.ascontiguousarray(color)
+
+
+def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
+    """
+    Return a camera's image, (height, width, 3) uint8 RGB; what is transparent becomes white.
+
+    Reads JPEG and PNG. Raises MessageError on anything else, and on images of more than
+    `MOST_PIXELS` before they are unpacked.
+    """
+    try:
+        with PIL.Image.open(BytesIO(msg.data), formats=('JPEG', 'PNG')) as image:
+            if image.width * image.height > MOST_PIXELS:
+                raise MessageError(f'expected an image of at most {MOST_PIXELS} pixels, got '
+                                   f'{image.height} x {image.width}', 'image_size')
+            if image.has_transparency_data:
+                pixels = np.asarray(image.convert('RGBA'))
+                return _over_white(pixels[..., :3], pixels[..., 3:])
+            return np.asarray(image.convert('RGB'))
+    except (OSError, ValueError, SyntaxError, PIL.Image.DecompressionBombError) as error:
+        raise MessageError('expected a compressed image as JPEG or PNG, got '
+                           f'{msg.format!r}: {error}', 'encoding') from error
 
 
 def image_to_msg(image: NDArray[np.uint8], header: Header) -> Image:

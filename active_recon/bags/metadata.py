@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from active_recon.errors import DataError
 import yaml
 
 VERSION = 9  # of the description, as Jazzy writes it
@@ -106,6 +107,17 @@ def offered_qos_yaml(qos: Sequence[QosProfile]) -> str:
 def as_yaml(value: object) -> str:
     """Return the value as YAML, its keys in their order."""
     return str(yaml.safe_dump(value, sort_keys=False))
+
+
+def yaml_mapping(text: bytes, name: str) -> dict[str, Any]:
+    """Return the mapping in a YAML text; DataError that says the name where it is none."""
+    try:
+        value = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise DataError(f'{name}: expected YAML, got: {" ".join(str(error).split())}') from error
+    if not isinstance(value, dict):
+        raise DataError(f'{name}: expected a mapping, got {type(value).__name__}')
+    return value
 
 
 def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:

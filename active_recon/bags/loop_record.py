@@ -1,0 +1,104 @@
+"""What the loop published in a bag: views, what they led to, goals, episodes, counters."""
+
+from collections.abc import Callable
+from typing import Any
+
+from active_recon.bags.camera_stream import read_message
+from active_recon.bags.message_types import CLOUD, DIAGNOSTICS, FLOAT, HEADER, IMAGE, POSE
+from active_recon.bags.raw import Bag, RawMessage
+from active_recon.errors import ActiveReconError, DataError
+from msg_tools.cameras import pose_from_msg
+from msg_tools.diagnostics import counts_from_msg
+from msg_tools.episodes import done_from_msg, episode_from_msg
+from msg_tools.goals import scores_from_msg, view_goal_from_msg
+from msg_tools.images import latent_from_msg
+from msg_tools.stamps import nanoseconds_from_stamp
+from msg_tools.voxels import voxel_grid_from_msg
+import numpy as np
+from numpy.typing import NDArray
+
+LOOP = {'episode': HEADER, 'view': POSE, 'occupancy': CLOUD, 'probabilities': CLOUD,
+        'latent': IMAGE, 'entropy': FLOAT, 'next_view': POSE, 'azimuth_scores': CLOUD,
+        'done': HEADER}
+"""The loop's own topics and their types."""
+_DIAGNOSTICS = '/diagnostics'
+
+
+class LoopRecord:
+    """
+    The loop's topics, their names after a namespace such as '/'; read once, as a whole.
+
+    - parts: what was said, by the topic's name in the loop, then by its stamp in nanoseconds
+    - published, received: when it was, the same way; what was published again counts once
+    - counters: the last ones of `/diagnostics`, by node
+
+    An entropy bears no stamp and has that of the view that was published next to it.
+    `object_size` is the grid's side in metres. Raises DataError on what is not as the loop's
+    nodes write it.
+    """
+
+    def __init__(self, bag: Bag, namespace: str, object_size: float, object_frame: str) -> None:
+        self.parts: dict[str, dict[int, Any]] = {role: {} for role in LOOP}
+        self.published: dict[str, dict[int, int]] = {role: {} for role in LOOP}
+        self.received: dict[str, dict[int, int]] = {role: {} for role in LOOP}
+        self.counters: dict[str, dict[str, int]] = {}
+        self._from_msg: dict[str, Callable[[Any], Any]] = {
+            'episode': episode_from_msg,
+            'view': lambda msg: pose_from_msg(msg, object_frame),
+            'occupancy': lambda msg: voxel_grid_from_msg(msg, object_size),
+            'probabilities': lambda msg: voxel_grid_from_msg(msg, object_size),
+            'latent': latent_from_msg,
+            'entropy': lambda msg: float(msg.data),
+            'next_view': lambda msg: view_goal_from_msg(msg, object_frame),
+            'azimuth_scores': _scores_from_msg,
+            'done': done_from_msg,
+        }
+        roles = {namespace + role: role for role in LOOP}
+        entropies = []
+        for message in bag.messages({*roles, _DIAGNOSTICS}):
+            if message.topic == _DIAGNOSTICS:
+                self._count(message)
+            elif roles[message.topic] == 'entropy':
+                entropies.append(message)
+            else:
+                self._take(roles[message.topic], message)
+        for message in entropies:
+            self._take('entropy', message)
+
+    def _take(self, role: str, message: RawMessage) -> None:
+        if message.type_name != LOOP[role]:
+            raise DataError(f'{message.topic}: expected messages of {LOOP[role]}, as the loop '
+                            f'publishes them, got {message.type_name}', 'topics')
+        msg = read_message(message)
+        stamp = self._stamp(role, message, msg)
+        if stamp is None or (stamp in self.parts[role] and role != 'done'):
+            return  # only an end can be taken back, under the stamp of the episode
+        try:
+            self.parts[role][stamp] = self._from_msg[role](msg)
+        except ActiveReconError as error:
+            raise DataError(f'{message.topic} at {message.received / 1e9:.3f} s: {error}',
+                            error.kind) from error
+        self.published[role][stamp] = message.published
+        self.received[role][stamp] = message.received
+
+    def _stamp(self, role: str, message: RawMessage, msg: Any) -> int | None:
+        if role == 'entropy':
+            views = self.published['view']
+            return min(views, key=lambda stamp: abs(views[stamp] - message.published),
+                       default=None)
+        return nanoseconds_from_stamp(msg.stamp if LOOP[role] == HEADER else msg.header.stamp)
+
+    def _count(self, message: RawMessage) -> None:
+        if message.type_name != DIAGNOSTICS:
+            return
+        msg = read_message(message)
+        for status in msg.status:
+            try:
+                self.counters[status.name.lstrip('/')] = counts_from_msg(msg, status.name)
+            except ValueError:  # another's diagnostics, which are no counters
+                continue
+
+
+def _scores_from_msg(msg: Any) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    candidates, scores = scores_from_msg(msg)
+    return candidates.astype(np.float64), scores

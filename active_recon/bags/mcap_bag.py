@@ -1,0 +1,80 @@
+"""A recording in MCAP, of one file or of several that follow each other."""
+
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from active_recon.bags.mcap_file import mcap_records
+from active_recon.bags.message_types import require_standard
+from active_recon.bags.metadata import yaml_mapping
+from active_recon.bags.raw import BagSummary, RawMessage
+from active_recon.bags.run import TopicSummary
+from active_recon.errors import DataError
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+
+RECORD_NAME = 'active_recon'
+"""The name of the metadata in which a recording says where it comes from."""
+_PARAMETERS = 'parameters/'
+
+
+class McapBag:
+    """MCAP files that follow each other in one recording."""
+
+    def __init__(self, files: list[Path]) -> None:
+        self._files = files
+
+    def summary(self) -> BagSummary:
+        """Read all of the files and say what is in them."""
+        types: dict[str, str] = {}
+        counts: dict[str, int] = {}
+        provenance: dict[str, str] = {}
+        parameters: dict[str, Mapping[str, Any]] = {}
+        begin = end = 0
+        for record in self._records(types):
+            if isinstance(record, RawMessage):
+                begin = min(begin or record.received, record.received)
+                end = max(end, record.received)
+                counts[record.topic] = counts.get(record.topic, 0) + 1
+            elif isinstance(record, Metadata) and record.name == RECORD_NAME:
+                provenance.update(record.metadata)
+            elif isinstance(record, Attachment) and record.name.startswith(_PARAMETERS):
+                node = record.name.removeprefix(_PARAMETERS).removesuffix('.yaml')
+                parameters[node] = yaml_mapping(record.data, record.name)
+        topics = [TopicSummary(name, types[name], counts.get(name, 0)) for name in sorted(types)]
+        return BagSummary(topics, begin, end, provenance, parameters)
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of the topics, file after file, each in its order."""
+        wanted = frozenset(topics)
+        for record in self._records({}):
+            if isinstance(record, RawMessage) and record.topic in wanted:
+                yield record
+
+    def _records(self, types: dict[str, str]) -> Iterator[RawMessage | Metadata | Attachment]:
+        """Yield what the files hold; `types` gathers the topics and their types."""
+        for path in self._files:
+            schemas: dict[int, Schema] = {}
+            channels: dict[int, tuple[str, str]] = {}
+            for record in mcap_records(path):
+                if isinstance(record, Schema):
+                    schemas[record.id] = record
+                    if record.encoding == 'ros2msg':
+                        require_standard(record.name, record.data, path)
+                elif isinstance(record, Channel):
+                    channels[record.id] = record.topic, _type_name(record, schemas)
+                    types[record.topic] = channels[record.id][1]
+                elif isinstance(record, Message):
+                    if record.channel_id not in channels:
+                        raise DataError(f'{path}: expected messages of announced channels, got '
+                                        f'one of channel {record.channel_id}', 'damaged')
+                    yield RawMessage(*channels[record.channel_id], record.data, record.log_time,
+                                     record.publish_time or record.log_time)
+                elif isinstance(record, Metadata | Attachment):
+                    yield record
+
+
+def _type_name(channel: Channel, schemas: Mapping[int, Schema]) -> str:
+    schema = schemas.get(channel.schema_id)
+    name = schema.name if schema else 'unknown'
+    # What is not CDR bears a name that no type has, and is so read by nobody.
+    return name if channel.message_encoding == 'cdr' else f'{name} as {channel.message_encoding}'

@@ -1,0 +1,124 @@
+"""MCAP files read record by record; no length is believed before the bytes are there."""
+
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+import struct
+from typing import BinaryIO
+import zlib
+
+from active_recon.errors import DataError
+from lz4.frame import LZ4FrameDecompressor
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.writer import MCAP0_MAGIC
+from zstandard import ZstdDecompressor
+
+MOST_BYTES = 1 << 28
+"""A record or an unpacked chunk of more is refused: no camera makes such messages."""
+MOST_ATTACHED = 1 << 20
+"""Attachments of more are passed over: parameters are far smaller."""
+_Reader = Callable[[ReadDataStream], McapRecord]
+_CHUNKED: dict[Opcode, _Reader] = {Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read}
+_READ: dict[Opcode, _Reader] = {
+    **_CHUNKED, Opcode.CHUNK: Chunk.read, Opcode.METADATA: Metadata.read,
+    Opcode.ATTACHMENT: Attachment.read}
+
+
+def mcap_records(path: Path) -> Iterator[McapRecord]:
+    """
+    Yield the schemas, channels, messages, metadata and attachments of a file, in its order.
+
+    The index is not used, so that it cannot mislead. Raises DataError where the file is no whole
+    MCAP file or a chunk is not what its checksum says.
+    """
+    try:
+        with path.open('rb') as file:
+            yield from _file_records(file, path.stat().st_size)
+    except DataError as error:
+        raise DataError(f'{path}: {error}', error.kind) from error
+    except OSError as error:
+        raise DataError(f'{path}: cannot be read: {error.strerror}') from error
+    except Exception as error:  # the decoders raise whatever damaged bytes lead them to
+        raise DataError(f'{path}: expected a whole MCAP file, got records that cannot be '
+                        f'understood ({error or type(error).__name__})', 'damaged') from error
+
+
+def _file_records(file: BinaryIO, size: int) -> Iterator[McapRecord]:
+    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+        raise DataError('expected an MCAP file, got another beginning', 'no_mcap')
+    for opcode, length in _heads(file, size):
+        if opcode == Opcode.FOOTER:
+            file.seek(length, 1)
+            if file.read() == MCAP0_MAGIC:
+                return
+            break
+        if opcode == Opcode.MESSAGE or opcode in _READ:
+            if opcode == Opcode.ATTACHMENT and length > MOST_ATTACHED:
+                continue
+            record = _record(opcode, file, length)
+            if isinstance(record, Chunk):
+                yield from _chunk_records(record)
+            else:
+                yield record
+    raise DataError('expected a whole MCAP file, but its end is missing; `active-recon bag '
+                    'repair` keeps all that is whole', 'truncated')
+
+
+def _chunk_records(chunk: Chunk) -> Iterator[McapRecord]:
+    data = _unpacked(chunk)
+    stream = BytesIO(data)
+    for opcode, length in _heads(stream, len(data)):
+        if opcode == Opcode.MESSAGE or opcode in _CHUNKED:
+            yield _record(opcode, stream, length)
+
+
+def _heads(stream: BinaryIO, end: int) -> Iterator[tuple[int, int]]:
+    """Yield each record's opcode and length, the stream at its content."""
+    following = stream.tell()
+    while following < end:
+        stream.seek(following)
+        head = stream.read(9)
+        opcode, length = struct.unpack('<BQ', head) if len(head) == 9 else (0, 0)
+        left = end - stream.tell()
+        if len(head) < 9 or length > left:
+            raise DataError(
+                f'expected a whole record at byte {following}, but it claims {length} bytes and '
+                f'{left} are left; `active-recon bag repair` keeps all that is whole',
+                'truncated')
+        following = stream.tell() + length
+        yield opcode, length
+
+
+def _record(opcode: int, stream: BinaryIO, length: int) -> McapRecord:
+    if length > MOST_BYTES:
+        raise DataError(f'expected records of at most {MOST_BYTES} bytes, got one of {length}',
+                        'too_large')
+    content = ReadDataStream(BytesIO(stream.read(length)))
+    if opcode != Opcode.MESSAGE:
+        return _READ[Opcode(opcode)](content)
+    if length < 22:
+        raise DataError(f'expected a message of at least 22 bytes, got {length}', 'damaged')
+    message: Message = Message.read(content, length)
+    return message
+
+
+def _unpacked(chunk: Chunk) -> bytes:
+    size = chunk.uncompressed_size
+    if size > MOST_BYTES:
+        raise DataError(f'expected chunks of at most {MOST_BYTES} bytes, got one that claims '
+                        f'{size}', 'too_large')
+    if chunk.compression == 'zstd':
+        data = ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
+    elif chunk.compression == 'lz4':
+        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+    elif chunk.compression == '':
+        data = chunk.data
+    else:
+        raise DataError('expected chunks packed by zstd, lz4 or not at all, got '
+                        f'{chunk.compression!r}', 'compression')
+    if len(data) != size or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+        raise DataError(f'expected a chunk of {size} bytes with its checksum, got {len(data)} '
+                        'bytes that are not as they were written', 'damaged')
+    return bytes(data)

@@ -1,0 +1,60 @@
+"""Messages out of CDR bytes, by the standard's own definitions alone."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from active_recon.errors import DataError
+from rosbags.typesys import get_types_from_msg, get_typestore, Stores
+from rosbags.typesys.store import Typestore
+
+HEADER = 'std_msgs/msg/Header'
+FLOAT = 'std_msgs/msg/Float64'
+IMAGE = 'sensor_msgs/msg/Image'
+COMPRESSED_IMAGE = 'sensor_msgs/msg/CompressedImage'
+CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+CLOUD = 'sensor_msgs/msg/PointCloud2'
+POSE = 'geometry_msgs/msg/PoseStamped'
+DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+READ_TYPES = frozenset((HEADER, FLOAT, IMAGE, COMPRESSED_IMAGE, CAMERA_INFO, JOINT_STATE, CLOUD,
+                        POSE, DIAGNOSTICS))
+
+
+@cache
+def _standard() -> Typestore:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def message_from_cdr(data: bytes, type_name: str, where: str) -> Any:
+    """
+    Return a message with the attributes that ROS's own has, its numbers as numpy arrays.
+
+    Raises DataError that says `where` when the bytes are not one of that type.
+    """
+    try:
+        return _standard().deserialize_cdr(data, type_name)
+    except Exception as error:  # the generated code raises whatever the bytes lead it to
+        raise DataError(f'{where}: expected the bytes of a {type_name}, got {len(data)} bytes of '
+                        f'something else ({error})', 'message_bytes') from error
+
+
+@cache
+def require_standard(type_name: str, definition: bytes, path: Path) -> None:
+    """
+    Raise DataError where a definition in a bag is not the standard's.
+
+    Types that are not read here may be defined in any way.
+    """
+    if type_name not in READ_TYPES:
+        return
+    try:
+        types = get_types_from_msg(definition.decode(), type_name)
+        theirs = {name: fields for name, (_, fields) in types.items()}
+        ours = {name: _standard().fielddefs[name][1] for name in theirs}
+    except Exception as error:  # the parser raises whatever the text leads it to
+        raise DataError(f'{path}: expected a definition of {type_name}, got: '
+                        f'{" ".join(str(error).split())}', 'definition') from error
+    if theirs != ours:
+        raise DataError(f'{path}: expected {type_name} to be defined as in ROS, got other fields '
+                        'under that name', 'definition')

@@ -1,0 +1,39 @@
+"""What every bag is read as: raw messages, and a summary of them."""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from active_recon.bags.run import TopicSummary
+
+
+@dataclass(frozen=True)
+class RawMessage:
+    """A message as it went over the wire, CDR; times in nanoseconds since 1970."""
+
+    topic: str
+    type_name: str
+    data: bytes
+    received: int
+    published: int
+
+
+@dataclass(frozen=True)
+class BagSummary:
+    """What is in a bag; `begin` and `end` are receive times, 0 where it holds no message."""
+
+    topics: list[TopicSummary]
+    begin: int
+    end: int
+    provenance: Mapping[str, str]
+    parameters: Mapping[str, Mapping[str, Any]]
+
+
+class Bag(Protocol):
+    """A bag that can be read any number of times."""
+
+    def summary(self) -> BagSummary:
+        """Read all of the bag and say what is in it; DataError where it is damaged."""
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of the topics in the bag's order; DataError where it is damaged."""

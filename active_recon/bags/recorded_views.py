@@ -1,0 +1,117 @@
+"""The views of a bag: those that the loop says it took, or those that its gate lets through."""
+
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Sequence
+import math
+from typing import Any
+
+from active_recon.bags.camera_stream import CameraStream
+from active_recon.bags.loop_record import LoopRecord
+from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedView
+from active_recon.errors import DataError
+from active_recon.view_gate import ViewGate
+from msg_tools.episodes import Episode
+from msg_tools.views import View
+
+
+def recorded_episodes(stream: CameraStream, record: LoopRecord) -> list[RecordedEpisode]:
+    """
+    Return the episodes that the loop recorded, each with its views in the order it took them.
+
+    What was recorded before any episode began is one without an id. Raises DataError where the
+    image of a view is missing or its camera is.
+    """
+    views = _taken_views(stream, sorted(record.parts['view']))
+    begun: list[Episode] = sorted(record.parts['episode'].values(), key=lambda each: each.begin)
+    if views and (not begun or views[0].stamp < begun[0].begin):
+        begun.insert(0, Episode('', views[0].stamp))
+    ends = [episode.begin for episode in begun[1:]] + [math.inf]
+    return [_episode(episode, [view for view in views if episode.begin <= view.stamp < end],
+                     end, stream, record)
+            for episode, end in zip(begun, ends, strict=True)]
+
+
+def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, dict[str, int]]:
+    """
+    Return the views that the gate of the reconstructor's node lets through, as one episode.
+
+    And with it the node's counters. Raises DataError where not one image becomes a view.
+    """
+    views = []
+    counters: Counter[str] = Counter()
+    refusal = 'there is no image'
+    for view in stream.views(wanted=lambda stamp: True):
+        if not isinstance(view, View):
+            refusal = str(view)
+            counters[f'refused/{view.kind}'] += 1
+            continue
+        counters['images'] += 1
+        if not gate.wants(view.camera, view.stamp):
+            counters['images_unused'] += 1
+            continue
+        gate.took(view.camera)
+        views.append(_view(view, None, stream, None))
+    if not counters['images']:
+        raise DataError(f'expected images with an azimuth each, got none: {refusal}', 'no_views')
+    if not views:
+        raise DataError(f'expected a camera that stands still for its views, got '
+                        f'{counters["images"]} images of one that never does', 'no_views')
+    counters['views'] = len(views)
+    return RecordedEpisode('', views[0].stamp, None, views, ''), dict(counters)
+
+
+def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
+    found = {}
+    refusal = 'the image was not recorded'
+    for view in stream.views(wanted=frozenset(stamps).__contains__):
+        if isinstance(view, View):
+            found[view.stamp] = view
+        else:
+            refusal = str(view)
+    for number, stamp in enumerate(stamps, 1):
+        if stamp not in found:
+            raise DataError(f'expected the image and the camera of view {number} '
+                            f'({stamp / 1e9:.3f} s), but they are missing: {refusal}', 'no_image')
+    return [found[stamp] for stamp in stamps]
+
+
+def _episode(episode: Episode, views: Sequence[View], end: float, stream: CameraStream,
+             record: LoopRecord) -> RecordedEpisode:
+    """Return an episode, with each goal after the view that it was decided upon."""
+    decided: dict[int, RecordedGoal] = {}
+    published = [record.published['view'][view.stamp] for view in views]
+    for goal in _goals(record, episode.begin, end):
+        after = bisect_right(published, record.published['next_view'][goal.stamp])
+        decided.setdefault(after, goal)  # asked again by `plan`, it is no new decision
+    reasons = [(record.published['done'][stamp], reason)
+               for stamp, (_, reason) in record.parts['done'].items()
+               if episode.begin <= stamp < end]
+    return RecordedEpisode(
+        episode.id, episode.begin, decided.get(0),
+        [_view(view, decided.get(number), stream, record) for number, view in enumerate(views, 1)],
+        max(reasons, default=(0, ''))[1])
+
+
+def _goals(record: LoopRecord, begin: int, end: float) -> list[RecordedGoal]:
+    goals = []
+    for stamp, azimuth in sorted(record.parts['next_view'].items()):
+        if begin <= stamp < end:
+            candidates, scores = record.parts['azimuth_scores'].get(stamp, (None, None))
+            goals.append(RecordedGoal(azimuth, stamp, candidates, scores,
+                                      record.received['next_view'][stamp]))
+    return goals
+
+
+def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
+          record: LoopRecord | None) -> RecordedView:
+    parts = record.parts if record else {}
+    received = {role: times[view.stamp]
+                for role, times in (stream.received | (record.received if record else {})).items()
+                if view.stamp in times}
+
+    def part(role: str) -> Any:
+        return parts.get(role, {}).get(view.stamp)
+
+    return RecordedView(view.stamp, view.image, view.camera, part('probabilities'),
+                        part('occupancy'), part('latent'), part('entropy'), goal, received)
