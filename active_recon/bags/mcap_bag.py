@@ -6,15 +6,15 @@ from typing import Any
 
 from active_recon.bags.mcap_file import mcap_records
 from active_recon.bags.message_types import require_standard
-from active_recon.bags.metadata import yaml_mapping
-from active_recon.bags.raw import BagSummary, RawMessage
-from active_recon.bags.run import TopicSummary
+from active_recon.bags.metadata import (
+    Contents,
+    parameters_node,
+    PROVENANCE,
+    yaml_mapping,
+)
+from active_recon.bags.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import DataError
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
-
-RECORD_NAME = 'active_recon'
-"""The name of the metadata in which a recording says where it comes from."""
-_PARAMETERS = 'parameters/'
 
 
 class McapBag:
@@ -26,22 +26,17 @@ class McapBag:
     def summary(self) -> BagSummary:
         """Read all of the files and say what is in them."""
         types: dict[str, str] = {}
-        counts: dict[str, int] = {}
+        contents = Contents()
         provenance: dict[str, str] = {}
         parameters: dict[str, Mapping[str, Any]] = {}
-        begin = end = 0
         for record in self._records(types):
             if isinstance(record, RawMessage):
-                begin = min(begin or record.received, record.received)
-                end = max(end, record.received)
-                counts[record.topic] = counts.get(record.topic, 0) + 1
-            elif isinstance(record, Metadata) and record.name == RECORD_NAME:
-                provenance.update(record.metadata)
-            elif isinstance(record, Attachment) and record.name.startswith(_PARAMETERS):
-                node = record.name.removeprefix(_PARAMETERS).removesuffix('.yaml')
+                contents.add(record.topic, record.received)
+            elif isinstance(record, Metadata) and record.name == PROVENANCE:
+                provenance = record.metadata
+            elif isinstance(record, Attachment) and (node := parameters_node(record.name)):
                 parameters[node] = yaml_mapping(record.data, record.name)
-        topics = [TopicSummary(name, types[name], counts.get(name, 0)) for name in sorted(types)]
-        return BagSummary(topics, begin, end, provenance, parameters)
+        return bag_summary(types, contents, provenance, parameters)
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of the topics, file after file, each in its order."""

@@ -120,5 +120,6 @@ def _unpacked(chunk: Chunk) -> bytes:
                         f'{chunk.compression!r}', 'compression')
     if len(data) != size or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise DataError(f'expected a chunk of {size} bytes with its checksum, got {len(data)} '
-                        'bytes that are not as they were written', 'damaged')
+                        'bytes that are not as they were written; `active-recon bag repair` keeps '
+                        'the others', 'damaged')
     return bytes(data)

@@ -94,6 +94,13 @@ def parameters_name(node: str) -> str:
     return f'parameters/{node.strip("/")}.yaml'
 
 
+def parameters_node(name: str) -> str:
+    """Return whose parameters an attachment of that name holds; '' where it is another's."""
+    if name.startswith('parameters/') and name.endswith('.yaml'):
+        return name.removeprefix('parameters/').removesuffix('.yaml')
+    return ''
+
+
 def metadata_yaml(information: dict[str, Any]) -> str:
     """Return the text of the file metadata.yaml."""
     return as_yaml({'rosbag2_bagfile_information': information})

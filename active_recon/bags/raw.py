@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from active_recon.bags.metadata import Contents
 from active_recon.bags.run import TopicSummary
 
 
@@ -27,6 +28,13 @@ class BagSummary:
     end: int
     provenance: Mapping[str, str]
     parameters: Mapping[str, Mapping[str, Any]]
+
+
+def bag_summary(types: Mapping[str, str], contents: Contents, provenance: Mapping[str, str],
+                parameters: Mapping[str, Mapping[str, Any]]) -> BagSummary:
+    """Return the summary of what was counted; `types` by topic."""
+    topics = [TopicSummary(name, types[name], contents.counts[name]) for name in sorted(types)]
+    return BagSummary(topics, contents.begin, contents.end, provenance, parameters)
 
 
 class Bag(Protocol):

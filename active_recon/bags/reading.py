@@ -42,7 +42,7 @@ def _episodes(bag: Bag, summary: BagSummary, topics: Topics
               ) -> tuple[list[RecordedEpisode], Mapping[str, Mapping[str, int]]]:
     """Return the episodes, and the counters by node."""
     namespace = None if topics.azimuth else loop_namespace(summary.topics)
-    node = summary.parameters.get('reconstructor', {})
+    node = summary.parameters.get(f'{namespace or "/"}reconstructor'.strip('/'), {})
     topics = replace(topics, max_pose_gap=_value(node, 'max_pose_gap', topics.max_pose_gap),
                      object_frame=_value(node, 'object_frame', topics.object_frame))
     stream = CameraStream(bag, camera_topics(summary.topics, topics), topics)

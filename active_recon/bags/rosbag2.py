@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from active_recon.bags.message_types import require_standard
-from active_recon.bags.raw import BagSummary, RawMessage
-from active_recon.bags.run import TopicSummary
+from active_recon.bags.metadata import Contents
+from active_recon.bags.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import ActiveReconError, DataError
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
@@ -20,16 +20,12 @@ class OtherBag:
 
     def summary(self) -> BagSummary:
         """Say what is in the bag, once all of it has been read."""
-        counts: dict[str, int] = {}
-        begin = end = 0
+        contents = Contents()
         with self._open() as reader:
             types = {each.topic: each.msgtype for each in reader.connections}
             for connection, received, _ in reader.messages():
-                begin = min(begin or received, received)
-                end = max(end, received)
-                counts[connection.topic] = counts.get(connection.topic, 0) + 1
-        topics = [TopicSummary(name, types[name], counts.get(name, 0)) for name in sorted(types)]
-        return BagSummary(topics, begin, end, {}, {})
+                contents.add(connection.topic, received)
+        return bag_summary(types, contents, {}, {})
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of the topics by their receive times."""

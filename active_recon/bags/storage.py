@@ -16,7 +16,7 @@ def open_bag(path: Path) -> Bag:
         raise DataError(f'{path}: expected a bag, but there is nothing')
     if not path.is_dir():
         return McapBag([path]) if _is_mcap(path) else OtherBag(path)
-    files = sorted(path.glob('*.mcap'))
+    files = sorted(path.glob('*.mcap'), key=lambda file: (len(file.name), file.name))
     if (path / 'metadata.yaml').exists():
         named = _named_files(path)
         if named is None:

@@ -1,0 +1,102 @@
+"""Recordings of a small loop, made without the loop: what its nodes would have published."""
+
+from dataclasses import dataclass, field
+
+from active_recon.bags.writer import BagWriter
+from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.voxels import VoxelGrid
+from msg_tools.cameras import camera_to_msgs, pose_to_msg
+from msg_tools.diagnostics import diagnostics_to_msg
+from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
+from msg_tools.goals import scores_to_msg, view_goal_to_msg
+from msg_tools.images import image_to_msg, latent_to_msg
+from msg_tools.stamps import stamp_from_nanoseconds
+from msg_tools.voxels import FLOOR, voxel_grid_to_msg
+import numpy as np
+from rclpy.serialization import serialize_message
+from recorded_messages import definition
+from std_msgs.msg import Float64, Header
+
+BEGIN = 1_700_000_000_000_000_000
+PERIOD = 100_000_000  # ns, of the camera
+STILL = 3  # images of a camera that stands, of which the last becomes the view
+DELAY = 2_000_000  # ns, until a message is received
+LENS = CANONICAL_INTRINSICS.resized(16, 16)
+
+
+@dataclass
+class LoopRun:
+    """Three views of one object, and the messages that tell of them: (time, topic, message)."""
+
+    id: str = 'first'
+    begin: int = BEGIN
+    azimuths: tuple[float, ...] = (0.0, 2.0, 4.0)
+    messages: list = field(default_factory=list)
+    stamps: list = field(default_factory=list)
+
+    def __post_init__(self):
+        rng = np.random.default_rng(self.begin % 1000 + len(self.id))
+        count = len(self.azimuths)
+        self.images = rng.integers(0, 256, (count, 16, 16, 3), np.uint8)
+        self.grids = [VoxelGrid(rng.random((32, 32, 32)).astype(np.float32) ** 16)
+                      for _ in range(count)]
+        self.latents = rng.normal(size=(count, 6, 4, 4)).astype(np.float32)
+        self.candidates = np.arange(24) * np.pi / 12
+        self.scores = rng.normal(size=(count, 24)).astype(np.float32)
+        self.goal_stamps = []
+        self._say(self.begin, '/episode', episode_to_msg(Episode(self.id, self.begin)))
+        self._say(self.begin + 1, '/done', done_to_msg(self.begin, ''))
+        now = self.begin + 2
+        for number in range(count):
+            now = self._view(number, now)
+        self._say(now, '/done', done_to_msg(self.stamps[-1], 'max_views'))
+        self._say(now + 1, '/diagnostics', diagnostics_to_msg(
+            '/reconstructor', {'views': count}, '', stamp_from_nanoseconds(now)))
+        self.end = now + PERIOD
+
+    def _say(self, time, topic, msg):
+        self.messages.append((time, topic, msg))
+
+    def _view(self, number, now):
+        """Publish a goal, the camera at rest, and what came of its last image."""
+        azimuth = self.azimuths[number]
+        self.goal_stamps.append(now)
+        goal = header(now, 'object')
+        self._say(now, '/azimuth_scores', scores_to_msg(
+            self.candidates, self.scores[number], 0.5, 2.1, goal))
+        for repeat in range(2):
+            self._say(now + 10 + repeat * PERIOD, '/next_view',
+                      view_goal_to_msg(azimuth, 0.5, 2.1, goal))
+        camera = orbit_camera(azimuth, intrinsics=LENS)
+        for _ in range(STILL):
+            now += PERIOD
+            stamped = header(now, 'camera')
+            info, pose = camera_to_msgs(camera, stamped)
+            self._say(now + 1, '/camera/pose', pose)
+            self._say(now + 2, '/camera/camera_info', info)
+            self._say(now + 3, '/camera/image_raw', image_to_msg(self.images[number], stamped))
+        self.stamps.append(now)
+        stamped, grid = header(now, 'object'), self.grids[number]
+        self._say(now + 1_000_000, '/occupancy', voxel_grid_to_msg(grid, 0.5, stamped))
+        self._say(now + 1_000_001, '/latent', latent_to_msg(self.latents[number], stamped))
+        self._say(now + 1_000_002, '/view', pose_to_msg(camera.pose, stamped))
+        self._say(now + 1_000_003, '/probabilities', voxel_grid_to_msg(grid, FLOOR, stamped))
+        self._say(now + 1_000_004, '/entropy', Float64(data=grid.entropy()))
+        return now + 2_000_000
+
+
+def header(stamp, frame):
+    return Header(stamp=stamp_from_nanoseconds(stamp), frame_id=frame)
+
+
+def type_name(msg):
+    return f'{type(msg).__module__.split(".")[0]}/msg/{type(msg).__name__}'
+
+
+def write_bag(folder, messages, max_bytes=None):
+    """Write (time, topic, message) into a bag, and return its folder."""
+    with BagWriter(folder, max_bytes) as bag:
+        for time, topic, msg in messages:
+            bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
+            bag.write(topic, serialize_message(msg), time + DELAY, time)
+    return folder

@@ -1,0 +1,155 @@
+"""Reading bags: what was recorded is what is read, in whatever form it was stored."""
+
+
+from active_recon.bags.reading import read_run
+from active_recon.bags.writer import BagWriter
+from active_recon.voxels import VoxelGrid
+from loop_bags import BEGIN, DELAY, LENS, LoopRun, type_name, write_bag
+from msg_tools.episodes import done_to_msg
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from recorded_messages import definition, STORE
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+
+
+@pytest.fixture(scope='module')
+def loop():
+    return LoopRun()
+
+
+@pytest.fixture(scope='module')
+def bag(loop, tmp_path_factory):
+    return write_bag(tmp_path_factory.mktemp('bags') / 'run', loop.messages)
+
+
+def only(run):
+    (episode,) = run.episodes
+    return episode
+
+
+def same(a, b):
+    """Whether two runs tell the same of their views."""
+    return [(view.stamp, view.image.tobytes(), view.camera.pose.tobytes(), view.entropy)
+            for episode in a.episodes for view in episode.views] == [
+           (view.stamp, view.image.tobytes(), view.camera.pose.tobytes(), view.entropy)
+            for episode in b.episodes for view in episode.views]
+
+
+def test_what_the_loop_published_is_what_is_read(loop, bag):
+    run = read_run(bag)
+    episode = only(run)
+    assert (episode.id, episode.begin, episode.done) == ('first', BEGIN, 'max_views')
+    assert [view.stamp for view in episode.views] == loop.stamps
+    for number, view in enumerate(episode.views):
+        assert np.array_equal(view.image, loop.images[number])
+        assert view.camera.azimuth == pytest.approx(loop.azimuths[number])
+        assert view.camera.intrinsics == LENS
+        grid = loop.grids[number].occupancy
+        assert np.array_equal(view.occupied.occupancy, np.where(grid > 0.5, grid, 0))
+        assert np.array_equal(
+            view.reconstruction.occupancy, np.where(grid > np.float32(0.02), grid, 0))
+        assert np.array_equal(view.latent, loop.latents[number])
+        assert view.entropy == VoxelGrid(grid).entropy()
+    assert run.counters == {'reconstructor': {'views': 3}}
+    assert (run.begin, run.end) == (BEGIN + DELAY, loop.messages[-1][0] + DELAY)
+    assert sum(topic.count for topic in run.topics) == len(loop.messages)
+
+
+def test_each_goal_follows_the_view_that_it_was_decided_upon(loop, bag):
+    episode = only(read_run(bag))
+    goals = [episode.first_goal, *(view.goal for view in episode.views[:-1])]
+    assert episode.views[-1].goal is None
+    for number, goal in enumerate(goals):
+        assert goal.azimuth == pytest.approx(loop.azimuths[number])
+        assert goal.stamp == loop.goal_stamps[number]
+        assert goal.received == loop.goal_stamps[number] + 10 + DELAY  # when it first came
+        np.testing.assert_allclose(goal.candidates, loop.candidates, atol=1e-6)
+        assert np.array_equal(goal.scores, loop.scores[number])
+
+
+def test_what_bears_a_views_stamp_tells_when_it_was_received(loop, bag):
+    view = only(read_run(bag)).views[0]
+    assert view.received['camera/image_raw'] == loop.stamps[0] + 3 + DELAY
+    assert view.received['occupancy'] == loop.stamps[0] + 1_000_000 + DELAY
+    assert view.received['entropy'] == loop.stamps[0] + 1_000_004 + DELAY
+    assert {'camera/pose', 'camera/camera_info', 'view', 'probabilities', 'latent'} < set(
+        view.received)
+
+
+def test_two_episodes_keep_their_views_apart(tmp_path):
+    first = LoopRun()
+    second = LoopRun('second', first.end, azimuths=(1.0, 3.0))
+    run = read_run(write_bag(tmp_path / 'run', [*first.messages, *second.messages]))
+    assert [episode.id for episode in run.episodes] == ['first', 'second']
+    assert [len(episode.views) for episode in run.episodes] == [3, 2]
+    assert [episode.done for episode in run.episodes] == ['max_views', 'max_views']
+    assert run.episodes[1].first_goal.azimuth == pytest.approx(1.0)
+
+
+def test_views_before_any_episode_are_one_without_an_id(loop, tmp_path):
+    later = [entry for entry in loop.messages if entry[1] != '/episode']
+    episode = only(read_run(write_bag(tmp_path / 'run', later)))
+    assert (episode.id, len(episode.views)) == ('', 3)
+
+
+def test_an_end_that_was_taken_back_is_none(loop, tmp_path):
+    resumed = (loop.messages[-1][0] + 1, '/done', done_to_msg(BEGIN, ''))
+    assert only(read_run(write_bag(tmp_path / 'run', [*loop.messages, resumed]))).done == ''
+
+
+def test_latched_messages_that_come_again_count_once(loop, bag, tmp_path):
+    again = [(time, topic, msg) for time, topic, msg in loop.messages
+             if topic in ('/view', '/occupancy', '/probabilities', '/latent', '/entropy')]
+    run = read_run(write_bag(tmp_path / 'run', [*loop.messages, *again]))
+    assert same(run, read_run(bag))
+
+
+def test_a_bare_file_a_split_bag_and_one_without_metadata_read_alike(loop, bag, tmp_path):
+    whole = read_run(bag)
+    assert same(read_run(bag / 'run_0.mcap'), whole)
+    split = write_bag(tmp_path / 'split', loop.messages, max_bytes=50_000)
+    assert len(list(split.glob('*.mcap'))) > 2
+    assert same(read_run(split), whole)
+    (split / 'metadata.yaml').unlink()
+    assert same(read_run(split), whole)
+
+
+def copied(bag, folder, storage):
+    """Copy a bag by a library that we did not write."""
+    with Reader(bag) as reader, Writer(folder, version=9, storage_plugin=storage) as writer:
+        connections = {each.id: writer.add_connection(
+            each.topic, each.msgtype, typestore=STORE) for each in reader.connections}
+        for connection, time, data in reader.messages():
+            writer.write(connections[connection.id], time, data)
+    return folder
+
+
+@pytest.mark.parametrize('storage', [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_bags_that_others_wrote_read_alike(bag, tmp_path, storage):
+    copy = copied(bag, tmp_path / 'copy', storage)
+    assert same(read_run(copy), read_run(bag))
+    (bare,) = [path for path in copy.iterdir() if path.suffix != '.yaml']
+    assert same(read_run(bare), read_run(bag))
+
+
+def test_the_order_in_the_file_does_not_matter(loop, bag, tmp_path):
+    by_topic = sorted(loop.messages, key=lambda entry: entry[1])
+    assert same(read_run(write_bag(tmp_path / 'run', by_topic)), read_run(bag))
+
+
+def test_a_namespace_before_the_topics_is_found(loop, bag, tmp_path):
+    moved = [(time, f'/robot{topic}', msg) for time, topic, msg in loop.messages]
+    assert same(read_run(write_bag(tmp_path / 'run', moved)), read_run(bag))
+
+
+def test_the_parameters_and_the_provenance_are_read(loop, tmp_path):
+    with BagWriter(tmp_path / 'run') as writer:
+        writer.add_provenance({'version': '1', 'policy': 'random'})
+        writer.attach_parameters('/view_planner', {'seed': 3, 'distance': float('inf')})
+        for time, topic, msg in loop.messages:
+            writer.add_topic(topic, type_name(msg), definition(type_name(msg)))
+            writer.write(topic, serialize_message(msg), time, time)
+    run = read_run(tmp_path / 'run')
+    assert run.provenance == {'version': '1', 'policy': 'random'}
+    assert run.parameters == {'view_planner': {'seed': 3, 'distance': float('inf')}}
