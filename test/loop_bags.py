@@ -99,4 +99,6 @@ def write_bag(folder, messages, max_bytes=None):
         for time, topic, msg in messages:
             bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
             bag.write(topic, serialize_message(msg), time + DELAY, time)
+            if max_bytes:
+                bag.flush()  # a file may end wherever a chunk does
     return folder
