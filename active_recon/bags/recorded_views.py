@@ -40,10 +40,10 @@ def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, 
     """
     views = []
     counters: Counter[str] = Counter()
-    refusal = 'there is no image'
+    refusal = ''
     for view in stream.views(wanted=lambda stamp: True):
         if not isinstance(view, View):
-            refusal = str(view)
+            refusal = refusal or str(view)
             counters[f'refused/{view.kind}'] += 1
             continue
         counters['images'] += 1
@@ -53,7 +53,8 @@ def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, 
         gate.took(view.camera)
         views.append(_view(view, None, stream, None))
     if not counters['images']:
-        raise DataError(f'expected images with an azimuth each, got none: {refusal}', 'no_views')
+        raise DataError(f'expected images with an azimuth each, got none: '
+                        f'{refusal or "there is no image"}', 'no_views')
     if not views:
         raise DataError(f'expected a camera that stands still for its views, got '
                         f'{counters["images"]} images of one that never does', 'no_views')
@@ -63,16 +64,17 @@ def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, 
 
 def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
     found = {}
-    refusal = 'the image was not recorded'
+    refusal = ''
     for view in stream.views(wanted=frozenset(stamps).__contains__):
         if isinstance(view, View):
             found[view.stamp] = view
         else:
-            refusal = str(view)
+            refusal = refusal or str(view)
     for number, stamp in enumerate(stamps, 1):
         if stamp not in found:
             raise DataError(f'expected the image and the camera of view {number} '
-                            f'({stamp / 1e9:.3f} s), but they are missing: {refusal}', 'no_image')
+                            f'({stamp / 1e9:.3f} s), but they are missing: '
+                            f'{refusal or "the image was not recorded"}', 'no_image')
     return [found[stamp] for stamp in stamps]
 
 

@@ -1,0 +1,134 @@
+"""Other people's bags: their topics and types, and the views that the gate finds in them."""
+
+from io import BytesIO
+import math
+
+from active_recon.bags.reading import read_run
+from active_recon.bags.topics import Topics
+from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.errors import DataError
+from loop_bags import BEGIN, header, PERIOD, write_bag
+from msg_tools.cameras import camera_to_msgs
+from msg_tools.images import image_to_msg
+import numpy as np
+import PIL.Image
+import pytest
+from sensor_msgs.msg import CompressedImage, JointState
+from std_msgs.msg import Float64
+
+AZIMUTHS = [0.0, 1.5, 3.0]
+IMAGES = np.random.default_rng(0).integers(0, 256, (len(AZIMUTHS), 24, 32, 3), np.uint8)
+TIMES = [(BEGIN + index * PERIOD, index // 3) for index in range(3 * len(AZIMUTHS))]
+"""Of the images, and the number of the azimuth where the camera stands for three of them."""
+
+
+def images(topic='/cam/color', make=image_to_msg, every=1):
+    return [(time, topic, make(IMAGES[number], header(time, 'camera')))
+            for time, number in TIMES[::every]]
+
+
+def png(image, stamp):
+    packed = BytesIO()
+    PIL.Image.fromarray(image).save(packed, 'PNG')
+    return CompressedImage(header=stamp, format='png', data=packed.getvalue())
+
+
+def joints(topic='/table', names=('turn',), sign=1):
+    return [(time, topic, JointState(header=header(time, ''), name=list(names), position=[
+        sign * AZIMUTHS[number] if name == 'turn' else 9.0 for name in names]))
+        for time, number in TIMES]
+
+
+def cameras(late=0):
+    """Poses and camera info, the poses a little later than the images."""
+    lens = CANONICAL_INTRINSICS.resized(32, 24)
+    both = [(time, *camera_to_msgs(orbit_camera(AZIMUTHS[number], 0.4, 3.0, lens),
+                                   header(time + late, 'camera')))
+            for time, number in TIMES]
+    for time, info, pose in both:
+        info.header = header(time, 'camera')
+        yield time, '/info', info
+        yield time + late, '/tracker', pose
+
+
+def views(folder, messages, **topics):
+    run = read_run(write_bag(folder, sorted(messages, key=lambda entry: entry[0])),
+                   Topics(**topics))
+    (episode,) = run.episodes
+    return episode.views
+
+
+def azimuths(found):
+    return pytest.approx([view.camera.azimuth for view in found])
+
+
+@pytest.mark.parametrize('make', [image_to_msg, png])
+def test_images_and_the_joint_of_a_turntable_are_views(tmp_path, make):
+    found = views(tmp_path / 'run', images(make=make) + joints())
+    assert azimuths(found) == AZIMUTHS
+    for view, image in zip(found, IMAGES, strict=True):
+        assert np.array_equal(view.image, image)
+        assert view.camera.elevation == pytest.approx(math.radians(30))
+        lens = view.camera.intrinsics  # the shorter side is what the canonical camera sees
+        assert lens.fy / 24 == pytest.approx(CANONICAL_INTRINSICS.fy / 137)
+        assert (lens.fx, lens.cx, lens.cy) == (lens.fy, 16, 12)
+
+
+def test_a_turned_object_is_a_camera_that_goes_the_other_way(tmp_path):
+    found = views(tmp_path / 'run', images() + joints(sign=-1), turned_object=True)
+    assert azimuths(found) == AZIMUTHS
+
+
+def test_one_joint_of_several_is_chosen_by_its_name(tmp_path):
+    folder = write_bag(tmp_path / 'run', images() + joints(names=('lift', 'turn')))
+    (episode,) = read_run(folder, Topics(joint='turn')).episodes
+    assert azimuths(episode.views) == AZIMUTHS
+    with pytest.raises(DataError, match='expected a position of one joint, got 2 of lift, turn'):
+        read_run(folder)
+    with pytest.raises(DataError, match='expected a position of tilt'):
+        read_run(folder, Topics(joint='tilt'))
+
+
+def test_a_float_is_joined_on_receive_times(tmp_path):
+    floats = [(time + 1, '/angle', Float64(data=AZIMUTHS[number])) for time, number in TIMES]
+    first = [(BEGIN - 1, '/angle', Float64(data=AZIMUTHS[0]))]
+    found = views(tmp_path / 'run', images() + first + floats)
+    assert azimuths(found) == AZIMUTHS
+
+
+def test_a_pose_and_the_camera_info_are_the_camera_as_it_was(tmp_path):
+    found = views(tmp_path / 'run', [*images(), *cameras()])
+    assert azimuths(found) == AZIMUTHS
+    assert found[1].camera.distance == pytest.approx(3.0)
+    assert found[1].camera.intrinsics.fx == pytest.approx(CANONICAL_INTRINSICS.fx * 32 / 137)
+
+
+def test_a_pose_between_two_is_interpolated_within_the_gap(tmp_path):
+    messages = [*images(), *cameras(late=PERIOD // 2)]
+    found = views(tmp_path / 'run', messages)
+    assert found[-1].camera.azimuth == pytest.approx(AZIMUTHS[-1])
+    with pytest.raises(DataError, match='expected images with an azimuth each.*within 0.01 s'):
+        views(tmp_path / 'short', messages, max_pose_gap=0.01)
+
+
+def test_without_camera_info_a_pose_tells_its_azimuth_alone(tmp_path):
+    poses = [entry for entry in cameras() if entry[1] == '/tracker']
+    found = views(tmp_path / 'run', images() + poses)
+    assert azimuths(found) == AZIMUTHS
+    assert found[0].camera.distance == pytest.approx(2.1)
+
+
+def test_topics_of_one_kind_are_told_apart_by_name(tmp_path):
+    folder = write_bag(tmp_path / 'run', images() + images('/cam/depth') + joints())
+    with pytest.raises(DataError, match='got /cam/color, /cam/depth; choose one with --image'):
+        read_run(folder)
+    (episode,) = read_run(folder, Topics(image='/cam/color')).episodes
+    assert len(episode.views) == 3
+    with pytest.raises(DataError, match='expected images on /cam/none of type'):
+        read_run(folder, Topics(image='/cam/none'))
+
+
+def test_a_camera_that_never_stands_still_gives_no_view(tmp_path):
+    turning = [(time, '/angle', Float64(data=index / 5)) for index, (time, _) in enumerate(TIMES)]
+    with pytest.raises(DataError, match='expected a camera that stands still.*9 images'):
+        views(tmp_path / 'run', images() + turning)
