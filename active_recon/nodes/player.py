@@ -1,0 +1,107 @@
+"""ROS shell that plays a bag: raw messages, as and when they were received, and their clock."""
+
+from collections.abc import Iterator
+from pathlib import Path
+import time
+
+from active_recon.bags.playing import played_topics
+from active_recon.bags.raw import RawMessage
+from active_recon.bags.storage import open_bag
+from active_recon.errors import ConfigError
+from active_recon.nodes.definitions import message_class
+from active_recon.nodes.parameters import declare
+from active_recon.nodes.qos import common_profile
+from active_recon.nodes.run import run_node
+from msg_tools.stamps import stamp_from_nanoseconds
+from rclpy.clock import Clock as SystemClock
+from rclpy.clock_type import ClockType
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
+from rosgraph_msgs.msg import Clock
+
+CLOCK = '/clock'
+HEARD_WITHIN_S = 2.0
+"""For so long each topic may wait for somebody to hear it; then the bag is played anyway."""
+_TICK_S = 0.002
+_CLOCK_EVERY_S = 0.02
+_SAY_EVERY_S = 10.0
+_QUEUE = 100
+
+
+class PlayerNode(Node):
+    """Publish a bag's messages once, then end the process."""
+
+    def __init__(self) -> None:
+        super().__init__('player')
+        bag = Path(declare(self, 'bag', '', 'the bag to play'))
+        self._rate = declare(self, 'rate', 1.0, 'how much faster than it was recorded')
+        topics = played_topics(bag, self._rate, declare(
+            self, 'topics', '', 'those to play, with commas between; empty for all'))
+        self._out = {}
+        for topic in topics:
+            try:
+                kind = message_class(topic.type_name)
+            except (ImportError, AttributeError, ValueError) as error:
+                raise ConfigError(f'{topic.name}: expected a type that is installed, got '
+                                  f'{topic.type_name}; leave it out by topics') from error
+            profile = common_profile(topic.qos, _QUEUE)
+            if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                profile.depth = 1
+            self._out[topic.name] = self.create_publisher(kind, topic.name, profile)
+        self._clock_pub = None if CLOCK in self._out else self.create_publisher(Clock, CLOCK, 10)
+        self._messages = self._read(bag)
+        self._next = next(self._messages, None)
+        self._begin = self._next.received if self._next is not None else 0
+        self._made_at = time.monotonic()
+        self._started_at: float | None = None
+        self._clock_at = self._said_at = 0.0
+        self.get_logger().info(f'playing {len(topics)} topics of {bag} at rate {self._rate:g}')
+        # By the system's clock: a node that is told to use the one it publishes would stand still.
+        self.create_timer(_TICK_S, self._play, clock=SystemClock(clock_type=ClockType.STEADY_TIME))
+
+    def _read(self, bag: Path) -> Iterator[RawMessage]:
+        return open_bag(bag).messages(self._out.keys())
+
+    def _play(self) -> None:
+        """Publish what is due by now."""
+        now = time.monotonic()
+        if self._started_at is None:
+            heard = all(publisher.get_subscription_count() for publisher in self._out.values())
+            if not heard and now - self._made_at < HEARD_WITHIN_S:
+                return
+            self._started_at = self._said_at = now
+        elapsed = (now - self._started_at) * self._rate
+        due = self._begin + round(elapsed * 1e9)
+        while self._next is not None and self._next.received <= due:
+            self._tell_time(self._next.received)
+            self._out[self._next.topic].publish(self._next.data)
+            self._next = next(self._messages, None)
+        if self._next is None:
+            self._finish()
+        if now - self._clock_at >= _CLOCK_EVERY_S:
+            self._tell_time(due)
+            self._clock_at = now
+        if now - self._said_at >= _SAY_EVERY_S:
+            self.get_logger().info(f'{elapsed:.0f} s of the recording are played')
+            self._said_at = now
+
+    def _tell_time(self, nanoseconds: int) -> None:
+        if self._clock_pub is not None:
+            self._clock_pub.publish(Clock(clock=stamp_from_nanoseconds(nanoseconds)))
+
+    def _finish(self) -> None:
+        """End the process once everything has been heard by those who listen."""
+        for publisher in self._out.values():
+            publisher.wait_for_all_acked(Duration(seconds=HEARD_WITHIN_S))
+        self.get_logger().info('done')
+        raise SystemExit(0)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Play a bag, or what of it can be played until the process is asked to stop."""
+    run_node(PlayerNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,123 @@
+"""Playing a bag: what live nodes hear is what was recorded, and they take it for a camera."""
+
+import subprocess
+import sys
+import time
+
+from geometry_msgs.msg import PoseStamped
+from msg_tools.stamps import nanoseconds_from_stamp
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosbags.highlevel import AnyReader
+from std_msgs.msg import Header
+
+pytestmark = pytest.mark.ros
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM = QoSProfile(depth=1000)
+CAMERA = 'camera/image_raw,camera/camera_info,camera/pose'
+VIEWS = 3
+
+
+def read(bag):
+    """Return each topic's messages, and the span of their receive times in seconds."""
+    topics = {}
+    with AnyReader([bag]) as reader:
+        for connection, _, data in reader.messages():
+            topics.setdefault(connection.topic, []).append(
+                reader.deserialize(data, connection.msgtype))
+        return topics, reader.duration / 1e9
+
+
+def stamps(msgs):
+    return [nanoseconds_from_stamp(getattr(msg, 'header', msg).stamp) for msg in msgs]
+
+
+@pytest.fixture(scope='module')
+def bag(shared_bench, start_shared_node, box, tmp_path_factory):
+    """The bag of a loop that took three views by the policy farthest."""
+    bags = tmp_path_factory.mktemp('bags')
+    nodes = [start_shared_node('recorder', output_dir=bags),
+             start_shared_node('turntable_camera', mesh=box, speed=3.0),
+             start_shared_node('reconstructor'),
+             start_shared_node('view_planner', policy='farthest', max_views=VIEWS,
+                               entropy_tolerance=0.0)]
+    done = shared_bench.hear(Header, 'done', LATCHED)
+    shared_bench.until(lambda: done and done[-1].frame_id, 'the end of the loop')
+    shared_bench.within(1.0, lambda: False)  # the camera streams on
+    for node in nodes:
+        assert node.stop() == 0
+    return next(bags.iterdir())
+
+
+@pytest.fixture
+def play(ros_domain, tmp_path):
+    """Start to play a bag; what it says goes into the file `said`."""
+    started = []
+
+    def start(bag, *options):
+        with (tmp_path / 'said').open('w') as said:
+            started.append(subprocess.Popen(
+                [sys.executable, '-m', 'active_recon.cli.main', 'play', str(bag), *options],
+                stdout=said, stderr=subprocess.STDOUT))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def bench(shared_bench):
+    return shared_bench
+
+
+def test_every_message_is_heard_in_order_at_the_rate(bench, play, bag):
+    recorded, seconds = read(bag)
+    poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
+    episodes = bench.hear(Header, 'episode', LATCHED)
+    began = time.monotonic()
+    process = play(bag, '--rate', '2', '--topics', 'camera/pose,/episode')
+    bench.until(lambda: process.poll() is not None, 'the end of the playing')
+    assert process.returncode == 0
+    assert time.monotonic() - began > seconds / 2
+    assert stamps(poses) == stamps(recorded['/camera/pose'])
+    assert [msg.frame_id for msg in episodes] == [msg.frame_id for msg in recorded['/episode']]
+
+
+def test_latched_topics_are_latched_again(bench, play, bag):
+    process = play(bag, '--topics', 'episode,camera/pose', '--rate', '0.5')
+    poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
+    bench.until(lambda: poses, 'the first pose, which follows the episode')
+    late = bench.hear(Header, 'episode', LATCHED)
+    bench.until(lambda: late, 'the episode, which was said before')
+    process.terminate()
+    assert process.wait(30) == 0
+
+
+def test_live_nodes_take_the_recorded_camera_for_one(bench, play, start_node, bag):
+    recorded, _ = read(bag)
+    start_node('reconstructor', use_sim_time='true')
+    start_node('view_planner', use_sim_time='true', policy='farthest', max_views=VIEWS,
+               entropy_tolerance=0.0)
+    views = bench.hear(PoseStamped, 'view', LATCHED)
+    done = bench.hear(Header, 'done', LATCHED)
+    play(bag, '--topics', CAMERA)
+    bench.until(lambda: done and done[-1].frame_id, 'the end of the loop')
+    assert done[-1].frame_id == 'max_views'
+    assert len(views) == VIEWS
+    assert set(stamps(views)) <= set(stamps(recorded['/camera/image_raw']))
+
+
+def test_a_rate_of_0_is_refused_in_one_line(play, bag, tmp_path):
+    assert play(bag, '--rate', '0').wait(60) == 2
+    (line,) = (tmp_path / 'said').read_text().splitlines()
+    assert 'expected a rate above 0' in line
+
+
+def test_a_bag_that_was_cut_off_is_refused_with_the_cure(play, bag, tmp_path):
+    (tmp_path / 'run').mkdir()
+    (tmp_path / 'run/run_0.mcap').write_bytes((bag / f'{bag.name}_0.mcap').read_bytes()[:-2000])
+    assert play(tmp_path / 'run').wait(60) == 2
+    (line,) = (tmp_path / 'said').read_text().splitlines()
+    assert 'active-recon bag repair' in line
