@@ -1,0 +1,73 @@
+"""A bag of every view of a turntable, from which any policy can be answered what it asks for."""
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+import time
+
+from active_recon import __version__
+from active_recon.bags.metadata import QosProfile
+from active_recon.bags.writer import BagWriter
+from active_recon.errors import RecordingError
+from active_recon.shown_object import ShownObject
+from msg_tools.cdr import camera_to_cdr
+from rosbags.typesys import get_typestore, Stores
+
+POSE, INFO, IMAGE = '/camera/pose', '/camera/camera_info', '/camera/image_raw'
+TYPES = {POSE: 'geometry_msgs/msg/PoseStamped',
+         INFO: 'sensor_msgs/msg/CameraInfo',
+         IMAGE: 'sensor_msgs/msg/Image'}
+FRAME = 'camera_optical_frame'
+IMAGES_EACH = 3
+"""At each azimuth, so that the camera is seen to stand still."""
+_PERIOD_NS = 100_000_000
+_STEP_NS = 1_000_000  # from stamp to receipt, and from one message of an image to the next
+
+
+def record_sweep(shown: ShownObject, folder: Path, begin: int | None = None,
+                 advance: Callable[[], None] = lambda: None) -> None:
+    """
+    Write a bag in which the camera goes around an object once and stands still at each view.
+
+    It is what the nodes' simulated turntable would have streamed at 10 Hz from `begin` on,
+    nanoseconds since 1970; by default up to now. `advance` is called after each view. The folder
+    appears when the bag is complete; RecordingError where it is there already, or the disk full.
+    """
+    folder = folder.absolute()
+    if folder.exists():
+        raise RecordingError(f'expected to begin a new bag in {folder}, but: it exists already',
+                             'bag_not_begun')
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix='.', dir=folder.parent) as unfinished:
+            stamp = begin if begin is not None else (
+                time.time_ns() - len(shown.images) * IMAGES_EACH * _PERIOD_NS)
+            with _announced(Path(unfinished) / folder.name, shown.name) as bag:
+                for index in range(len(shown.images)):
+                    for _ in range(IMAGES_EACH):
+                        _write_view(bag, shown, index, stamp)
+                        stamp += _PERIOD_NS
+                    advance()
+            bag.folder.rename(folder)
+    except OSError as error:
+        raise RecordingError(f'expected to write a bag into {folder}, but: {error}',
+                             'bag_not_begun') from error
+
+
+def _announced(folder: Path, name: str) -> BagWriter:
+    definitions = get_typestore(Stores.ROS2_JAZZY)
+    bag = BagWriter(folder)
+    bag.add_provenance({'version': __version__, 'object': name})
+    for topic, type_name in TYPES.items():
+        text, _ = definitions.generate_msgdef(type_name, ros_version=2)
+        bag.add_topic(topic, type_name, text, (QosProfile(),))
+    return bag
+
+
+def _write_view(bag: BagWriter, shown: ShownObject, index: int, stamp: int) -> None:
+    image, info, pose = camera_to_cdr(shown.images[index], shown.cameras[index], stamp, FRAME)
+    # The image comes last, as from the node: whoever hears it has what belongs to it.
+    messages = {POSE: pose, INFO: info, IMAGE: image}
+    for number, (topic, data) in enumerate(messages.items(), start=1):
+        received = stamp + number * _STEP_NS
+        bag.write(topic, data, received, received - _STEP_NS)

@@ -1,0 +1,57 @@
+"""A sweep: every view of a turntable in one bag, as its camera would have streamed it."""
+
+import math
+
+from active_recon.bags.reading import read_run
+from active_recon.bags.sweep import IMAGES_EACH, record_sweep
+from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.errors import RecordingError
+from active_recon.shown_object import rendered_object
+import numpy as np
+import pytest
+from recorded_messages import doctor, small_disk
+from rosbags.rosbag2 import Reader
+import trimesh
+
+BEGIN = 1_700_000_000_000_000_000
+
+
+@pytest.fixture(scope='module')
+def shown(tmp_path_factory):
+    path = tmp_path_factory.mktemp('mesh') / 'box.ply'
+    trimesh.creation.box((1, 0.6, 0.4)).export(path)
+    return rendered_object(path)
+
+
+@pytest.fixture
+def sweep(shown, tmp_path):
+    record_sweep(shown, tmp_path / 'sweep', BEGIN)
+    return tmp_path / 'sweep'
+
+
+def test_every_azimuth_is_a_view_as_it_was_rendered(shown, sweep):
+    run = read_run(sweep)
+    (episode,) = run.episodes
+    assert run.provenance['object'] == 'box.ply'
+    assert len(episode.views) == len(AZIMUTHS)
+    for view, azimuth, image in zip(episode.views, AZIMUTHS, shown.images, strict=True):
+        assert azimuth_difference(view.camera.azimuth, azimuth) == pytest.approx(0, abs=1e-9)
+        assert view.camera.elevation == pytest.approx(math.radians(30))
+        assert np.array_equal(view.image, image)
+
+
+def test_it_opens_elsewhere_and_holds_three_topics_of_equal_length(sweep):
+    assert [doctor(path).returncode for path in sweep.glob('*.mcap')] == [0]
+    with Reader(sweep) as reader:
+        assert {connection.topic: connection.msgcount for connection in reader.connections} == {
+            f'/camera/{name}': IMAGES_EACH * len(AZIMUTHS)
+            for name in ('image_raw', 'camera_info', 'pose')}
+        assert BEGIN < reader.start_time < BEGIN + 10_000_000
+
+
+def test_what_is_there_is_not_written_over_and_what_fails_leaves_nothing(shown, sweep, tmp_path):
+    with pytest.raises(RecordingError, match='exists already'):
+        record_sweep(shown, sweep)
+    with small_disk(2000), pytest.raises(RecordingError):
+        record_sweep(shown, tmp_path / 'another')
+    assert [path.name for path in tmp_path.iterdir()] == ['sweep']
