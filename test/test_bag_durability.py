@@ -1,5 +1,8 @@
 """Bags that are cut off: what was flushed is kept and read, whatever happens next."""
 
+from pathlib import Path
+import resource
+
 from active_recon.errors import RecordingError
 import pytest
 from recorded_messages import announced, cdr, doctor, header, image, small_disk, time_of
@@ -45,3 +48,19 @@ def test_a_disk_that_fills_while_the_bag_is_closed_is_told(tmp_path):
         bag.close()
     with AnyReader([bag.path]) as reader:
         assert reader.message_count == 0
+
+
+def resident():
+    """Return the memory of this process that is in use, in bytes."""
+    return int(Path('/proc/self/statm').read_text().split()[1]) * resource.getpagesize()
+
+
+def test_memory_stays_flat_over_10_000_messages(tmp_path):
+    sent = [cdr(image(number, 64)) for number in range(10)]
+    with announced(tmp_path / 'run', max_bytes=20_000_000) as bag:
+        for number in range(12_000):
+            if number == 2000:
+                before = resident()
+            bag.write('/camera/image_raw', sent[number % 10], time_of(number), 0)
+        assert resident() - before < 4_000_000
+    assert sum(path.stat().st_size for path in bag.folder.iterdir()) > 15_000_000
