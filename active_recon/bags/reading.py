@@ -27,7 +27,11 @@ def read_run(path: Path, topics: Topics = _FOUND) -> RecordedRun:
     the reconstructor's node does. Raises DataError that says what is wrong or missing.
     """
     bag = open_bag(path)
-    summary = bag.summary()
+    return run_in(bag, bag.summary(), path, topics)
+
+
+def run_in(bag: Bag, summary: BagSummary, path: Path, topics: Topics) -> RecordedRun:
+    """Return the run in an open bag, as `read_run` does."""
     try:
         episodes, counters = _episodes(bag, summary, topics)
     except ActiveReconError as error:

@@ -3,9 +3,11 @@
 from pathlib import Path
 from typing import Annotated
 
+from active_recon.cli.bag_info import info
 import typer
 
 bag = typer.Typer(help='Recorded bags: look into them, repair them.', no_args_is_help=True)
+bag.command()(info)
 
 
 @bag.command()

@@ -1,0 +1,71 @@
+"""`active-recon bag info`: what is in a bag, and whether it can be replayed."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, TYPE_CHECKING
+
+from active_recon.cli.bag_topics import with_topics
+import typer
+
+if TYPE_CHECKING:
+    from active_recon.bags.raw import BagSummary
+    from active_recon.bags.run import RecordedEpisode, RecordedRun
+    from active_recon.bags.topics import Topics
+
+
+@with_topics
+def info(
+    path: Annotated[Path, typer.Argument(
+        metavar='BAG', help='A rosbag2 folder, or an MCAP or sqlite3 file.')],
+    topics: 'Topics',
+) -> None:
+    """
+    Say what is in a bag, and whether it can be replayed, or what is missing for that.
+
+    Other people's bags are read too: name the topics of the camera where they are not found.
+
+    Example: active-recon bag info drive.db3 --image /cam/color --azimuth /table/joints
+    """
+    from active_recon.bags.description import describe_bag
+
+    described = describe_bag(path, topics)
+    _tell_contents(path, described.summary)
+    if described.run is None:
+        typer.echo(f'cannot be replayed: {described.missing}')
+    else:
+        _tell_run(described.run)
+
+
+def _tell_contents(path: Path, summary: 'BagSummary') -> None:
+    messages = sum(topic.count for topic in summary.topics)
+    typer.echo(f'{path}: {messages} messages in {(summary.end - summary.begin) / 1e9:.1f} s')
+    for name, value in summary.provenance.items():
+        typer.echo(f'  {name}: {value}')
+    if summary.parameters:
+        typer.echo(f'  parameters of {", ".join(sorted(summary.parameters))}')
+    width = max((len(topic.name) for topic in summary.topics), default=0)
+    for topic in summary.topics:
+        typer.echo(f'  {topic.name:<{width}}  {topic.count:>6}  {topic.type_name}')
+
+
+def _tell_run(run: 'RecordedRun') -> None:
+    chosen = 'that its gate would take' if 'bag' in run.counters else 'that the loop took'
+    typer.echo(f'can be replayed, with the views {chosen}:')
+    for number, episode in enumerate(run.episodes, 1):
+        azimuths = ', '.join(f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
+        end = f', done: {episode.done}' if episode.done else ''
+        typer.echo(f'  episode {number}: {len(episode.views)} views at azimuths {azimuths} degrees'
+                   f'{end}')
+        if missing := _not_recorded(episode):
+            typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')
+
+
+def _not_recorded(episode: 'RecordedEpisode') -> list[str]:
+    recorded: dict[str, list[Any]] = {
+        'probabilities': [view.reconstruction for view in episode.views],
+        'occupancy': [view.occupied for view in episode.views],
+        'entropy': [view.entropy for view in episode.views],
+        'latent': [view.latent for view in episode.views],
+        'goals': [view.goal for view in episode.views[:-1]],
+    }
+    return [what for what, values in recorded.items() if any(value is None for value in values)]
