@@ -121,7 +121,8 @@ class VoxelGrid:
 def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
                      resolution: int = RESOLUTION) -> VoxelGrid:
     """Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `points`."""
-    index = np.floor((points[:, :3] + size / 2) / size * resolution)
+    with np.errstate(invalid='ignore', over='ignore'):  # what is not finite is refused below
+        index = np.floor((points[:, :3] + size / 2) / size * resolution)
     if not ((index >= 0) & (index < resolution)).all():  # also where a coordinate is NaN
         raise DataError(f'expected points inside a cube of {size} m about the origin')
     occupancy = np.zeros((resolution,) * 3, np.float32)

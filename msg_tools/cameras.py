@@ -15,6 +15,7 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 OBJECT_FRAME = 'object'
+_FARTHEST = 1e9  # metres: squares of what is beyond may overflow
 
 
 def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
@@ -49,7 +50,8 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
     Return the pose, (4, 4), object from optical frame.
 
     A quaternion is normalised. Raises MessageError where the pose is not in the object frame, is
-    not finite, has a quaternion of zero, or stands at the frame's origin.
+    not finite or a million kilometres away, has a quaternion of zero, or stands at the frame's
+    origin.
     """
     if msg.header.frame_id != frame:
         raise MessageError(f'expected a camera pose in the frame {frame!r}, '
@@ -57,7 +59,7 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
     point, turn = msg.pose.position, msg.pose.orientation
     position = np.array([point.x, point.y, point.z])
     quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
-    if not (np.isfinite(position).all() and np.isfinite(quaternion).all()):
+    if not (np.abs([*position, *quaternion]) < _FARTHEST).all():  # nor where a number is NaN
         raise MessageError(f'expected a finite camera pose, got position {position.tolist()} and '
                            f'quaternion {quaternion.tolist()}', 'pose')
     if np.linalg.norm(quaternion) < 1e-6:

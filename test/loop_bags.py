@@ -38,7 +38,7 @@ class LoopRun:
         rng = np.random.default_rng(self.begin % 1000 + len(self.id))
         count = len(self.azimuths)
         self.images = rng.integers(0, 256, (count, 16, 16, 3), np.uint8)
-        self.grids = [VoxelGrid(rng.random((32, 32, 32)).astype(np.float32) ** 16)
+        self.grids = [VoxelGrid(np.float32(rng.random((32,) * 3) * (rng.random((32,) * 3) < 0.03)))
                       for _ in range(count)]
         self.latents = rng.normal(size=(count, 6, 4, 4)).astype(np.float32)
         self.candidates = np.arange(24) * np.pi / 12

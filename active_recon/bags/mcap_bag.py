@@ -18,9 +18,10 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
 
 class McapBag:
-    """MCAP files that follow each other in one recording."""
+    """MCAP files that follow each other in the recording of that path."""
 
-    def __init__(self, files: list[Path]) -> None:
+    def __init__(self, path: Path, files: list[Path]) -> None:
+        self._path = path
         self._files = files
 
     def summary(self) -> BagSummary:
@@ -35,7 +36,8 @@ class McapBag:
             elif isinstance(record, Metadata) and record.name == PROVENANCE:
                 provenance = record.metadata
             elif isinstance(record, Attachment) and (node := parameters_node(record.name)):
-                parameters[node] = yaml_mapping(record.data, record.name)
+                parameters[node] = yaml_mapping(
+                    record.data, f'{self._path}: {record.name}')
         return bag_summary(types, contents, provenance, parameters)
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:

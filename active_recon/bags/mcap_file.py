@@ -42,7 +42,8 @@ def mcap_records(path: Path) -> Iterator[McapRecord]:
         raise DataError(f'{path}: cannot be read: {error.strerror}') from error
     except Exception as error:  # the decoders raise whatever damaged bytes lead them to
         raise DataError(f'{path}: expected a whole MCAP file, got records that cannot be '
-                        f'understood ({error or type(error).__name__})', 'damaged') from error
+                        f'understood ({str(error) or type(error).__name__}); `active-recon bag '
+                        'repair` keeps the others', 'damaged') from error
 
 
 def _file_records(file: BinaryIO, size: int) -> Iterator[McapRecord]:

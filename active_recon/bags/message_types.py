@@ -63,8 +63,8 @@ def require_standard(type_name: str, definition: bytes, path: Path) -> None:
         theirs = {name: fields for name, (_, fields) in types.items()}
         ours = {name: _standard().fielddefs[name][1] for name in theirs}
     except Exception as error:  # the parser raises whatever the text leads it to
-        raise DataError(f'{path}: expected a definition of {type_name}, got: '
-                        f'{" ".join(str(error).split())}', 'definition') from error
+        raise DataError(f'{path}: expected a definition of {type_name}, got a text that cannot '
+                        'be read as one', 'definition') from error
     if theirs != ours:
         raise DataError(f'{path}: expected {type_name} to be defined as in ROS, got other fields '
                         'under that name', 'definition')

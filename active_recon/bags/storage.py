@@ -15,7 +15,7 @@ def open_bag(path: Path) -> Bag:
     if not path.exists():
         raise DataError(f'{path}: expected a bag, but there is nothing')
     if not path.is_dir():
-        return McapBag([path]) if _is_mcap(path) else OtherBag(path)
+        return McapBag(path, [path]) if _is_mcap(path) else OtherBag(path)
     files = sorted(path.glob('*.mcap'), key=lambda file: (len(file.name), file.name))
     if (path / 'metadata.yaml').exists():
         named = _named_files(path)
@@ -25,7 +25,7 @@ def open_bag(path: Path) -> Bag:
     if not files:
         raise DataError(f'{path}: expected a folder with a bag, got neither a metadata.yaml nor '
                         'an MCAP file')
-    return McapBag(files)
+    return McapBag(path, files)
 
 
 def _is_mcap(path: Path) -> bool:

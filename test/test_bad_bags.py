@@ -1,0 +1,199 @@
+"""Bags that are none, damaged or that lie: one clear error each, and no memory for a claim."""
+
+import struct
+import tracemalloc
+
+from active_recon.bags.reading import read_run
+from active_recon.cli.main import main
+from active_recon.errors import DataError
+from foreign_recordings import images, joints
+from loop_bags import BEGIN, LoopRun, type_name, write_bag
+from mcap.opcode import Opcode
+from mcap.writer import CompressionType, Writer
+import pytest
+from rclpy.serialization import serialize_message
+from recorded_messages import definition
+from rosbags.rosbag2 import StoragePlugin
+from test_reading import copied, same
+import zstandard
+
+RUN = LoopRun()
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    return write_bag(tmp_path_factory.mktemp('bags') / 'run', RUN.messages)
+
+
+def mcap(path, definitions=definition, compression=CompressionType.NONE, chunked=False,
+         messages=RUN.messages):
+    """Write an MCAP file of the run by hand."""
+    with path.open('wb') as file:
+        writer = Writer(file, use_chunking=chunked, compression=compression)
+        writer.start('ros2', 'a test')
+        channels = {}
+        for time, topic, msg in messages:
+            if topic not in channels:
+                schema = writer.register_schema(
+                    type_name(msg), 'ros2msg', definitions(type_name(msg)).encode())
+                channels[topic] = writer.register_channel(topic, 'cdr', schema)
+            writer.add_message(channels[topic], time, serialize_message(msg), time)
+        writer.finish()
+    return path
+
+
+def refusal(path, match):
+    """Return the one error that a bag is refused with; what was there is untouched."""
+    files = [path, *path.rglob('*')] if path.is_dir() else [path]
+    before = {file: file.read_bytes() for file in files if file.is_file()}
+    with pytest.raises(DataError, match=match) as refused:
+        read_run(path)
+    assert '\n' not in str(refused.value)
+    assert str(path) in str(refused.value)
+    after = {file: file.read_bytes() for file in files if file.is_file()}
+    assert after == before
+    return refused.value
+
+
+@pytest.mark.parametrize('content', [b'', b'hello', b'\x89PNG\r\n\x1a\n' + bytes(100)])
+def test_what_is_no_bag_is_refused(tmp_path, content):
+    for name in ('bag.mcap', 'bag.db3', 'bag'):
+        (tmp_path / name).write_bytes(content)
+        refusal(tmp_path / name, 'expected ')
+
+
+def test_a_file_cut_off_anywhere_is_refused_and_the_repair_named(bag, tmp_path):
+    whole = (bag / 'run_0.mcap').read_bytes()
+    for length in range(9, len(whole), len(whole) // 50):
+        (tmp_path / 'cut.mcap').write_bytes(whole[:length])
+        refusal(tmp_path / 'cut.mcap', 'active-recon bag repair')
+
+
+def test_a_chunk_with_one_wrong_bit_is_refused(bag, tmp_path):
+    content = bytearray((bag / 'run_0.mcap').read_bytes())
+    content[len(content) // 3] ^= 4
+    (tmp_path / 'bit.mcap').write_bytes(content)
+    refusal(tmp_path / 'bit.mcap', 'repair|cannot be understood')
+
+
+def peak(path, match):
+    """Return the most bytes that were taken while a bag was refused."""
+    tracemalloc.start()
+    try:
+        refusal(path, match)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def first_record(content, opcode):
+    """Return where the first record of that kind begins."""
+    position = 8
+    while content[position] != opcode:
+        position += 9 + struct.unpack_from('<Q', content, position + 1)[0]
+    return position
+
+
+@pytest.mark.parametrize('claim', [2**31, 2**40, 2**63])
+def test_a_message_that_claims_gigabytes_takes_none(tmp_path, claim):
+    content = bytearray(mcap(tmp_path / 'bag.mcap').read_bytes())
+    struct.pack_into('<Q', content, first_record(content, Opcode.MESSAGE) + 1, claim)
+    (tmp_path / 'bag.mcap').write_bytes(content)
+    assert peak(tmp_path / 'bag.mcap', f'claims {claim} bytes') < 30_000_000
+
+
+@pytest.mark.parametrize('claim', [1000, 2**27, 2**40])
+def test_a_chunk_that_unpacks_to_gigabytes_takes_none(tmp_path, claim):
+    """A chunk of 64 kB that is 2 GB of zeros, whatever it claims to be."""
+    packer = zstandard.ZstdCompressor().compressobj()
+    packed = b''.join(packer.compress(bytes(1 << 24)) for _ in range(128)) + packer.flush()
+    content = mcap(tmp_path / 'bag.mcap').read_bytes()
+    chunk = struct.pack('<QQQI', 0, 0, claim, 0) + struct.pack('<I4sQ', 4, b'zstd', len(packed))
+    record = struct.pack('<BQ', Opcode.CHUNK, len(chunk) + len(packed)) + chunk + packed
+    at = first_record(content, Opcode.SCHEMA)
+    (tmp_path / 'bag.mcap').write_bytes(content[:at] + record + content[at:])
+    assert peak(tmp_path / 'bag.mcap', 'expected (a chunk|chunks)') < 2.5 * 2**27
+
+
+@pytest.mark.parametrize('compression', list(CompressionType))
+def test_chunks_are_read_however_they_are_packed(bag, tmp_path, compression):
+    path = mcap(tmp_path / 'bag.mcap', compression=compression, chunked=True)
+    assert same(read_run(path), read_run(bag))
+
+
+def test_a_definition_that_is_not_ros_own_is_refused(tmp_path):
+    def lying(name):
+        return definition(name).replace('uint32 height', 'uint64 height')
+
+    refusal(mcap(tmp_path / 'bag.mcap', lying), 'to be defined as in ROS, got other fields')
+
+
+def test_bytes_of_another_type_than_the_schemas_are_refused(tmp_path):
+    lying = tmp_path / 'bag.mcap'
+    with lying.open('wb') as file:
+        writer = Writer(file)
+        writer.start('ros2', 'a test')
+        for topic, name in (('/camera/image_raw', 'sensor_msgs/msg/Image'),
+                            ('/camera/pose', 'geometry_msgs/msg/PoseStamped')):
+            schema = writer.register_schema(name, 'ros2msg', definition(name).encode())
+            channel = writer.register_channel(topic, 'cdr', schema)
+            writer.add_message(channel, BEGIN, serialize_message(RUN.messages[0][2]), BEGIN)
+        writer.finish()
+    refusal(lying, 'expected the bytes of a geometry_msgs/msg/PoseStamped')
+
+
+def test_a_bag_without_images_is_refused(tmp_path):
+    refusal(write_bag(tmp_path / 'run', joints()), 'expected images on a topic of type')
+
+
+def test_images_without_an_azimuth_are_refused(tmp_path):
+    refusal(write_bag(tmp_path / 'run', images()), "expected the camera's poses or azimuths on")
+
+
+def test_images_whose_poses_are_of_another_time_are_refused(tmp_path):
+    later = LoopRun(begin=BEGIN + 10**12)
+    entries = [*images(topic='/camera/image_raw'), *(
+        entry for entry in later.messages if entry[1] in ('/camera/pose', '/camera/camera_info'))]
+    refusal(write_bag(tmp_path / 'run', entries), 'expected images with an azimuth each.*pose')
+
+
+def test_times_that_run_backwards_are_refused(tmp_path):
+    backwards = list(reversed(images())) + joints()
+    refusal(write_bag(tmp_path / 'run', backwards), 'the times run backwards')
+    ours = [entry for entry in RUN.messages if entry[1] != '/camera/image_raw']
+    pictures = [entry for entry in RUN.messages if entry[1] == '/camera/image_raw']
+    refusal(write_bag(tmp_path / 'ours', [*ours, *reversed(pictures)]), 'the times run backwards')
+
+
+def test_a_view_whose_image_was_lost_is_named(tmp_path):
+    lost = [entry for entry in RUN.messages
+            if not (entry[1] == '/camera/image_raw' and entry[0] - 3 == RUN.stamps[1])]
+    refusal(write_bag(tmp_path / 'run', lost), 'view 2 .*the image was not recorded')
+
+
+@pytest.mark.parametrize(('text', 'match'), [
+    ('{', 'expected YAML'), ('[1, 2]', 'expected a mapping, got list'),
+    ('a: 1', "expected rosbag2's description"),
+    ('rosbag2_bagfile_information: {storage_identifier: mcap, relative_file_paths: [x.mcap]}',
+     'it is missing'),
+    ('rosbag2_bagfile_information: {storage_identifier: sqlite4, version: 5}', 'expected a bag')])
+def test_a_folder_whose_description_is_none_is_refused(tmp_path, text, match):
+    (tmp_path / 'run').mkdir()
+    (tmp_path / 'run' / 'metadata.yaml').write_text(text)
+    refusal(tmp_path / 'run', match)
+
+
+def test_a_damaged_database_is_refused(bag, tmp_path):
+    copy = copied(bag, tmp_path / 'copy', StoragePlugin.SQLITE3)
+    content = (copy / 'copy.db3').read_bytes()
+    (copy / 'copy.db3').write_bytes(content[:len(content) // 2])
+    refusal(copy, 'expected a bag of rosbag2')
+
+
+def test_the_command_ends_with_one_line_and_exit_code_2(tmp_path, monkeypatch, capsys):
+    (tmp_path / 'bag.mcap').write_bytes(b'hello')
+    monkeypatch.setattr('sys.argv', ['active-recon', 'bag', 'info', str(tmp_path / 'bag.mcap')])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.count('\n') == 1
