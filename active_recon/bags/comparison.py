@@ -1,0 +1,135 @@
+"""What a replay computed beside what was recorded: the same bits, or how far apart."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from active_recon.bags.replay import cells_above, ReplayedEpisode, ReplayedView
+from active_recon.bags.run import RecordedGoal
+from active_recon.cameras import azimuth_difference, wrap_azimuth
+from active_recon.planner import Goal
+from active_recon.voxels import VoxelGrid
+from msg_tools.voxels import FLOOR
+import numpy as np
+
+TOLERANCES: Mapping[str, float] = {
+    'probabilities': 1e-3,
+    'occupancy': 1e-3,
+    'latent': 1e-3,
+    'entropy': 1e-3,
+    'goal': 1e-3,
+    'scores': 1e-2,
+    'stop': 0.0,
+}
+"""How far another machine's replay may be off: probabilities and latents as they are, entropy as a
+share, goals in radians, scores in the policy's units, and whether the episode ended not at all."""
+
+SAME_BITS, WITHIN_TOLERANCE, DIFFERENT, NOTHING_RECORDED = (
+    'same bits', 'within tolerance', 'different', 'nothing recorded')
+
+
+@dataclass
+class Deviation:
+    """Of one quantity: how many were compared, how many had the same bits, the largest gap."""
+
+    tolerance: float
+    compared: int = 0
+    same: int = 0
+    largest: float = 0.0
+
+    @property
+    def verdict(self) -> str:
+        """One of the four words above."""
+        if not self.compared:
+            return NOTHING_RECORDED
+        if self.same == self.compared:
+            return SAME_BITS
+        return WITHIN_TOLERANCE if self.largest <= self.tolerance else DIFFERENT
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The deviation of each quantity, by the names of TOLERANCES."""
+
+    deviations: Mapping[str, Deviation] = field(default_factory=lambda: {
+        name: Deviation(tolerance) for name, tolerance in TOLERANCES.items()})
+
+    @property
+    def verdict(self) -> str:
+        """The worst of the quantities; what was not recorded does not count."""
+        verdicts = {deviation.verdict for deviation in self.deviations.values()}
+        return next((word for word in (DIFFERENT, WITHIN_TOLERANCE, SAME_BITS)
+                     if word in verdicts), NOTHING_RECORDED)
+
+
+def compare(episodes: Sequence[ReplayedEpisode], threshold: float) -> Comparison:
+    """
+    Compare all that was recorded of each view with what the replay made of it.
+
+    `threshold` is that above which the replay calls a cell occupied.
+    """
+    comparison = Comparison()
+    for episode in episodes:
+        last = episode.views[-1] if episode.views else None
+        for view in episode.views:
+            done = episode.recorded.done if view is last else ''
+            for name, same, apart in _deviations(view, done, threshold):
+                deviation = comparison.deviations[name]
+                deviation.compared += 1
+                deviation.same += same
+                # A NaN is as far off as can be
+                deviation.largest = max(deviation.largest, apart if apart == apart else np.inf)
+    return comparison
+
+
+def _deviations(view: ReplayedView, done: str,
+                threshold: float) -> Iterator[tuple[str, bool, float]]:
+    """Yield the name of each recorded quantity, whether its bits are the same, and the gap."""
+    recorded, grid = view.recorded, view.reconstruction.grid
+    if recorded.reconstruction is not None:
+        yield 'probabilities', *_cells(recorded.reconstruction, grid, FLOOR)
+    if recorded.occupied is not None:
+        yield 'occupancy', *_cells(recorded.occupied, grid, threshold)
+    if recorded.latent is not None:
+        latent = view.reconstruction.latent
+        yield ('latent', np.array_equal(recorded.latent, latent),
+               _largest(recorded.latent, latent))
+    if recorded.entropy is not None:
+        entropy = grid.entropy()
+        yield ('entropy', recorded.entropy == entropy,
+               abs(recorded.entropy - entropy) / max(abs(recorded.entropy), 1e-9))
+    if view.decision is None:
+        return
+    if recorded.goal is not None or done:
+        stopped_alike = view.decision.reason == ('' if recorded.goal is not None else done)
+        yield 'stop', stopped_alike, 0.0 if stopped_alike else np.inf
+    if recorded.goal is not None and view.decision.goal is not None:
+        yield from _goal(recorded.goal, view.decision.goal)
+
+
+def _goal(recorded: RecordedGoal, goal: Goal) -> Iterator[tuple[str, bool, float]]:
+    azimuth = wrap_azimuth(goal.azimuth)
+    yield ('goal', recorded.azimuth == azimuth,
+           abs(float(azimuth_difference(recorded.azimuth, azimuth))))
+    if recorded.scores is not None:
+        yield ('scores', np.array_equal(recorded.scores, goal.scores),
+               _largest(recorded.scores, goal.scores))
+
+
+def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, float]:
+    """
+    Compare a recorded cloud of the cells above a threshold with the whole grid.
+
+    A cell that is missing in the cloud was at most at the threshold.
+    """
+    if recorded.occupancy.shape != grid.occupancy.shape:
+        return False, np.inf
+    told = recorded.occupancy > 0
+    apart = np.where(told, np.abs(recorded.occupancy - grid.occupancy),
+                     np.maximum(grid.occupancy - np.float32(above), 0))
+    return np.array_equal(recorded.occupancy, cells_above(grid, above)), float(apart.max())
+
+
+def _largest(recorded: np.ndarray, replayed: np.ndarray) -> float:
+    if recorded.shape != replayed.shape:
+        return np.inf
+    return float(np.abs(recorded - replayed).max(initial=0))

@@ -1,0 +1,104 @@
+"""Replay: the recorded views through the core again, with no ROS and no clock."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+import hashlib
+
+from active_recon.bags.run import RecordedEpisode, RecordedRun, RecordedView
+from active_recon.planner import Decision, Goal, Planner
+from active_recon.reconstructor import Reconstruction, Reconstructor
+from active_recon.voxels import VoxelGrid
+from msg_tools.voxels import FLOOR
+import numpy as np
+from numpy.typing import NDArray
+import torch
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayedView:
+    """A view folded in again; the decision after it is None where no planner was asked."""
+
+    recorded: RecordedView
+    reconstruction: Reconstruction
+    decision: Decision | None
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayedEpisode:
+    """An episode's views again; the first goal follows from where the camera stood."""
+
+    recorded: RecordedEpisode
+    first_goal: Goal | None
+    views: Sequence[ReplayedView]
+
+
+def replay(run: RecordedRun, reconstructor: Reconstructor, planner: Planner | None = None,
+           advance: Callable[[], None] = lambda: None) -> list[ReplayedEpisode]:
+    """
+    Fold all views in again, in the order of their stamps, and decide after each.
+
+    The planner goes from episode to episode as the node's did, so that a seed draws the same.
+    `advance` is called after each view. Raises ViewError on a view that is none.
+    """
+    return [_replay_episode(episode, reconstructor, planner, advance)
+            for episode in sorted(run.episodes, key=lambda episode: episode.begin)]
+
+
+def _replay_episode(episode: RecordedEpisode, reconstructor: Reconstructor,
+                    planner: Planner | None, advance: Callable[[], None]) -> ReplayedEpisode:
+    reconstructor.reset()
+    first_goal = None
+    if planner is not None:
+        planner.reset()
+        if episode.first_goal is not None:
+            first_goal = planner.first_goal(episode.first_goal.azimuth)
+    views = []
+    for view in sorted(episode.views, key=lambda view: view.stamp):
+        reconstruction = reconstructor.add_view(view.image, view.camera)
+        decision = None if planner is None else decide(
+            planner, reconstruction, view.camera.azimuth)
+        views.append(ReplayedView(view, reconstruction, decision))
+        advance()
+    return ReplayedEpisode(episode, first_goal, views)
+
+
+def decide(planner: Planner, reconstruction: Reconstruction, azimuth: float) -> Decision:
+    """Return what the planner decides of what its node hears: no cells of next to no occupancy."""
+    grid = reconstruction.grid
+    heard = VoxelGrid(cells_above(grid, FLOOR), grid.size)
+    return planner.add_view(reconstruction.latent, azimuth, heard.entropy())
+
+
+def cells_above(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
+    """Return the occupancies above a threshold, 0 elsewhere: what a published cloud tells."""
+    return np.ascontiguousarray(np.where(grid.occupied(threshold), grid.occupancy, np.float32(0)))
+
+
+def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:
+    """Return the SHA-256 of every bit that a replay has computed."""
+    digest = hashlib.sha256()
+    for view in (view for episode in episodes for view in episode.views):
+        reconstruction, decision = view.reconstruction, view.decision
+        digest.update(reconstruction.grid.occupancy.tobytes())
+        digest.update(reconstruction.latent.tobytes())
+        digest.update(repr(reconstruction.grid.entropy()).encode())
+        if decision is not None:
+            digest.update(decision.reason.encode())
+            if decision.goal is not None:
+                digest.update(repr(decision.goal.azimuth).encode())
+                digest.update(decision.goal.scores.tobytes())
+    return digest.hexdigest()
+
+
+@contextmanager
+def fixed_arithmetic(threads: int) -> Iterator[None]:
+    """Compute with so many threads and with algorithms that always add in the same order."""
+    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before[0])
+        torch.use_deterministic_algorithms(before[1])

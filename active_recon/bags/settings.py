@@ -1,0 +1,83 @@
+"""The network and the planner that a run was made with, found again by what its bag says."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any
+
+from active_recon.bags.run import RecordedRun
+from active_recon.errors import WeightsError
+from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
+from active_recon.planner import Planner
+from active_recon.reconstructor import Reconstructor
+
+_OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
+_OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw')
+
+
+@dataclass(frozen=True)
+class Settings:
+    """
+    What the loop was started with; what is missing in the mappings is the core's default.
+
+    `planner` is None where nothing tells which policy chose.
+    """
+
+    weights: Path
+    reconstructor: Mapping[str, Any]
+    planner: Mapping[str, Any] | None
+    threads: int = 1
+
+    def load_reconstructor(self) -> Reconstructor:
+        """Raise WeightsError or ConfigError where it cannot be."""
+        return Reconstructor.load(self.weights, **self.reconstructor)
+
+    def load_planner(self) -> Planner | None:
+        """Return None where nothing tells which policy chose; raise as the reconstructor does."""
+        return None if self.planner is None else Planner.load(**self.planner)
+
+
+def recorded_settings(run: RecordedRun, weights: Path | None = None) -> Settings:
+    """
+    Return what a run was made with, by its parameters and the hash of its weights.
+
+    `weights`: a file to look at first. Raises WeightsError where no file has the recorded hash.
+    """
+    of_reconstructor = node_parameters(run, 'reconstructor')
+    of_planner = node_parameters(run, 'view_planner')
+    found = _recorded_weights(run, weights, of_reconstructor.get('weights', ''))
+    planner = None
+    if 'policy' in of_planner:
+        planner = _given(of_planner, _OF_PLANNER)
+        own = of_planner.get('weights', '')
+        same = own == of_reconstructor.get('weights', '')
+        planner['weights'] = found if same else Path(own) if own else SHIPPED
+    return Settings(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
+                    of_reconstructor.get('threads', 1))
+
+
+def node_parameters(run: RecordedRun, node: str) -> Mapping[str, Any]:
+    """Return the parameters of a node, in whatever namespace; empty where the bag has none."""
+    return next((values for name, values in run.parameters.items()
+                 if name.rpartition('/')[2] == node), {})
+
+
+def _given(parameters: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the named parameters that were given: NaN stands for one that was not."""
+    return {name: value for name in names if (value := parameters.get(name)) is not None
+            and not (isinstance(value, float) and math.isnan(value))}
+
+
+def _recorded_weights(run: RecordedRun, weights: Path | None, parameter: str) -> Path:
+    wanted = run.provenance.get('weights_sha256')
+    named = [path for path in (weights, Path(parameter) if parameter else None) if path]
+    if wanted is None:
+        return [*named, SHIPPED][0]
+    for path in (*named, SHIPPED, *sorted(FOLDER.glob('*.safetensors'))):
+        if path.is_file() and weights_hash(path) == wanted:
+            return path
+    raise WeightsError(
+        f'{run.path}: expected the weights that it was recorded with, SHA-256 {wanted[:12]}..., '
+        'but neither those that ship nor those that were named are: the weights have changed '
+        'since. Name the file by --weights, or replay under others by --model')

@@ -1,0 +1,234 @@
+"""Replay: the same bits as recorded, or the gap that was found, whatever the run was."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from active_recon.bags.comparison import (
+    compare,
+    DIFFERENT,
+    NOTHING_RECORDED,
+    SAME_BITS,
+    TOLERANCES,
+    WITHIN_TOLERANCE,
+)
+from active_recon.bags.replay import fixed_arithmetic, replay, replay_hash
+from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
+from active_recon.bags.settings import recorded_settings
+from active_recon.cameras import orbit_camera, wrap_azimuth
+from active_recon.errors import WeightsError
+from active_recon.models.runtime import TorchRuntime
+from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
+from active_recon.planner import Planner
+from active_recon.policies.attention import AttentionPolicy
+from active_recon.policies.geometric import RandomPolicy
+from active_recon.reconstructor import Reconstructor
+from active_recon.voxels import grid_from_points
+import numpy as np
+import pytest
+import torch
+
+THRESHOLD, FLOOR = 0.15, 0.02
+SECOND = 1_000_000_000
+
+
+def image_at(azimuth):
+    """Return an image that differs from those of other azimuths."""
+    return np.random.default_rng(round(azimuth * 1e6)).integers(0, 256, (137, 137, 3), np.uint8)
+
+
+def goal_of(goal, stamp):
+    return RecordedGoal(wrap_azimuth(goal.azimuth), stamp, goal.candidates, goal.scores, stamp)
+
+
+def episode_of(reconstructor, planner, begin, azimuth):
+    """Run the loop on the core alone and return what a recorder would have seen of it."""
+    reconstructor.reset()
+    planner.reset()
+    first = goal = planner.first_goal(azimuth)
+    views, stamp, done = [], begin, ''
+    while not done:
+        stamp += SECOND
+        camera = orbit_camera(goal.azimuth)
+        image = image_at(goal.azimuth)
+        known = reconstructor.add_view(image, camera)
+        heard, occupied = (grid_from_points(known.grid.points(above)) for above in (
+            FLOOR, THRESHOLD))
+        decision = planner.add_view(known.latent, camera.azimuth, heard.entropy())
+        goal, done = decision.goal, decision.reason
+        views.append(RecordedView(
+            stamp, image, camera, heard, occupied, known.latent, known.grid.entropy(),
+            None if goal is None else goal_of(goal, stamp + 1), {}))
+    return RecordedEpisode(f'from {begin}', begin, goal_of(first, begin), views, done)
+
+
+def loop_of(network, policy):
+    return (Reconstructor(TorchRuntime(network), THRESHOLD), Planner(policy, 3, 0.0))
+
+
+def policies(attention):
+    return {'attention': lambda: AttentionPolicy(attention),
+            'random': lambda: RandomPolicy(np.random.default_rng(7))}
+
+
+def run_of(episodes):
+    return RecordedRun(Path('run'), episodes, {}, {}, {}, [], SECOND, 10 * SECOND)
+
+
+@pytest.fixture(params=['attention', 'random'])
+def make_loop(request, network, attention):
+    """Return what makes the core of the loop anew, its policy with its seed."""
+    policy = policies(attention)[request.param]
+    return lambda: loop_of(network, policy())
+
+
+@pytest.fixture
+def run(make_loop):
+    loop = make_loop()
+    return run_of([episode_of(*loop, begin * 100 * SECOND, begin) for begin in (1, 2)])
+
+
+def changed(run, **fields):
+    """Return the run with another second view in its first episode."""
+    first, *others = run.episodes
+    views = [first.views[0], replace(first.views[1], **fields), *first.views[2:]]
+    return replace(run, episodes=[replace(first, views=views), *others])
+
+
+def test_a_replay_has_the_bits_of_the_run(run, make_loop):
+    comparison = compare(replay(run, *make_loop()), THRESHOLD)
+    assert {name: (found.compared, found.same, found.largest)
+            for name, found in comparison.deviations.items()} == {
+        'probabilities': (6, 6, 0), 'occupancy': (6, 6, 0), 'latent': (6, 6, 0),
+        'entropy': (6, 6, 0), 'goal': (4, 4, 0), 'scores': (4, 4, 0), 'stop': (6, 6, 0)}
+    assert comparison.verdict == SAME_BITS
+
+
+def test_views_count_in_the_order_of_their_stamps_however_they_lie_in_the_bag(run, make_loop):
+    shuffled = run_of([replace(episode, views=episode.views[::-1])
+                       for episode in run.episodes[::-1]])
+    assert compare(replay(shuffled, *make_loop()), THRESHOLD).verdict == SAME_BITS
+
+
+def test_every_replay_has_the_same_hash_and_another_image_another(run, make_loop):
+    assert len({replay_hash(replay(run, *make_loop())) for _ in range(5)}) == 1
+    other = changed(run, image=255 - run.episodes[0].views[1].image)
+    assert replay_hash(replay(other, *make_loop())) != replay_hash(replay(run, *make_loop()))
+
+
+def off_by(view, name, gap):
+    """Return the fields of a view whose quantity was recorded with a gap."""
+    def grid(recorded):
+        occupancy = recorded.occupancy.copy()
+        occupancy[np.unravel_index(occupancy.argmax(), occupancy.shape)] -= np.float32(gap)
+        return replace(recorded, occupancy=occupancy)
+
+    match name:
+        case 'probabilities':
+            return {'reconstruction': grid(view.reconstruction)}
+        case 'occupancy':
+            return {'occupied': grid(view.occupied)}
+        case 'latent':
+            return {'latent': view.latent + np.float32(gap)}
+        case 'entropy':
+            return {'entropy': view.entropy * (1 + gap)}
+        case 'goal':
+            return {'goal': replace(view.goal, azimuth=wrap_azimuth(view.goal.azimuth + gap))}
+        case 'scores':
+            return {'goal': replace(view.goal, scores=view.goal.scores + np.float32(gap))}
+    raise AssertionError(name)
+
+
+@pytest.mark.parametrize('name', [name for name, limit in TOLERANCES.items() if limit > 0])
+def test_what_was_recorded_otherwise_is_told_by_name_and_by_how_far(run, make_loop, name):
+    view = run.episodes[0].views[1]
+    for share, verdict in ((0.5, WITHIN_TOLERANCE), (2, DIFFERENT)):
+        gap = share * TOLERANCES[name]
+        comparison = compare(
+            replay(changed(run, **off_by(view, name, gap)), *make_loop()), THRESHOLD)
+        found = comparison.deviations[name]
+        assert (found.verdict, comparison.verdict) == (verdict, verdict)
+        assert found.same == found.compared - 1
+        assert found.largest == pytest.approx(gap, rel=0.01)
+        assert {other.verdict for other in comparison.deviations.values()
+                if other is not found} == {SAME_BITS}
+
+
+def test_an_end_that_was_not_recorded_so_is_different(run, make_loop):
+    first, second = run.episodes
+    ended_early = replace(first, views=first.views[:2], done='max_views')
+    ended_early.views[1] = replace(first.views[1], goal=None)
+    for episodes in ([replace(first, done='entropy_settled'), second], [ended_early, second]):
+        comparison = compare(replay(run_of(episodes), *make_loop()), THRESHOLD)
+        assert comparison.deviations['stop'].verdict == comparison.verdict == DIFFERENT
+
+
+def test_a_recording_that_broke_off_is_compared_as_far_as_it_goes(run, make_loop):
+    first, second = run.episodes
+    cut = replace(second, done='', views=[
+        second.views[0],
+        replace(second.views[1], goal=None, entropy=None, latent=None, occupied=None)])
+    comparison = compare(replay(run_of([first, cut]), *make_loop()), THRESHOLD)
+    assert comparison.verdict == SAME_BITS
+    assert {name: found.compared for name, found in comparison.deviations.items()} == {
+        'probabilities': 5, 'occupancy': 4, 'latent': 4, 'entropy': 4, 'goal': 3, 'scores': 3,
+        'stop': 4}
+
+
+def test_images_alone_are_replayed_with_nothing_to_compare(run, make_loop):
+    bare = run_of([replace(episode, done='', first_goal=None, views=[
+        replace(view, reconstruction=None, occupied=None, latent=None, entropy=None, goal=None)
+        for view in episode.views]) for episode in run.episodes])
+    reconstructor, _ = make_loop()
+    episodes = replay(bare, reconstructor)
+    assert compare(episodes, THRESHOLD).verdict == NOTHING_RECORDED
+    assert all(view.decision is None for episode in episodes for view in episode.views)
+
+
+def test_a_cell_at_the_edge_of_the_cloud_is_off_by_what_it_is_beyond_the_edge(run, make_loop):
+    view = run.episodes[0].views[1]
+    occupancy = view.reconstruction.occupancy.copy()
+    lowest = np.where(occupancy > 0, occupancy, 1).argmin()
+    beyond = occupancy.flat[lowest] - FLOOR
+    occupancy.flat[lowest] = 0
+    lacking = changed(run, reconstruction=replace(view.reconstruction, occupancy=occupancy))
+    found = compare(replay(lacking, *make_loop()), THRESHOLD).deviations['probabilities']
+    assert found.same == found.compared - 1
+    assert found.largest == pytest.approx(beyond, abs=1e-6)
+
+
+def test_arithmetic_is_fixed_inside_and_as_before_outside():
+    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    with fixed_arithmetic(before[0] + 1):
+        assert torch.get_num_threads() == before[0] + 1
+        assert torch.are_deterministic_algorithms_enabled()
+    assert (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()) == before
+
+
+def test_settings_are_those_of_the_bag_and_what_it_lacks_is_the_cores():
+    bag = replace(run_of([]), provenance={'weights_sha256': weights_hash()}, parameters={
+        'reconstructor': {'weights': '', 'threshold': float('nan'), 'object_size': 0.25,
+                          'threads': 2, 'take_views': 'at_goal'},
+        'view_planner': {'weights': '', 'policy': 'random', 'seed': 5, 'max_views': 3}})
+    settings = recorded_settings(bag)
+    assert settings.weights == SHIPPED
+    assert settings.threads == 2
+    assert settings.reconstructor == {'object_size': 0.25}
+    assert settings.planner == {
+        'policy': 'random', 'seed': 5, 'max_views': 3, 'weights': SHIPPED}
+    assert settings.load_reconstructor().object_size == 0.25
+
+
+def test_a_bag_that_names_no_policy_has_no_planner():
+    assert recorded_settings(run_of([])).load_planner() is None
+
+
+def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
+    other = FOLDER / '2d3d.safetensors'
+    bag = replace(run_of([]), provenance={'weights_sha256': weights_hash(other)})
+    assert recorded_settings(bag).weights == other
+    moved = tmp_path / 'moved.safetensors'
+    moved.write_bytes(b'weights of another day')
+    bag = replace(bag, provenance={'weights_sha256': weights_hash(moved)})
+    assert recorded_settings(bag, moved).weights == moved
+    with pytest.raises(WeightsError, match='the weights have changed since'):
+        recorded_settings(bag)
