@@ -11,6 +11,8 @@ STILL_ANGLE = 0.01
 """A still camera has not moved by more, radians as seen from the object or turned in place."""
 STILL_TIME = 0.08
 """For so long, seconds: two images of a stream of 10 Hz."""
+GOAL_TOLERANCE = 0.14
+"""An azimuth this near to a goal reaches it, radians: 24 rendered views can be 7.5 degrees off."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class ViewGate:
     given or expected, else by_separation.
     """
 
-    def __init__(self, take_views: str = 'auto', goal_tolerance: float = 0.14,
+    def __init__(self, take_views: str = 'auto', goal_tolerance: float = GOAL_TOLERANCE,
                  min_view_separation: float = 0.2) -> None:
         if take_views not in TAKE_VIEWS:
             raise ConfigError(f'take_views: expected one of {", ".join(TAKE_VIEWS)}, '

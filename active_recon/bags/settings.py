@@ -1,7 +1,7 @@
 """The network and the planner that a run was made with, found again by what its bag says."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,23 @@ class Settings:
     reconstructor: Mapping[str, Any]
     planner: Mapping[str, Any] | None
     threads: int = 1
+
+    def under(self, weights: Path | None = None, policy: str | None = None,
+              threshold: float | None = None) -> 'Settings':
+        """Return the settings with another model, policy or threshold; None keeps what was."""
+        reconstructor = dict(self.reconstructor)
+        if weights is not None:
+            reconstructor.pop('threshold', None)  # each model has its own
+        if threshold is not None:
+            reconstructor['threshold'] = threshold
+        planner = None if self.planner is None else dict(self.planner)
+        if policy is not None:
+            yaw = {name: reconstructor[name] for name in ('object_yaw',) if name in reconstructor}
+            planner = {**yaw, 'weights': self.weights, **(planner or {}), 'policy': policy}
+        if planner is not None and weights is not None:
+            planner['weights'] = weights
+        return replace(self, weights=weights or self.weights, reconstructor=reconstructor,
+                       planner=planner)
 
     def load_reconstructor(self) -> Reconstructor:
         """Raise WeightsError or ConfigError where it cannot be."""

@@ -1,0 +1,83 @@
+"""A run of plain numbers written as a bag, on the loop's topics: the inverse of reading one."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from active_recon.bags.metadata import QosProfile
+from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun
+from active_recon.bags.settings import node_parameters
+from active_recon.bags.writer import BagWriter
+from active_recon.errors import RecordingError
+from msg_tools.definitions import message_definition
+from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
+from msg_tools.loop import goal_to_msgs, image_to_msgs, view_to_msgs
+from msg_tools.serialization import message_bytes, type_name
+
+_LATCHED = QosProfile(durability='transient_local')
+_STREAM = QosProfile()
+
+
+def write_run(run: RecordedRun, folder: Path) -> None:
+    """
+    Write a run as a new bag, whole or not at all.
+
+    What a view or a goal does not tell when it was received bears its stamp. Raises
+    RecordingError where the folder exists or the disk is full.
+    """
+    if folder.exists():
+        raise RecordingError(f'expected to write a new bag in {folder}, but it exists: '
+                             'nothing is overwritten', 'bag_not_begun')
+    try:
+        with TemporaryDirectory(prefix=f'.{folder.name}-', dir=folder.parent) as beside:
+            unfinished = Path(beside) / folder.name
+            with BagWriter(unfinished) as bag:
+                _write(run, bag)
+            unfinished.rename(folder)
+    except OSError as error:
+        raise RecordingError(f'expected to write a new bag in {folder}, but: {error}',
+                             'bag_not_begun') from error
+
+
+def _write(run: RecordedRun, bag: BagWriter) -> None:
+    bag.add_provenance(run.provenance)
+    for node, parameters in run.parameters.items():
+        bag.attach_parameters(node, parameters)
+    size = node_parameters(run, 'reconstructor').get('object_size', 1.0)
+    messages = (found for episode in run.episodes for found in _messages(episode, size))
+    for received, topic, stamp, msg in sorted(messages, key=lambda found: found[0]):
+        kind = type_name(msg)
+        qos = _STREAM if topic.startswith('camera/') else _LATCHED
+        bag.add_topic(f'/{topic}', kind, message_definition(kind), (qos,))
+        bag.write(f'/{topic}', message_bytes(msg), received, stamp)
+
+
+def _messages(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str, int, Any]]:
+    """Yield when each message was received, its topic, its stamp, and itself."""
+    begin = Episode(episode.id, episode.begin)
+    yield episode.begin, 'episode', episode.begin, episode_to_msg(begin)
+    yield episode.begin, 'done', episode.begin, done_to_msg(episode.begin, '')
+    yield from _of_goal(episode.first_goal, size)
+    for view in episode.views:
+        messages = image_to_msgs(view.stamp, view.image, view.camera) | view_to_msgs(
+            view.stamp, view.camera, view.reconstruction, view.occupied, view.latent,
+            view.entropy)
+        yield from _at(messages, view.stamp, view.received)
+        yield from _of_goal(view.goal, size)
+    if episode.done and episode.views:
+        last = episode.views[-1]
+        received = max([last.stamp, *last.received.values()])
+        yield received, 'done', last.stamp, done_to_msg(last.stamp, episode.done)
+
+
+def _of_goal(goal: RecordedGoal | None, size: float) -> Iterator[tuple[int, str, int, Any]]:
+    if goal is not None:
+        messages = goal_to_msgs(goal.stamp, goal.azimuth, goal.candidates, goal.scores, size)
+        yield from _at(messages, goal.stamp, dict.fromkeys(messages, goal.received))
+
+
+def _at(messages: Mapping[str, Any], stamp: int,
+        received: Mapping[str, int]) -> Iterator[tuple[int, str, int, Any]]:
+    for topic, msg in messages.items():
+        yield received.get(topic, stamp), topic, stamp, msg

@@ -1,0 +1,63 @@
+"""What the loop's nodes publish for one view and for one goal, by the topics' names."""
+
+from typing import Any
+
+from active_recon.cameras import Camera, CANONICAL_DISTANCE, CANONICAL_ELEVATION
+from active_recon.voxels import VoxelGrid
+from msg_tools.cameras import camera_to_msgs, OBJECT_FRAME, pose_to_msg
+from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
+from msg_tools.images import image_to_msg, latent_to_msg
+from msg_tools.stamps import stamp_from_nanoseconds
+from msg_tools.voxels import voxel_grid_to_msg
+import numpy as np
+from numpy.typing import NDArray
+from std_msgs.msg import Float64, Header
+
+CAMERA_FRAME = 'camera_optical_frame'
+
+
+def image_to_msgs(stamp: int, image: NDArray[np.uint8], camera: Camera) -> dict[str, Any]:
+    """Return what a camera publishes of an image, (H, W, 3) uint8 RGB, at a stamp in ns."""
+    header = _header(stamp, CAMERA_FRAME)
+    info, pose = camera_to_msgs(camera, header)
+    return {'camera/pose': pose, 'camera/camera_info': info,
+            'camera/image_raw': image_to_msg(image, header)}
+
+
+def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
+                 occupied: VoxelGrid | None, latent: NDArray[np.float32] | None,
+                 entropy: float | None) -> dict[str, Any]:
+    """
+    Return what the reconstructor publishes of a view, at the stamp of its image in ns.
+
+    The grids are 0 where a cell is not published; what is None is not published at all.
+    """
+    header = _header(stamp, OBJECT_FRAME)
+    messages: dict[str, Any] = {}
+    if occupied is not None:
+        messages['occupancy'] = voxel_grid_to_msg(occupied, 0, header)
+    if latent is not None:
+        messages['latent'] = latent_to_msg(latent, header)
+    messages['view'] = pose_to_msg(camera.pose, header)
+    if probabilities is not None:
+        messages['probabilities'] = voxel_grid_to_msg(probabilities, 0, header)
+    if entropy is not None:
+        messages['entropy'] = Float64(data=entropy)
+    return messages
+
+
+def goal_to_msgs(stamp: int, azimuth: float, candidates: NDArray[np.float64] | None,
+                 scores: NDArray[np.float32] | None, object_size: float = 1.0) -> dict[str, Any]:
+    """Return what the planner publishes of a goal, an azimuth in radians, at a stamp in ns."""
+    header = _header(stamp, OBJECT_FRAME)
+    place = CANONICAL_ELEVATION, CANONICAL_DISTANCE * object_size
+    messages: dict[str, Any] = {}
+    if candidates is not None and scores is not None:
+        messages['azimuth_scores'] = scores_to_msg(candidates, scores, *place, header)
+    messages['next_view'] = view_goal_to_msg(azimuth, *place, header)
+    messages['next_azimuth'] = azimuth_goal_to_msg(azimuth, header)
+    return messages
+
+
+def _header(stamp: int, frame: str) -> Header:
+    return Header(stamp=stamp_from_nanoseconds(stamp), frame_id=frame)

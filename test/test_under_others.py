@@ -1,0 +1,137 @@
+"""A run under others: only views that were taken, and what another had made of them."""
+
+from dataclasses import replace
+import math
+
+from active_recon.bags.comparison import compare, SAME_BITS
+from active_recon.bags.replay import replay
+from active_recon.bags.run import RecordedEpisode, RecordedView
+from active_recon.bags.settings import recorded_settings, Settings
+from active_recon.bags.under_others import explored, Others, reconstructed, run_under
+from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.errors import DataError
+from active_recon.models.network_2d3d import Network2d3d
+from active_recon.models.weights import Bundle, save_weights, weights_hash
+from active_recon.planner import Planner
+from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
+import numpy as np
+import pytest
+from recorded_runs import episode_of, image_at, loop_of, policies, run_of, SECOND, THRESHOLD
+import torch
+
+
+@pytest.fixture
+def sweep():
+    """Return an episode of all 24 azimuths that nobody has asked for."""
+    views = [RecordedView(SECOND * (number + 2), image_at(azimuth), orbit_camera(azimuth), None,
+                          None, None, None, None, {}) for number, azimuth in enumerate(AZIMUTHS)]
+    return RecordedEpisode('sweep', SECOND, None, views, '')
+
+
+@pytest.fixture
+def loop(network, attention):
+    return loop_of(network, policies(attention)['attention']())
+
+
+def azimuths(episode):
+    return [view.camera.azimuth for view in episode.views]
+
+
+def test_a_policy_gets_the_views_that_it_asks_for(sweep, loop):
+    reconstructor, _ = loop
+    episode = explored(sweep, reconstructor, Planner(UniformPolicy(4), 4, 0.0), 0.14)
+    np.testing.assert_allclose(azimuths(episode), np.radians([0, 90, 180, 270]), atol=1e-9)
+    assert [view.goal and round(math.degrees(view.goal.azimuth)) for view in episode.views] == [
+        90, 180, 270, None]
+    assert episode.done == 'max_views'
+    images = {view.image.tobytes() for view in sweep.views}
+    assert all(view.image.tobytes() in images for view in episode.views)
+
+
+def test_what_was_explored_is_a_run_like_a_recorded_one(sweep, loop):
+    run = run_of([explored(sweep, *loop, 0.14)])
+    stamps = [stamp for view in run.episodes[0].views
+              for stamp in (view.stamp, view.goal.stamp if view.goal else view.stamp + 1)]
+    assert stamps == sorted(set(stamps))
+    assert stamps[0] > run.episodes[0].first_goal.stamp >= run.episodes[0].begin
+    assert compare(replay(run, *loop), THRESHOLD).verdict == SAME_BITS
+
+
+def test_exploring_what_a_policy_has_taken_takes_the_same_again(loop):
+    episode = episode_of(*loop, SECOND, 1.0)
+    again = explored(episode, *loop, 0.14)
+    assert azimuths(again) == azimuths(episode)
+    for before, after in zip(episode.views, again.views, strict=True):
+        np.testing.assert_array_equal(before.reconstruction.occupancy,
+                                      after.reconstruction.occupancy)
+        assert before.entropy == after.entropy
+    assert again.done == episode.done
+
+
+def test_a_view_that_was_never_taken_is_refused_by_its_azimuth(sweep, loop):
+    reconstructor, _ = loop
+    half = replace(sweep, views=sweep.views[:12])  # 0 to 165 degrees
+    with pytest.raises(DataError, match='after view 1 .* azimuth of 180.0 degrees.* 15.0 off'):
+        explored(half, reconstructor, Planner(FarthestPolicy(), 4, 0.0), 0.14)
+
+
+def test_an_episode_without_views_is_refused(sweep, loop):
+    with pytest.raises(DataError, match='without'):
+        explored(replace(sweep, views=[]), *loop, 0.14)
+
+
+def test_another_threshold_changes_the_occupied_cells_alone(loop):
+    episode = episode_of(*loop, SECOND, 1.0)
+    reconstructor, _ = loop
+    reconstructor.threshold = 0.2
+    again = reconstructed(episode, reconstructor)
+    for before, after in zip(episode.views, again.views, strict=True):
+        kept = before.reconstruction.occupancy > 0.2
+        np.testing.assert_array_equal(after.occupied.occupancy > 0, kept)
+        assert 0 < kept.sum() < (before.occupied.occupancy > 0).sum()
+        assert (after.stamp, after.goal, after.entropy) == (
+            before.stamp, before.goal, before.entropy)
+
+
+@pytest.fixture
+def weights(tmp_path, tiny, network, attention):
+    """Return two weights files, the first of them that of `network`."""
+    torch.manual_seed(1)
+    paths = [tmp_path / 'one.safetensors', tmp_path / 'two.safetensors']
+    for path, net in zip(paths, [network, Network2d3d.from_config(tiny)], strict=True):
+        save_weights(path, Bundle(net, attention, tiny, THRESHOLD))
+    return paths
+
+
+def test_a_run_under_others_says_so_and_replays_to_the_same_bits(sweep, weights, tmp_path):
+    recorded = Settings(weights[0], {'object_size': 1.0}, None)
+    run = replace(run_of([sweep]), path=tmp_path / 'walk', provenance={
+        'object': 'chair', 'config_sha256': 'old'})
+    other = run_under(run, recorded, Others(weights[1], 'attention', 0.12))
+    assert other.provenance == {
+        'object': 'chair', 'policy': 'attention', 'replay_of': 'walk', 'version': '0.1.0',
+        'weights_sha256': weights_hash(weights[1])}
+    settings = recorded_settings(other)
+    assert settings.weights == weights[1]
+    assert settings.planner['policy'] == 'attention'
+    assert compare(replay(other, settings.load_reconstructor(), settings.load_planner()),
+                   0.12).verdict == SAME_BITS
+
+
+def test_under_another_model_alone_nothing_tells_who_chose_the_views(weights, tmp_path, loop):
+    run = replace(run_of([episode_of(*loop, SECOND, 1.0)]), path=tmp_path, parameters={
+        'view_planner': {'policy': 'attention', 'weights': str(weights[0]), 'max_views': 3}})
+    recorded = Settings(weights[0], {}, {'policy': 'attention', 'weights': weights[0]})
+    other = run_under(run, recorded, Others(weights=weights[1]))
+    assert azimuths(other.episodes[0]) == azimuths(run.episodes[0])
+    assert 'view_planner' not in other.parameters
+    same_model = run_under(run, recorded, Others(threshold=0.2))
+    assert same_model.parameters['view_planner']['max_views'] == 3
+    assert same_model.parameters['reconstructor']['threshold'] == 0.2
+
+
+def test_each_model_has_its_own_threshold_unless_one_is_given(weights):
+    recorded = Settings(weights[0], {'threshold': 0.3}, None)
+    assert recorded.under(weights[1]).load_reconstructor().threshold == THRESHOLD
+    assert recorded.under(weights[1], threshold=0.2).load_reconstructor().threshold == 0.2
+    assert recorded.under(policy='farthest').load_reconstructor().threshold == 0.3
