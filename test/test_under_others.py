@@ -11,7 +11,7 @@ from active_recon.bags.under_others import explored, Others, reconstructed, run_
 from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.errors import DataError
 from active_recon.models.network_2d3d import Network2d3d
-from active_recon.models.weights import Bundle, save_weights, weights_hash
+from active_recon.models.weights import Bundle, config_hash, save_weights, weights_hash
 from active_recon.planner import Planner
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
 import numpy as np
@@ -103,14 +103,15 @@ def weights(tmp_path, tiny, network, attention):
     return paths
 
 
-def test_a_run_under_others_says_so_and_replays_to_the_same_bits(sweep, weights, tmp_path):
+def test_a_run_under_others_says_so_and_replays_to_the_same_bits(
+        sweep, weights, tiny, tmp_path):
     recorded = Settings(weights[0], {'object_size': 1.0}, None)
     run = replace(run_of([sweep]), path=tmp_path / 'walk', provenance={
         'object': 'chair', 'config_sha256': 'old'})
     other = run_under(run, recorded, Others(weights[1], 'attention', 0.12))
     assert other.provenance == {
         'object': 'chair', 'policy': 'attention', 'replay_of': 'walk', 'version': '0.1.0',
-        'weights_sha256': weights_hash(weights[1])}
+        'weights_sha256': weights_hash(weights[1]), 'config_sha256': config_hash(tiny)}
     settings = recorded_settings(other)
     assert settings.weights == weights[1]
     assert settings.planner['policy'] == 'attention'
@@ -120,14 +121,14 @@ def test_a_run_under_others_says_so_and_replays_to_the_same_bits(sweep, weights,
 
 def test_under_another_model_alone_nothing_tells_who_chose_the_views(weights, tmp_path, loop):
     run = replace(run_of([episode_of(*loop, SECOND, 1.0)]), path=tmp_path, parameters={
-        'view_planner': {'policy': 'attention', 'weights': str(weights[0]), 'max_views': 3}})
+        '/view_planner': {'policy': 'attention', 'weights': str(weights[0]), 'max_views': 3}})
     recorded = Settings(weights[0], {}, {'policy': 'attention', 'weights': weights[0]})
     other = run_under(run, recorded, Others(weights=weights[1]))
     assert azimuths(other.episodes[0]) == azimuths(run.episodes[0])
-    assert 'view_planner' not in other.parameters
+    assert '/view_planner' not in other.parameters
     same_model = run_under(run, recorded, Others(threshold=0.2))
-    assert same_model.parameters['view_planner']['max_views'] == 3
-    assert same_model.parameters['reconstructor']['threshold'] == 0.2
+    assert same_model.parameters['/view_planner']['max_views'] == 3
+    assert same_model.parameters['/reconstructor']['threshold'] == 0.2
 
 
 def test_each_model_has_its_own_threshold_unless_one_is_given(weights):

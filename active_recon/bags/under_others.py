@@ -51,19 +51,18 @@ def run_under(run: RecordedRun, recorded: Settings, others: Others,
         tolerance = node_parameters(run, 'reconstructor').get('goal_tolerance', GOAL_TOLERANCE)
         episodes = [explored(episode, reconstructor, planner, tolerance, advance)
                     for episode in before]
-    provenance = {**run.provenance, 'version': __version__, 'replay_of': run.path.name,
-                  'weights_sha256': reconstructor.weights_hash}
-    if others.weights is not None:
-        provenance.pop('config_sha256', None)
-    if others.policy is not None:
-        provenance['policy'] = others.policy
-    parameters = {'reconstructor': {
-        **node_parameters(run, 'reconstructor'), 'threshold': math.nan,
+    made_by = {'weights_sha256': reconstructor.weights_hash,
+               'config_sha256': reconstructor.config_hash}
+    provenance = {**run.provenance, **made_by, 'version': __version__,
+                  'replay_of': run.path.name}
+    parameters = {'/reconstructor': {
+        **node_parameters(run, 'reconstructor'), **made_by, 'threshold': math.nan,
         'weights': str(settings.weights), **settings.reconstructor}}
     if settings.planner is not None and (others.policy or not others.weights):
-        parameters['view_planner'] = {
-            **node_parameters(run, 'view_planner'), **settings.planner,
-            'weights': str(settings.planner['weights'])}
+        planning = {**node_parameters(run, 'view_planner'), **settings.planner,
+                    'weights': str(settings.planner['weights'])}
+        parameters['/view_planner'] = planning
+        provenance['policy'] = planning['policy']
     times = [time for episode in episodes for view in episode.views
              for time in (view.stamp, *view.received.values())]
     return replace(run, episodes=episodes, provenance=provenance, parameters=parameters,
