@@ -29,6 +29,13 @@ class Others:
     policy: str | None = None
     threshold: float | None = None
 
+    @property
+    def name(self) -> str:
+        """What is other, in a word for the name of a bag."""
+        return '_'.join(word for word in (
+            self.weights and self.weights.stem, self.policy,
+            self.threshold and f'threshold-{self.threshold:g}') if word)
+
 
 def run_under(run: RecordedRun, recorded: Settings, others: Others,
               advance: Callable[[], None] = lambda: None) -> RecordedRun:

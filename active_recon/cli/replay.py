@@ -1,0 +1,116 @@
+"""`active-recon replay`: a recorded run again, with no ROS running, as it was or under others."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+import math
+from pathlib import Path
+import time
+from typing import Annotated, TYPE_CHECKING
+
+from active_recon.cli.demo import PolicyName
+from active_recon.cli.progress import progress_bar
+import typer
+
+if TYPE_CHECKING:
+    from active_recon.bags.run import RecordedRun
+    from active_recon.bags.settings import Settings
+    from active_recon.bags.under_others import Others
+    from active_recon.bags.verification import Verification
+
+
+def replay(
+    bag: Annotated[Path, typer.Argument(help="A rosbag2 folder, or a bag's file.")],
+    model: Annotated[str | None, typer.Option(
+        help='Another model: its name, or a weights file. The views stay those that were taken.',
+    )] = None,
+    policy: Annotated[PolicyName | None, typer.Option(
+        help='Another policy. It chooses among the views of the bag, and is refused where it '
+             'wants one that was never taken.')] = None,
+    threshold: Annotated[float | None, typer.Option(
+        help='Another occupancy above which a cell is occupied.')] = None,
+    out: Annotated[Path | None, typer.Option(
+        help='The folder of the new bag, with one of the three above; default: beside BAG, with '
+             'what is other in its name.')] = None,
+    weights: Annotated[Path | None, typer.Option(
+        help='The weights file that BAG was recorded with, where it does not ship any more.',
+    )] = None,
+    threads: Annotated[int | None, typer.Option(
+        min=1, help='CPU threads of the network; default: as many as the run had.')] = None,
+) -> None:
+    """
+    Replay a bag and compare with what was recorded, or replay it under others.
+
+    The images go through the network and the policy again, in the order of their stamps. The same
+    machine and versions give the same bits; another machine the same within a tolerance, which is
+    told. Exit code 1: neither.
+
+    With --model, --policy or --threshold a new bag is written, beside the old one:
+
+    active-recon replay bags/2026-11-21_14-35-54
+
+    active-recon replay bags/sweep --policy farthest
+    """
+    from active_recon.bags.reading import read_run
+    from active_recon.bags.settings import recorded_settings
+    from active_recon.bags.under_others import Others
+    from active_recon.models.weights import find_weights
+
+    began = time.monotonic()
+    run = read_run(bag)
+    settings = recorded_settings(run, weights)
+    others = Others(find_weights(model) if model else None, policy.value if policy else None,
+                    threshold)
+    if others != Others():
+        _write_under(run, settings, others, out)
+    else:
+        _tell(_verified(run, settings, threads), run, time.monotonic() - began)
+
+
+def _verified(run: 'RecordedRun', settings: 'Settings', threads: int | None) -> 'Verification':
+    from active_recon.bags.verification import verify
+
+    with _bar('replaying', run) as advance:
+        return verify(run, settings, threads, lambda: advance(1, ''))
+
+
+def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
+    from active_recon.bags.comparison import DIFFERENT, NOTHING_RECORDED
+
+    ran_s = (run.end - run.begin) / 1e9
+    typer.echo(f'{verified.view_count} views in {len(run.episodes)} episodes, replayed in '
+               f'{took_s:.2f} s, {ran_s / took_s:.0f} times as fast as the run ({ran_s:.1f} s)')
+    for name, found in verified.comparison.deviations.items():
+        gap = '' if found.same == found.compared else (
+            f'{found.same} of {found.compared} the same, at most {found.largest:.2g} apart '
+            f'(tolerance {found.tolerance:g})')
+        typer.echo(f'  {name:<14}{found.compared:>4} compared  {found.verdict:<17} {gap}'.rstrip())
+    if not verified.knows_policy:
+        typer.echo('the bag does not tell which policy chose: goals and stop are not compared')
+    typer.echo(f'hash {verified.hash}')
+    verdict = verified.comparison.verdict
+    typer.echo({NOTHING_RECORDED: 'nothing was recorded that could be compared'}.get(
+        verdict, f'{verdict}: what was recorded and the replay'))
+    if verdict == DIFFERENT:
+        raise typer.Exit(1)
+
+
+def _write_under(run: 'RecordedRun', settings: 'Settings', others: 'Others',
+                 out: Path | None) -> None:
+    from active_recon.bags.replay import fixed_arithmetic
+    from active_recon.bags.run_writing import write_run
+    from active_recon.bags.under_others import run_under
+
+    with _bar('replaying', run) as advance, fixed_arithmetic(settings.threads):
+        other = run_under(run, settings, others, lambda: advance(1, ''))
+    folder = out or run.path.with_name(f'{run.path.stem}_{others.name}')
+    write_run(other, folder)
+    for episode in other.episodes:
+        entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)
+        azimuths = ', '.join(
+            f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
+        typer.echo(f'views from {azimuths} degrees; entropy {entropies} nats')
+    typer.echo(f'wrote {folder}')
+
+
+def _bar(title: str, run: 'RecordedRun') -> AbstractContextManager[Callable[[int, str], None]]:
+    return progress_bar(title, sum(len(episode.views) for episode in run.episodes))
