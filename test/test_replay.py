@@ -10,7 +10,7 @@ from active_recon.bags.comparison import (
     TOLERANCES,
     WITHIN_TOLERANCE,
 )
-from active_recon.bags.replay import fixed_arithmetic, replay, replay_hash
+from active_recon.bags.replay import computing_with, replay, replay_hash
 from active_recon.bags.settings import recorded_settings
 from active_recon.cameras import wrap_azimuth
 from active_recon.errors import WeightsError
@@ -143,12 +143,11 @@ def test_a_cell_at_the_edge_of_the_cloud_is_off_by_what_it_is_beyond_the_edge(ru
     assert found.largest == pytest.approx(beyond, abs=1e-6)
 
 
-def test_arithmetic_is_fixed_inside_and_as_before_outside():
-    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
-    with fixed_arithmetic(before[0] + 1):
-        assert torch.get_num_threads() == before[0] + 1
-        assert torch.are_deterministic_algorithms_enabled()
-    assert (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()) == before
+def test_threads_are_fixed_inside_and_as_before_outside():
+    before = torch.get_num_threads()
+    with computing_with(before + 1):
+        assert torch.get_num_threads() == before + 1
+    assert torch.get_num_threads() == before
 
 
 def test_settings_are_those_of_the_bag_and_what_it_lacks_is_the_cores():

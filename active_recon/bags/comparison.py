@@ -12,12 +12,12 @@ from msg_tools.voxels import FLOOR
 import numpy as np
 
 TOLERANCES: Mapping[str, float] = {
-    'probabilities': 1e-3,
-    'occupancy': 1e-3,
-    'latent': 1e-3,
-    'entropy': 1e-3,
-    'goal': 1e-3,
-    'scores': 1e-2,
+    'probabilities': 1e-4,
+    'occupancy': 1e-4,
+    'latent': 1e-4,
+    'entropy': 1e-4,
+    'goal': 1e-4,
+    'scores': 1e-3,
     'stop': 0.0,
 }
 """How far another machine's replay may be off: probabilities and latents as they are, entropy as a

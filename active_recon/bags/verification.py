@@ -4,9 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from active_recon.bags.comparison import compare, Comparison
-from active_recon.bags.replay import fixed_arithmetic, replay, replay_hash
+from active_recon.bags.replay import replay, replay_hash
 from active_recon.bags.run import RecordedRun
-from active_recon.bags.settings import Settings
+from active_recon.planner import Planner
+from active_recon.reconstructor import Reconstructor
 
 
 @dataclass(frozen=True)
@@ -23,17 +24,14 @@ class Verification:
     knows_policy: bool
 
 
-def verify(run: RecordedRun, settings: Settings, threads: int | None = None,
+def verify(run: RecordedRun, reconstructor: Reconstructor, planner: Planner | None,
            advance: Callable[[], None] = lambda: None) -> Verification:
     """
-    Replay a run as it was recorded and compare.
+    Replay a run with what it was made with, and compare; `advance` is called after each view.
 
-    `threads` of the network; None: as many as the run had. Raises WeightsError and ConfigError
-    where what it was made with cannot be loaded, ViewError on a view that is none.
+    Raises ViewError on a view that is none.
     """
-    reconstructor, planner = settings.load_reconstructor(), settings.load_planner()
-    with fixed_arithmetic(threads or settings.threads):
-        episodes = replay(run, reconstructor, planner, advance)
+    episodes = replay(run, reconstructor, planner, advance)
     return Verification(
         compare(episodes, reconstructor.threshold), replay_hash(episodes),
         sum(len(episode.views) for episode in episodes), planner is not None)

@@ -51,34 +51,35 @@ def replay(
     active-recon replay bags/sweep --policy farthest
     """
     from active_recon.bags.reading import read_run
+    from active_recon.bags.replay import computing_with
     from active_recon.bags.settings import recorded_settings
     from active_recon.bags.under_others import Others
+    from active_recon.bags.verification import verify
     from active_recon.models.weights import find_weights
 
-    began = time.monotonic()
-    run = read_run(bag)
-    settings = recorded_settings(run, weights)
     others = Others(find_weights(model) if model else None, policy.value if policy else None,
                     threshold)
-    if others != Others():
-        _write_under(run, settings, others, out)
-    else:
-        _tell(_verified(run, settings, threads), run, time.monotonic() - began)
-
-
-def _verified(run: 'RecordedRun', settings: 'Settings', threads: int | None) -> 'Verification':
-    from active_recon.bags.verification import verify
-
-    with _bar('replaying', run) as advance:
-        return verify(run, settings, threads, lambda: advance(1, ''))
+    began = time.monotonic()
+    run = read_run(bag)
+    reading_s = time.monotonic() - began
+    settings = recorded_settings(run, weights)
+    with computing_with(threads or settings.threads):
+        if others != Others():
+            _write_under(run, settings, others, out)
+            return
+        reconstructor, planner = settings.load_reconstructor(), settings.load_planner()
+        began = time.monotonic()
+        with _bar('replaying', run) as advance:
+            verified = verify(run, reconstructor, planner, lambda: advance(1, ''))
+    _tell(verified, run, reading_s + time.monotonic() - began)
 
 
 def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
     from active_recon.bags.comparison import DIFFERENT, NOTHING_RECORDED
 
     ran_s = (run.end - run.begin) / 1e9
-    typer.echo(f'{verified.view_count} views in {len(run.episodes)} episodes, replayed in '
-               f'{took_s:.2f} s, {ran_s / took_s:.0f} times as fast as the run ({ran_s:.1f} s)')
+    typer.echo(f'views: {verified.view_count}, read and replayed in {took_s:.2f} s, '
+               f'{ran_s / took_s:.0f} times as fast as they were recorded ({ran_s:.1f} s)')
     for name, found in verified.comparison.deviations.items():
         gap = '' if found.same == found.compared else (
             f'{found.same} of {found.compared} the same, at most {found.largest:.2g} apart '
@@ -96,11 +97,10 @@ def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
 
 def _write_under(run: 'RecordedRun', settings: 'Settings', others: 'Others',
                  out: Path | None) -> None:
-    from active_recon.bags.replay import fixed_arithmetic
     from active_recon.bags.run_writing import write_run
     from active_recon.bags.under_others import run_under
 
-    with _bar('replaying', run) as advance, fixed_arithmetic(settings.threads):
+    with _bar('replaying', run) as advance:
         other = run_under(run, settings, others, lambda: advance(1, ''))
     folder = out or run.path.with_name(f'{run.path.stem}_{others.name}')
     write_run(other, folder)
