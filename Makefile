@@ -20,7 +20,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo test test-full bench lint clean
+.PHONY: help venv demo golden test test-full bench lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -30,6 +30,12 @@ venv: .venv/installed  ## .venv with the package and all that it needs
 
 demo: .venv/installed  ## the loop over ROS 2 on a real model; ARGS='--views 3' and so on
 	@$(BIN)/active-recon demo $(ARGS)
+
+golden: .venv/installed  ## the golden run anew, once weights or loop have changed
+	@rm -rf build/golden
+	@$(BIN)/active-recon demo --views 4 --output-dir build/golden
+	@rm -rf bags/golden/run && mkdir -p bags/golden/run
+	@mv build/golden/*/*.mcap build/golden/*/metadata.yaml bags/golden/run/
 
 test: lint .venv/colcon/installed  ## style, types, and every test but the long ones; ARGS go to pytest
 	@echo '== testing; the long tests run with `make test-full`'

@@ -7,6 +7,7 @@ from pathlib import Path
 import time
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.bag_topics import with_topics
 from active_recon.cli.demo import PolicyName
 from active_recon.cli.progress import progress_bar
 import typer
@@ -14,12 +15,16 @@ import typer
 if TYPE_CHECKING:
     from active_recon.bags.run import RecordedRun
     from active_recon.bags.settings import Settings
+    from active_recon.bags.topics import Topics
     from active_recon.bags.under_others import Others
     from active_recon.bags.verification import Verification
 
 
+@with_topics
 def replay(
-    bag: Annotated[Path, typer.Argument(help="A rosbag2 folder, or a bag's file.")],
+    path: Annotated[Path, typer.Argument(
+        metavar='BAG', help='A rosbag2 folder, or an MCAP or sqlite3 file.')],
+    topics: 'Topics',
     model: Annotated[str | None, typer.Option(
         help='Another model: its name, or a weights file. The views stay those that were taken.',
     )] = None,
@@ -40,15 +45,14 @@ def replay(
     """
     Replay a bag and compare with what was recorded, or replay it under others.
 
-    The images go through the network and the policy again, in the order of their stamps. The same
-    machine and versions give the same bits; another machine the same within a tolerance, which is
-    told. Exit code 1: neither.
+    The images go through the network and the policy again, in the order of their stamps, with no
+    ROS running and no clock. The same machine and versions give the same bits, another machine the
+    same within a tolerance; which of them held is told. Exit code 1: neither. With --model,
+    --policy or --threshold nothing is compared, and a new bag is written beside the old one.
 
-    With --model, --policy or --threshold a new bag is written, beside the old one:
+    Example: active-recon replay bags/2026-11-21_14-35-54
 
-    active-recon replay bags/2026-11-21_14-35-54
-
-    active-recon replay bags/sweep --policy farthest
+    Example: active-recon replay bags/sweep --policy farthest
     """
     from active_recon.bags.reading import read_run
     from active_recon.bags.replay import computing_with
@@ -60,7 +64,7 @@ def replay(
     others = Others(find_weights(model) if model else None, policy.value if policy else None,
                     threshold)
     began = time.monotonic()
-    run = read_run(bag)
+    run = read_run(path, topics)
     reading_s = time.monotonic() - began
     settings = recorded_settings(run, weights)
     with computing_with(threads or settings.threads):

@@ -1,0 +1,151 @@
+"""The golden run: recorded from the real loop, and replayed here to what was recorded."""
+
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+import time
+
+from active_recon.bags.comparison import SAME_BITS, WITHIN_TOLERANCE
+from active_recon.bags.reading import read_run
+from active_recon.bags.replay import computing_with, replay, replay_hash
+from active_recon.bags.settings import recorded_settings
+from active_recon.bags.verification import verify
+from active_recon.cameras import azimuth_difference
+from active_recon.cli.main import main
+from active_recon.models.weights import weights_hash
+import pytest
+
+ROOT = Path(__file__).parents[1]
+GOLDEN = ROOT / 'bags' / 'golden' / 'run'
+REPLAYS = 100
+TIMES_FASTER = 20
+
+
+@pytest.fixture(scope='module')
+def run():
+    return read_run(GOLDEN)
+
+
+@pytest.fixture(scope='module', autouse=True)
+def same_weights(run):
+    """Fail every test with the reason where the run was made with weights of another day."""
+    recorded, shipped = run.provenance['weights_sha256'], weights_hash()
+    if recorded != shipped:
+        pytest.fail(f'the weights that ship ({shipped[:12]}) are not those that the golden run '
+                    f'was recorded with ({recorded[:12]}): record it anew by `make golden`')
+
+
+@pytest.fixture(scope='module')
+def loop(run):
+    """Return the reconstructor and the planner that the run was made with."""
+    settings = recorded_settings(run)
+    return settings.load_reconstructor(), settings.load_planner()
+
+
+def command(monkeypatch, capsys, *arguments):
+    """Run a command; return its exit code and what it said."""
+    monkeypatch.setattr('sys.argv', ['active-recon', *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    said = capsys.readouterr()
+    return end.value.code or 0, said.out + said.err
+
+
+def test_it_is_small_and_says_what_made_it(run):
+    assert sum(path.stat().st_size for path in GOLDEN.rglob('*')) < 2_000_000
+    assert {'version', 'weights_sha256', 'config_sha256', 'policy', 'seed', 'object'} <= set(
+        run.provenance)
+    assert [(len(episode.views), episode.done) for episode in run.episodes] == [(4, 'max_views')]
+
+
+def test_its_goals_were_reached_by_its_views(run):
+    views = run.episodes[0].views
+    goals = [run.episodes[0].first_goal, *(view.goal for view in views[:-1])]
+    for goal, view in zip(goals, views, strict=True):
+        assert abs(azimuth_difference(goal.azimuth, view.camera.azimuth)) < 0.14
+
+
+def test_all_of_it_replays_to_what_was_recorded(run, loop):
+    with computing_with(1):
+        verified = verify(run, *loop)
+    assert verified.comparison.verdict in (SAME_BITS, WITHIN_TOLERANCE)
+    assert {name: found.compared for name, found in verified.comparison.deviations.items()} == {
+        'probabilities': 4, 'occupancy': 4, 'latent': 4, 'entropy': 4, 'goal': 3, 'scores': 3,
+        'stop': 4}
+
+
+def test_a_hundred_replays_have_one_hash(run, loop):
+    with computing_with(1):
+        assert len({replay_hash(replay(run, *loop)) for _ in range(REPLAYS)}) == 1
+
+
+def test_a_replay_is_many_times_faster_than_the_run(loop):
+    """Time of the processor, so that what else runs beside the test does not count."""
+    def once():
+        began = time.process_time()
+        run = read_run(GOLDEN)
+        verify(run, *loop)
+        return (run.end - run.begin) / 1e9 / (time.process_time() - began)
+
+    with computing_with(1):
+        assert max(once() for _ in range(3)) > TIMES_FASTER
+
+
+@pytest.mark.parametrize(('variables', 'threads'), [
+    ({'ATEN_CPU_CAPABILITY': 'default'}, 1), ({'ONEDNN_MAX_CPU_ISA': 'SSE41'}, 1),
+    ({'ATEN_CPU_CAPABILITY': 'default', 'ONEDNN_MAX_CPU_ISA': 'SSE41'}, 2)])
+def test_another_processor_stays_within_tolerance(variables, threads):
+    ended = subprocess.run(
+        [sys.executable, '-m', 'active_recon.cli.main', 'replay', GOLDEN, '--threads',
+         str(threads)], capture_output=True, text=True, timeout=120,
+        env={**os.environ, **variables, 'PYTHONPATH': str(ROOT)})
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert re.search(f'^({SAME_BITS}|{WITHIN_TOLERANCE}): what was recorded', ended.stdout, re.M)
+
+
+def test_the_command_tells_the_verdict_and_the_hash(run, loop, monkeypatch, capsys):
+    with computing_with(1):
+        expected = verify(run, *loop)
+    code, said = command(monkeypatch, capsys, 'replay', GOLDEN)
+    assert code == 0
+    assert f'hash {expected.hash}' in said
+    assert f'{expected.comparison.verdict}: what was recorded' in said
+    assert 'views: 4, read and replayed in' in said
+
+
+@pytest.fixture
+def copied(tmp_path):
+    """Return a copy of the bag that a new one may be written beside."""
+    return Path(shutil.copytree(GOLDEN, tmp_path / 'walk'))
+
+
+@pytest.mark.parametrize(('options', 'name', 'knows_policy'), [
+    (('--threshold', '0.6'), 'threshold-0.6', True), (('--model', '2d3d'), '2d3d', False),
+    (('--policy', 'attention'), 'attention', True)])
+def test_a_replay_under_others_is_a_bag_that_replays_to_the_same_bits(
+        copied, options, name, knows_policy, monkeypatch, capsys):
+    code, said = command(monkeypatch, capsys, 'replay', copied, *options)
+    beside = copied.with_name(f'walk_{name}')
+    assert (code, f'wrote {beside}' in said) == (0, True)
+    again = read_run(beside)
+    assert again.provenance['replay_of'] == 'walk'
+    settings = recorded_settings(again)
+    planner = settings.load_planner()
+    assert (planner is not None) == knows_policy
+    with computing_with(1):
+        assert verify(again, settings.load_reconstructor(),
+                      planner).comparison.verdict == SAME_BITS
+    code, said = command(monkeypatch, capsys, 'replay', copied, *options)
+    assert (code, 'nothing is overwritten' in said) == (2, True)
+
+
+def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
+        copied, monkeypatch, capsys):
+    code, said = command(monkeypatch, capsys, 'replay', copied, '--policy', 'farthest')
+    assert code == 2
+    assert 'azimuth of 45.0 degrees' in said
+    assert 'record-sweep' in said
+    assert [path.name for path in copied.parent.iterdir()] == ['walk']
