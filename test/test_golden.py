@@ -149,3 +149,8 @@ def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
     assert 'azimuth of 45.0 degrees' in said
     assert 'record-sweep' in said
     assert [path.name for path in copied.parent.iterdir()] == ['walk']
+
+
+def test_a_place_for_a_bag_that_is_not_written_is_refused(tmp_path, monkeypatch, capsys):
+    code, said = command(monkeypatch, capsys, 'replay', GOLDEN, '--out', tmp_path / 'new')
+    assert (code, '--out: expected with --model' in said) == (2, True)

@@ -178,3 +178,4 @@ def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
     assert recorded_settings(bag, moved).weights == moved
     with pytest.raises(WeightsError, match='the weights have changed since'):
         recorded_settings(bag)
+    assert recorded_settings(bag, other, instead=True).weights == other

@@ -4,13 +4,21 @@ from collections.abc import Callable
 from typing import Any
 
 from active_recon.bags.camera_stream import read_message
-from active_recon.bags.message_types import CLOUD, DIAGNOSTICS, FLOAT, HEADER, IMAGE, POSE
+from active_recon.bags.message_types import (
+    CLOUD,
+    DIAGNOSTICS,
+    FLOAT,
+    HEADER,
+    IMAGE,
+    JOINT_STATE,
+    POSE,
+)
 from active_recon.bags.raw import Bag, RawMessage
 from active_recon.errors import ActiveReconError, DataError
 from msg_tools.cameras import pose_from_msg
 from msg_tools.diagnostics import counts_from_msg
 from msg_tools.episodes import done_from_msg, episode_from_msg
-from msg_tools.goals import scores_from_msg, view_goal_from_msg
+from msg_tools.goals import azimuth_goal_from_msg, scores_from_msg, view_goal_from_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
@@ -18,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 LOOP = {'episode': HEADER, 'view': POSE, 'occupancy': CLOUD, 'probabilities': CLOUD,
-        'latent': IMAGE, 'entropy': FLOAT, 'next_view': POSE, 'azimuth_scores': CLOUD,
-        'done': HEADER}
+        'latent': IMAGE, 'entropy': FLOAT, 'next_view': POSE, 'next_azimuth': JOINT_STATE,
+        'azimuth_scores': CLOUD, 'done': HEADER}
 """The loop's own topics and their types."""
 _DIAGNOSTICS = '/diagnostics'
 
@@ -50,6 +58,7 @@ class LoopRecord:
             'latent': latent_from_msg,
             'entropy': lambda msg: float(msg.data),
             'next_view': lambda msg: view_goal_from_msg(msg, object_frame),
+            'next_azimuth': azimuth_goal_from_msg,
             'azimuth_scores': _scores_from_msg,
             'done': done_from_msg,
         }

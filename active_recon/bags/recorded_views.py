@@ -100,6 +100,8 @@ def _goals(record: LoopRecord, begin: int, end: float) -> list[RecordedGoal]:
     for stamp, azimuth in sorted(record.parts['next_view'].items()):
         if begin <= stamp < end:
             candidates, scores = record.parts['azimuth_scores'].get(stamp, (None, None))
+            # A joint's angle has all of its bits, that of a pose has been through sine and cosine
+            azimuth = record.parts['next_azimuth'].get(stamp, azimuth)
             goals.append(RecordedGoal(azimuth, stamp, candidates, scores,
                                       record.received['next_view'][stamp]))
     return goals

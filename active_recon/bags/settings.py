@@ -55,15 +55,18 @@ class Settings:
         return None if self.planner is None else Planner.load(**self.planner)
 
 
-def recorded_settings(run: RecordedRun, weights: Path | None = None) -> Settings:
+def recorded_settings(run: RecordedRun, weights: Path | None = None,
+                      instead: bool = False) -> Settings:
     """
     Return what a run was made with, by its parameters and the hash of its weights.
 
-    `weights`: a file to look at first. Raises WeightsError where no file has the recorded hash.
+    `weights`: a file to look at first, or, with `instead`, to be taken whatever was recorded.
+    Raises WeightsError where no file has the recorded hash.
     """
     of_reconstructor = node_parameters(run, 'reconstructor')
     of_planner = node_parameters(run, 'view_planner')
-    found = _recorded_weights(run, weights, of_reconstructor.get('weights', ''))
+    found = weights if weights and instead else _recorded_weights(
+        run, weights, of_reconstructor.get('weights', ''))
     planner = None
     if 'policy' in of_planner:
         planner = _given(of_planner, _OF_PLANNER)

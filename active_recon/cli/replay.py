@@ -10,6 +10,7 @@ from typing import Annotated, TYPE_CHECKING
 from active_recon.cli.bag_topics import with_topics
 from active_recon.cli.demo import PolicyName
 from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
@@ -63,10 +64,13 @@ def replay(
 
     others = Others(find_weights(model) if model else None, policy.value if policy else None,
                     threshold)
+    if out and others == Others():
+        raise ConfigError('--out: expected with --model, --policy or --threshold, for a new bag; '
+                          'without them nothing is written')
     began = time.monotonic()
     run = read_run(path, topics)
     reading_s = time.monotonic() - began
-    settings = recorded_settings(run, weights)
+    settings = recorded_settings(run, others.weights or weights, others.weights is not None)
     with computing_with(threads or settings.threads):
         if others != Others():
             _write_under(run, settings, others, out)
