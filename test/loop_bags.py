@@ -93,9 +93,11 @@ def type_name(msg):
     return f'{type(msg).__module__.split(".")[0]}/msg/{type(msg).__name__}'
 
 
-def write_bag(folder, messages, max_bytes=None):
+def write_bag(folder, messages, max_bytes=None, parameters=None):
     """Write (time, topic, message) into a bag, and return its folder."""
     with BagWriter(folder, max_bytes) as bag:
+        if parameters:
+            bag.attach_parameters('/reconstructor', parameters)
         for time, topic, msg in messages:
             bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
             bag.write(topic, serialize_message(msg), time + DELAY, time)

@@ -1,16 +1,28 @@
 """Reading bags: what was recorded is what is read, in whatever form it was stored."""
 
 
+from contextlib import closing
+import sqlite3
+
 from active_recon.bags.reading import read_run
 from active_recon.bags.writer import BagWriter
+from active_recon.errors import DataError
 from active_recon.voxels import VoxelGrid
 from loop_bags import BEGIN, DELAY, LENS, LoopRun, type_name, write_bag
+from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.episodes import done_to_msg
+from msg_tools.voxels import FIELDS
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 from recorded_messages import definition, STORE
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import (
+    CompressionFormat,
+    CompressionMode,
+    Reader,
+    StoragePlugin,
+    Writer,
+)
 
 
 @pytest.fixture(scope='module')
@@ -108,16 +120,19 @@ def test_latched_messages_that_come_again_count_once(loop, bag, tmp_path):
 def test_a_bare_file_a_split_bag_and_one_without_metadata_read_alike(loop, bag, tmp_path):
     whole = read_run(bag)
     assert same(read_run(bag / 'run_0.mcap'), whole)
-    split = write_bag(tmp_path / 'split', loop.messages, max_bytes=50_000)
+    split = write_bag(tmp_path / 'split', loop.messages, max_bytes=20_000)
     assert len(list(split.glob('*.mcap'))) > 2
     assert same(read_run(split), whole)
     (split / 'metadata.yaml').unlink()
     assert same(read_run(split), whole)
 
 
-def copied(bag, folder, storage):
+def copied(bag, folder, storage, packed=None):
     """Copy a bag by a library that we did not write."""
-    with Reader(bag) as reader, Writer(folder, version=9, storage_plugin=storage) as writer:
+    writer = Writer(folder, version=9, storage_plugin=storage)
+    if packed:
+        writer.set_compression(packed, CompressionFormat.ZSTD)
+    with Reader(bag) as reader, writer:
         connections = {each.id: writer.add_connection(
             each.topic, each.msgtype, typestore=STORE) for each in reader.connections}
         for connection, time, data in reader.messages():
@@ -153,3 +168,45 @@ def test_the_parameters_and_the_provenance_are_read(loop, tmp_path):
     run = read_run(tmp_path / 'run')
     assert run.provenance == {'version': '1', 'policy': 'random'}
     assert run.parameters == {'view_planner': {'seed': 3, 'distance': float('inf')}}
+
+
+@pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+def test_bags_that_rosbag2_packed_read_alike(bag, tmp_path, storage, mode):
+    assert same(read_run(copied(bag, tmp_path / 'copy', storage, mode)), read_run(bag))
+
+
+def test_a_database_of_an_older_ros_has_no_definitions_and_needs_none(bag, tmp_path):
+    copy = copied(bag, tmp_path / 'copy', StoragePlugin.SQLITE3)
+    with closing(sqlite3.connect(copy / 'copy.db3')) as database:
+        for table in ('schema', 'metadata', 'message_definitions'):
+            database.execute(f'DROP TABLE {table}')
+        database.commit()
+    assert same(read_run(copy / 'copy.db3'), read_run(bag))
+
+
+def test_the_size_of_the_object_is_that_of_the_recorded_node(loop, bag, tmp_path):
+    larger = [(time, topic, scaled(msg, 3) if topic in ('/occupancy', '/probabilities') else msg)
+              for time, topic, msg in loop.messages]
+    folder = write_bag(tmp_path / 'run', larger, parameters={'object_size': 3})
+    for view, small in zip(only(read_run(folder)).views, only(read_run(bag)).views, strict=True):
+        assert view.occupied.size == 3
+        assert np.array_equal(view.occupied.occupancy, small.occupied.occupancy)
+
+
+def scaled(msg, factor):
+    table = cloud_from_msg(msg, FIELDS) * np.float32([factor, factor, factor, 1])
+    return cloud_to_msg(table, FIELDS, msg.header)
+
+
+def test_a_recorded_parameter_of_another_type_is_refused(loop, tmp_path):
+    folder = write_bag(tmp_path / 'run', loop.messages, parameters={'object_size': 'large'})
+    with pytest.raises(DataError, match="object_size: expected a float, got 'large'"):
+        read_run(folder)
+
+
+def test_an_image_that_came_twice_is_one(loop, bag, tmp_path):
+    again = [entry for entry in loop.messages if entry[1] == '/camera/image_raw'
+             for _ in range(2)]
+    others = [entry for entry in loop.messages if entry[1] != '/camera/image_raw']
+    assert same(read_run(write_bag(tmp_path / 'run', others + again)), read_run(bag))
