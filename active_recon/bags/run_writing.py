@@ -10,11 +10,12 @@ from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun
 from active_recon.bags.settings import node_parameters
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import RecordingError
-from msg_tools.definitions import message_definition
 from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
 from msg_tools.loop import goal_to_msgs, image_to_msgs, view_to_msgs
 from msg_tools.serialization import message_bytes, type_name
+from rosbags.typesys import get_typestore, Stores
 
+_UNNAMED = 'unnamed'  # of a bag without episodes: on the wire each has an id
 _LATCHED = QosProfile(durability='transient_local')
 _STREAM = QosProfile()
 
@@ -45,17 +46,19 @@ def _write(run: RecordedRun, bag: BagWriter) -> None:
     for node, parameters in run.parameters.items():
         bag.attach_parameters(node, parameters)
     size = node_parameters(run, 'reconstructor').get('object_size', 1.0)
+    definitions = get_typestore(Stores.ROS2_JAZZY)
     messages = (found for episode in run.episodes for found in _messages(episode, size))
     for received, topic, stamp, msg in sorted(messages, key=lambda found: found[0]):
         kind = type_name(msg)
         qos = _STREAM if topic.startswith('camera/') else _LATCHED
-        bag.add_topic(f'/{topic}', kind, message_definition(kind), (qos,))
+        definition, _ = definitions.generate_msgdef(kind, ros_version=2)
+        bag.add_topic(f'/{topic}', kind, definition, (qos,))
         bag.write(f'/{topic}', message_bytes(msg), received, stamp)
 
 
 def _messages(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str, int, Any]]:
     """Yield when each message was received, its topic, its stamp, and itself."""
-    begin = Episode(episode.id, episode.begin)
+    begin = Episode(episode.id or _UNNAMED, episode.begin)
     yield episode.begin, 'episode', episode.begin, episode_to_msg(begin)
     yield episode.begin, 'done', episode.begin, done_to_msg(episode.begin, '')
     yield from _of_goal(episode.first_goal, size)

@@ -10,11 +10,11 @@ from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import ConfigError, RecordingError
 from active_recon.nodes.asked_parameters import AskedParameters
+from active_recon.nodes.definitions import message_class, message_definition
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import declare
 from active_recon.nodes.qos import common_profile, offered_profile
 from active_recon.nodes.run import one_line, run_node
-from msg_tools.definitions import message_class, message_definition
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.subscription import Subscription
