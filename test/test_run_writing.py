@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from active_recon.bags.reading import read_run
 from active_recon.bags.run_writing import write_run
 from active_recon.cameras import orbit_camera
 from active_recon.errors import RecordingError
@@ -90,3 +91,30 @@ def test_nothing_is_overwritten_and_nothing_half_written(run, bag):
     with pytest.raises(ValueError):
         write_run(wrong, bag.with_name('torn'))
     assert [path.name for path in bag.parent.iterdir()] == ['bag']
+
+
+def same_goal(read, written):
+    if written is None:
+        return read is None
+    np.testing.assert_array_equal(read.scores, written.scores)
+    np.testing.assert_allclose(read.candidates, written.candidates, atol=1e-6)
+    return (read.azimuth, read.stamp, read.received) == (
+        written.azimuth, written.stamp, written.received)
+
+
+def test_what_is_read_is_what_was_written(run, bag):
+    read = read_run(bag)
+    assert read.provenance == run.provenance
+    assert read.parameters == {'reconstructor': {'object_size': 1.0}}
+    (episode,), (written,) = read.episodes, run.episodes
+    assert (episode.id, episode.begin, episode.done) == (written.id, written.begin, written.done)
+    assert same_goal(episode.first_goal, written.first_goal)
+    for view, before in zip(episode.views, written.views, strict=True):
+        assert (view.stamp, view.entropy) == (before.stamp, before.entropy)
+        assert same_goal(view.goal, before.goal)
+        np.testing.assert_array_equal(view.image, before.image)
+        np.testing.assert_array_equal(view.latent, before.latent)
+        np.testing.assert_allclose(view.camera.pose, before.camera.pose, atol=1e-12)
+        np.testing.assert_array_equal(view.reconstruction.occupancy,
+                                      before.reconstruction.occupancy)
+        np.testing.assert_array_equal(view.occupied.occupancy, before.occupied.occupancy)

@@ -9,6 +9,11 @@ import subprocess
 import sys
 import time
 
+from active_recon.bags.comparison import SAME_BITS
+from active_recon.bags.reading import read_run
+from active_recon.bags.replay import computing_with
+from active_recon.bags.settings import recorded_settings
+from active_recon.bags.verification import verify
 from active_recon.meshes import load_mesh
 from active_recon.objects import find_object
 from active_recon.voxelise import voxelise
@@ -160,6 +165,16 @@ def test_the_whole_loop_is_in_the_bag(messages):
     refused = {value.key for msg in messages['/diagnostics'] for status in msg.status
                for value in status.values if value.key.startswith('refused')}
     assert not refused
+
+
+def test_the_bag_replays_to_the_same_bits_on_the_machine_that_made_it(finished):
+    folder, _, _ = finished
+    run = read_run(folder)
+    settings = recorded_settings(run)
+    with computing_with(settings.threads):
+        verified = verify(run, settings.load_reconstructor(), settings.load_planner())
+    assert verified.knows_policy
+    assert {found.verdict for found in verified.comparison.deviations.values()} == {SAME_BITS}
 
 
 def test_mcap_ros2_decodes_every_message(finished, messages):

@@ -1,0 +1,53 @@
+"""A sweep bag under every policy: it has all the views that any of them may ask for."""
+
+from active_recon.bags.reading import read_run
+from active_recon.bags.sweep import record_sweep
+from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
+from active_recon.cli.main import main
+from active_recon.policies import POLICIES
+from active_recon.shown_object import ShownObject
+import numpy as np
+import pytest
+from recorded_runs import image_at
+
+
+@pytest.fixture(scope='module')
+def sweep(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('bags') / 'sweep'
+    shown = ShownObject('nothing', [image_at(azimuth) for azimuth in AZIMUTHS],
+                        [orbit_camera(azimuth) for azimuth in AZIMUTHS])
+    record_sweep(shown, folder, begin=10**18)
+    return folder
+
+
+def replayed(monkeypatch, capsys, *arguments):
+    """Replay with the command; return its exit code and what it said."""
+    monkeypatch.setattr('sys.argv', ['active-recon', 'replay', *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    said = capsys.readouterr()
+    return end.value.code or 0, said.out + said.err
+
+
+def test_a_sweep_has_nothing_to_compare_and_says_so(sweep, monkeypatch, capsys):
+    code, said = replayed(monkeypatch, capsys, sweep)
+    assert code == 0
+    assert 'views: 24, ' in said
+    assert 'does not tell which policy chose' in said
+    assert 'nothing was recorded that could be compared' in said
+
+
+@pytest.mark.parametrize('policy', POLICIES)
+def test_each_policy_takes_the_views_that_it_asks_for(
+        sweep, tmp_path, policy, monkeypatch, capsys):
+    out = tmp_path / policy
+    code, said = replayed(monkeypatch, capsys, sweep, '--policy', policy, '--out', out)
+    assert code == 0, said
+    (episode,) = read_run(out).episodes
+    goals = [episode.first_goal, *(view.goal for view in episode.views[:-1])]
+    for goal, view in zip(goals, episode.views, strict=True):
+        assert abs(azimuth_difference(goal.azimuth, view.camera.azimuth)) <= np.radians(7.5) + 1e-9
+    assert episode.done in ('max_views', 'entropy_settled')
+    code, said = replayed(monkeypatch, capsys, out)
+    assert code == 0
+    assert said.endswith('same bits: what was recorded and the replay\n')
