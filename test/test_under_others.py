@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 import math
+from pathlib import Path
 
 from active_recon.bags.comparison import compare, SAME_BITS
 from active_recon.bags.replay import replay
 from active_recon.bags.run import RecordedEpisode, RecordedView
 from active_recon.bags.settings import recorded_settings, Settings
-from active_recon.bags.under_others import explored, Others, reconstructed, run_under
+from active_recon.bags.under_others import beside, explored, Others, reconstructed, run_under
 from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.errors import DataError
 from active_recon.models.network_2d3d import Network2d3d
@@ -136,3 +137,13 @@ def test_each_model_has_its_own_threshold_unless_one_is_given(weights):
     assert recorded.under(weights[1]).load_reconstructor().threshold == THRESHOLD
     assert recorded.under(weights[1], threshold=0.2).load_reconstructor().threshold == 0.2
     assert recorded.under(policy='farthest').load_reconstructor().threshold == 0.3
+
+
+def test_the_new_bag_lies_beside_the_old_one_wherever_the_user_stands(tmp_path, monkeypatch):
+    bag = tmp_path / 'run.of.today'
+    bag.mkdir()
+    monkeypatch.chdir(bag)
+    others = Others(Path('some/2d3d.safetensors'), 'farthest', 0.25)
+    expected = tmp_path / 'run.of.today_2d3d_farthest_threshold-0.25'
+    assert beside(Path('.'), others) == beside(bag, others) == expected
+    assert beside(tmp_path / 'one.mcap', Others(policy='random')) == tmp_path / 'one_random'

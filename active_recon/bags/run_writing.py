@@ -31,6 +31,7 @@ def write_run(run: RecordedRun, folder: Path) -> None:
         raise RecordingError(f'expected to write a new bag in {folder}, but it exists: '
                              'nothing is overwritten', 'bag_not_begun')
     try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f'.{folder.name}-', dir=folder.parent) as beside:
             unfinished = Path(beside) / folder.name
             with BagWriter(unfinished) as bag:

@@ -37,6 +37,13 @@ class Others:
             self.threshold and f'threshold-{self.threshold:g}') if word)
 
 
+def beside(path: Path, others: Others) -> Path:
+    """Return where a bag's replay under others goes: beside it, with what is other in its name."""
+    place = path.resolve()
+    name = place.name if place.is_dir() else place.stem
+    return place.with_name(f'{name}_{others.name}')
+
+
 def run_under(run: RecordedRun, recorded: Settings, others: Others,
               advance: Callable[[], None] = lambda: None) -> RecordedRun:
     """
@@ -61,7 +68,7 @@ def run_under(run: RecordedRun, recorded: Settings, others: Others,
     made_by = {'weights_sha256': reconstructor.weights_hash,
                'config_sha256': reconstructor.config_hash}
     provenance = {**run.provenance, **made_by, 'version': __version__,
-                  'replay_of': run.path.name}
+                  'replay_of': run.path.resolve().name}
     parameters = {'/reconstructor': {
         **node_parameters(run, 'reconstructor'), **made_by, 'threshold': math.nan,
         'weights': str(settings.weights), **settings.reconstructor}}

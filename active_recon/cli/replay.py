@@ -106,11 +106,11 @@ def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
 def _write_under(run: 'RecordedRun', settings: 'Settings', others: 'Others',
                  out: Path | None) -> None:
     from active_recon.bags.run_writing import write_run
-    from active_recon.bags.under_others import run_under
+    from active_recon.bags.under_others import beside, run_under
 
     with _bar('replaying', run) as advance:
         other = run_under(run, settings, others, lambda: advance(1, ''))
-    folder = out or run.path.with_name(f'{run.path.stem}_{others.name}')
+    folder = out or beside(run.path, others)
     write_run(other, folder)
     for episode in other.episodes:
         entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)
