@@ -1,14 +1,14 @@
 """Reading bags: what was recorded is what is read, in whatever form it was stored."""
 
 
-from contextlib import closing
+from contextlib import closing, contextmanager
 import sqlite3
 
 from active_recon.bags.reading import read_run
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import DataError
 from active_recon.voxels import VoxelGrid
-from loop_bags import BEGIN, DELAY, LENS, LoopRun, type_name, write_bag
+from loop_bags import BEGIN, DELAY, LENS, LoopRun, STILL, type_name, write_bag
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.episodes import done_to_msg
 from msg_tools.voxels import FIELDS
@@ -210,3 +210,20 @@ def test_an_image_that_came_twice_is_one(loop, bag, tmp_path):
              for _ in range(2)]
     others = [entry for entry in loop.messages if entry[1] != '/camera/image_raw']
     assert same(read_run(write_bag(tmp_path / 'run', others + again)), read_run(bag))
+
+
+def test_reading_tells_how_far_it_is(loop, bag):
+    told = {}
+
+    @contextmanager
+    def reporting(title, total):
+        told[title] = [total, 0]
+
+        def advance(steps, note):
+            told[title][1] += steps
+
+        yield advance
+
+    read_run(bag, reporting=reporting)
+    size = sum(path.stat().st_size for path in bag.glob('*.mcap'))
+    assert told == {'checking the bag': [size, size], 'reading the images': [3 * STILL, 3 * STILL]}

@@ -16,6 +16,7 @@ from active_recon.bags.raw import Bag, RawMessage
 from active_recon.bags.topics import CameraTopics, Topics
 from active_recon.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.errors import DataError, MessageError
+from active_recon.reporting import Advance, Reporting, silent
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
 from msg_tools.goals import joint_position_from_msg
 from msg_tools.images import compressed_image_from_msg, image_from_msg
@@ -44,10 +45,12 @@ class CameraStream:
     topic's name in the loop, nanoseconds.
     """
 
-    def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics) -> None:
+    def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics,
+                 reporting: Reporting = silent) -> None:
         self._bag = bag
         self._camera = camera
         self._topics = topics
+        self._reporting = reporting
         self._unstamped = camera.azimuth.type_name == FLOAT
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
@@ -61,9 +64,15 @@ class CameraStream:
         Raises DataError where the images' times run backwards.
         """
         yield from self._read_cameras()
+        with self._reporting('reading the images', self._camera.image.count) as advance:
+            yield from self._joined(wanted, advance)
+
+    def _joined(self, wanted: Callable[[int], bool], advance: Advance
+                ) -> Iterator[View | MessageError]:
         joiner = ViewJoiner(self._topics.max_pose_gap)
         fed = 0
         for message in self._bag.messages({self._camera.image.name}):
+            advance(1, '')
             msg = read_message(message)
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             if not wanted(stamp):

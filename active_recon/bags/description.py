@@ -9,6 +9,7 @@ from active_recon.bags.run import RecordedRun
 from active_recon.bags.storage import open_bag
 from active_recon.bags.topics import Topics
 from active_recon.errors import ActiveReconError
+from active_recon.reporting import Reporting, silent
 
 
 @dataclass(frozen=True)
@@ -20,11 +21,11 @@ class BagDescription:
     missing: str
 
 
-def describe_bag(path: Path, topics: Topics) -> BagDescription:
+def describe_bag(path: Path, topics: Topics, reporting: Reporting = silent) -> BagDescription:
     """Describe a bag; raises DataError where it is none, or a damaged one."""
     bag = open_bag(path)
-    summary = bag.summary()
+    summary = bag.summary(reporting)
     try:
-        return BagDescription(summary, run_in(bag, summary, path, topics), '')
+        return BagDescription(summary, run_in(bag, summary, path, topics, reporting), '')
     except ActiveReconError as error:
         return BagDescription(summary, None, str(error).removeprefix(f'{path}: '))

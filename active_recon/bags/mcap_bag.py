@@ -14,6 +14,7 @@ from active_recon.bags.metadata import (
 )
 from active_recon.bags.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import DataError
+from active_recon.reporting import Advance, Reporting, silent
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
 
@@ -24,13 +25,18 @@ class McapBag:
         self._path = path
         self._files = files
 
-    def summary(self) -> BagSummary:
+    def summary(self, reporting: Reporting = silent) -> BagSummary:
         """Read all of the files and say what is in them."""
+        size = sum(path.stat().st_size for path in self._files)
+        with reporting('checking the bag', size) as advance:
+            return self._summary(advance)
+
+    def _summary(self, advance: Advance) -> BagSummary:
         types: dict[str, str] = {}
         contents = Contents()
         provenance: dict[str, str] = {}
         parameters: dict[str, Mapping[str, Any]] = {}
-        for record in self._records(types):
+        for record in self._records(types, advance):
             if isinstance(record, RawMessage):
                 contents.add(record.topic, record.received)
             elif isinstance(record, Metadata) and record.name == PROVENANCE:
@@ -43,16 +49,17 @@ class McapBag:
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of the topics, file after file, each in its order."""
         wanted = frozenset(topics)
-        for record in self._records({}):
+        for record in self._records({}, lambda steps, note: None):
             if isinstance(record, RawMessage) and record.topic in wanted:
                 yield record
 
-    def _records(self, types: dict[str, str]) -> Iterator[RawMessage | Metadata | Attachment]:
+    def _records(self, types: dict[str, str], advance: Advance
+                 ) -> Iterator[RawMessage | Metadata | Attachment]:
         """Yield what the files hold; `types` gathers the topics and their types."""
         for path in self._files:
             schemas: dict[int, Schema] = {}
             channels: dict[int, tuple[str, str]] = {}
-            for record in mcap_records(path):
+            for record in mcap_records(path, advance):
                 if isinstance(record, Schema):
                     schemas[record.id] = record
                     if record.encoding == 'ros2msg':

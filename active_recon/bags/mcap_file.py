@@ -8,6 +8,7 @@ from typing import BinaryIO
 import zlib
 
 from active_recon.errors import DataError
+from active_recon.reporting import Advance
 from lz4.frame import LZ4FrameDecompressor
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -19,6 +20,7 @@ MOST_BYTES = 1 << 28
 """A record or an unpacked chunk of more is refused: no camera makes such messages."""
 MOST_ATTACHED = 1 << 20
 """Attachments of more are passed over: parameters are far smaller."""
+_HEAD = 9  # bytes: an opcode and a length
 _Reader = Callable[[ReadDataStream], McapRecord]
 _CHUNKED: dict[Opcode, _Reader] = {Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read}
 _READ: dict[Opcode, _Reader] = {
@@ -26,16 +28,17 @@ _READ: dict[Opcode, _Reader] = {
     Opcode.ATTACHMENT: Attachment.read}
 
 
-def mcap_records(path: Path) -> Iterator[McapRecord]:
+def mcap_records(path: Path, advance: Advance) -> Iterator[McapRecord]:
     """
     Yield the schemas, channels, messages, metadata and attachments of a file, in its order.
 
-    The index is not used, so that it cannot mislead. Raises DataError where the file is no whole
+    The index is not used, so that it cannot mislead. `advance` is told the bytes.
+    Raises DataError where the file is no whole
     MCAP file or a chunk is not what its checksum says.
     """
     try:
         with path.open('rb') as file:
-            yield from _file_records(file, path.stat().st_size)
+            yield from _file_records(file, path.stat().st_size, advance)
     except DataError as error:
         raise DataError(f'{path}: {error}', error.kind) from error
     except OSError as error:
@@ -46,13 +49,15 @@ def mcap_records(path: Path) -> Iterator[McapRecord]:
                         'repair` keeps the others', 'damaged') from error
 
 
-def _file_records(file: BinaryIO, size: int) -> Iterator[McapRecord]:
+def _file_records(file: BinaryIO, size: int, advance: Advance) -> Iterator[McapRecord]:
     if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
         raise DataError('expected an MCAP file, got another beginning', 'no_mcap')
     for opcode, length in _heads(file, size):
+        advance(_HEAD + length, '')
         if opcode == Opcode.FOOTER:
             file.seek(length, 1)
             if file.read() == MCAP0_MAGIC:
+                advance(2 * len(MCAP0_MAGIC), '')
                 return
             break
         if opcode == Opcode.MESSAGE or opcode in _READ:
@@ -80,10 +85,10 @@ def _heads(stream: BinaryIO, end: int) -> Iterator[tuple[int, int]]:
     following = stream.tell()
     while following < end:
         stream.seek(following)
-        head = stream.read(9)
-        opcode, length = struct.unpack('<BQ', head) if len(head) == 9 else (0, 0)
+        head = stream.read(_HEAD)
+        opcode, length = struct.unpack('<BQ', head) if len(head) == _HEAD else (0, 0)
         left = end - stream.tell()
-        if len(head) < 9 or length > left:
+        if len(head) < _HEAD or length > left:
             raise DataError(
                 f'expected a whole record at byte {following}, but it claims {length} bytes and '
                 f'{left} are left; `active-recon bag repair` keeps all that is whole',

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 from active_recon.bags.metadata import Contents
 from active_recon.bags.run import TopicSummary
+from active_recon.reporting import Reporting, silent
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ def bag_summary(types: Mapping[str, str], contents: Contents, provenance: Mappin
 class Bag(Protocol):
     """A bag that can be read any number of times."""
 
-    def summary(self) -> BagSummary:
+    def summary(self, reporting: Reporting = silent) -> BagSummary:
         """Read all of the bag and say what is in it; DataError where it is damaged."""
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:

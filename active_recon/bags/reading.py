@@ -13,13 +13,14 @@ from active_recon.bags.run import RecordedEpisode, RecordedRun
 from active_recon.bags.storage import open_bag
 from active_recon.bags.topics import camera_topics, loop_namespace, Topics
 from active_recon.errors import ActiveReconError, DataError
+from active_recon.reporting import Reporting, silent
 from active_recon.view_gate import ViewGate
 
 _FOUND = Topics()
 Value = TypeVar('Value', float, str)
 
 
-def read_run(path: Path, topics: Topics = _FOUND) -> RecordedRun:
+def read_run(path: Path, topics: Topics = _FOUND, reporting: Reporting = silent) -> RecordedRun:
     """
     Read a bag of ours or of others: an MCAP or sqlite3 file, or a rosbag2 folder.
 
@@ -27,13 +28,14 @@ def read_run(path: Path, topics: Topics = _FOUND) -> RecordedRun:
     the reconstructor's node does. Raises DataError that says what is wrong or missing.
     """
     bag = open_bag(path)
-    return run_in(bag, bag.summary(), path, topics)
+    return run_in(bag, bag.summary(reporting), path, topics, reporting)
 
 
-def run_in(bag: Bag, summary: BagSummary, path: Path, topics: Topics) -> RecordedRun:
+def run_in(bag: Bag, summary: BagSummary, path: Path, topics: Topics,
+           reporting: Reporting) -> RecordedRun:
     """Return the run in an open bag, as `read_run` does."""
     try:
-        episodes, counters = _episodes(bag, summary, topics)
+        episodes, counters = _episodes(bag, summary, topics, reporting)
     except ActiveReconError as error:
         told = str(error)
         raise DataError(told if told.startswith(str(path)) else f'{path}: {told}',
@@ -42,14 +44,14 @@ def run_in(bag: Bag, summary: BagSummary, path: Path, topics: Topics) -> Recorde
                        summary.topics, summary.begin, summary.end)
 
 
-def _episodes(bag: Bag, summary: BagSummary, topics: Topics
+def _episodes(bag: Bag, summary: BagSummary, topics: Topics, reporting: Reporting
               ) -> tuple[list[RecordedEpisode], Mapping[str, Mapping[str, int]]]:
     """Return the episodes, and the counters by node."""
     namespace = None if topics.azimuth else loop_namespace(summary.topics)
     node = summary.parameters.get(f'{namespace or "/"}reconstructor'.strip('/'), {})
     topics = replace(topics, max_pose_gap=_value(node, 'max_pose_gap', topics.max_pose_gap),
                      object_frame=_value(node, 'object_frame', topics.object_frame))
-    stream = CameraStream(bag, camera_topics(summary.topics, topics), topics)
+    stream = CameraStream(bag, camera_topics(summary.topics, topics), topics, reporting)
     if namespace is None:
         episode, counters = gated_views(stream, ViewGate())
         return [episode], {'bag': counters}

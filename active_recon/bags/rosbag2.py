@@ -8,6 +8,7 @@ from active_recon.bags.message_types import require_standard
 from active_recon.bags.metadata import Contents
 from active_recon.bags.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import ActiveReconError, DataError
+from active_recon.reporting import Reporting, silent
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
 
@@ -18,13 +19,15 @@ class OtherBag:
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def summary(self) -> BagSummary:
+    def summary(self, reporting: Reporting = silent) -> BagSummary:
         """Say what is in the bag, once all of it has been read."""
         contents = Contents()
-        with self._open() as reader:
+        with self._open() as reader, reporting(
+                'checking the bag', reader.message_count) as advance:
             types = {each.topic: each.msgtype for each in reader.connections}
             for connection, received, _ in reader.messages():
                 contents.add(connection.topic, received)
+                advance(1, '')
         return bag_summary(types, contents, {}, {})
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:

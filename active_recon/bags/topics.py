@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 from active_recon.bags.message_types import (
     CAMERA_INFO,
@@ -12,7 +13,7 @@ from active_recon.bags.message_types import (
     POSE,
 )
 from active_recon.bags.run import TopicSummary
-from active_recon.errors import DataError
+from active_recon.errors import ConfigError, DataError
 
 IMAGE_TYPES = (IMAGE, COMPRESSED_IMAGE)
 AZIMUTH_TYPES = (POSE, JOINT_STATE, FLOAT)
@@ -39,6 +40,12 @@ class Topics:
     turned_object: bool = False
     object_frame: str = 'object'
     max_pose_gap: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuse a gap that is none."""
+        if not 0 <= self.max_pose_gap < math.inf:
+            raise ConfigError('max_pose_gap: expected seconds from 0 on, got '
+                              f'{self.max_pose_gap}')
 
 
 @dataclass(frozen=True)

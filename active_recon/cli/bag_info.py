@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, TYPE_CHECKING
 
 from active_recon.cli.bag_topics import with_topics
+from active_recon.cli.progress import bag_progress
 import typer
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def info(
     """
     from active_recon.bags.description import describe_bag
 
-    described = describe_bag(path, topics)
+    described = describe_bag(path, topics, bag_progress(path))
     _tell_contents(path, described.summary)
     if described.run is None:
         typer.echo(f'cannot be replayed: {described.missing}')

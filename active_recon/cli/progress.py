@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 import time
 
+from active_recon.reporting import Reporting, silent
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -14,7 +16,15 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+_LARGE_BAG = 50_000_000  # bytes, about a second
 _LINE_EVERY = 30.0  # seconds between lines where there is no terminal to draw a bar on
+
+
+def bag_progress(path: Path) -> Reporting:
+    """Return the progress bar for a bag that takes more than a moment to read, else none."""
+    files = path.rglob('*') if path.is_dir() else [path]
+    size = sum(file.stat().st_size for file in files if file.is_file())
+    return progress_bar if size > _LARGE_BAG else silent
 
 
 @contextmanager

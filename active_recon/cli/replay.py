@@ -9,7 +9,7 @@ from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.bag_topics import with_topics
 from active_recon.cli.demo import PolicyName
-from active_recon.cli.progress import progress_bar
+from active_recon.cli.progress import bag_progress, progress_bar
 from active_recon.errors import ConfigError
 import typer
 
@@ -68,7 +68,7 @@ def replay(
         raise ConfigError('--out: expected with --model, --policy or --threshold, for a new bag; '
                           'without them nothing is written')
     began = time.monotonic()
-    run = read_run(path, topics)
+    run = read_run(path, topics, bag_progress(path))
     reading_s = time.monotonic() - began
     settings = recorded_settings(run, others.weights or weights, others.weights is not None)
     with computing_with(threads or settings.threads):

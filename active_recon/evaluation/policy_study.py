@@ -1,7 +1,6 @@
 """What each view policy is worth on one frozen network, beside chance and beside an oracle."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -26,6 +25,7 @@ from active_recon.models.weights import load_weights, state_hash
 from active_recon.policies import load_policy
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Choice, Policy
+from active_recon.reporting import Advance, Reporting, silent
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,14 +35,6 @@ _TIMED_EPISODES = 8
 
 Runs = Mapping[str, Sequence[Episodes]]
 """The same episodes under each seed of each policy."""
-Reporting = Callable[[str, int], AbstractContextManager[Callable[[int, str], None]]]
-"""Opens a report of what is done, given a title and how many steps: `advance(steps, note)`."""
-
-
-@contextmanager
-def silent(title: str, total: int) -> Iterator[Callable[[int, str], None]]:
-    """Report to nobody."""
-    yield lambda steps, note: None
 
 
 def contenders(names: Sequence[str], attentions: Sequence[AttentionModel] = (), count: int = 5,
@@ -181,7 +173,7 @@ def _attentive(model: AttentionModel, rng: np.random.Generator) -> Policy:
     return AttentionPolicy(model)
 
 
-def _advance(advance: Callable[[int, str], None], done: int) -> None:
+def _advance(advance: Advance, done: int) -> None:
     advance(done, '')
 
 

@@ -10,8 +10,8 @@ from active_recon.datasets.layout import list_objects, ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.errors import DataError, WeightsError
-from active_recon.evaluation.policy_study import Reporting, silent
 from active_recon.models.weights import find_weights
+from active_recon.reporting import Reporting, silent
 from active_recon.voxels import RESOLUTION
 
 SAMPLES = 150_000
