@@ -240,6 +240,18 @@ def test_a_node_that_comes_back_is_asked_again(bench, start_node, tmp_path):
         planner.stop()
 
 
+def test_the_loop_goes_on_where_the_recording_has_stopped(bench, start_node, box, tmp_path):
+    recorder = start_node('recorder', output_dir=tmp_path / 'bags')
+    resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (30_000, resource.RLIM_INFINITY))
+    start_node('turntable_camera', mesh=box, speed=3.0)
+    start_node('reconstructor')
+    bench.until(lambda: recorder.log('recording stopped'), 'the end of the recording')
+    start_node('view_planner', policy='farthest', max_views=2, entropy_tolerance=0.0)
+    done = bench.hear(Header, 'done', LATCHED)
+    bench.until(lambda: done and done[-1].frame_id == 'max_views', 'the end of the loop')
+    assert recorder.running and len(recorder.log('recording stopped')) == 1
+
+
 def noise(size):
     """Return bytes that do not compress."""
     return np.random.default_rng(0).integers(0, 256, size, np.uint8).tobytes()
