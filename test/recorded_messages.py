@@ -9,6 +9,7 @@ import sys
 from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
 import numpy as np
+from pymcap_cli.doctor import examine_mcap, Severity
 from rosbags.typesys import get_typestore, Stores
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -50,6 +51,13 @@ def announced(folder, max_bytes=None):
 def doctor(path):
     program = Path(sys.executable).with_name('pymcap-cli')
     return subprocess.run([program, 'doctor', path], capture_output=True, text=True, timeout=60)
+
+
+def errors_in(path):
+    """Return the errors that the same checker finds, with no process of its own."""
+    with path.open('rb') as file:
+        report = examine_mcap(file, path.stat().st_size, str(path))
+    return [finding.message for finding in report.findings if finding.severity is Severity.ERROR]
 
 
 @contextmanager
