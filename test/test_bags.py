@@ -1,5 +1,6 @@
 """Bags: what is written is what readers that we did not write read."""
 
+from active_recon.bags import writer
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import RecordingError
 from mcap.reader import make_reader
@@ -190,3 +191,15 @@ def test_a_long_bag_is_split_by_size_and_read_as_one(tmp_path):
         assert attachments(file) == {
             'parameters/view_planner.yaml': ('application/yaml', {'seed': 3})}
         assert ('active_recon', {'seed': '3'}) in metadata_records(file)
+
+
+def test_a_bag_of_many_chunks_is_split_so_that_their_index_stays_small(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, 'MOST_CHUNKS', 5)
+    with announced(tmp_path / 'run') as bag:
+        for number in range(12):
+            bag.write('/episode', cdr(header(number)), time_of(number), time_of(number))
+            bag.flush()
+            bag.flush()
+    with Reader(bag.folder) as reader:
+        assert reader.message_count == 12
+    assert len(list(bag.folder.glob('*.mcap'))) == 3

@@ -29,6 +29,8 @@ class BagFile:
         """What was taken in."""
         self.flushed = Contents()
         """What of it is in the file."""
+        self.chunks = 0
+        """How many chunks that are; each costs memory, for the index."""
         self._chunks = WholeChunks(path)
         # Summary offsets as this library writes them are refused by checkers of MCAP files.
         self._mcap = Writer(self._chunks, use_summary_offsets=False)  # type: ignore[arg-type]
@@ -72,7 +74,7 @@ class BagFile:
             self._channels[topic], receive_time, data, publish_time, sequence)
         if self._chunks.pending:
             self._chunks.flush()
-            self.flushed = self.contents.copy()
+            self._note_flushed()
 
     def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
         """Take in a record of metadata; a later one of the same name holds."""
@@ -85,7 +87,7 @@ class BagFile:
     def flush(self) -> None:
         """Write the chunk begun, and all else that waits."""
         self._mcap.flush()  # type: ignore[no-untyped-call]
-        self.flushed = self.contents.copy()
+        self._note_flushed()
 
     def sync(self) -> None:
         """Return when what was flushed would survive a power cut."""
@@ -100,3 +102,8 @@ class BagFile:
     def abandon(self) -> None:
         """Close the file as it is: after the last flush, with no index."""
         self._chunks.close()
+
+    def _note_flushed(self) -> None:
+        if self.contents != self.flushed:
+            self.chunks += 1
+            self.flushed = self.contents.copy()

@@ -27,16 +27,19 @@ from active_recon.bags.metadata import (
 )
 from active_recon.errors import RecordingError
 
+MOST_CHUNKS = 20_000
+"""Of one file; their index takes 30 MB of memory until it is written."""
+
 
 class BagWriter:
     """
     Records messages into a folder: `<folder's name>_0.mcap`, `_1.mcap`, ..., `metadata.yaml`.
 
     The folder is made where it is missing; a folder that already holds a bag is refused, nothing
-    is ever overwritten. A new file is begun when the last has reached `max_bytes`. Messages reach
-    the disk in chunks, by `flush` or when a chunk is full. Where the disk is full (or fails) the
-    call that noticed raises RecordingError, the unwritten chunk is dropped, and the bag is
-    closed: it stays a readable one up to its last chunk.
+    is ever overwritten. A new file is begun when the last has reached `max_bytes`, or MOST_CHUNKS.
+    Messages reach the disk in chunks, by `flush` or when a chunk is full. Where the disk is full
+    (or fails) the call that noticed raises RecordingError, the unwritten chunk is dropped, and
+    the bag is closed: it stays a readable one up to its last chunk.
     """
 
     def __init__(self, folder: Path, max_bytes: int | None = None) -> None:
@@ -98,7 +101,7 @@ class BagWriter:
             raise RecordingError(f'{topic}: expected a topic announced by add_topic', 'topic')
         self._counts[topic] += 1
         try:
-            if self._max_bytes is not None and self._file.size >= self._max_bytes:
+            if self._file_is_full():
                 self._split()
             if not self._file.has(topic):
                 self._file.add_topic(*self._topics[topic])
@@ -168,6 +171,10 @@ class BagWriter:
     def _attach(self, file: BagFile, node: str) -> None:
         file.attach(parameters_name(node), 'application/yaml', self._parameters[node],
                     time.time_ns())
+
+    def _file_is_full(self) -> bool:
+        return self._file.chunks >= MOST_CHUNKS or (
+            self._max_bytes is not None and self._file.size >= self._max_bytes)
 
     def _split(self) -> None:
         self._file.finish()
