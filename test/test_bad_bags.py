@@ -174,6 +174,7 @@ def test_a_view_whose_image_was_lost_is_named(tmp_path):
 @pytest.mark.parametrize(('text', 'match'), [
     ('{', 'expected YAML'), ('[1, 2]', 'expected a mapping, got list'),
     ('a: 1', "expected rosbag2's description"),
+    ('a: &a [x, x]\nb: [*a, *a]', 'expected YAML, got: an alias'),
     ('rosbag2_bagfile_information: {storage_identifier: mcap, relative_file_paths: [x.mcap]}',
      'it is missing'),
     ('rosbag2_bagfile_information: {storage_identifier: sqlite4, version: 5}', 'expected a bag')])

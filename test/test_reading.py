@@ -153,6 +153,14 @@ def test_the_order_in_the_file_does_not_matter(loop, bag, tmp_path):
     assert same(read_run(write_bag(tmp_path / 'run', by_topic)), read_run(bag))
 
 
+def test_without_poses_of_the_camera_the_loops_views_tell_where_it_stood(loop, bag, tmp_path):
+    fewer = [entry for entry in loop.messages if entry[1] != '/camera/pose']
+    views = only(read_run(write_bag(tmp_path / 'run', fewer))).views
+    for view, known in zip(views, only(read_run(bag)).views, strict=True):
+        np.testing.assert_allclose(view.camera.pose, known.camera.pose, atol=1e-12)
+        assert view.camera.intrinsics == known.camera.intrinsics
+
+
 def test_a_namespace_before_the_topics_is_found(loop, bag, tmp_path):
     moved = [(time, f'/robot{topic}', msg) for time, topic, msg in loop.messages]
     assert same(read_run(write_bag(tmp_path / 'run', moved)), read_run(bag))

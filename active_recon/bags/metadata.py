@@ -117,14 +117,25 @@ def as_yaml(value: object) -> str:
 
 
 def yaml_mapping(text: bytes, name: str) -> dict[str, Any]:
-    """Return the mapping in a YAML text; DataError that says the name where it is none."""
+    """
+    Return the mapping in a YAML text; DataError that says the name where it is none.
+
+    An alias is refused: a few of them, nested, are gigabytes once they are written out.
+    """
     try:
-        value = yaml.safe_load(text)
+        value = yaml.load(text, _NoAliases)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise DataError(f'{name}: expected YAML, got: {" ".join(str(error).split())}') from error
     if not isinstance(value, dict):
         raise DataError(f'{name}: expected a mapping, got {type(value).__name__}')
     return value
+
+
+class _NoAliases(yaml.SafeLoader):
+    def compose_node(self, parent: yaml.Node | None, index: object) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError('an alias, which no recording needs')
+        return super().compose_node(parent, index)
 
 
 def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
