@@ -10,14 +10,14 @@ from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import RecordingError
 from active_recon.shown_object import ShownObject
-from msg_tools.cdr import camera_to_cdr
+from msg_tools.loop import image_to_msgs
+from msg_tools.serialization import message_bytes
 from rosbags.typesys import get_typestore, Stores
 
 POSE, INFO, IMAGE = '/camera/pose', '/camera/camera_info', '/camera/image_raw'
 TYPES = {POSE: 'geometry_msgs/msg/PoseStamped',
          INFO: 'sensor_msgs/msg/CameraInfo',
          IMAGE: 'sensor_msgs/msg/Image'}
-FRAME = 'camera_optical_frame'
 IMAGES_EACH = 3
 """At each azimuth, so that the camera is seen to stand still."""
 _PERIOD_NS = 100_000_000
@@ -65,9 +65,8 @@ def _announced(folder: Path, name: str) -> BagWriter:
 
 
 def _write_view(bag: BagWriter, shown: ShownObject, index: int, stamp: int) -> None:
-    image, info, pose = camera_to_cdr(shown.images[index], shown.cameras[index], stamp, FRAME)
     # The image comes last, as from the node: whoever hears it has what belongs to it.
-    messages = {POSE: pose, INFO: info, IMAGE: image}
-    for number, (topic, data) in enumerate(messages.items(), start=1):
+    messages = image_to_msgs(stamp, shown.images[index], shown.cameras[index])
+    for number, (topic, msg) in enumerate(messages.items(), start=1):
         received = stamp + number * _STEP_NS
-        bag.write(topic, data, received, received - _STEP_NS)
+        bag.write(f'/{topic}', message_bytes(msg), received, received - _STEP_NS)
