@@ -13,7 +13,7 @@ from active_recon.bags.comparison import (
 from active_recon.bags.replay import computing_with, replay, replay_hash
 from active_recon.bags.settings import recorded_settings
 from active_recon.cameras import wrap_azimuth
-from active_recon.errors import WeightsError
+from active_recon.errors import DataError, WeightsError
 from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
 import numpy as np
 import pytest
@@ -179,3 +179,22 @@ def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
     with pytest.raises(WeightsError, match='the weights have changed since'):
         recorded_settings(bag)
     assert recorded_settings(bag, other, instead=True).weights == other
+
+
+@pytest.mark.parametrize(('node', 'parameter', 'value'), [
+    ('reconstructor', 'object_size', 'large'), ('reconstructor', 'threads', 0),
+    ('reconstructor', 'weights', ['a']), ('view_planner', 'seed', -1),
+    ('view_planner', 'max_views', 10**9), ('view_planner', 'policy', 5)])
+def test_a_recorded_parameter_that_cannot_be_is_refused_by_its_name(node, parameter, value):
+    bag = replace(run_of([]), parameters={f'/robot/{node}': {parameter: value}})
+    with pytest.raises(DataError, match=f'parameter {parameter}: expected'):
+        recorded_settings(bag)
+
+
+def test_size_and_front_are_those_given_else_the_bags_own():
+    bag = replace(run_of([]), parameters={'turntable_camera': {'object_size': 2},
+                                          'view_planner': {'policy': 'farthest'}})
+    assert recorded_settings(bag).reconstructor == {'object_size': 2.0}
+    settings = recorded_settings(bag, given={'object_size': 0.25, 'object_yaw': 1.0})
+    assert settings.reconstructor == {'object_size': 0.25, 'object_yaw': 1.0}
+    assert settings.planner['object_yaw'] == 1.0

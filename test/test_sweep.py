@@ -33,6 +33,7 @@ def test_every_azimuth_is_a_view_as_it_was_rendered(shown, sweep):
     run = read_run(sweep)
     (episode,) = run.episodes
     assert run.provenance['object'] == 'box.ply'
+    assert run.parameters['turntable_camera'] == {'object_size': 1.0}
     assert len(episode.views) == len(AZIMUTHS)
     for view, azimuth, image in zip(episode.views, AZIMUTHS, shown.images, strict=True):
         assert azimuth_difference(view.camera.azimuth, azimuth) == pytest.approx(0, abs=1e-9)

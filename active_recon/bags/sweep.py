@@ -25,13 +25,14 @@ _STEP_NS = 1_000_000  # from stamp to receipt, and from one message of an image 
 
 
 def record_sweep(shown: ShownObject, folder: Path, begin: int | None = None,
-                 advance: Callable[[], None] = lambda: None) -> None:
+                 object_size: float = 1.0, advance: Callable[[], None] = lambda: None) -> None:
     """
     Write a bag in which the camera goes around an object once and stands still at each view.
 
     It is what the nodes' simulated turntable would have streamed at 10 Hz from `begin` on,
-    nanoseconds since 1970; by default up to now. `advance` is called after each view. The folder
-    appears when the bag is complete; RecordingError where it is there already, or the disk full.
+    nanoseconds since 1970; by default up to now. `object_size` is what the object was shown with,
+    metres. `advance` is called after each view. The folder appears when the bag is complete;
+    RecordingError where it is there already, or the disk full.
     """
     folder = folder.absolute()
     if folder.exists():
@@ -43,6 +44,7 @@ def record_sweep(shown: ShownObject, folder: Path, begin: int | None = None,
             stamp = begin if begin is not None else (
                 time.time_ns() - len(shown.images) * IMAGES_EACH * _PERIOD_NS)
             with _announced(Path(unfinished) / folder.name, shown.name) as bag:
+                bag.attach_parameters('/turntable_camera', {'object_size': object_size})
                 for index in range(len(shown.images)):
                     for _ in range(IMAGES_EACH):
                         _write_view(bag, shown, index, stamp)

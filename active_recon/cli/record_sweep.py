@@ -35,5 +35,5 @@ def record_sweep(
 
     with progress_bar('rendering and recording', len(AZIMUTHS)) as advance:
         shown = rendered_object(find_object(model), object_size, background, up, front)
-        record_sweep(shown, out, advance=lambda: advance(1, ''))
+        record_sweep(shown, out, object_size=object_size, advance=lambda: advance(1, ''))
     typer.echo(f'{len(shown.images)} views of {shown.name} are in {out}')

@@ -40,6 +40,12 @@ def replay(
     weights: Annotated[Path | None, typer.Option(
         help='The weights file that BAG was recorded with, where it does not ship any more.',
     )] = None,
+    object_size: Annotated[float | None, typer.Option(
+        min=0.001, max=1000.0, help='Side of the voxel grid, m; default: as recorded, else 1.',
+    )] = None,
+    object_yaw_deg: Annotated[float | None, typer.Option(
+        min=-360.0, max=360.0,
+        help="Azimuth of the object's front; default: as recorded, else 0.")] = None,
     threads: Annotated[int | None, typer.Option(
         min=1, help='CPU threads of the network; default: as many as the run had.')] = None,
 ) -> None:
@@ -70,7 +76,10 @@ def replay(
     began = time.monotonic()
     run = read_run(path, topics, bag_progress(path))
     reading_s = time.monotonic() - began
-    settings = recorded_settings(run, others.weights or weights, others.weights is not None)
+    settings = recorded_settings(
+        run, others.weights or weights, others.weights is not None, {
+            'object_size': object_size,
+            'object_yaw': None if object_yaw_deg is None else math.radians(object_yaw_deg)})
     with computing_with(threads or settings.threads):
         if others != Others():
             _write_under(run, settings, others, out)
