@@ -15,7 +15,7 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 OBJECT_FRAME = 'object'
-_FARTHEST = 1e9  # metres: squares of what is beyond may overflow
+_LARGEST = 1e9  # metres or pixels: what is computed with more may overflow
 
 
 def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
@@ -28,7 +28,7 @@ def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
     if msg.width == 0 or msg.height == 0:
         raise MessageError('expected camera info with an image size above 0, '
                            f'got {msg.height} x {msg.width}', 'camera_info')
-    if not np.isfinite([fx, fy, cx, cy]).all() or fx <= 0 or fy <= 0:
+    if not _sensible(fx, fy, cx, cy) or fx <= 0 or fy <= 0:
         raise MessageError('expected camera info of a calibrated camera with finite focal lengths '
                            f'above 0, got fx {fx}, fy {fy}, cx {cx}, cy {cy}', 'camera_info')
     return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, int(msg.width), int(msg.height))
@@ -59,7 +59,7 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
     point, turn = msg.pose.position, msg.pose.orientation
     position = np.array([point.x, point.y, point.z])
     quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
-    if not (np.abs([*position, *quaternion]) < _FARTHEST).all():  # nor where a number is NaN
+    if not _sensible(*position, *quaternion):
         raise MessageError(f'expected a finite camera pose, got position {position.tolist()} and '
                            f'quaternion {quaternion.tolist()}', 'pose')
     if np.linalg.norm(quaternion) < 1e-6:
@@ -91,3 +91,8 @@ def camera_to_msgs(camera: Camera, stamp: Header, frame: str = OBJECT_FRAME
     """Return both messages of one camera; `stamp` bears the stamp and the camera's own frame."""
     return (intrinsics_to_msg(camera.intrinsics, stamp),
             pose_to_msg(camera.pose, Header(stamp=stamp.stamp, frame_id=frame)))
+
+
+def _sensible(*values: float) -> bool:
+    """Return whether all of the values are finite, and of a size that cameras have."""
+    return all(abs(value) < _LARGEST for value in values)

@@ -57,6 +57,7 @@ def pose(frame='object', x=1.0, w=1.0):
     (pose(w=0.0), 'quaternion', 'unit quaternion'),
     (pose(w=math.nan), 'pose', 'finite camera pose'),
     (pose(x=math.inf), 'pose', 'finite camera pose'),
+    (pose(x=1e200), 'pose', 'finite camera pose'),
     (pose(x=0.0), 'pose', 'away from the object')])
 def test_what_is_no_pose_is_refused_in_plain_words(msg, kind, said):
     with pytest.raises(MessageError, match=said) as caught:
@@ -65,7 +66,8 @@ def test_what_is_no_pose_is_refused_in_plain_words(msg, kind, said):
 
 
 @pytest.mark.parametrize('info', [
-    CameraInfo(), CameraInfo(width=4, height=4), CameraInfo(width=4, height=4, k=[math.nan] * 9)])
+    CameraInfo(), CameraInfo(width=4, height=4), CameraInfo(width=4, height=4, k=[math.nan] * 9),
+    CameraInfo(width=4, height=4, k=[1e300] * 9)])
 def test_camera_info_of_no_calibrated_camera_is_refused(info):
     with pytest.raises(MessageError, match='expected camera info'):
         intrinsics_from_msg(info)
