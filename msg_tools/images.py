@@ -58,7 +58,8 @@ def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
                 pixels = np.asarray(image.convert('RGBA'))
                 return _over_white(pixels[..., :3], pixels[..., 3:])
             return np.asarray(image.convert('RGB'))
-    except (OSError, ValueError, SyntaxError, PIL.Image.DecompressionBombError) as error:
+    except (OSError, ValueError, SyntaxError, PIL.Image.DecompressionBombError,
+            PIL.Image.DecompressionBombWarning) as error:
         raise MessageError('expected a compressed image as JPEG or PNG, got '
                            f'{msg.format!r}: {error}', 'encoding') from error
 

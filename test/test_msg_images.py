@@ -1,13 +1,23 @@
 """Images and latents between ROS and numpy."""
 
 import array
+from io import BytesIO
+import struct
 import sys
+import zlib
 
 from active_recon.errors import MessageError
-from msg_tools.images import image_from_msg, image_to_msg, latent_from_msg, latent_to_msg
+from msg_tools.images import (
+    compressed_image_from_msg,
+    image_from_msg,
+    image_to_msg,
+    latent_from_msg,
+    latent_to_msg,
+)
 import numpy as np
+import PIL.Image
 import pytest
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 RGB = np.random.default_rng(0).integers(0, 256, (4, 6, 3), np.uint8)
@@ -89,3 +99,41 @@ def test_a_latent_that_is_none_is_refused():
         latent_from_msg(message(RGB, 'rgb8'))
     with pytest.raises(MessageError, match='finite latent'):
         latent_from_msg(message(FLOAT * np.nan, '32FC3'))
+
+
+def packed(image, kind='PNG'):
+    file = BytesIO()
+    PIL.Image.fromarray(image).save(file, kind)
+    return CompressedImage(format=kind.lower(), data=file.getvalue())
+
+
+def test_a_compressed_image_is_the_image():
+    image = np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8)
+    assert np.array_equal(compressed_image_from_msg(packed(image)), image)
+    smooth = np.full((16, 16, 3), (200, 100, 50), np.uint8)
+    found = compressed_image_from_msg(packed(smooth, 'JPEG'))
+    np.testing.assert_allclose(found.astype(int), smooth, atol=3)
+
+
+def test_a_grey_or_transparent_compressed_image_is_rgb_over_white():
+    grey = compressed_image_from_msg(packed(np.full((2, 3), 7, np.uint8)))
+    assert np.array_equal(grey, np.full((2, 3, 3), 7))
+    clear = compressed_image_from_msg(packed(np.zeros((2, 3, 4), np.uint8)))
+    assert np.array_equal(clear, np.full((2, 3, 3), 255))
+
+
+def claiming(width, height):
+    """Return a PNG of one pixel that claims another size."""
+    content = bytearray(packed(np.zeros((1, 1, 3), np.uint8)).data)
+    content[16:24] = struct.pack('>II', width, height)
+    content[29:33] = struct.pack('>I', zlib.crc32(content[12:29]))
+    return CompressedImage(format='png', data=bytes(content))
+
+
+@pytest.mark.parametrize('msg', [
+    CompressedImage(), CompressedImage(format='png', data=b'hello'), claiming(9000, 9000),
+    claiming(10_000, 10_000), claiming(100_000, 100_000), claiming(0, 5), packed(RGB, 'GIF'),
+    CompressedImage(format='png', data=packed(RGB).data[:100])])
+def test_what_is_no_compressed_image_is_refused(msg):
+    with pytest.raises(MessageError, match='expected (a compressed|an) image'):
+        compressed_image_from_msg(msg)
