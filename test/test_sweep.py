@@ -5,13 +5,15 @@ import math
 from active_recon.bags.reading import read_run
 from active_recon.bags.sweep import IMAGES_EACH, record_sweep
 from active_recon.cameras import azimuth_difference, AZIMUTHS
-from active_recon.errors import RecordingError
+from active_recon.cli.main import app
+from active_recon.errors import MeshError, RecordingError
 from active_recon.shown_object import rendered_object
 import numpy as np
 import pytest
 from recorded_messages import errors_in, small_disk
 from rosbags.rosbag2 import Reader
 import trimesh
+from typer.testing import CliRunner
 
 BEGIN = 1_700_000_000_000_000_000
 
@@ -56,3 +58,12 @@ def test_what_is_there_is_not_written_over_and_what_fails_leaves_nothing(shown, 
     with small_disk(2000), pytest.raises(RecordingError):
         record_sweep(shown, tmp_path / 'another')
     assert [path.name for path in tmp_path.iterdir()] == ['sweep']
+
+
+def test_the_command_records_any_mesh_and_refuses_what_is_none(tmp_path):
+    trimesh.creation.box((1, 0.6, 0.4)).export(tmp_path / 'box.ply')
+    done = CliRunner().invoke(app, [
+        'record-sweep', str(tmp_path / 'box.ply'), '--out', str(tmp_path / 'sweep')])
+    assert done.exit_code == 0 and '24 views of box.ply' in done.stdout
+    refused = CliRunner().invoke(app, ['record-sweep', 'nonsense', '--out', str(tmp_path / 'no')])
+    assert isinstance(refused.exception, MeshError) and not (tmp_path / 'no').exists()

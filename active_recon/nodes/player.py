@@ -21,7 +21,7 @@ from rclpy.qos import DurabilityPolicy
 from rosgraph_msgs.msg import Clock
 
 CLOCK = '/clock'
-HEARD_WITHIN_S = 2.0
+HEARD_WITHIN_S = 3.0
 """For so long each topic may wait for somebody to hear it; then the bag is played anyway."""
 _TICK_S = 0.002
 _CLOCK_EVERY_S = 0.02
@@ -67,8 +67,7 @@ class PlayerNode(Node):
         """Publish what is due by now."""
         now = time.monotonic()
         if self._started_at is None:
-            heard = all(publisher.get_subscription_count() for publisher in self._out.values())
-            if not heard and now - self._made_at < HEARD_WITHIN_S:
+            if not self._are_heard(now - self._made_at):
                 return
             self._started_at = self._said_at = now
         elapsed = (now - self._started_at) * self._rate
@@ -85,6 +84,16 @@ class PlayerNode(Node):
         if now - self._said_at >= _SAY_EVERY_S:
             self.get_logger().info(f'{elapsed:.0f} s of the recording are played')
             self._said_at = now
+
+    def _are_heard(self, waited_s: float) -> bool:
+        """Return whether there is nobody to wait for any longer."""
+        unheard = [name for name, publisher in self._out.items()
+                   if not publisher.get_subscription_count()]
+        if unheard and waited_s < HEARD_WITHIN_S:
+            return False
+        if unheard:
+            self.get_logger().info(f'played although nobody hears {", ".join(unheard)}')
+        return True
 
     def _tell_time(self, nanoseconds: int) -> None:
         if self._clock_pub is not None:
