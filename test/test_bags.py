@@ -92,6 +92,15 @@ def test_an_empty_bag_is_a_bag(tmp_path):
         assert reader.message_count == 0
 
 
+def test_a_bag_whose_topics_said_nothing_is_a_bag(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        bag.flush()
+    for path in (bag.folder, bag.path):
+        with AnyReader([path]) as reader:
+            assert reader.message_count == 0
+    assert not errors_in(bag.path)
+
+
 def test_a_flush_brings_what_was_written_to_the_disk_while_the_bag_goes_on(tmp_path):
     with announced(tmp_path / 'run') as bag:
         bag.write('/episode', cdr(header(3)), time_of(3), time_of(3))

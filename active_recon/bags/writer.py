@@ -73,7 +73,7 @@ class BagWriter:
     def add_topic(self, name: str, type_name: str, definition: str,
                   qos: tuple[QosProfile, ...] = ()) -> None:
         """
-        Announce a topic before its first message.
+        Announce a topic before its first message; one that never has any is not in the bag.
 
         `type_name` is as in 'std_msgs/msg/Header', `definition` its text in the ros2msg form: the
         message file, then each type that it names, after a line of 80 '=' and 'MSG: pkg/Name'.
@@ -205,9 +205,11 @@ class BagWriter:
         return [*self._done, (self.path.name, self._file.flushed)]
 
     def _write_metadata(self) -> None:
-        topics = [topic for topic, _ in self._topics.values()]
-        write_whole(self.folder / 'metadata.yaml',
-                    metadata_yaml(bag_information(self._files(), topics)))
+        files = self._files()
+        counts = total(contents for _, contents in files).counts
+        # Readers look in the files for the definition of each topic that is named there
+        topics = [topic for topic, _ in self._topics.values() if counts[topic.name]]
+        write_whole(self.folder / 'metadata.yaml', metadata_yaml(bag_information(files, topics)))
 
     def __enter__(self) -> 'BagWriter':
         """Close the bag where the block ends."""
