@@ -1,5 +1,6 @@
 """The golden run: recorded from the real loop, and replayed here to what was recorded."""
 
+from dataclasses import replace
 import os
 from pathlib import Path
 import re
@@ -11,6 +12,7 @@ import time
 from active_recon.bags.comparison import SAME_BITS, WITHIN_TOLERANCE
 from active_recon.bags.reading import read_run
 from active_recon.bags.replay import computing_with, replay, replay_hash
+from active_recon.bags.run_writing import write_run
 from active_recon.bags.settings import recorded_settings
 from active_recon.bags.verification import verify
 from active_recon.cameras import azimuth_difference
@@ -114,6 +116,28 @@ def test_the_command_tells_the_verdict_and_the_hash(run, loop, monkeypatch, caps
     assert f'hash {expected.hash}' in said
     assert f'{expected.comparison.verdict}: what was recorded' in said
     assert 'views: 4, read and replayed in' in said
+
+
+def test_what_was_recorded_otherwise_is_told_and_ends_with_code_1(
+        run, tmp_path, monkeypatch, capsys):
+    (episode,) = run.episodes
+    views = [replace(view, entropy=view.entropy * 1.01) for view in episode.views]
+    write_run(replace(run, episodes=[replace(episode, views=views)]), tmp_path / 'other')
+    code, said = command(monkeypatch, capsys, 'replay', tmp_path / 'other')
+    assert code == 1
+    assert re.search('entropy +4 compared  different +0 of 4 the same, at most 0.0099 apart', said)
+    assert said.endswith('different: what was recorded and the replay\n')
+
+
+def test_weights_that_are_nowhere_any_more_are_asked_for_by_their_hash(
+        run, tmp_path, monkeypatch, capsys):
+    lost = run.provenance | {'weights_sha256': '0123456789ab' + 52 * 'c'}
+    write_run(replace(run, provenance=lost), tmp_path / 'old')
+    code, said = command(monkeypatch, capsys, 'replay', tmp_path / 'old')
+    assert code == 2
+    assert 'SHA-256 0123456789ab..., but neither' in said
+    code, said = command(monkeypatch, capsys, 'replay', tmp_path / 'old', '--model', '2d3d')
+    assert code == 0
 
 
 @pytest.fixture
