@@ -12,12 +12,22 @@ from active_recon.bags.comparison import (
 )
 from active_recon.bags.replay import computing_with, replay, replay_hash
 from active_recon.bags.settings import recorded_settings
-from active_recon.cameras import wrap_azimuth
+from active_recon.cameras import orbit_camera, wrap_azimuth
 from active_recon.errors import DataError, WeightsError
 from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
 import numpy as np
 import pytest
-from recorded_runs import episode_of, FLOOR, loop_of, policies, run_of, SECOND, THRESHOLD
+from recorded_runs import (
+    episode_of,
+    FLOOR,
+    goal_of,
+    image_at,
+    loop_of,
+    policies,
+    run_of,
+    SECOND,
+    THRESHOLD,
+)
 import torch
 
 
@@ -107,6 +117,26 @@ def test_an_end_that_was_not_recorded_so_is_different(run, make_loop):
     for episodes in ([replace(first, done='entropy_settled'), second], [ended_early, second]):
         comparison = compare(replay(run_of(episodes), *make_loop()), THRESHOLD)
         assert comparison.deviations['stop'].verdict == comparison.verdict == DIFFERENT
+
+
+def test_a_view_more_that_was_asked_for_after_the_end_is_no_difference(make_loop):
+    reconstructor, planner = make_loop()
+    episode = episode_of(reconstructor, planner, SECOND, 1.0)
+    goal = planner.plan()
+    camera = orbit_camera(goal.azimuth)
+    known = reconstructor.add_view(image_at(goal.azimuth), camera)
+    planner.add_view(known.latent, camera.azimuth, known.grid.entropy())
+    *views, last = episode.views
+    asked = replace(last, done='max_views', goal=goal_of(goal, last.stamp + 1))
+    more = replace(last, stamp=last.stamp + SECOND, image=image_at(goal.azimuth), camera=camera,
+                   reconstruction=None, occupied=None, latent=known.latent, entropy=None)
+    run = run_of([replace(episode, views=[*views, asked, more])])
+    found = compare(replay(run, *make_loop()), THRESHOLD).deviations
+    assert (found['stop'].verdict, found['stop'].compared) == (SAME_BITS, 4)
+    assert (found['latent'].verdict, found['latent'].compared) == (SAME_BITS, 4)
+    ended_early = replace(asked, done='entropy_settled')
+    run = run_of([replace(episode, views=[*views, ended_early, more])])
+    assert compare(replay(run, *make_loop()), THRESHOLD).verdict == DIFFERENT
 
 
 def test_a_recording_that_broke_off_is_compared_as_far_as_it_goes(run, make_loop):

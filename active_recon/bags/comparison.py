@@ -71,7 +71,7 @@ def compare(episodes: Sequence[ReplayedEpisode], threshold: float) -> Comparison
     for episode in episodes:
         last = episode.views[-1] if episode.views else None
         for view in episode.views:
-            done = episode.recorded.done if view is last else ''
+            done = view.recorded.done or (episode.recorded.done if view is last else '')
             for name, same, apart in _deviations(view, done, threshold):
                 deviation = comparison.deviations[name]
                 deviation.compared += 1
@@ -100,7 +100,7 @@ def _deviations(view: ReplayedView, done: str,
     if view.decision is None:
         return
     if recorded.goal is not None or done:
-        stopped_alike = view.decision.reason == ('' if recorded.goal is not None else done)
+        stopped_alike = view.decision.reason == done
         yield 'stop', stopped_alike, 0.0 if stopped_alike else np.inf
     if recorded.goal is not None and view.decision.goal is not None:
         yield from _goal(recorded.goal, view.decision.goal)

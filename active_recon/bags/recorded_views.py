@@ -118,4 +118,5 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
         return parts.get(role, {}).get(view.stamp)
 
     return RecordedView(view.stamp, view.image, view.camera, part('probabilities'),
-                        part('occupancy'), part('latent'), part('entropy'), goal, received)
+                        part('occupancy'), part('latent'), part('entropy'), goal, received,
+                        (part('done') or (0, ''))[1])

@@ -47,6 +47,8 @@ class RecordedView:
     - occupied: the cells above the threshold
     - latent: A_t, (C, h, w); entropy: nats
     - goal: decided after this view; None too where the episode was done
+    - done: the reason where the episode was done after this view, '' where it was not; with a goal
+      too where `plan` then asked for one more
     - received: when each message of the view was received, nanoseconds, by the topic's name in
       the loop: 'camera/image_raw', 'view', 'occupancy', 'probabilities', 'entropy', ...
     """
@@ -60,6 +62,7 @@ class RecordedView:
     entropy: float | None
     goal: RecordedGoal | None
     received: Mapping[str, int]
+    done: str = ''
 
 
 @dataclass(frozen=True, eq=False)

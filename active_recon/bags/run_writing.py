@@ -68,11 +68,10 @@ def _messages(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str,
             view.stamp, view.camera, view.reconstruction, view.occupied, view.latent,
             view.entropy)
         yield from _at(messages, view.stamp, view.received)
+        if reason := view.done or (episode.done if view is episode.views[-1] else ''):
+            received = max([view.stamp, *view.received.values()])
+            yield received, 'done', view.stamp, done_to_msg(view.stamp, reason)
         yield from _of_goal(view.goal, size)
-    if episode.done and episode.views:
-        last = episode.views[-1]
-        received = max([last.stamp, *last.received.values()])
-        yield received, 'done', last.stamp, done_to_msg(last.stamp, episode.done)
 
 
 def _of_goal(goal: RecordedGoal | None, size: float) -> Iterator[tuple[int, str, int, Any]]:

@@ -122,7 +122,7 @@ def explored(episode: RecordedEpisode, reconstructor: Reconstructor, planner: Pl
         goal = decision.goal
         known = _known(view, reconstruction, reconstructor.threshold)
         views.append(replace(
-            known, stamp=stamp, received={},
+            known, stamp=stamp, received={}, done=decision.reason,
             # A nanosecond later: the goal comes after the view that led to it
             goal=None if goal is None else _recorded(goal, stamp + 1)))
         advance()
