@@ -11,7 +11,7 @@ from loop_bags import BEGIN, PERIOD, write_bag
 from msg_tools.images import image_to_msg
 import numpy as np
 import pytest
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, Header
 
 
 def views(folder, messages, **topics):
@@ -57,6 +57,24 @@ def test_a_float_is_joined_on_receive_times(tmp_path):
     first = [(BEGIN - 1, '/angle', Float64(data=AZIMUTHS[0]))]
     found = views(tmp_path / 'run', images() + first + floats)
     assert azimuths(found) == AZIMUTHS
+
+
+def test_joints_without_stamps_are_joined_on_receive_times(tmp_path):
+    unstamped = joints()
+    for _, _, msg in unstamped:
+        msg.header = Header()
+    assert azimuths(views(tmp_path / 'run', images() + unstamped)) == AZIMUTHS
+
+
+def test_camera_info_of_no_calibrated_camera_is_as_good_as_none(tmp_path):
+    messages = [*images(), *cameras()]
+    for _, topic, msg in messages:
+        if topic == '/info':
+            msg.k = [0.0] * 9
+    found = views(tmp_path / 'run', messages)
+    assert azimuths(found) == AZIMUTHS
+    assert found[0].camera.distance == pytest.approx(2.1)
+    assert found[0].camera.intrinsics.fy / 24 == pytest.approx(CANONICAL_INTRINSICS.fy / 137)
 
 
 def test_a_pose_and_the_camera_info_are_the_camera_as_it_was(tmp_path):

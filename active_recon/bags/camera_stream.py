@@ -9,10 +9,10 @@ from active_recon.bags.message_types import (
     COMPRESSED_IMAGE,
     FLOAT,
     JOINT_STATE,
-    message_from_cdr,
     POSE,
+    read_message,
 )
-from active_recon.bags.raw import Bag, RawMessage
+from active_recon.bags.raw import Bag
 from active_recon.bags.topics import CameraTopics, Topics
 from active_recon.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.errors import DataError, MessageError
@@ -28,21 +28,17 @@ from numpy.typing import NDArray
 IMAGE_ROLE, INFO_ROLE, POSE_ROLE = 'camera/image_raw', 'camera/camera_info', 'camera/pose'
 
 
-def read_message(message: RawMessage) -> Any:
-    """Return the message that the bytes are; DataError where they are none of its type."""
-    where = f'{message.topic} at {message.received / 1e9:.3f} s'
-    return message_from_cdr(message.data, message.type_name, where)
-
-
 class CameraStream:
     """
     Reads the camera's topics of a bag.
 
     Poses are interpolated and refused as in the node. Where a bag has azimuths alone, or no
-    camera info, the camera is the canonical one at that azimuth, and the shorter side of its
-    image what the canonical camera sees. A Float64 bears no stamp: it and the images are then
-    joined on their receive times. `received` tells when what bears a stamp was received, by the
-    topic's name in the loop, nanoseconds.
+    camera info of a calibrated camera, the camera is the canonical one at that azimuth, and the
+    shorter side of its image what the canonical camera sees. Azimuths without stamps are joined
+    to the images on their receive times.
+
+    `received` tells when what bears a stamp was received, by the topic's name in the loop,
+    nanoseconds.
     """
 
     def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics,
@@ -51,7 +47,7 @@ class CameraStream:
         self._camera = camera
         self._topics = topics
         self._reporting = reporting
-        self._unstamped = camera.azimuth.type_name == FLOAT
+        self._unstamped = False
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
         self.received: dict[str, dict[int, int]] = {
@@ -99,38 +95,45 @@ class CameraStream:
     def _read_cameras(self) -> Iterator[MessageError]:
         """Read the poses and lenses, in the order of their stamps; yield what is refused."""
         info, azimuth = self._camera.camera_info, self._camera.azimuth
+        poses = []
         for message in self._bag.messages({azimuth.name, *([info.name] if info else ())}):
             msg = read_message(message)
-            stamp = (message.received if message.type_name == FLOAT
+            stamp = (0 if message.type_name == FLOAT
                      else nanoseconds_from_stamp(msg.header.stamp))
             role = POSE_ROLE if message.topic == azimuth.name else INFO_ROLE
             self.received[role].setdefault(stamp, message.received)
             try:
                 if role == POSE_ROLE:
-                    self._poses.append((stamp, self._pose(msg)))
+                    poses.append((stamp, message.received, self._pose(msg)))
                 else:
                     self._lenses.append((stamp, intrinsics_from_msg(msg)))
             except MessageError as error:
                 yield error
+        if azimuth.type_name != POSE:
+            self._lenses.clear()  # at a distance that nobody knows, a lens says nothing
+        self._unstamped = not any(stamp for stamp, _, _ in poses)
+        self._poses = [(received if self._unstamped else stamp, self._placed(pose))
+                       for stamp, received, pose in poses]
         self._poses.sort(key=_stamp)
         self._lenses.sort(key=_stamp)
 
     def _pose(self, msg: Any) -> NDArray[np.float64]:
         kind = self._camera.azimuth.type_name
         if kind == POSE:
-            pose = pose_from_msg(msg, self._topics.object_frame)
-            if self._camera.camera_info:
-                return pose
-            return orbit_camera(Camera(pose).azimuth).pose
+            return pose_from_msg(msg, self._topics.object_frame)
         azimuth = (joint_position_from_msg(msg, self._topics.joint) if kind == JOINT_STATE
                    else float(msg.data))
         if not math.isfinite(azimuth):
             raise MessageError(f'expected a finite azimuth, got {azimuth}', 'azimuth')
         return orbit_camera(-azimuth if self._topics.turned_object else azimuth).pose
 
+    def _placed(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pose itself, or the canonical one at its azimuth where no lens is known."""
+        return pose if self._lenses else orbit_camera(Camera(pose).azimuth).pose
+
     def _lens(self, time: int, height: int, width: int) -> Intrinsics:
         """Return the camera info of that time, or the last before it."""
-        if self._lenses and self._camera.azimuth.type_name == POSE:
+        if self._lenses:
             return self._lenses[max(bisect_right(self._lenses, time, key=_stamp) - 1, 0)][1]
         side = min(height, width)
         focal = CANONICAL_INTRINSICS.fx * side / CANONICAL_INTRINSICS.width

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from active_recon.bags.camera_stream import read_message
 from active_recon.bags.message_types import (
     CLOUD,
     DIAGNOSTICS,
@@ -12,6 +11,7 @@ from active_recon.bags.message_types import (
     IMAGE,
     JOINT_STATE,
     POSE,
+    read_message,
 )
 from active_recon.bags.raw import Bag, RawMessage
 from active_recon.errors import ActiveReconError, DataError

@@ -4,6 +4,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from active_recon.bags.raw import RawMessage
 from active_recon.errors import DataError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from rosbags.typesys.store import Typestore
@@ -28,25 +29,27 @@ def _standard() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
-def message_from_cdr(data: bytes, type_name: str, where: str) -> Any:
+def read_message(message: RawMessage) -> Any:
     """
     Return a message with the attributes that ROS's own has, its numbers as numpy arrays.
 
-    Raises DataError that says `where` when the bytes are not one of that type.
+    Raises DataError where the bytes are not one of its type.
     """
-    store = _standard()
+    data, store = message.data, _standard()
     try:
         if data[:2] not in (b'\0\0', b'\0\1') or len(data) < 4:
             raise ValueError('another encapsulation than CDR')
-        kind = store.get_msgdef(type_name)
+        kind = store.get_msgdef(message.type_name)
         read = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
-        message, end = read(data[4:], 0, kind.cls, store)
+        content, end = read(data[4:], 0, kind.cls, store)
         if len(data) - 4 - end > _MOST_PADDING:
             raise ValueError(f'{len(data) - 4 - end} bytes left over')
-        return message
+        return content
     except Exception as error:  # the generated code raises whatever the bytes lead it to
-        raise DataError(f'{where}: expected the bytes of a {type_name}, got {len(data)} bytes of '
-                        f'something else ({error})', 'message_bytes') from error
+        raise DataError(
+            f'{message.topic} at {message.received / 1e9:.3f} s: expected the bytes of a '
+            f'{message.type_name}, got {len(data)} bytes of something else ({error})',
+            'message_bytes') from error
 
 
 @cache
