@@ -1,8 +1,10 @@
 """The parameters of other nodes, asked for as the nodes appear."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 import time
 
+from rcl_interfaces.msg import ParameterType
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -43,18 +45,29 @@ class AskedParameters:
             client = self._clients.setdefault(name, AsyncParameterClient(self._node, name))
             if client.services_are_ready():
                 self._asked_at[name] = now
-                client.list_parameters(callback=lambda listed, name=name: self._get(name, listed))
+                client.list_parameters(callback=partial(self._ask_types, name))
 
-    def _get(self, name: str, listed: Future) -> None:
+    def _ask_types(self, name: str, listed: Future) -> None:
         answer = listed.result()
         if answer is not None and name in self._asked_at:
             names = list(answer.result.names)
-            self._clients[name].get_parameters(
-                names, callback=lambda got: self._take(name, names, got))
+            self._clients[name].get_parameter_types(
+                names, callback=partial(self._ask_values, name, names))
+
+    def _ask_values(self, name: str, names: list[str], typed: Future) -> None:
+        """Ask for those that have a value: one without keeps a node from telling any."""
+        answer = typed.result()
+        if answer is None or len(answer.types) != len(names) or name not in self._asked_at:
+            return
+        known = [each for each, kind in zip(names, answer.types, strict=True)
+                 if kind != ParameterType.PARAMETER_NOT_SET]
+        self._clients[name].get_parameters(known, callback=partial(self._take, name, known))
 
     def _take(self, name: str, names: list[str], got: Future) -> None:
         answer = got.result()
-        if answer is None or self._asked_at.pop(name, None) is None:
+        if answer is None or len(answer.values) != len(names):
+            return
+        if self._asked_at.pop(name, None) is None:
             return
         self._known.add(name)
         self._on_known(name, dict(zip(
