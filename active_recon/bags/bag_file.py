@@ -1,6 +1,7 @@
 """One MCAP file of a bag: what was flushed to it is kept, whatever happens next."""
 
 from collections.abc import Mapping
+from operator import itemgetter
 from pathlib import Path
 
 from active_recon.bags.metadata import (
@@ -13,14 +14,18 @@ from active_recon.bags.metadata import (
 from active_recon.bags.whole_chunks import WholeChunks
 from mcap.writer import Writer
 
+_CHUNK_BYTES = 1_000_000
+
 
 class BagFile:
     """
     An MCAP file of profile `ros2` that is being written; `path` must not exist yet.
 
-    Messages wait in a chunk until `flush`, or until there are a million bytes of them. Every
-    method raises OSError where the disk is full or fails, and then what was flushed before stands
-    in a readable file.
+    Messages wait in a chunk until `flush`, or until there are a million bytes of them, and stand
+    in it in the order in which they were received: a middleware hands over topic by topic, but a
+    file without an index is scanned, for which some readers ask for that order. Every method
+    raises OSError where the disk is full or fails, and then what was flushed before stands in a
+    readable file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -36,6 +41,8 @@ class BagFile:
         self._mcap = Writer(self._chunks, use_summary_offsets=False)  # type: ignore[arg-type]
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
+        self._waiting: list[tuple[int, int, bytes, int, int]] = []
+        self._waiting_bytes = 0
         self._mcap.start(profile='ros2', library='active_recon')
         # Without this record rosbag2 takes a bare file for one of an older version.
         self.add_metadata('rosbag2', {
@@ -70,11 +77,11 @@ class BagFile:
               sequence: int) -> None:
         """Take in a message of an announced topic; times in nanoseconds since 1970."""
         self.contents.add(topic, receive_time)
-        self._mcap.add_message(
-            self._channels[topic], receive_time, data, publish_time, sequence)
-        if self._chunks.pending:
-            self._chunks.flush()
-            self._note_flushed()
+        self._waiting.append(
+            (receive_time, self._channels[topic], data, publish_time, sequence))
+        self._waiting_bytes += len(data)
+        if self._waiting_bytes >= _CHUNK_BYTES:
+            self.flush()
 
     def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
         """Take in a record of metadata; a later one of the same name holds."""
@@ -86,6 +93,11 @@ class BagFile:
 
     def flush(self) -> None:
         """Write the chunk begun, and all else that waits."""
+        for time, channel, data, publish_time, sequence in sorted(
+                self._waiting, key=itemgetter(0)):
+            self._mcap.add_message(channel, time, data, publish_time, sequence)
+        self._waiting.clear()
+        self._waiting_bytes = 0
         self._mcap.flush()  # type: ignore[no-untyped-call]
         self._note_flushed()
 
