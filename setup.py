@@ -61,6 +61,6 @@ setup(
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'test': [
             'mcap-ros2-support>=0.5.5', 'pymcap-cli>=0.30', 'pytest>=8', 'rosbags>=0.10',
-            'rosless>=0.5', 'setuptools>=70.1'],
+            'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
     },
 )
