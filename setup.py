@@ -27,7 +27,8 @@ setup(
     python_requires='>=3.11',
     packages=find_packages(include=[NAME, f'{NAME}.*', 'msg_tools', 'msg_tools.*']),
     package_data={NAME: [
-        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*', 'nodes/*.xml']},
+        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*', 'nodes/*.xml',
+        'report/templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -40,6 +41,7 @@ setup(
         f'{name} = {module}:main' for name, module in EXECUTABLES.items()]},
     install_requires=[
         'embreex>=2.17.7.post6,<5',
+        'jinja2>=3.1,<4',
         'lightning-fabric>=2.4,<3',
         'matplotlib>=3.9,<4',
         'mcap>=1.5,<2',
@@ -47,6 +49,7 @@ setup(
         'opencv-python-headless>=4.9,<6',
         'PyYAML>=6,<7',
         'pillow>=10.1,<14',
+        'plotly>=6,<8',
         'rich>=13.7,<16',
         'safetensors>=0.4.3,<1',
         'scikit-image>=0.22,<1',
