@@ -43,7 +43,7 @@ def turntable_map(subject: Subject) -> Figure:
     return {
         'data': data,
         'layout': {
-            'showlegend': False, 'margin': {'l': 0, 'r': 0, 't': 0, 'b': 0}, 'square': True,
+            'showlegend': False, 'margin': {'l': 0, 'r': 0, 't': 0, 'b': 0},
             'xaxis': axis, 'yaxis': {**axis, 'scaleanchor': 'x'},
             'images': [_thumbnail(view.image, at, side)
                        for view, at in zip(subject.views, spread, strict=True)],

@@ -84,6 +84,17 @@ def test_another_view_shows_another_shape_and_what_was_thought_then(opened, chan
     assert last_goal != first_goal
 
 
+def test_page_turns_dark_with_its_reader(opened, changed_share):
+    page = opened()
+    light = shape(page)
+    page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+        'features': [{'name': 'prefers-color-scheme', 'value': 'dark'}]})
+    page.until(lambda: changed_share(light, shape(page)) > 0.9, 'the dark')
+    ink = page.run('return [document.body, document.querySelector(".chart .xtick text")].map('
+                   '(each) => getComputedStyle(each)[each === document.body ? "color" : "fill"])')
+    assert ink[0] == ink[1] == 'rgb(230, 231, 234)'
+
+
 def test_choosing_an_image_chooses_its_view(opened):
     page = opened()
     page.run('document.querySelectorAll(".film label")[1].click()')

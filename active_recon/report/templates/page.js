@@ -28,7 +28,7 @@
     paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
     font: { family: 'system-ui, sans-serif', size: 12.5, color: '--ink' },
     hoverlabel: { bgcolor: '--card', font: { color: '--ink' }, bordercolor: '--rule' },
-    ...layout, xaxis: axis(layout.xaxis), yaxis: axis(layout.yaxis),
+    ...layout, ...(layout.xaxis && { xaxis: axis(layout.xaxis), yaxis: axis(layout.yaxis) }),
   }), config);
 
   const panels = [...document.querySelectorAll('.panel')].map((panel) => {
