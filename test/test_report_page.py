@@ -125,6 +125,7 @@ def test_several_runs_are_compared_in_a_table_with_a_row_each(run):
     assert sum(tag == 'article' for tag, _ in elements.tags) == 3
     assert all(run.path.name in elements.text for run in runs)
     assert 'side by side' in elements.text
+    assert 'view limit' in elements.text
 
 
 def test_bag_with_hardly_anything_in_it_still_gives_a_page(run):

@@ -12,10 +12,11 @@ GOAL_TOLERANCE = 0.14
 """Radians, where the reconstructor's parameter was not recorded."""
 ELEVATION_TOLERANCE = math.radians(5)
 _STOPPED = {
-    'max_views': ('note', 'It stopped because it had taken as many views as it was allowed.'),
-    'entropy_settled': ('note', 'It stopped by itself: the last two views changed almost nothing, '
-                                'so another was not worth taking.'),
-    '': ('warning', 'It never said that it was done: the recording ends, or a new episode '
+    'max_views': ('view limit', 'It stopped because it had taken as many views as it was '
+                                'allowed.'),
+    'entropy_settled': ('settled', 'It stopped by itself: the last two views changed almost '
+                                   'nothing, so another was not worth taking.'),
+    '': ('cut off', 'It never said that it was done: the recording ends, or a new episode '
                     'begins, in the middle.'),
 }
 _REFUSED = {
@@ -47,9 +48,16 @@ def findings(subject: Subject) -> list[Finding]:
     return sorted(found, key=lambda finding: finding.level != 'warning')
 
 
+def stopped(reason: str) -> str:
+    """Return in a word or two why an episode stopped, by the planner's reason."""
+    word, _ = _STOPPED.get(reason, (reason, ''))
+    return word
+
+
 def _stop(subject: Subject) -> Iterator[tuple[str, str]]:
     reason = subject.episode.done
-    yield _STOPPED.get(reason, ('note', f'It stopped for the reason “{reason}”.'))
+    _, sentence = _STOPPED.get(reason, ('', f'It stopped for the reason “{reason}”.'))
+    yield 'note' if reason else 'warning', sentence
 
 
 def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
@@ -64,9 +72,10 @@ def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
             elif count > 0 and key.startswith('warned/') and key != 'warned/elevation':
                 yield 'warning', f'{name} warned {count} times of {key.removeprefix("warned/")}.'
         if {'images', 'views', 'images_unused'} <= counts.keys():
-            yield 'note', (f'Of {counts["images"]} images that {name} heard, {counts["views"]} '
-                           f'became views; {counts["images_unused"]} showed the camera on its way '
-                           'or waiting, and were left out as they should be.')
+            yield 'note', (f'When {name} last reported, it had heard {counts["images"]} images. '
+                           f'{counts["views"]} had become views; {counts["images_unused"]} showed '
+                           'the camera on its way or waiting, and were left out as they should '
+                           'be.')
 
 
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:

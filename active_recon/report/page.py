@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from datetime import datetime, UTC
 import gzip
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.report.charts import entropy_chart, iou_chart, stage_chart
-from active_recon.report.findings import findings
+from active_recon.report.findings import findings, stopped
 from active_recon.report.images import data_uri
 from active_recon.report.scene import scene
 from active_recon.report.stages import median, STAGES, timings
@@ -82,6 +83,8 @@ def _panel(subject: Subject) -> dict[str, Any]:
         'ious': subject.ious,
         'timings': times,
         'image_to_goal_ms': median([timing.total for timing in times]),
+        'travel_deg': math.degrees(subject.travel),
+        'stopped': stopped(subject.episode.done),
         'others': len(run.episodes) - 1,
     }
 
