@@ -9,7 +9,7 @@ from active_recon.report.truth import known_truth
 from active_recon.report.turntable_map import turntable_map
 import plotly.graph_objects as go
 import pytest
-from recorded_runs import changed, recorded_run
+from report_runs import changed, recorded_run
 
 
 @pytest.fixture(scope='module')

@@ -8,7 +8,7 @@ from active_recon.cameras import orbit_camera
 from active_recon.report.findings import findings
 from active_recon.report.subject import Subject
 import pytest
-from recorded_runs import changed, recorded_run
+from report_runs import changed, recorded_run
 
 
 @pytest.fixture(scope='module')

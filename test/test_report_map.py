@@ -9,7 +9,7 @@ from active_recon.report.subject import Subject
 from active_recon.report.turntable_map import place, spread_out, turntable_map
 import numpy as np
 import pytest
-from recorded_runs import changed, recorded_run
+from report_runs import changed, recorded_run
 
 
 @pytest.fixture(scope='module')

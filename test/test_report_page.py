@@ -19,7 +19,7 @@ from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
 import numpy as np
 import pytest
-from recorded_runs import changed, recorded_run
+from report_runs import changed, recorded_run
 
 EVIL = '</script><script id="evil">alert(1)</script><b title=\'"&'
 

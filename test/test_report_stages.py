@@ -4,7 +4,9 @@ from dataclasses import replace
 
 from active_recon.report.stages import median, STAGES, timings, two_clocks
 import pytest
-from recorded_runs import changed, DECISION, HAND_OVER, MS, NETWORK, recorded_run, TURN, WAY
+from report_runs import changed, DECISION, HAND_OVER, MS, NETWORK, recorded_run, TURN, WAY
+
+IMAGE = 'camera/image_raw'
 
 
 @pytest.fixture(scope='module')
@@ -12,10 +14,11 @@ def run():
     return recorded_run(policy='uniform', views=3)
 
 
-def with_arrivals(run, **arrivals):
-    """Return the episode, its first view heard at other times; None is not heard at all."""
+def with_image_at(run, arrival):
+    """Return the episode, its first image heard at another time; None is not at all."""
     first, *rest = run.episodes[0].views
-    received = {name: at for name, at in (first.received | arrivals).items() if at is not None}
+    received = {name: at for name, at in (first.received | {IMAGE: arrival}).items()
+                if at is not None}
     return changed(run, views=[replace(first, received=received), *rest]).episodes[0]
 
 
@@ -36,15 +39,15 @@ def test_last_view_of_an_episode_that_is_done_has_no_decision_and_no_total(run):
 
 def test_what_overtakes_takes_no_time_and_the_sum_stays(run):
     stamp = run.episodes[0].views[0].stamp
-    timing = timings(with_arrivals(run, image=stamp + WAY + NETWORK + MS // 2))[0]
+    timing = timings(with_image_at(run, stamp + WAY + NETWORK + MS // 2))[0]
     assert timing.stages[1] == 0
     assert min(timing.stages) >= 0
     assert sum(timing.stages) == timing.total
 
 
 def test_stages_on_both_sides_of_a_message_not_heard_are_unknown_but_the_total_is_known(run):
-    whole, lacking = (timings(with_arrivals(run, image=image))[0] for image in (
-        run.episodes[0].views[0].received['image'], None))
+    whole, lacking = (timings(with_image_at(run, arrival))[0] for arrival in (
+        run.episodes[0].views[0].received[IMAGE], None))
     assert lacking.stages[:2] == (None, None)
     assert lacking.stages[2:] == whole.stages[2:]
     assert lacking.total == whole.total

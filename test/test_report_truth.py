@@ -17,7 +17,7 @@ from active_recon.report.truth import (
 from active_recon.voxels import VoxelGrid, write_binvox
 import numpy as np
 import pytest
-from recorded_runs import changed, recorded_run
+from report_runs import changed, recorded_run
 
 
 @pytest.fixture(scope='module')

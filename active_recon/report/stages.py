@@ -22,7 +22,7 @@ class Stage(NamedTuple):
 
 
 STAGES = (
-    Stage('on its way', 'from the exposure until the image was recorded', ('image',)),
+    Stage('on its way', 'from the exposure until the image was recorded', ('camera/image_raw',)),
     Stage('reconstruct', 'the network takes the image in and publishes the shape',
           ('occupancy',)),
     Stage('hand over', 'until all that the planner needs has arrived',

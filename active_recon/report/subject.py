@@ -1,6 +1,6 @@
 """What a page shows: one episode of one run, and what is known beside it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import math
 
@@ -27,7 +27,7 @@ class Subject:
     computed: str = ''
 
     @property
-    def views(self) -> list[RecordedView]:
+    def views(self) -> Sequence[RecordedView]:
         """The views in the order in which they were taken."""
         return self.episode.views
 

@@ -4,7 +4,7 @@ from active_recon.report.page import report_page, write_page
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
 import pytest
-from recorded_runs import recorded_run
+from report_runs import recorded_run
 
 LAPTOP, PHONE = (1280, 800), (390, 844)
 pytestmark = pytest.mark.browser

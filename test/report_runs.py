@@ -20,7 +20,7 @@ import numpy as np
 BEGIN = 1_790_000_000_000_000_000
 MS = 1_000_000
 WAY, NETWORK, HAND_OVER, DECISION, TURN = 2 * MS, 8 * MS, 1 * MS, 4 * MS, 1500 * MS
-ARRIVALS = {'image': WAY, 'occupancy': WAY + NETWORK, 'latent': WAY + NETWORK,
+ARRIVALS = {'camera/image_raw': WAY, 'occupancy': WAY + NETWORK, 'latent': WAY + NETWORK,
             'view': WAY + NETWORK + HAND_OVER // 2, 'probabilities': WAY + NETWORK + HAND_OVER,
             'entropy': WAY + NETWORK + HAND_OVER}
 
