@@ -53,6 +53,13 @@ def test_reason_to_stop_is_told(run, reason, level, words):
     assert any(words in text for text in said(changed(run, done=reason), level))
 
 
+def test_run_without_a_planner_is_not_cut_off(run):
+    views = [replace(view, goal=None) for view in run.episodes[0].views]
+    unplanned = changed(run, done='', first_goal=None, views=views)
+    assert said(unplanned) == []
+    assert any('No planner' in text for text in said(unplanned, 'note'))
+
+
 @pytest.mark.parametrize(('off_deg', 'warned'), [(5, False), (12, True), (-12, True)])
 def test_view_off_its_goal_is_told_beyond_the_tolerance(run, off_deg, warned):
     azimuth = run.episodes[0].views[0].camera.azimuth + math.radians(off_deg)

@@ -171,3 +171,9 @@ def test_letters_go_on_beyond_the_alphabet():
     assert every[:2] == ['A', 'B']
     assert every[25:28] == ['Z', 'AA', 'AB']
     assert len(set(every)) == len(every)
+
+
+def test_page_of_recorded_shapes_does_not_wait_for_torch():
+    code = ('import sys, active_recon.report.page, active_recon.report.truth; '
+            "sys.exit('torch' in sys.modules)")
+    assert subprocess.run([sys.executable, '-c', code], check=False).returncode == 0

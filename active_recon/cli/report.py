@@ -4,6 +4,14 @@ from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.topics import (
+    AzimuthTopic,
+    CameraInfoTopic,
+    ImageTopic,
+    JointName,
+    ObjectFrame,
+    TurnedObject,
+)
 from active_recon.errors import ConfigError
 import typer
 
@@ -26,6 +34,12 @@ def report(
     model: Annotated[str | None, typer.Option(
         help='What rebuilds the shapes where a bag holds none: a model that ships, or a '
              '.safetensors file.')] = None,
+    image: ImageTopic = '',
+    camera_info: CameraInfoTopic = '',
+    azimuth: AzimuthTopic = '',
+    joint: JointName = '',
+    turned_object: TurnedObject = False,
+    object_frame: ObjectFrame = 'object',
 ) -> None:
     """
     Write recorded runs as one HTML page that opens in any browser, with no network.
@@ -36,6 +50,7 @@ def report(
     Example: active-recon report bags/2026-11-21_10-00-00 --out run.html
     """
     from active_recon.bags.reading import read_run
+    from active_recon.bags.topics import Topics
     from active_recon.report.page import report_page, write_page
 
     truths = truth or []
@@ -43,11 +58,12 @@ def report(
         raise ConfigError('--truth: expected one for all bags or one for each of '
                           f'{len(bags)}, got {len(truths)}')
     path = out or (bags[0] if bags[0].is_dir() else bags[0].parent) / 'report.html'
+    topics = Topics(image, camera_info, azimuth, joint, turned_object, object_frame)
     subjects: list[Subject] = []
     with progress_bar('reading', len(bags)) as advance:
         for index, bag in enumerate(bags):
             named = truths[index if len(truths) > 1 else 0] if truths else None
-            subjects += _subjects(read_run(bag), named, episode, model, len(subjects))
+            subjects += _subjects(read_run(bag, topics), named, episode, model, len(subjects))
             advance(1, bag.name)
     write_page(report_page(subjects), path)
     typer.echo(f'wrote {path} ({path.stat().st_size / 1e6:.1f} MB)')

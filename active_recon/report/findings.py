@@ -56,6 +56,9 @@ def stopped(reason: str) -> str:
 
 def _stop(subject: Subject) -> Iterator[tuple[str, str]]:
     reason = subject.episode.done
+    if not reason and not any(subject.goals):
+        yield 'note', 'No planner was recorded: the views are those that the camera came by.'
+        return
     _, sentence = _STOPPED.get(reason, ('', f'It stopped for the reason “{reason}”.'))
     yield 'note' if reason else 'warning', sentence
 
@@ -68,14 +71,14 @@ def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
             kind = key.removeprefix('refused/')
             if count > 0 and kind != key:
                 what = _REFUSED.get(kind, f'messages were refused ({kind})')
-                yield 'warning', f'{count} {what}, says {name}.'
+                yield 'warning', f'{count} {what}, says the {name}.'
             elif count > 0 and key.startswith('warned/') and key != 'warned/elevation':
-                yield 'warning', f'{name} warned {count} times of {key.removeprefix("warned/")}.'
+                yield 'warning', (f'The {name} warned {count} times of '
+                                  f'{key.removeprefix("warned/")}.')
         if {'images', 'views', 'images_unused'} <= counts.keys():
-            yield 'note', (f'When {name} last reported, it had heard {counts["images"]} images. '
-                           f'{counts["views"]} had become views; {counts["images_unused"]} showed '
-                           'the camera on its way or waiting, and were left out as they should '
-                           'be.')
+            yield 'note', (f'By the last count of the {name}, {counts["images"]} images came in. '
+                           f'{counts["views"]} became views; {counts["images_unused"]} showed the '
+                           'camera on its way or waiting, and were left out as they should be.')
 
 
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:

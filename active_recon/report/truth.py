@@ -2,17 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from active_recon.bags.run import RecordedEpisode, RecordedRun
 from active_recon.errors import ConfigError
 from active_recon.meshes import load_mesh
 from active_recon.objects import find_object, shipped_objects
-from active_recon.reconstructor import Reconstructor
 from active_recon.report.subject import shown_grid
 from active_recon.voxelise import voxelise
 from active_recon.voxels import read_binvox, turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # it brings torch, for which most reports need not wait
+    from active_recon.reconstructor import Reconstructor
 
 
 def read_truth(path: Path, run: RecordedRun) -> NDArray[np.bool_]:
@@ -41,7 +44,7 @@ def known_truth(run: RecordedRun) -> NDArray[np.bool_] | None:
     return read_truth(find_object(name), run) if name in shipped_objects() else None
 
 
-def with_reconstruction(run: RecordedRun, reconstructor: Reconstructor) -> RecordedRun:
+def with_reconstruction(run: RecordedRun, reconstructor: 'Reconstructor') -> RecordedRun:
     """Return the run with the shapes that its images give where the bag holds none."""
     return replace(run, episodes=[_reconstructed(episode, reconstructor)
                                   for episode in run.episodes])
@@ -52,7 +55,7 @@ def lacks_reconstruction(run: RecordedRun) -> bool:
     return any(shown_grid(view) is None for episode in run.episodes for view in episode.views)
 
 
-def _reconstructed(episode: RecordedEpisode, reconstructor: Reconstructor) -> RecordedEpisode:
+def _reconstructed(episode: RecordedEpisode, reconstructor: 'Reconstructor') -> RecordedEpisode:
     reconstructor.reset()
     views = []
     for view in episode.views:
