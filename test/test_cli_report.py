@@ -28,7 +28,7 @@ def bags(tmp_path, monkeypatch, run):
         if not path.is_dir():
             raise DataError(f'{path}: expected a bag')
         asked.append(topics)
-        return replace(run, path=path, provenance={})
+        return replace(run, path=path, parameters={})
 
     monkeypatch.setattr(reading, 'read_run', read_run)
     for name in ('first', 'second'):

@@ -25,19 +25,20 @@ def run() -> RecordedRun:
     return recorded_run('chair', 'uniform', 3)
 
 
-def named(run, name):
-    return replace(run, provenance={'object': name})
+def shown(run, mesh, up=''):
+    return replace(run, parameters={'turntable_camera': {'mesh': mesh, 'up': up}})
 
 
-@pytest.mark.parametrize('name', ['chair', '/somewhere/objects/chair.glb'])
-def test_object_that_ships_is_known_by_its_name(run, name):
-    truth = known_truth(named(run, name))
+def test_object_that_ships_is_known_wherever_it_was_installed(run):
+    truth = known_truth(shown(run, '/elsewhere/active_recon/objects/chair.glb'))
     assert (truth == read_truth(find_object('chair'), run)).all()
 
 
-@pytest.mark.parametrize('name', ['', 'teapot', '/somewhere/teapot.glb'])
-def test_truth_of_another_object_is_not_known(run, name):
-    assert known_truth(named(run, name)) is None
+@pytest.mark.parametrize(('mesh', 'up'), [
+    ('', ''), ('/mine/chair.glb', ''), ('/elsewhere/active_recon/objects/teapot.glb', ''),
+    ('/elsewhere/active_recon/objects/chair.glb', 'z')])
+def test_truth_of_any_other_object_is_not_known(run, mesh, up):
+    assert known_truth(shown(run, mesh, up)) is None
 
 
 def test_mesh_and_its_binvox_are_the_same_truth(run, tmp_path):

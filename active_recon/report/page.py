@@ -90,8 +90,9 @@ def _panel(subject: Subject) -> dict[str, Any]:
 
 
 def _object_name(provenance: str) -> str:
-    """Return a name to speak of: a mesh file's path is known by its stem."""
-    return Path(provenance).stem if '/' in provenance else provenance
+    """Return a name to speak of: a mesh file goes by its stem."""
+    path = Path(provenance)
+    return path.stem if path.suffix else provenance
 
 
 def _number(value: float | None, places: int = 0) -> str:

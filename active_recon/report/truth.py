@@ -39,9 +39,13 @@ def read_truth(path: Path, run: RecordedRun) -> NDArray[np.bool_]:
 
 
 def known_truth(run: RecordedRun) -> NDArray[np.bool_] | None:
-    """Return the true cells where the bag names one of the objects that ship, else None."""
-    name = Path(run.provenance.get('object', '')).stem
-    return read_truth(find_object(name), run) if name in shipped_objects() else None
+    """Return the true cells where the camera says that it showed an object that ships."""
+    camera = run.parameters.get('turntable_camera', {})
+    mesh = Path(str(camera.get('mesh', '')))
+    ships = mesh.parts[-3:-1] == ('active_recon', 'objects') and mesh.stem in shipped_objects()
+    if not ships or camera.get('up') or camera.get('front'):
+        return None
+    return read_truth(find_object(mesh.stem), run)
 
 
 def with_reconstruction(run: RecordedRun, reconstructor: 'Reconstructor') -> RecordedRun:
