@@ -133,7 +133,10 @@ def test_bag_with_hardly_anything_in_it_still_gives_a_page(run):
                     received={}) for view in run.episodes[0].views[:1]]
     stranger = replace(changed(run, views=bare, first_goal=None, id='', done=''), provenance={},
                        parameters={}, counters={}, topics=[], begin=0, end=0)
-    assert 'An object, rebuilt from 1 view' in page_of(stranger)
+    page = page_of(stranger)
+    assert 'An object, rebuilt from 1 view' in page
+    assert 'no loop' in page
+    assert 'data-own="stages"' not in page
 
 
 def test_figure_that_is_not_finite_is_left_out(run):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 import math
+from pathlib import Path
 
 from active_recon.bags.run import RecordedRun
 from active_recon.errors import ConfigError, MeshError
@@ -43,6 +44,7 @@ def test_truth_of_any_other_object_is_not_known(run, mesh, up):
 
 def test_mesh_and_its_binvox_are_the_same_truth(run, tmp_path):
     cells = read_truth(find_object('chair'), run)
+    assert (read_truth(Path('chair'), run) == cells).all()
     write_binvox(VoxelGrid(cells.astype(np.float32)), tmp_path / 'chair.binvox')
     assert (read_truth(tmp_path / 'chair.binvox', run) == cells).all()
 

@@ -26,8 +26,9 @@ def report(
     out: Annotated[Path | None, typer.Option(
         help='Where the page goes; default: report.html in the first bag.')] = None,
     truth: Annotated[list[Path] | None, typer.Option(
-        help="The object's true shape, a mesh or a .binvox, for the IoU; once for all bags, or "
-             'once for each in their order. Objects that ship need none.')] = None,
+        help="The object's true shape for the IoU: a mesh, a .binvox or bed, car, chair, sofa, "
+             'table; once for all bags, or once for each in their order. The demo needs '
+             'none.')] = None,
     episode: Annotated[int | None, typer.Option(
         min=1, help='Only this episode of each bag, counted from 1; default: all with '
                     'views.')] = None,

@@ -6,6 +6,7 @@ and dark; the page resolves it.
 """
 
 from collections.abc import Callable, Sequence
+import math
 from typing import Any
 
 from active_recon.report.stages import STAGES, Timing
@@ -70,7 +71,7 @@ def _progress(subjects: Sequence[Subject], title: str,
             'margin': {'l': 58, 'r': 12, 't': 12, 'b': 44},
             'legend': {'orientation': 'h', 'x': 0, 'y': 1, 'yanchor': 'bottom'},
             'xaxis': {'title': {'text': 'after view'}, 'fixedrange': True, 'showgrid': False,
-                      'tickvals': list(range(1, longest + 1)), 'range': [0.6, longest + 0.4]},
+                      'tick0': 1, 'dtick': math.ceil(longest / 12), 'range': [0.6, longest + 0.4]},
             'yaxis': {'title': {'text': title}, 'fixedrange': True},
         },
     }

@@ -82,6 +82,7 @@ def _panel(subject: Subject) -> dict[str, Any]:
         'entropies': subject.entropies,
         'ious': subject.ious,
         'timings': times,
+        'timed': any(stage is not None for timing in times for stage in timing.stages[1:]),
         'image_to_goal_ms': median([timing.total for timing in times]),
         'travel_deg': math.degrees(subject.travel),
         'stopped': stopped(subject.episode.done),

@@ -22,14 +22,15 @@ def read_truth(path: Path, run: RecordedRun) -> NDArray[np.bool_]:
     """
     Return the true cells of a run's object, (X, Y, Z), from a mesh or a binvox file.
 
-    They stand as the run's object stood, by the reconstructor's `object_yaw`. Raises MeshError,
+    The name of an object that ships is a mesh too. The cells stand as the run's object stood, by
+    the reconstructor's `object_yaw`. Raises MeshError,
     DataError, and ConfigError where a binvox has another number of cells than the run.
     """
     resolution = _resolution(run)
     if path.suffix.lower() == '.binvox':
         grid = read_binvox(path)
     else:
-        grid = voxelise(load_mesh(path), resolution)
+        grid = voxelise(load_mesh(find_object(str(path))), resolution)
     side = grid.occupancy.shape[0]
     if side != resolution:
         raise ConfigError(f'{path}: expected {resolution} cells a side, as {run.path.name} has, '
