@@ -20,7 +20,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full bench lint clean
+.PHONY: help venv demo golden test test-full bench chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -37,13 +37,24 @@ golden: .venv/installed  ## the golden run anew, once weights or loop have chang
 	@rm -rf bags/golden/run && mkdir -p bags/golden/run
 	@mv build/golden/*/*.mcap build/golden/*/metadata.yaml bags/golden/run/
 
-test: lint .venv/colcon/installed  ## style, types, and every test but the long ones; ARGS go to pytest
+test: lint chromium .venv/colcon/installed  ## style, types, and every test but the long ones; ARGS go to pytest
 	@echo '== testing; the long tests run with `make test-full`'
 	@$(BIN)/python -m pytest -m 'not slow' $(ARGS)
 
-test-full: lint .venv/colcon/installed  ## every test, high counts and soak too
+test-full: lint chromium .venv/colcon/installed  ## every test, high counts and soak too
 	@echo '== testing everything'
 	@$(BIN)/python -m pytest $(ARGS)
+
+# The pages are tested in Debian's Chromium, which only root can install.
+chromium:
+	@missing="$$(command -v chromium >/dev/null || echo chromium) $$(command -v chromedriver \
+		>/dev/null || echo chromium-driver)"; test "$$missing" = ' ' && exit 0; \
+	if test "$$(id -u)" != 0 || ! command -v apt-get >/dev/null; then \
+		echo "expected Chromium and its driver for the tests of the pages: install $$missing"; \
+		exit 1; fi; \
+	echo "== installing $$missing"; \
+	apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install -y \
+		--no-install-recommends $$missing >/dev/null
 
 bench: .venv/installed  ## the figures of the README's table, measured here
 	@echo '== measuring'

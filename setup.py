@@ -6,7 +6,7 @@ import os
 from setuptools import find_packages, setup
 
 NAME = 'active_recon'
-NODES = ('reconstructor', 'recorder', 'turntable_camera', 'view_planner')
+NODES = ('reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer')
 EXECUTABLES = {
     'active-recon': f'{NAME}.cli.main', **{node: f'{NAME}.nodes.{node}' for node in NODES}}
 
@@ -27,7 +27,8 @@ setup(
     python_requires='>=3.11',
     packages=find_packages(include=[NAME, f'{NAME}.*', 'msg_tools', 'msg_tools.*']),
     package_data={NAME: [
-        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*', 'nodes/*.xml']},
+        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*', 'nodes/*.xml',
+        'report/templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -40,6 +41,7 @@ setup(
         f'{name} = {module}:main' for name, module in EXECUTABLES.items()]},
     install_requires=[
         'embreex>=2.17.7.post6,<5',
+        'jinja2>=3.1,<4',
         'lightning-fabric>=2.4,<3',
         'lz4>=4.3,<5',
         'matplotlib>=3.9,<4',
@@ -48,6 +50,7 @@ setup(
         'opencv-python-headless>=4.9,<6',
         'PyYAML>=6,<7',
         'pillow>=10.1,<14',
+        'plotly>=6,<8',
         'rich>=13.7,<16',
         'rosbags>=0.11,<1',
         'safetensors>=0.4.3,<1',
@@ -57,6 +60,7 @@ setup(
         'torch>=2.5,<3',
         'trimesh>=4.4,<6',
         'typer>=0.12,<1',
+        'viser>=1.1,<2',
         'zstandard>=0.22,<1',
         *ROS_WHEELS,
     ],
@@ -64,6 +68,6 @@ setup(
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'test': [
             'mcap-ros2-support>=0.5.5', 'pymcap-cli>=0.30', 'pytest>=8', 'rosless>=0.5',
-            'setuptools>=70.1'],
+            'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

@@ -15,10 +15,11 @@ MAY_IMPORT = {  # beside itself; what is not named here is part of the core
     'bags': {'core', 'msg_tools'},
     'nodes': {'core', 'msg_tools', 'bags'},
     'demo': {'core', 'bags', 'nodes'},
+    'report': {'core', 'bags'},
     'evaluation': {'core'},
     'training': {'core', 'evaluation'},
     'paper': {'core', 'evaluation', 'training'},
-    'cli': {'core', 'bags', 'demo', 'evaluation', 'training', 'paper'},
+    'cli': {'core', 'bags', 'demo', 'evaluation', 'training', 'paper', 'report'},
 }
 KNOW_ROS = {'nodes', 'msg_tools'}
 ROS = re.compile(r'(rclpy|rosidl_\w+|rmw_\w+|ament_\w+|tf2_\w+|launch(_\w+)?|cv_bridge|'

@@ -10,6 +10,7 @@ from active_recon.cli.paper import paper
 from active_recon.cli.play import play
 from active_recon.cli.record_sweep import record_sweep
 from active_recon.cli.replay import replay
+from active_recon.cli.report import report
 from active_recon.cli.sheet import sheet
 from active_recon.cli.train import train
 from active_recon.errors import ActiveReconError
@@ -18,7 +19,8 @@ import typer
 app = typer.Typer(
     help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, render, train, evaluate, paper, sheet, play, replay, record_sweep):
+for command in (demo, report, replay, play, record_sweep, render, train, evaluate, paper,
+                sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

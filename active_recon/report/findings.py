@@ -1,0 +1,114 @@
+"""What a reader should know of a run before believing it, each in one sentence."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import math
+
+from active_recon.cameras import azimuth_difference, CANONICAL_ELEVATION
+from active_recon.report.stages import two_clocks
+from active_recon.report.subject import degrees, Subject
+
+GOAL_TOLERANCE = 0.14
+"""Radians, where the reconstructor's parameter was not recorded."""
+ELEVATION_TOLERANCE = math.radians(5)
+_STOPPED = {
+    'max_views': ('view limit', 'It stopped because it had taken as many views as it was '
+                                'allowed.'),
+    'entropy_settled': ('settled', 'It stopped by itself: the last two views changed almost '
+                                   'nothing, so another was not worth taking.'),
+    '': ('cut off', 'It never said that it was done: the recording ends, or a new episode '
+                    'begins, in the middle.'),
+}
+_REFUSED = {
+    'no_pose': 'images were dropped: no camera pose arrived close enough to them in time '
+               '(late poses)',
+    'no_camera_info': 'images were dropped: the camera info of their stamp never came',
+    'camera_info': 'images were dropped: their camera info did not fit them',
+    'last_episode': 'images were dropped: they were older than the episode',
+    'duplicate': 'images were dropped: they came twice',
+    'out_of_order': 'images were dropped: they came in the wrong order',
+    'image_size': 'images were dropped: their size was not what was announced',
+    'encoding': 'images were dropped: their encoding is not known',
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A sentence, and how much it matters: 'warning' or 'note'."""
+
+    level: str
+    text: str
+
+
+def findings(subject: Subject) -> list[Finding]:
+    """Return what the run earned, the warnings first."""
+    found = [Finding(level, text) for level, text in (
+        *_stop(subject), *_counted(subject), *_off_goal(subject), *_off_elevation(subject),
+        *_estimate(subject))]
+    return sorted(found, key=lambda finding: finding.level != 'warning')
+
+
+def stopped(reason: str) -> str:
+    """Return in a word or two why an episode stopped, by the planner's reason."""
+    word, _ = _STOPPED.get(reason, (reason, ''))
+    return word
+
+
+def _stop(subject: Subject) -> Iterator[tuple[str, str]]:
+    reason = subject.episode.done
+    if not reason and not any(subject.goals):
+        yield 'note', 'No planner was recorded: the views are those that the camera came by.'
+        return
+    _, sentence = _STOPPED.get(reason, ('', f'It stopped for the reason “{reason}”.'))
+    yield 'note' if reason else 'warning', sentence
+
+
+def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
+    """Yield what the nodes counted; the counts are of the whole run, not of one episode."""
+    for node, counts in sorted(subject.run.counters.items()):
+        name = node.strip('/')
+        for key, count in sorted(counts.items()):
+            kind = key.removeprefix('refused/')
+            if count > 0 and kind != key:
+                what = _REFUSED.get(kind, f'messages were refused ({kind})')
+                yield 'warning', f'{count} {what}, says the {name}.'
+            elif count > 0 and key.startswith('warned/') and key != 'warned/elevation':
+                yield 'warning', (f'The {name} warned {count} times of '
+                                  f'{key.removeprefix("warned/")}.')
+        if {'images', 'views', 'images_unused'} <= counts.keys():
+            yield 'note', (f'By the last count of the {name}, {counts["images"]} images came in. '
+                           f'{counts["views"]} became views; {counts["images_unused"]} showed the '
+                           'camera on its way or waiting, and were left out as they should be.')
+
+
+def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
+    parameters = subject.run.parameters.get('reconstructor', {})
+    tolerance = float(parameters.get('goal_tolerance', GOAL_TOLERANCE))
+    for number, (view, goal) in enumerate(zip(subject.views, subject.goals, strict=True), 1):
+        away = goal and abs(float(azimuth_difference(view.camera.azimuth, goal.azimuth)))
+        if away and away > tolerance:
+            yield 'warning', (f'View {number} was taken {math.degrees(away):.0f}° away from its '
+                              'goal.')
+
+
+def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:
+    off = [(number, view.camera.elevation) for number, view in enumerate(subject.views, 1)
+           if abs(view.camera.elevation - CANONICAL_ELEVATION) > ELEVATION_TOLERANCE]
+    if off:
+        listed = ', '.join(f'{number} ({math.degrees(elevation):.0f}°)'
+                           for number, elevation in off)
+        yield 'warning', (
+            f'The camera stood at another elevation than the {degrees(CANONICAL_ELEVATION)}° that '
+            f'the network was trained with, in view {listed}: the shape will be worse.')
+
+
+def _estimate(subject: Subject) -> Iterator[tuple[str, str]]:
+    if subject.computed:
+        yield 'note', ('The bag holds no reconstruction. The shapes shown here were computed from '
+                       f'its images for this page, by {subject.computed}.')
+    known = [entropy for entropy in subject.entropies if entropy is not None]
+    if len(known) > 1 and known[-1] > known[0]:
+        yield 'note', 'After the last view the estimate was less certain than after the first.'
+    if any(map(two_clocks, subject.views)):
+        yield 'warning', ('The images are stamped by another clock than the recorder’s, so how '
+                          'long they were on their way is not known.')

@@ -1,0 +1,106 @@
+"""The page itself: one HTML file with its style, its script and Plotly inside."""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from datetime import datetime, UTC
+import gzip
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from active_recon.errors import ConfigError, DataError
+from active_recon.report.charts import entropy_chart, iou_chart, stage_chart
+from active_recon.report.findings import findings, stopped
+from active_recon.report.images import data_uri
+from active_recon.report.scene import scene
+from active_recon.report.stages import median, STAGES, timings
+from active_recon.report.subject import degrees, Subject
+from active_recon.report.turntable_map import turntable_map
+from jinja2 import Environment, PackageLoader, StrictUndefined
+import plotly
+
+MOST_SUBJECTS = 12
+"""Each is drawn in 3D, and browsers hold not many more such drawings on a page."""
+_IMAGE_SIDE = 320
+_PLOTLY = Path(plotly.__file__).parent / 'package_data' / 'plotly.min.js'
+
+
+def report_page(subjects: Sequence[Subject]) -> str:
+    """
+    Return the HTML page of some episodes; the same episodes give the same text.
+
+    Raises DataError where there is none, ConfigError where there are more than a browser draws.
+    """
+    if not subjects:
+        raise DataError('expected an episode with views to report on, got none: no image of these '
+                        'bags became a view')
+    if len(subjects) > MOST_SUBJECTS:
+        raise ConfigError(f'expected at most {MOST_SUBJECTS} episodes on one page, got '
+                          f'{len(subjects)}: name fewer bags, or one episode of each')
+    panels = [_panel(subject) for subject in subjects]
+    several = len(subjects) > 1
+    known_truth = any(subject.truth is not None for subject in subjects)
+    shared = {'entropy': entropy_chart(subjects), 'iou': iou_chart(subjects)}
+    drawn = {'shared': shared, 'panels': [
+        {'scene': scene(subject), 'map': turntable_map(subject),
+         'stages': stage_chart(timings(subject.episode))} for subject in subjects]}
+    environment = Environment(
+        loader=PackageLoader('active_recon.report', 'templates'), autoescape=True,
+        trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
+    environment.filters |= {'number': _number, 'degrees': degrees}
+    return environment.get_template('page.html').render(
+        panels=panels, several=several, known_truth=known_truth, stages=STAGES,
+        drawn=_packed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
+        plotly=_packed(_PLOTLY.read_bytes()))
+
+
+def write_page(page: str, path: Path) -> None:
+    """Write a page, whole or not at all; raises DataError where it cannot be written."""
+    partial = path.with_name(f'.{path.name}.partial')
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(page, encoding='utf-8')
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise DataError(f'{path}: cannot be written: {error.strerror}') from error
+
+
+def _panel(subject: Subject) -> dict[str, Any]:
+    """Return what the template says of one subject."""
+    run, times = subject.run, timings(subject.episode)
+    recorded = datetime.fromtimestamp(run.begin / 1e9, UTC)
+    return {
+        'subject': subject,
+        'object': _object_name(run.provenance.get('object', '')),
+        'policy': run.provenance.get('policy', ''),
+        'recorded': f'{recorded:%Y-%m-%d %H:%M} UTC' if run.begin > 0 else '',
+        'duration_s': (run.end - run.begin) / 1e9,
+        'findings': findings(subject),
+        'images': [data_uri(view.image, _IMAGE_SIDE) for view in subject.views],
+        'entropies': subject.entropies,
+        'ious': subject.ious,
+        'timings': times,
+        'timed': any(stage is not None for timing in times for stage in timing.stages[1:]),
+        'image_to_goal_ms': median([timing.total for timing in times]),
+        'travel_deg': math.degrees(subject.travel),
+        'stopped': stopped(subject.episode.done),
+        'others': len(run.episodes) - 1,
+    }
+
+
+def _object_name(provenance: str) -> str:
+    """Return a name to speak of: a mesh file goes by its stem."""
+    path = Path(provenance)
+    return path.stem if path.suffix else provenance
+
+
+def _number(value: float | None, places: int = 0) -> str:
+    """Return a figure for people, a dash where it is not known."""
+    return '–' if value is None else f'{value:,.{places}f}'.replace(',', '\u202f')
+
+
+def _packed(raw: bytes) -> str:
+    """Return bytes as base64 of gzip, without the time that gzip would add."""
+    return b64encode(gzip.compress(raw, 9, mtime=0)).decode()

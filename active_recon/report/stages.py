@@ -1,0 +1,88 @@
+"""Where the time goes from an image to the goal that follows from it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from statistics import median_low
+from typing import NamedTuple
+
+from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedView
+
+NS_PER_MS = 1e6
+ONE_CLOCK_S = 60.0
+"""A message recorded later than that after its stamp, or before it, has a stamp of other clock."""
+
+
+class Stage(NamedTuple):
+    """A stage by its name, what happens in it, and the messages with whose arrival it ends."""
+
+    name: str
+    meaning: str
+    ends_with: tuple[str, ...]
+
+
+STAGES = (
+    Stage('on its way', 'from the exposure until the image was recorded', ('camera/image_raw',)),
+    Stage('reconstruct', 'the network takes the image in and publishes the shape',
+          ('occupancy',)),
+    Stage('hand over', 'until all that the planner needs has arrived',
+          ('latent', 'view', 'probabilities')),
+    Stage('decide', 'the planner names the next goal', ('goal',)),
+)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """
+    Milliseconds of one view, None where not recorded.
+
+    `stages` are those of STAGES, `total` is from the image to the goal, `turn` from the goal that
+    asked for the view to its image. Arrivals are the recorder's: what overtook the end of the
+    stage before took 0.
+    """
+
+    stages: tuple[float | None, ...]
+    total: float | None
+    turn: float | None
+
+
+def timings(episode: RecordedEpisode) -> list[Timing]:
+    """Return the timing of each view."""
+    asked = [episode.first_goal, *(view.goal for view in episode.views)]
+    return [_timing(view, goal) for view, goal in zip(episode.views, asked, strict=False)]
+
+
+def two_clocks(view: RecordedView) -> bool:
+    """Return whether an image's stamp and the recorder's times cannot be of one clock."""
+    return any(not 0 <= arrival - view.stamp <= ONE_CLOCK_S * 1e9
+               for arrival in view.received.values())
+
+
+def median(values: Sequence[float | None]) -> float | None:
+    """Return the middle of what is known, None where nothing is."""
+    known = [value for value in values if value is not None]
+    return median_low(known) if known else None
+
+
+def _timing(view: RecordedView, asked: RecordedGoal | None) -> Timing:
+    arrivals = dict(view.received)
+    if view.goal is not None:
+        arrivals['goal'] = view.goal.received
+    stamp = None if two_clocks(view) else view.stamp
+    ends = [max((arrivals[name] for name in stage.ends_with if name in arrivals), default=None)
+            for stage in STAGES]
+    marks = list(accumulate([stamp, *ends], _no_earlier))
+    known = [mark if end is not None else None
+             for mark, end in zip(marks, [stamp, *ends], strict=True)]
+    turn = None if asked is None else _ms(asked.received, stamp)
+    return Timing(tuple(_ms(start, end) for start, end in pairwise(known)),
+                  _ms(known[0], known[-1]), None if turn is None or turn < 0 else turn)
+
+
+def _no_earlier(before: int | None, end: int | None) -> int | None:
+    """Return the later of two, of which either may not be known."""
+    return end if before is None else before if end is None else max(before, end)
+
+
+def _ms(start: int | None, end: int | None) -> float | None:
+    return None if start is None or end is None else (end - start) / NS_PER_MS

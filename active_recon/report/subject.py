@@ -1,0 +1,83 @@
+"""What a page shows: one episode of one run, and what is known beside it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import math
+
+from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
+from active_recon.cameras import azimuth_difference
+from active_recon.voxels import iou, VoxelGrid
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """
+    One episode that has views, under a letter of its own on the page.
+
+    `truth` holds the object's true cells, (X, Y, Z), where they are known. `computed` says that
+    the bag held no reconstruction and that this was made up for, by which weights.
+    """
+
+    letter: str
+    run: RecordedRun
+    episode: RecordedEpisode
+    truth: NDArray[np.bool_] | None = None
+    computed: str = ''
+
+    @property
+    def views(self) -> Sequence[RecordedView]:
+        """The views in the order in which they were taken."""
+        return self.episode.views
+
+    @property
+    def goals(self) -> list[RecordedGoal | None]:
+        """The goal that asked for each view."""
+        return [self.episode.first_goal, *(view.goal for view in self.views[:-1])]
+
+    @property
+    def threshold(self) -> float:
+        """Occupancy above which a cell counts as occupied: between what was and what was not."""
+        above, below = 1.0, 0.0
+        for view in self.views:
+            if view.reconstruction is not None and view.occupied is not None:
+                occupancy, chosen = view.reconstruction.occupancy, view.occupied.occupied(0)
+                above = min(above, float(occupancy.min(initial=1, where=chosen)))
+                below = max(below, float(occupancy.max(initial=0, where=~chosen)))
+        return (above + below) / 2
+
+    @property
+    def entropies(self) -> list[float | None]:
+        """Nats after each view, None where not known."""
+        return [view.entropy if view.entropy is not None and math.isfinite(view.entropy) else None
+                for view in self.views]
+
+    @property
+    def ious(self) -> list[float | None]:
+        """IoU with the truth after each view, None where not known."""
+        return [None if self.truth is None or view.occupied is None
+                else float(iou(view.occupied.occupied(0), self.truth)) for view in self.views]
+
+    @property
+    def travel(self) -> float:
+        """Radians travelled between the views, the short way each time."""
+        azimuths = [view.camera.azimuth for view in self.views]
+        return float(np.abs(azimuth_difference(azimuths[1:], azimuths[:-1])).sum())
+
+
+def shown_grid(view: RecordedView) -> VoxelGrid | None:
+    """Return the probabilities after a view, or its occupied cells where there are no more."""
+    return view.reconstruction if view.reconstruction is not None else view.occupied
+
+
+def letters() -> Iterator[str]:
+    """Yield A, B, ..., Z, then AA, AB, ..."""
+    for number in range(26 ** 2 + 26):
+        high, low = divmod(number, 26)
+        yield (chr(64 + high) if high else '') + chr(65 + low)
+
+
+def degrees(radians: float) -> int:
+    """Return an azimuth as whole degrees in [0, 360)."""
+    return round(math.degrees(radians)) % 360

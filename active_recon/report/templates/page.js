@@ -1,0 +1,108 @@
+'use strict';
+(async () => {
+  const inflated = async (id) => {
+    const packed = Uint8Array.from(atob(document.getElementById(id).textContent),
+      (letter) => letter.charCodeAt(0));
+    const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip'));
+    return new Response(plain).text();
+  };
+  const script = document.createElement('script');
+  script.textContent = await inflated('plotly');
+  document.head.append(script);
+  const drawn = JSON.parse(await inflated('drawn'));
+  const config = { displayModeBar: false, responsive: true, scrollZoom: false };
+  const dark = matchMedia('(prefers-color-scheme: dark)');
+  const still = matchMedia('(prefers-reduced-motion: reduce)');
+
+  // Colours are named as the style sheet's variables, which know light and dark.
+  const resolved = (value) => {
+    if (typeof value === 'string' && value.startsWith('--')) {
+      return getComputedStyle(document.documentElement).getPropertyValue(value).trim();
+    }
+    if (Array.isArray(value)) return value.map(resolved);
+    if (value === null || typeof value !== 'object') return value;
+    return Object.fromEntries(Object.entries(value).map(([key, inner]) => [key, resolved(inner)]));
+  };
+  const axis = (own) => ({ gridcolor: '--rule', zeroline: false, linecolor: '--rule', ...own });
+  const draw = (place, { data, layout }) => Plotly.react(place, resolved(data), resolved({
+    paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
+    font: { family: 'system-ui, sans-serif', size: 12.5, color: '--ink' },
+    hoverlabel: { bgcolor: '--card', font: { color: '--ink' }, bordercolor: '--rule' },
+    ...layout, ...(layout.xaxis && { xaxis: axis(layout.xaxis), yaxis: axis(layout.yaxis) }),
+  }), config);
+
+  const panels = [...document.querySelectorAll('.panel')].map((panel) => {
+    const { scene, map, stages } = drawn.panels[panel.dataset.panel];
+    const [grids, truth] = [scene.grids.map(unpacked), unpacked(scene.truth)];
+    const place = panel.querySelector('.scene');
+    const turn = panel.querySelector('.turn');
+    const slider = panel.querySelector('input[type=range]');
+    const self = { place, turning: !still.matches, visible: false, angle: 0.6, at: grids.length - 1 };
+
+    const chosen = () => panel.querySelector('.after input:checked').value;
+    self.drawScene = () => {
+      const cells = chosen() === 'truth' ? truth : grids[self.at];
+      const threshold = Number(slider.value) === Number(slider.defaultValue)
+        ? scene.threshold : Number(slider.value);
+      const mesh = surface(cells ?? [], scene.side, chosen() === 'truth' ? 0.5 : threshold);
+      panel.querySelector('output').textContent = Number(slider.value).toFixed(2);
+      const fit = truth && cells && chosen() !== 'truth'
+        ? ` · IoU ${overlap(cells, truth, threshold).toFixed(2)}` : '';
+      panel.querySelector('.count').textContent = cells
+        ? `${mesh.count} cells${chosen() === 'truth' ? ' of the true shape' : ''}${fit}`
+        : 'no shape is known after this view';
+      draw(place, { data: sceneTraces(mesh, scene.cameras, self.at), layout: { ...SCENE_LAYOUT,
+        scene: { ...SCENE_LAYOUT.scene, camera: { eye: eyeAt(self.angle),
+          center: { x: 0, y: 0, z: -0.08 } } } } });
+    };
+    self.drawRest = () => {
+      const shown = map.data.filter((trace) => !trace.meta || trace.meta.of === self.at);
+      draw(panel.querySelector('.map'), { data: shown, layout: map.layout });
+      for (const chart of panel.querySelectorAll('[data-own=stages]')) draw(chart, stages);
+    };
+    self.setTurning = (on) => {
+      self.turning = on;
+      turn.textContent = on ? 'Pause' : 'Turn';
+      turn.setAttribute('aria-pressed', on);
+    };
+    const choose = () => {
+      if (chosen() !== 'truth') self.at = Number(chosen());
+      panel.querySelectorAll('.film li').forEach((item, i) => item.classList.toggle('chosen', i === self.at));
+      self.drawScene();
+      self.drawRest();
+    };
+    panel.querySelector('.after').addEventListener('change', choose);
+    slider.addEventListener('input', self.drawScene);
+    turn.addEventListener('click', () => self.setTurning(!self.turning));
+    place.addEventListener('pointerdown', () => self.setTurning(false));
+    new IntersectionObserver(([entry]) => { self.visible = entry.isIntersecting; }).observe(place);
+    self.setTurning(self.turning);
+    choose();
+    return self;
+  });
+
+  const drawShared = () => document.querySelectorAll('[data-shared]').forEach(
+    (chart) => draw(chart, drawn.shared[chart.dataset.shared]));
+  drawShared();
+  dark.addEventListener('change', () => {
+    drawShared();
+    for (const panel of panels) { panel.drawScene(); panel.drawRest(); }
+  });
+
+  let last = performance.now();
+  const step = async (now) => {
+    for (const panel of panels) {
+      if (!panel.turning || !panel.visible || document.hidden) continue;
+      panel.angle += Math.min(now - last, 100) * 0.00035;
+      await Plotly.relayout(panel.place, { 'scene.camera.eye': eyeAt(panel.angle) });
+    }
+    last = now;
+    requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
+  document.documentElement.dataset.ready = 'yes';
+})().catch((error) => {
+  const trouble = document.getElementById('trouble');
+  trouble.textContent = `The drawings could not be made: ${error.message}. A browser of 2023 or later is needed.`;
+  trouble.hidden = false;
+});

@@ -1,0 +1,176 @@
+"""
+The turntable from above: images around it, the object in it, goals and what the planner thought.
+
+Lengths are of the map: the ring of cameras has the radius 1. The object's front, +x, points down.
+A trace with a `meta` of `{'of': k}` belongs to view k, from 0, and shows while that is chosen.
+"""
+
+from collections.abc import Sequence
+import math
+from typing import Any
+
+from active_recon.bags.run import RecordedGoal, RecordedView
+from active_recon.cameras import azimuth_difference
+from active_recon.report.charts import Figure, view_color
+from active_recon.report.images import data_uri
+from active_recon.report.subject import degrees, shown_grid, Subject
+import numpy as np
+from numpy.typing import NDArray
+
+_OBJECT = 1.1  # side of the object's cube
+_GOALS = 1.12
+_PETAL = (1.22, 1.56)  # from the worst score to the best
+_THUMBNAILS = 1.95
+_THUMBNAIL = 0.62
+_REACH = _THUMBNAILS + _THUMBNAIL / 2 + 0.04
+_TOGETHER = math.radians(8)
+
+
+def turntable_map(subject: Subject) -> Figure:
+    """Return the map of one episode."""
+    azimuths = [view.camera.azimuth for view in subject.views]
+    spread = spread_out(azimuths)
+    side = min(_THUMBNAIL, 0.8 * 2 * math.pi * _THUMBNAILS / max(len(azimuths), 1))
+    axis = {'range': [-_REACH, _REACH], 'visible': False, 'fixedrange': True}
+    data: list[dict[str, Any]] = []
+    for index, view in enumerate(subject.views):
+        own = [*_from_above(view, subject.threshold), *_decision(subject.goals[index])]
+        data += [{**trace, 'meta': {'of': index}} for trace in own]
+    data += _path(azimuths)
+    data += [_goal(goal.azimuth, 8, '--quiet') for goal in subject.goals if goal is not None]
+    data += [_camera(number, azimuth, azimuths[:number - 1])
+             for number, azimuth in enumerate(azimuths, 1)]
+    return {
+        'data': data,
+        'layout': {
+            'showlegend': False, 'margin': {'l': 0, 'r': 0, 't': 0, 'b': 0},
+            'xaxis': axis, 'yaxis': {**axis, 'scaleanchor': 'x'},
+            'images': [_thumbnail(view.image, at, side)
+                       for view, at in zip(subject.views, spread, strict=True)],
+            'shapes': [
+                {'type': 'circle', 'x0': -1, 'x1': 1, 'y0': -1, 'y1': 1, 'layer': 'below',
+                 'line': {'color': '--rule', 'width': 1.5}, 'fillcolor': '--plate'},
+                *(_leader(number, azimuth, at) for number, (azimuth, at) in enumerate(
+                    zip(azimuths, spread, strict=True), 1)),
+                *(_frame(number, at, side) for number, at in enumerate(spread, 1))],
+            'annotations': [{'x': 0, 'y': -0.67, 'text': 'front ▾', 'showarrow': False,
+                             'font': {'size': 11, 'color': '--quiet'}}],
+        },
+    }
+
+
+def place(azimuth: float, radius: float) -> tuple[float, float]:
+    """Return x to the right and y up of a point on the map."""
+    return radius * math.sin(azimuth), -radius * math.cos(azimuth)
+
+
+def spread_out(azimuths: Sequence[float]) -> list[float]:
+    """Return azimuths (radians) near those given, moved apart so that images do not overlap."""
+    apart = min(math.radians(27), 2 * math.pi / max(len(azimuths), 1))
+    spread = np.array(azimuths, np.float64)
+    for _ in range(400):
+        away = azimuth_difference(spread[:, None], spread)
+        # Of two at one place the later gives way counter-clockwise
+        earlier = np.tri(len(spread), k=-1, dtype=bool)
+        sign = np.where(away == 0, np.where(earlier, 1, -1), np.sign(away))
+        push = np.maximum(apart - np.abs(away), 0)
+        np.fill_diagonal(push, 0)
+        if push.max(initial=0) < 1e-3:
+            break
+        spread += 0.25 * (sign * push).sum(axis=1)
+    return [float(azimuth) for azimuth in spread]
+
+
+def _from_above(view: RecordedView, threshold: float) -> list[dict[str, Any]]:
+    grid = shown_grid(view)
+    if grid is None:
+        return []
+    seen: NDArray[np.bool_] = np.asarray(grid.occupied(threshold).any(axis=2))
+    across = ((np.arange(len(seen)) + 0.5) / len(seen) - 0.5) * _OBJECT
+    return [{
+        'type': 'heatmap', 'z': seen.astype(int).tolist(), 'x': across.tolist(),
+        'y': (-across).tolist(), 'zmin': 0, 'zmax': 1, 'showscale': False, 'hoverinfo': 'skip',
+        'colorscale': [[0, 'rgba(0,0,0,0)'], [1, '--object']],
+    }]
+
+
+def _decision(goal: RecordedGoal | None) -> list[dict[str, Any]]:
+    """Return the goal amid a petal for each candidate azimuth, the longer the better its score."""
+    if goal is None:
+        return []
+    chosen = _goal(goal.azimuth, 15, '--goal')
+    if goal.candidates is None or goal.scores is None:
+        return [chosen]
+    finite = np.isfinite(goal.scores) & np.isfinite(goal.candidates)
+    azimuths, scores = goal.candidates[finite], goal.scores[finite].astype(np.float64)
+    if not len(scores):
+        return [chosen]
+    shares = (scores - scores.min()) / (np.ptp(scores) or 1.0)
+    x: list[float | None] = []
+    y: list[float | None] = []
+    tips, words = [], []
+    half = 0.4 * 2 * math.pi / len(scores)
+    for azimuth, score, share in zip(azimuths.tolist(), scores.tolist(), shares.tolist(),
+                                     strict=True):
+        inner, outer = _PETAL[0], _PETAL[0] + 0.03 + share * (_PETAL[1] - _PETAL[0])
+        corners = [place(azimuth + turn, radius) for turn, radius in (
+            (-half, inner), (-half, outer), (0, outer), (half, outer), (half, inner),
+            (-half, inner))]
+        x += [*(corner[0] for corner in corners), None]
+        y += [*(corner[1] for corner in corners), None]
+        tips.append(place(azimuth, (inner + outer) / 2))
+        words.append(f'{degrees(azimuth)}°: score {score:.4g}')
+    return [
+        {'type': 'scatter', 'mode': 'lines', 'x': x, 'y': y, 'fill': 'toself',
+         'fillcolor': '--score', 'line': {'width': 0}, 'hoverinfo': 'skip'},
+        {'type': 'scatter', 'mode': 'markers', 'x': [tip[0] for tip in tips],
+         'y': [tip[1] for tip in tips], 'marker': {'size': 14, 'opacity': 0},
+         'text': words, 'hovertemplate': '%{text}<extra></extra>'},
+        chosen,
+    ]
+
+
+def _path(azimuths: Sequence[float]) -> list[dict[str, Any]]:
+    points = [place(azimuth, 0.93) for azimuth in azimuths]
+    return [{
+        'type': 'scatter', 'mode': 'lines+markers', 'hoverinfo': 'skip',
+        'x': [point[0] for point in points], 'y': [point[1] for point in points],
+        'line': {'color': '--quiet', 'width': 1.2, 'dash': 'dot'},
+        'marker': {'symbol': 'arrow', 'angleref': 'previous', 'size': 9, 'color': '--quiet'},
+    }] if len(points) > 1 else []
+
+
+def _goal(azimuth: float, size: int, color: str) -> dict[str, Any]:
+    x, y = place(azimuth, _GOALS)
+    return {'type': 'scatter', 'mode': 'markers', 'x': [x], 'y': [y], 'cliponaxis': False,
+            'marker': {'symbol': 'diamond-open', 'size': size, 'color': color,
+                       'line': {'width': 2}},
+            'hovertemplate': f'goal at {degrees(azimuth)}°<extra></extra>'}
+
+
+def _camera(number: int, azimuth: float, earlier: Sequence[float]) -> dict[str, Any]:
+    again = int((np.abs(azimuth_difference(earlier, azimuth)) < _TOGETHER).sum())
+    x, y = place(azimuth, 1 - 0.17 * min(again, 4))
+    return {'type': 'scatter', 'mode': 'markers+text', 'x': [x], 'y': [y], 'text': [str(number)],
+            'textfont': {'color': '--on-view', 'size': 12},
+            'marker': {'size': 22, 'color': view_color(number)},
+            'hovertemplate': f'view {number} at {degrees(azimuth)}°<extra></extra>'}
+
+
+def _leader(number: int, azimuth: float, at: float) -> dict[str, Any]:
+    (x0, y0), (x1, y1) = place(azimuth, 1.0), place(at, _THUMBNAILS)
+    return {'type': 'line', 'x0': x0, 'y0': y0, 'x1': x1, 'y1': y1, 'layer': 'below',
+            'line': {'color': view_color(number), 'width': 1.2}}
+
+
+def _thumbnail(image: NDArray[np.uint8], at: float, side: float) -> dict[str, Any]:
+    x, y = place(at, _THUMBNAILS)
+    return {'source': data_uri(image, 160), 'xref': 'x', 'yref': 'y', 'x': x, 'y': y,
+            'sizex': side, 'sizey': side, 'xanchor': 'center', 'yanchor': 'middle',
+            'sizing': 'contain', 'layer': 'above'}
+
+
+def _frame(number: int, at: float, side: float) -> dict[str, Any]:
+    x, y = place(at, _THUMBNAILS)
+    return {'type': 'rect', 'x0': x - side / 2, 'x1': x + side / 2, 'y0': y - side / 2,
+            'y1': y + side / 2, 'line': {'color': view_color(number), 'width': 2.5}}

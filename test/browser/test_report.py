@@ -1,0 +1,134 @@
+"""The report in a real browser: it is drawn, it answers, and it complains of nothing."""
+
+from active_recon.report.page import report_page, write_page
+from active_recon.report.subject import letters, Subject
+from active_recon.report.truth import known_truth
+import pytest
+from report_runs import recorded_run
+
+LAPTOP, PHONE = (1280, 800), (390, 844)
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope='module')
+def pages(tmp_path_factory):
+    """Return the URLs of a page of one run and of one of three."""
+    folder = tmp_path_factory.mktemp('pages')
+    runs = [recorded_run('chair'), recorded_run('chair', 'uniform', 3), recorded_run('car')]
+    subjects = [Subject(letter, run, run.episodes[0], known_truth(run))
+                for letter, run in zip(letters(), runs, strict=False)]
+    for name, shown in (('one', subjects[:1]), ('three', subjects)):
+        write_page(report_page(shown), folder / f'{name}.html')
+    return {name: (folder / f'{name}.html').as_uri() for name in ('one', 'three')}
+
+
+@pytest.fixture
+def opened(chromium, pages):
+    """Return a function that opens a page, waits until it is drawn, and lets it stand still."""
+    def opened(name='one', size=LAPTOP, scheme='light'):
+        chromium.open(pages[name], size, scheme)
+        chromium.until(lambda: chromium.run('return document.documentElement.dataset.ready'),
+                       'the drawings')
+        chromium.run('document.querySelectorAll(".turn").forEach((button) => button.click())')
+        return chromium
+    return opened
+
+
+def button(page):
+    return page.run('return document.querySelector(".turn").textContent')
+
+
+def shape(page):
+    """Return the first 3D view as it is seen."""
+    page.run('document.querySelector(".scene").scrollIntoView()')
+    page.driver.execute_async_script(  # two frames: what was asked for has been drawn
+        'requestAnimationFrame(() => requestAnimationFrame(arguments[0]))')
+    left, top, width, height = page.run(
+        'const box = document.querySelector(".scene").getBoundingClientRect();'
+        'return [box.left, box.top, box.width, box.height].map(Math.round)')
+    return page.picture()[max(top, 0):top + height, left:left + width]
+
+
+def cells(page):
+    return int(page.run('return document.querySelector(".count").textContent').split()[0])
+
+
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+@pytest.mark.parametrize('size', [LAPTOP, PHONE], ids=['laptop', 'phone'])
+@pytest.mark.parametrize('name', ['one', 'three'])
+def test_page_is_drawn_without_complaint_and_fits_its_window(opened, name, size, scheme):
+    page = opened(name, size, scheme)
+    picture = shape(page).astype(int)
+    blue = picture[..., 2] - picture[..., 0]
+    assert (blue > 40).mean() > 0.02  # the object, amid grey
+    drawn = page.run('return [...document.querySelectorAll(".chart, .map")].map((each) => '
+                     'each.querySelectorAll("path, image").length)')
+    assert min(drawn) > 3
+    assert page.run('return document.documentElement.scrollWidth') <= size[0]
+    assert page.run('return document.getElementById("trouble").hidden')
+    assert page.errors() == []
+
+
+def test_another_view_shows_another_shape_and_what_was_thought_then(opened, changed_share):
+    page = opened()
+    seen = []
+    for index in (4, 0, 5):  # the last view, the first, and the truth
+        page.run('document.querySelectorAll(".after input")[arguments[0]].click()', index)
+        goal = page.run('return document.querySelector(".map").data.find((trace) => '
+                        'trace.meta && trace.marker?.symbol === "diamond-open").hovertemplate')
+        seen.append((shape(page), cells(page), goal))
+    (last, last_cells, last_goal), (first, first_cells, first_goal), (true, true_cells, _) = seen
+    assert changed_share(last, first) > 0.01
+    assert changed_share(first, true) > 0.01
+    assert len({last_cells, first_cells, true_cells}) == 3
+    assert last_goal != first_goal
+
+
+def test_page_turns_dark_with_its_reader(opened, changed_share):
+    page = opened()
+    light = shape(page)
+    page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+        'features': [{'name': 'prefers-color-scheme', 'value': 'dark'}]})
+    page.until(lambda: changed_share(light, shape(page)) > 0.9, 'the dark')
+    ink = page.run('return [document.body, document.querySelector(".chart .xtick text")].map('
+                   '(each) => getComputedStyle(each)[each === document.body ? "color" : "fill"])')
+    assert ink[0] == ink[1] == 'rgb(230, 231, 234)'
+
+
+def test_choosing_an_image_chooses_its_view(opened):
+    page = opened()
+    page.run('document.querySelectorAll(".film label")[1].click()')
+    assert page.run('return document.querySelector(".after input:checked").value') == '1'
+    assert page.run('return [...document.querySelectorAll(".film li")].findIndex((item) => '
+                    'item.classList.contains("chosen"))') == 1
+
+
+def test_higher_threshold_leaves_fewer_cells(opened, changed_share):
+    page = opened()
+    slide = ('const slider = document.querySelector("input[type=range]"); slider.value = '
+             'arguments[0]; slider.dispatchEvent(new Event("input", {bubbles: true}))')
+    before, counts = shape(page), []
+    for threshold in (0.1, 0.3, 0.6, 0.9):
+        page.run(slide, threshold)
+        counts.append(cells(page))
+        assert page.run('return document.querySelector("output").textContent') == (
+            f'{threshold:.2f}')
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] < counts[0]
+    assert changed_share(before, shape(page)) > 0.01
+
+
+def test_at_the_recorded_threshold_just_the_recorded_cells_are_drawn(opened):
+    recorded = recorded_run('chair').episodes[0].views[-1].occupied
+    assert cells(opened()) == recorded.occupied(0).sum()
+
+
+def test_object_turns_until_it_is_paused(opened, changed_share):
+    page = opened()
+    assert button(page) == 'Turn'
+    before = shape(page)
+    assert changed_share(before, shape(page)) < 0.001
+    page.run('document.querySelector(".turn").click()')
+    assert button(page) == 'Pause'
+    page.until(lambda: changed_share(before, shape(page)) > 0.02, 'the object to turn')
+    assert page.errors() == []

@@ -1,0 +1,87 @@
+"""Warnings: a clean run has none, and each is there only where it was earned."""
+
+from dataclasses import replace
+import math
+
+from active_recon.bags.run import RecordedGoal
+from active_recon.cameras import orbit_camera
+from active_recon.report.findings import findings
+from active_recon.report.subject import Subject
+import pytest
+from report_runs import changed, recorded_run
+
+
+@pytest.fixture(scope='module')
+def run():
+    return recorded_run(policy='uniform', views=3)
+
+
+def said(run, level='warning', **known):
+    return [finding.text for finding in findings(Subject('A', run, run.episodes[0], **known))
+            if finding.level == level]
+
+
+def counted(run, **counts):
+    heard = {'images': 80, 'images_unused': 77, 'views': 3}
+    return replace(run, counters={'/reconstructor': heard | {
+        key.replace('__', '/'): count for key, count in counts.items()}})
+
+
+def test_clean_run_has_no_warnings(run):
+    assert said(run) == []
+
+
+def test_late_poses_and_dropped_images_are_told_with_their_number(run):
+    assert said(counted(run, refused__no_pose=0)) == []
+    [warning] = said(counted(run, refused__no_pose=7))
+    assert warning.startswith('7 images were dropped')
+    assert 'late poses' in warning
+
+
+def test_refusal_of_a_kind_unknown_here_is_told_by_its_name(run):
+    [warning] = said(counted(run, refused__gremlins=2))
+    assert '2 messages were refused (gremlins)' in warning
+
+
+@pytest.mark.parametrize(('reason', 'level', 'words'), [
+    ('max_views', 'note', 'as many views'),
+    ('entropy_settled', 'note', 'by itself'),
+    ('battery', 'note', 'battery'),
+    ('', 'warning', 'never said that it was done'),
+])
+def test_reason_to_stop_is_told(run, reason, level, words):
+    assert any(words in text for text in said(changed(run, done=reason), level))
+
+
+def test_run_without_a_planner_is_not_cut_off(run):
+    views = [replace(view, goal=None) for view in run.episodes[0].views]
+    unplanned = changed(run, done='', first_goal=None, views=views)
+    assert said(unplanned) == []
+    assert any('No planner' in text for text in said(unplanned, 'note'))
+
+
+@pytest.mark.parametrize(('off_deg', 'warned'), [(5, False), (12, True), (-12, True)])
+def test_view_off_its_goal_is_told_beyond_the_tolerance(run, off_deg, warned):
+    azimuth = run.episodes[0].views[0].camera.azimuth + math.radians(off_deg)
+    asked = RecordedGoal(azimuth, 0, None, None, 0)
+    assert (said(changed(run, first_goal=asked))
+            == ['View 1 was taken 12° away from its goal.'] * warned)
+
+
+@pytest.mark.parametrize(('elevation_deg', 'warned'), [(30, False), (34, False), (45, True)])
+def test_other_elevation_is_told(run, elevation_deg, warned):
+    view = run.episodes[0].views[0]
+    camera = orbit_camera(view.camera.azimuth, math.radians(elevation_deg))
+    assert bool(said(changed(run, views=[replace(view, camera=camera)]))) == warned
+
+
+def test_shape_that_was_not_recorded_is_told(run):
+    assert any('abc' in text for text in said(run, 'note', computed='the weights abc'))
+    assert not any('weights' in text for text in said(run, 'note'))
+
+
+def test_warnings_come_before_notes(run):
+    levels = [finding.level for finding in findings(
+        Subject('A', counted(run, refused__no_pose=1), run.episodes[0]))]
+    assert levels == sorted(levels, key=['warning', 'note'].index)
+    assert set(levels) == {'warning', 'note'}

@@ -1,0 +1,87 @@
+"""The map of the turntable: where things stand on it, and that petals say what scores say."""
+
+from dataclasses import replace
+import math
+
+from active_recon.bags.run import RecordedGoal
+from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.report.subject import Subject
+from active_recon.report.turntable_map import place, spread_out, turntable_map
+import numpy as np
+import pytest
+from report_runs import changed, recorded_run
+
+
+@pytest.fixture(scope='module')
+def run():
+    return recorded_run(policy='uniform', views=3)
+
+
+def drawn(run):
+    return turntable_map(Subject('A', run, run.episodes[0]))
+
+
+def petals(run, scores):
+    """Return the outer ends of the first view's petals, (24,) radii."""
+    goal = RecordedGoal(0.0, 0, AZIMUTHS, np.asarray(scores, np.float32), 0)
+    [trace] = [trace for trace in drawn(changed(run, first_goal=goal))['data']
+               if trace.get('fill') == 'toself' and trace['meta'] == {'of': 0}]
+    radii = [math.hypot(x, y) if x is not None else 0.0
+             for x, y in zip(trace['x'], trace['y'], strict=True)]
+    return np.array(radii).reshape(24, -1).max(axis=1)
+
+
+@pytest.mark.parametrize(('azimuth_deg', 'at'), [
+    (0, (0, -1)), (90, (1, 0)), (180, (0, 1)), (270, (-1, 0))])
+def test_front_is_below_and_azimuths_run_counter_clockwise(azimuth_deg, at):
+    assert place(math.radians(azimuth_deg), 1) == pytest.approx(at)
+
+
+@pytest.mark.parametrize('azimuths', [
+    [0.0], [0.0, 0.0, 0.0], [0.1, 6.2, 0.0, 3.0], list(np.linspace(0, 6, 12)), [1.0] * 12])
+def test_images_move_apart(azimuths):
+    spread = spread_out(azimuths)
+    away = np.abs(azimuth_difference(np.array(spread)[:, None], spread))
+    np.fill_diagonal(away, np.inf)
+    assert away.min() > math.radians(23)
+
+
+def test_images_with_room_stay_where_their_cameras_were():
+    azimuths = [0.0, 1.0, 2.5, 5.0]
+    assert spread_out(azimuths) == azimuths
+
+
+def test_longer_petals_are_better_scores(run):
+    scores = np.random.default_rng(0).normal(size=24)
+    assert (np.argsort(petals(run, scores)) == np.argsort(scores)).all()
+
+
+def test_equal_scores_give_equal_petals(run):
+    assert np.ptp(petals(run, np.full(24, 3.0))) < 1e-9
+
+
+def test_every_view_shows_its_image_its_goal_and_its_number(run):
+    figure = drawn(run)
+    assert len(figure['layout']['images']) == 3
+    numbers = [trace['text'][0] for trace in figure['data']
+               if trace.get('mode') == 'markers+text']
+    assert numbers == ['1', '2', '3']
+    large = [trace['meta']['of'] for trace in figure['data']
+             if trace.get('marker', {}).get('symbol') == 'diamond-open' and 'meta' in trace]
+    assert large == [0, 1, 2]
+
+
+def test_view_that_came_back_to_a_place_stands_beside_the_first(run):
+    view = run.episodes[0].views[0]
+    figure = drawn(changed(run, views=[view, view]))
+    first, second = (trace for trace in figure['data'] if trace.get('mode') == 'markers+text')
+    assert (first['x'], first['y']) != (second['x'], second['y'])
+
+
+def test_goal_without_scores_is_still_drawn(run):
+    goal = RecordedGoal(1.0, 0, None, None, 0)
+    views = [replace(view, goal=None) for view in run.episodes[0].views]
+    figure = drawn(changed(run, first_goal=goal, views=views))
+    assert not any(trace.get('fill') == 'toself' for trace in figure['data'])
+    assert sum(trace.get('marker', {}).get('symbol') == 'diamond-open'
+               for trace in figure['data']) == 2  # small, and large while view 1 is chosen

@@ -1,0 +1,182 @@
+"""The page as a file: whole, closed to the network, the same every time, and safe to open."""
+
+from base64 import b64decode
+from dataclasses import replace
+import gzip
+from html.parser import HTMLParser
+import json
+import math
+import os
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+from active_recon.bags.run import TopicSummary
+from active_recon.errors import ConfigError, DataError
+from active_recon.report.page import MOST_SUBJECTS, report_page, write_page
+from active_recon.report.subject import letters, Subject
+from active_recon.report.truth import known_truth
+import numpy as np
+import pytest
+from report_runs import changed, recorded_run
+
+EVIL = '</script><script id="evil">alert(1)</script><b title=\'"&'
+
+
+@pytest.fixture(scope='module')
+def run():
+    return recorded_run('chair', views=5)
+
+
+def page_of(*runs):
+    return report_page([Subject(letter, run, run.episodes[0], known_truth(run))
+                        for letter, run in zip(letters(), runs, strict=False)])
+
+
+class Elements(HTMLParser):
+    """All start tags with their attributes, and what text is not in a script or a style."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.text, self._inside = [], '', ''
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self._inside = tag
+
+    def handle_endtag(self, _tag):
+        self._inside = ''
+
+    def handle_data(self, data):
+        self.text += '' if self._inside in ('script', 'style') else data
+
+
+def drawn_in(page):
+    """Return what the page's script draws from."""
+    packed = page.split('id="drawn">')[1].split('<')[0]
+    return json.loads(gzip.decompress(b64decode(packed)))
+
+
+def test_page_of_five_views_is_small_and_quickly_made(run):
+    began = time.monotonic()
+    page = page_of(run)
+    assert time.monotonic() - began < 5
+    assert len(page.encode()) < 6e6
+
+
+def test_nothing_is_fetched(run):
+    elements = Elements(page_of(run))
+    for tag, attributes in elements.tags:
+        for name in ('src', 'href', 'srcset', 'action', 'data'):
+            assert attributes.get(name, 'data:').startswith('data:'), (tag, attributes)
+    [policy] = [attributes['content'] for tag, attributes in elements.tags
+                if attributes.get('http-equiv') == 'Content-Security-Policy']
+    assert "default-src 'none'" in policy
+    assert not any(word in policy for word in ('http', '*', 'connect-src'))
+
+
+def test_same_run_gives_the_same_bytes_in_another_process(run):
+    code = ('import sys; from test_report_page import *; '
+            "sys.stdout.write(page_of(recorded_run('chair', views=5)))")
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    other = subprocess.run([sys.executable, '-c', code], capture_output=True, check=True,
+                           text=True, env={**os.environ, 'PYTHONPATH': paths,
+                                           'PYTHONHASHSEED': '7'}).stdout
+    assert other == page_of(run)
+
+
+def test_what_comes_from_a_bag_is_text_and_never_markup(run):
+    evil = replace(
+        changed(run, id=EVIL, done=EVIL), path=Path(EVIL.replace('/', '')),
+        provenance={'policy': EVIL, 'object': EVIL, EVIL: EVIL},
+        parameters={EVIL: {EVIL: EVIL}}, counters={EVIL: {f'refused/{EVIL}': 3}},
+        topics=[TopicSummary(EVIL, EVIL, 1)])
+    plain = replace(run, provenance={}, parameters={'a': {'b': 'c'}}, counters={'a': {'b': 1}},
+                    topics=run.topics[:1])
+    for count in (1, 2):
+        elements, clean = Elements(page_of(*[evil] * count)), Elements(page_of(*[plain] * count))
+        assert not any(attributes.get('id') == 'evil' for _, attributes in elements.tags)
+        assert elements.text.count(EVIL) >= 9 * count
+        scripts, honest = (sum(tag == 'script' for tag, _ in each.tags)
+                           for each in (elements, clean))
+        assert scripts == honest
+
+
+def test_page_draws_just_what_was_recorded(run):
+    panel = drawn_in(page_of(run))['panels'][0]['scene']
+    for packed, view in zip(panel['grids'], run.episodes[0].views, strict=True):
+        cells = np.frombuffer(b64decode(packed), '<u2').reshape([panel['side']] * 3) / 65535
+        np.testing.assert_allclose(cells, view.reconstruction.occupancy, atol=1 / 65535)
+        assert ((cells > panel['threshold']) == view.occupied.occupied(0)).all()
+
+
+def test_figures_known_of_a_run_stand_on_its_page(run):
+    text = Elements(page_of(run)).text
+    for word in (run.path.name, run.provenance['weights_sha256'], 'attention', 'Chair',
+                 '/camera/image_raw', 'goal_tolerance'):
+        assert word in text
+
+
+def test_several_runs_are_compared_in_a_table_with_a_row_each(run):
+    runs = [run, replace(run, path=Path('another_bag')), recorded_run('car', 'farthest', 2)]
+    elements = Elements(page_of(*runs))
+    assert sum(tag == 'article' for tag, _ in elements.tags) == 3
+    assert all(run.path.name in elements.text for run in runs)
+    assert 'side by side' in elements.text
+    assert 'view limit' in elements.text
+
+
+def test_bag_with_hardly_anything_in_it_still_gives_a_page(run):
+    bare = [replace(view, reconstruction=None, occupied=None, latent=None, entropy=None, goal=None,
+                    received={}) for view in run.episodes[0].views[:1]]
+    stranger = replace(changed(run, views=bare, first_goal=None, id='', done=''), provenance={},
+                       parameters={}, counters={}, topics=[], begin=0, end=0)
+    page = page_of(stranger)
+    assert 'An object, rebuilt from 1 view' in page
+    assert 'no loop' in page
+    assert 'data-own="stages"' not in page
+
+
+def test_figure_that_is_not_finite_is_left_out(run):
+    views = [replace(view, entropy=math.nan, goal=view.goal and replace(
+        view.goal, scores=np.full(24, np.nan, np.float32))) for view in run.episodes[0].views]
+    page = page_of(changed(run, views=views))
+    assert 'NaN' not in json.dumps(drawn_in(page))
+    assert 'nan' not in Elements(page).text
+
+
+def test_no_episode_and_too_many_are_refused(run):
+    with pytest.raises(DataError, match='expected an episode with views'):
+        report_page([])
+    with pytest.raises(ConfigError, match=f'at most {MOST_SUBJECTS}'):
+        report_page([Subject('A', run, run.episodes[0])] * (MOST_SUBJECTS + 1))
+
+
+def test_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = tmp_path / 'deep' / 'page.html'
+    write_page('first', path)
+    assert path.read_text() == 'first'
+
+    def full(_self, _target):
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(Path, 'replace', full)
+    with pytest.raises(DataError, match='No space left'):
+        write_page('second', path)
+    assert path.read_text() == 'first'
+    assert [each.name for each in path.parent.iterdir()] == ['page.html']
+
+
+def test_letters_go_on_beyond_the_alphabet():
+    every = list(letters())
+    assert every[:2] == ['A', 'B']
+    assert every[25:28] == ['Z', 'AA', 'AB']
+    assert len(set(every)) == len(every)
+
+
+def test_page_of_recorded_shapes_does_not_wait_for_torch():
+    code = ('import sys, active_recon.report.page, active_recon.report.truth; '
+            "sys.exit('torch' in sys.modules)")
+    assert subprocess.run([sys.executable, '-c', code], check=False).returncode == 0
