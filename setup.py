@@ -6,7 +6,7 @@ import os
 from setuptools import find_packages, setup
 
 NAME = 'active_recon'
-NODES = ('reconstructor', 'recorder', 'turntable_camera', 'view_planner')
+NODES = ('reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer')
 EXECUTABLES = {
     'active-recon': f'{NAME}.cli.main', **{node: f'{NAME}.nodes.{node}' for node in NODES}}
 
@@ -55,6 +55,7 @@ setup(
         'torch>=2.5,<3',
         'trimesh>=4.4,<6',
         'typer>=0.12,<1',
+        'viser>=1.1,<2',
         *ROS_WHEELS,
     ],
     extras_require={

@@ -8,13 +8,14 @@ from active_recon.cli.making import dataset, render
 from active_recon.cli.paper import paper
 from active_recon.cli.sheet import sheet
 from active_recon.cli.train import train
+from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
 import typer
 
 app = typer.Typer(
     help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, render, train, evaluate, paper, sheet):
+for command in (demo, view, render, train, evaluate, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 
