@@ -1,8 +1,10 @@
 """`active-recon view`: the loop in the browser, live or from a bag."""
 
+from contextlib import suppress
 import os
 from pathlib import Path
 import sys
+import time
 from typing import Annotated
 
 from active_recon.viewer.address import DEFAULT_PORT, HIGHEST_PORT
@@ -28,4 +30,22 @@ def view(
         # The node takes this process's place, and so hears its Ctrl-C
         os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.viewer',
                                   '--ros-args', '-p', f'port:={port}'])
-    raise NotImplementedError
+    _step_through(bag, port)
+
+
+def _step_through(bag: Path, port: int) -> None:
+    from active_recon.bags.reading import read_run
+    from active_recon.demo.interrupts import held_interrupts
+    from active_recon.viewer.page import UPDATES_PER_S
+    from active_recon.viewer.playback import Playback
+
+    playback = Playback(read_run(bag), port)
+    try:
+        typer.echo(f'{bag} is shown at {playback.page.url} until Ctrl-C')
+        with suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked:
+            while True:
+                raise_if_asked()
+                playback.draw(time.monotonic())
+                time.sleep(1 / UPDATES_PER_S)
+    finally:
+        playback.page.close()

@@ -21,7 +21,7 @@ _BAR_COLOR: Color = (176, 186, 204)
 _FLOOR = -0.5  # the grid's lowest side
 _BAR_RADIUS = 1.15  # outside of the cube, inside the cameras
 _BAR_HEIGHT = 0.3
-_FRUSTUM = 0.26
+_FRUSTUM = 0.22
 _BOX: Any = trimesh.creation.box()
 _GAP = 0.93  # of a cell: the seams let the single voxels be told apart
 

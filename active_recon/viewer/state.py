@@ -68,21 +68,23 @@ class Observer:
     def __init__(self) -> None:
         self.state = LoopState()
         self._begin = 0
-        self._goal_stamp = -1
-        self._done_stamp = -1
+        self._goal_stamp = self._scores_stamp = self._done_stamp = -1
 
     def begin_episode(self, identity: str, begin: int) -> None:
         """Begin an episode, unless it is the one that is known; what belongs to it stays."""
         if identity == self.state.episode:
             return
-        self._begin = begin
+        if begin < self._begin:  # time has gone back, as where a recording is played
+            self._goal_stamp = self._scores_stamp = self._done_stamp = -1
         known = self.state
-        views = tuple(view for view in known.views if view.stamp >= begin)
-        asked = self._goal_stamp >= begin
+        views = tuple(view for view in known.views if view.stamp >= begin >= self._begin)
+        self._begin = begin
         self.state = LoopState(
             identity, views, known.grid if views else None, known.threshold if views else None,
-            known.camera, known.picture, known.goal if asked else None,
-            known.scores if asked else None, known.done if views else '')
+            known.camera, known.picture,
+            known.goal if self._goal_stamp >= begin else None,
+            known.scores if self._scores_stamp >= begin else None,
+            known.done if self._done_stamp >= begin else '')
 
     def see(self, camera: Camera | None = None, picture: NDArray[np.uint8] | None = None) -> None:
         """Note where the camera is, and what it sees, (H, W, 3) uint8 RGB."""
@@ -90,12 +92,16 @@ class Observer:
             self.state, camera=self.state.camera if camera is None else camera,
             picture=self.state.picture if picture is None else picture)
 
-    def take_view(self, view: TakenView, grid: VoxelGrid, threshold: float | None) -> None:
+    def take_view(self, view: TakenView, grid: VoxelGrid | None,
+                  threshold: float | None) -> None:
         """Add a view and what is known after it."""
-        if view.stamp < self._begin or any(view.stamp == old.stamp for old in self.state.views):
+        known = self.state.views
+        if view.stamp < self._begin or any(view.stamp == old.stamp for old in known):
             return
-        self.state = replace(self.state, views=(*self.state.views, view), grid=grid,
-                             threshold=threshold)
+        views = tuple(sorted((*known, view), key=lambda taken: taken.stamp))
+        self.state = replace(self.state, views=views)
+        if views[-1] is view:
+            self.state = replace(self.state, grid=grid, threshold=threshold)
 
     def set_goal(self, stamp: int, camera: Camera) -> None:
         """Note a goal; the same stamp again is the same goal."""
@@ -106,6 +112,7 @@ class Observer:
     def set_scores(self, stamp: int, scores: Scores) -> None:
         """Note what the planner thinks of the candidates, at its goal's stamp."""
         if stamp >= self._begin:
+            self._scores_stamp = stamp
             self.state = replace(self.state, scores=scores)
 
     def set_done(self, stamp: int, reason: str) -> None:
