@@ -12,7 +12,7 @@ from active_recon.viewer.scene import Scene
 from active_recon.viewer.state import entropy_lines, LoopState
 import numpy as np
 import rich
-from viser import ClientHandle, ViserServer
+from viser import ClientHandle, uplot, ViserServer
 
 UPDATES_PER_S = 30.0
 _LOWEST, _HIGHEST = 0.02, 0.98  # below, nothing is published
@@ -25,6 +25,11 @@ is a view that was taken, the grey one is where the camera is now, the yellow on
 look next. The bars around the turntable are what the planner expects of each direction, the best
 one yellow.
 """
+
+
+def _entropy_scales(count: int) -> dict[str, uplot.Scale]:
+    """Return the axes' scales for so many views: room for one more on either side."""
+    return {'x': uplot.Scale(time=False, range=(0.0, count + 1.0))}
 
 
 def _step_back_from_a_narrow_window(client: ClientHandle) -> None:
@@ -82,8 +87,8 @@ class Page:
                 (*entropy_lines(()),), ({'label': 'view'}, {
                     'label': 'entropy', 'stroke': 'rgb(37, 99, 168)', 'width': 2,
                     'points': {'show': True, 'size': 8, 'fill': 'rgb(37, 99, 168)'}}),
-                scales={'x': {'time': False}}, legend={'show': False}, height=170, visible=False,
-                axes=({'incrs': (1.0, 2.0, 5.0)}, {'size': 60.0}))
+                scales=_entropy_scales(0), legend={'show': False}, height=170, visible=False,
+                axes=({'incrs': (1.0, 2.0, 5.0)}, {'size': 60.0}), padding=(12, 24, 0, 0))
         with panel.add_tab('What is shown'):
             gui.add_markdown(_LEGEND)
 
@@ -137,6 +142,7 @@ class Page:
             self._no_entropy.visible, self._entropy.visible = not known, known
             if known:
                 self._entropy.data = (numbers, entropies)
+                self._entropy.scales = _entropy_scales(len(numbers))
 
     def notify(self, title: str, words: str) -> None:
         """Show a note for some seconds to whoever looks."""

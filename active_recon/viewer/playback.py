@@ -62,6 +62,12 @@ class Playback:
         self._step = self.page.add_steps(len(self._states), 'View')
         self.page.add_button(PLAY, 'Show one view after the other, from here or from the first.')
         self._stepped_at: float | None = None
+        self.told: list[str] = []
+
+    @property
+    def playing(self) -> bool:
+        """Whether one view follows the other by itself."""
+        return self._stepped_at is not None
 
     def draw(self, now: float) -> None:
         """Show the view that is chosen; `now` is any clock in seconds."""
@@ -73,7 +79,8 @@ class Playback:
             self._stepped_at = now if self._step.value < len(self._states) else None
             self._step.value = min(self._step.value + 1, len(self._states))
         state = self._states[self._step.value - 1]
-        self.page.tell(self._words(state))
+        self.told = self._words(state)
+        self.page.tell(self.told)
         self.page.draw(state)
 
     def _words(self, state: LoopState) -> list[str]:

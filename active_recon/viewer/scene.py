@@ -83,14 +83,15 @@ class Scene:
         kept = before == views[:len(before)]
         if not kept:
             for handle in self._views:
-                handle.remove()
+                handle.remove()  # and with it its label
             self._views.clear()
         first = len(before) if kept else 0
         for number, view in enumerate(views[first:], first + 1):
             name, color = f'/views/{number}', view_color(number)
             again = sum(_together(view, earlier) for earlier in views[:number - 1])
-            self._views += [self._frustum(name, view.camera, color, view.image), self._label(
-                f'{name}/label', f'{number} · {math.degrees(view.camera.azimuth):.0f}°', again)]
+            self._views.append(self._frustum(name, view.camera, color, view.image))
+            self._label(f'{name}/label', f'{number} · {math.degrees(view.camera.azimuth):.0f}°',
+                        again)
 
     def _draw_goal(self, goal: Camera | None) -> None:
         if goal is None:
@@ -118,9 +119,9 @@ class Scene:
             color=color, image=image, thickness=0.012, cast_shadow=False,
             wxyz=SO3.from_matrix(camera.pose[:3, :3]).wxyz, position=camera.position / self._size)
 
-    def _label(self, name: str, words: str, others: int = 0) -> Any:
+    def _label(self, name: str, words: str, others: int = 0) -> None:
         # Above the camera, and above others' labels there: y is down in its optical frame
-        return self._scene.add_label(
+        self._scene.add_label(
             name, words, position=(0, -0.62 * _FRUSTUM - 0.1 * others, _FRUSTUM),
             anchor='bottom-center', font_screen_scale=0.9)
 
