@@ -13,7 +13,9 @@ import pytest
 pytestmark = pytest.mark.browser
 PHONE = (390, 844)
 LAPTOP = (1280, 800)
-_SCENE = 940  # pixels to the left of the panel, on a laptop
+_SMALL = (900, 600)  # fast to draw without a graphics card
+_SCENE = 560  # pixels to the left of the panel there
+_BLOCK = 10  # pixels: the page draws more coarsely while the machine is busy
 
 
 def ball(radius):
@@ -39,21 +41,33 @@ def page():
     shown.close()
 
 
+def scene(chromium):
+    """Return the scene's mean colours in blocks of pixels, (H, W, 3)."""
+    picture = chromium.picture()[:, :_SCENE].astype(float)
+    height, width = (length // _BLOCK for length in picture.shape[:2])
+    return picture.reshape(height, _BLOCK, width, _BLOCK, 3).mean(axis=(1, 3))
+
+
 def shown(chromium, draw, fits=lambda picture: True, what='the page at rest'):
-    """Draw until the picture fits and no longer changes; return it."""
+    """Draw until the scene fits and no longer changes; return it."""
     last = None
 
     def at_rest():
         nonlocal last
         draw()
-        before, last = last, chromium.picture()
-        return before is not None and np.array_equal(before, last) and fits(last)
+        before, last = last, scene(chromium)
+        return before is not None and apart(before, last) < 0.002 and fits(last)
 
     chromium.until(at_rest, what, budget_s=60)
     return last
 
 
-def opened(chromium, url, size=LAPTOP):
+def apart(before, after):
+    """Return the share of blocks, [0, 1], that differ visibly."""
+    return float((np.abs(before - after).max(axis=-1) > 12).mean())
+
+
+def opened(chromium, url, size=_SMALL):
     """Open a page and wait until it is drawn; close what a browser without a card complains of."""
     chromium.open(url, size)
     chromium.until(lambda: 'Threshold' in chromium.text(), 'the panel')
@@ -80,35 +94,34 @@ def observed(views):
     return observer.state
 
 
-def test_a_new_view_changes_what_is_shown_and_nothing_complains(page, chromium, changed_share):
+def test_a_new_view_changes_what_is_shown_and_nothing_complains(page, chromium):
     page.tell(['1 view, the last 3 s ago.', 'No publisher on /next_view yet.'])
     opened(chromium, page.url)
-    empty = shown(chromium, lambda: page.draw(LoopState()), lambda picture: changed_share(
-        np.full_like(picture, 255), picture) > 0.02, 'the turntable')
+    empty = shown(chromium, lambda: page.draw(LoopState()), lambda picture: apart(
+        np.full_like(picture, 255), picture) > 0.01, 'the turntable')
     state = observed(1)
     first = shown(chromium, lambda: page.draw(state),
-                  lambda picture: changed_share(empty, picture) > 0.02, 'the first view')
+                  lambda picture: apart(empty, picture) > 0.01, 'the first view')
     state = observed(2)
     shown(chromium, lambda: page.draw(state),
-          lambda picture: changed_share(first, picture) > 0.01, 'the second view')
-    shown(chromium, lambda: page.draw(LoopState('b')), lambda picture: changed_share(
-        empty[:, :_SCENE], picture[:, :_SCENE]) < 0.002, 'an empty turntable again')
+          lambda picture: apart(first, picture) > 0.01, 'the second view')
+    shown(chromium, lambda: page.draw(LoopState('b')),
+          lambda picture: apart(empty, picture) < 0.003, 'an empty turntable again')
     assert '1 view, the last 3 s ago.' in chromium.text()
     assert 'No publisher on /next_view yet.' in chromium.text()
     assert not chromium.errors()
 
 
-def test_the_threshold_is_the_loops_own_until_it_is_moved(page, chromium, changed_share):
+def test_the_threshold_is_the_loops_own_until_it_is_moved(page, chromium):
     state = observed(1)
     opened(chromium, page.url)
     before = shown(chromium, lambda: page.draw(state))
     field = chromium.driver.find_element('css selector', '.mantine-NumberInput-input')
     assert field.get_attribute('value') == '0.5'
     field.send_keys('\ue003' * 3 + '0.8\ue007')  # backspaces, enter
-    shown(chromium, lambda: page.draw(state), lambda picture: changed_share(
-        before[:, :_SCENE], picture[:, :_SCENE]) > 0.002, 'fewer cells')
+    shown(chromium, lambda: page.draw(state), lambda picture: apart(before, picture) > 0.003,
+          'fewer cells')
     state = observed(2)  # whose own threshold is 0.5 as well
-    page.draw(state)
     shown(chromium, lambda: page.draw(state))
     assert field.get_attribute('value') == '0.8'
     assert not chromium.errors()
@@ -179,21 +192,23 @@ def playback(tmp_path):
     shown.page.close()
 
 
-def test_a_bag_is_stepped_through_view_by_view(playback, chromium, changed_share):
+def test_a_bag_is_stepped_through_view_by_view(playback, chromium):
+    def told(words):
+        chromium.until(lambda: (playback.draw(0.0), words in chromium.text())[1], words)
+
     opened(chromium, playback.page.url)
-    chromium.until(lambda: (playback.draw(0.0), 'View 1 of 3, episode 1 of 2' in chromium.text()
-                            )[1], 'the first view')
+    told('View 1 of 3, episode 1 of 2')
     first = shown(chromium, lambda: playback.draw(0.0))
     slider = chromium.driver.find_elements('css selector', '[role=slider]')[0]
     slider.send_keys('\ue014\ue014')  # arrows to the right
-    chromium.until(lambda: (playback.draw(0.0), 'View 3 of 3' in chromium.text())[1], 'the third')
+    told('View 3 of 3, episode 1 of 2')
+    told('The last one: max views.')
     shown(chromium, lambda: playback.draw(0.0),
-          lambda picture: changed_share(first, picture) > 0.01, 'the third view')
-    assert 'The last one: max views.' in chromium.text()
+          lambda picture: apart(first, picture) > 0.01, 'the third view')
     slider.send_keys('\ue012\ue012')
-    chromium.until(lambda: (playback.draw(0.0), 'View 1 of 3' in chromium.text())[1], 'the first')
-    shown(chromium, lambda: playback.draw(0.0), lambda picture: changed_share(
-        first[:, :_SCENE], picture[:, :_SCENE]) < 0.002, 'the first view again')
+    told('View 1 of 3, episode 1 of 2')
+    shown(chromium, lambda: playback.draw(0.0),
+          lambda picture: apart(first, picture) < 0.003, 'the first view again')
     assert not chromium.errors()
 
 
