@@ -190,10 +190,10 @@ def test_the_last_view_the_end_and_a_silent_camera_are_told():
     assert link_words(links(ago_s=1.2), state) == ['2 views, the last 1 s ago.']
     assert link_words(links(ago_s=1.2), LoopState(views=(view(1),))) == [
         '1 view, the last 1 s ago.']
-    done = LoopState(views=(view(1), view(2)), done='entropy_settled')
+    done = LoopState('1f', (view(1), view(2)), done='entropy_settled')
     assert link_words(links(ago_s=130), done) == [
         'Done (entropy settled): 2 views, the last 2 min ago.',
-        'The camera has been silent for 2 min.']
+        'The camera has been silent for 2 min.', 'Episode 1f.']
 
 
 @pytest.mark.parametrize(('seconds', 'words'), [

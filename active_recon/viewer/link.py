@@ -34,6 +34,8 @@ def link_words(links: Mapping[str, TopicLink], state: LoopState) -> list[str]:
     silent_s = links['image'].heard_ago_s
     if links['image'].publishers and silent_s is not None and silent_s > _SILENT_S:
         words.append(f'The camera has been silent for {ago(silent_s)}.')
+    if state.episode:
+        words.append(f'Episode {state.episode}.')
     return words
 
 
