@@ -20,10 +20,11 @@ import numpy as np
 import viser
 from websockets.sync.client import connect
 
-_PAIRS = 8
-_VIEWS = 150
+_PAIRS = 6
+_VIEWS = 75  # of a run; all of them together are one episode, of at most 1000
 _RATE = 30.0  # views a second, each of which changes all that the page shows
 _BUDGET_S = 30.0
+_AGAIN_S = 2.0
 
 
 def watching_figures() -> list[Figure]:
@@ -116,33 +117,34 @@ def _camera() -> Iterator[Callable[[], float]]:
     cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
     images = [composite(renderer.render(camera), 255) for camera in cameras]
 
-    def spin_until(condition: Callable[[], bool], what: str) -> None:
-        deadline = time.monotonic() + _BUDGET_S
-        while not condition():
-            if time.monotonic() > deadline:
-                raise TimeoutError(f'waited {_BUDGET_S} s in vain for {what}')
+    def spin(condition: Callable[[], bool], budget_s: float) -> bool:
+        deadline = time.monotonic() + budget_s
+        while not condition() and time.monotonic() < deadline:
             executor.spin_once(timeout_sec=0.005)
+        return condition()
 
-    def goal_ms() -> float:
-        spent = []
-        for turn in range(_VIEWS):
-            due = time.perf_counter() + 1 / _RATE
-            index = turn % len(cameras)
+    def show(index: int) -> float:
+        """Show a view, again if it gets lost (the camera is heard best effort); return the ms."""
+        for _ in range(round(_BUDGET_S / _AGAIN_S)):
             header = Header(stamp=node.get_clock().now().to_msg(), frame_id='camera')
             info, pose = camera_to_msgs(cameras[index], header)
             image, known = image_to_msg(images[index], header), len(goals)
             start = time.perf_counter()
             for publisher, message in ((info_pub, info), (pose_pub, pose), (image_pub, image)):
                 publisher.publish(message)
-            spin_until(lambda known=known: len(goals) > known, f'goal {turn}')
-            spent.append(1e3 * (max(goals.values()) - start))
-            spin_until(lambda due=due: time.perf_counter() >= due, 'the next view')
+            if spin(lambda known=known: len(goals) > known, _AGAIN_S):  # type: ignore[misc]
+                return 1e3 * (max(goals.values()) - start)
+        raise TimeoutError(f'showed a view for {_BUDGET_S} s, but no goal came')
+
+    def goal_ms() -> float:
+        spent = []
+        for turn in range(_VIEWS):
+            due = time.perf_counter() + 1 / _RATE
+            spent.append(show(turn % len(cameras)))
+            spin(lambda due=due: time.perf_counter() >= due, 1.0)  # type: ignore[misc]
         return float(np.median(spent))
 
     try:
-        spin_until(lambda: image_pub.get_subscription_count() > 0, 'the reconstructor')
-        spin_until(lambda: node.count_publishers('next_view') > 0, 'the planner')
-        spin_until(lambda: node.count_subscribers('latent') > 0, 'the planner')
         yield goal_ms
     finally:
         executor.shutdown()
