@@ -20,7 +20,7 @@ import numpy as np
 import viser
 from websockets.sync.client import connect
 
-_PAIRS = 6
+_PAIRS = 6  # and one run to warm up
 _VIEWS = 75  # of a run; all of them together are one episode, of at most 1000
 _RATE = 30.0  # views a second, each of which changes all that the page shows
 _BUDGET_S = 30.0

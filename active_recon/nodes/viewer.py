@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+import os
 import time
 from typing import Any
 
@@ -162,6 +163,7 @@ class ViewerNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the viewer until it is asked to stop."""
+    os.nice(10)  # where cores are short, who watches gives way to the loop
     run_node(ViewerNode, args)
 
 
