@@ -7,6 +7,7 @@ import platform
 from benchmarks.core import reconstruct_and_plan, rendering
 from benchmarks.figures import Figure, reference_ms
 from benchmarks.loop import demo_figure, reconstructor_figures
+from benchmarks.viewer import watching_figures
 
 RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'benchmarks.json'
 
@@ -19,7 +20,7 @@ def main() -> None:
     figures = []
     for measure in (lambda: [reconstruct_and_plan()], lambda: [rendering(1, 400)],
                     lambda: [rendering(2, 100)], reconstructor_figures,
-                    lambda: [demo_figure()]):
+                    watching_figures, lambda: [demo_figure()]):
         for figure in measure():
             figures.append(figure)
             print(_row(figure, reference), flush=True)  # noqa: T201

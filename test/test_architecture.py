@@ -13,13 +13,14 @@ MAY_IMPORT = {  # beside itself; what is not named here is part of the core
     'core': set(),
     'msg_tools': {'core'},
     'bags': {'core', 'msg_tools'},
-    'nodes': {'core', 'msg_tools', 'bags'},
-    'demo': {'core', 'bags', 'nodes'},
+    'viewer': {'core', 'bags'},
     'report': {'core', 'bags'},
+    'nodes': {'core', 'msg_tools', 'bags', 'viewer'},
+    'demo': {'core', 'bags', 'nodes', 'viewer'},
     'evaluation': {'core'},
     'training': {'core', 'evaluation'},
     'paper': {'core', 'evaluation', 'training'},
-    'cli': {'core', 'bags', 'demo', 'evaluation', 'training', 'paper', 'report'},
+    'cli': {'core', 'bags', 'demo', 'evaluation', 'training', 'paper', 'report', 'viewer'},
 }
 KNOW_ROS = {'nodes', 'msg_tools'}
 ROS = re.compile(r'(rclpy|rosidl_\w+|rmw_\w+|ament_\w+|tf2_\w+|launch(_\w+)?|cv_bridge|'
@@ -76,6 +77,8 @@ def test_imports_follow_the_direction(path):
     ('active_recon.planner', 'from active_recon.cli.main import main'),
     ('active_recon.evaluation.metrics', 'from active_recon.training.losses import loss'),
     ('active_recon.bags.writer', 'import rclpy.serialization'),
+    ('active_recon.viewer.page', 'import rclpy'),
+    ('active_recon.viewer.page', 'from msg_tools.voxels import voxel_grid_from_msg'),
     ('active_recon.cli.demo', 'from active_recon.nodes import reconstructor'),
     ('msg_tools.images', 'from active_recon.bags.writer import BagWriter'),
     ('msg_tools.images', 'from active_recon.nodes.qos import LATCHED'),

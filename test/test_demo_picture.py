@@ -3,10 +3,11 @@
 import math
 
 from active_recon.cameras import orbit_camera
-from active_recon.demo.drawing import PAPER, view_color
+from active_recon.demo.drawing import PAPER
 from active_recon.demo.picture import COLUMNS, run_picture, TILE, turntable_plan
 from active_recon.rendering import composite, Renderer
 from active_recon.seen_view import SeenView
+from active_recon.view_colors import view_color
 from active_recon.voxel_boxes import height_range, voxel_boxes
 from active_recon.voxelise import voxelise
 from active_recon.voxels import VoxelGrid

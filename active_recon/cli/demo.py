@@ -27,6 +27,8 @@ def demo(
         min=0, help='Of the first view and of the policy random.')] = 0,
     output_dir: Annotated[Path, typer.Option(
         help='The folder in which the run gets its own.')] = Path('bags'),
+    view: Annotated[bool, typer.Option(
+        '--view', help='Show the loop in the browser too; it then goes on until Ctrl-C.')] = False,
 ) -> None:
     """Watch a camera reconstruct an object and decide by itself where to look next."""
     from rich.console import Console
@@ -38,7 +40,8 @@ def demo(
             from active_recon.objects import find_object
 
         folder = run_demo(
-            Demo(find_object(object_name), views, policy.value, seed, output_dir), console)
+            Demo(find_object(object_name), views, policy.value, seed, output_dir, view),
+            console)
     except KeyboardInterrupt:
         console.print('interrupted; the nodes are stopped and the bag is closed')
         raise typer.Exit(130) from None

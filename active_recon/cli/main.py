@@ -13,13 +13,14 @@ from active_recon.cli.replay import replay
 from active_recon.cli.report import report
 from active_recon.cli.sheet import sheet
 from active_recon.cli.train import train
+from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
 import typer
 
 app = typer.Typer(
     help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, report, replay, play, record_sweep, render, train, evaluate, paper,
+for command in (demo, view, report, replay, play, record_sweep, render, train, evaluate, paper,
                 sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')

@@ -1,20 +1,13 @@
 """Colours, text and tiles on an RGB picture."""
 
+from active_recon.view_colors import Color
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-Color = tuple[int, int, int]
 PAPER: Color = (250, 250, 252)
 INK: Color = (44, 48, 58)
 QUIET: Color = (170, 176, 188)
-_VIEW_COLORS: tuple[Color, ...] = (
-    (37, 99, 168), (217, 95, 2), (27, 136, 105), (190, 43, 110), (109, 80, 172), (140, 100, 20))
-
-
-def view_color(number: int) -> Color:
-    """Return the colour of a view, numbered from 1; they repeat after six."""
-    return _VIEW_COLORS[(number - 1) % len(_VIEW_COLORS)]
 
 
 def text(picture: NDArray[np.uint8], words: str, at: tuple[int, int], size: int,

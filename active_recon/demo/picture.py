@@ -10,9 +10,10 @@ from active_recon.cameras import (
     CANONICAL_INTRINSICS,
     orbit_camera,
 )
-from active_recon.demo.drawing import centred, PAPER, paste, QUIET, text, view_color
+from active_recon.demo.drawing import centred, PAPER, paste, QUIET, text
 from active_recon.rendering import composite, Renderer
 from active_recon.seen_view import SeenView
+from active_recon.view_colors import view_color
 from active_recon.voxel_boxes import height_range, voxel_picture
 from active_recon.voxels import VoxelGrid
 import cv2

@@ -1,6 +1,7 @@
 """The demo from start to end: start the nodes, watch the loop, keep what came of it."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 import os
@@ -15,6 +16,7 @@ from active_recon.demo.processes import NodeProcesses, private_environment
 from active_recon.demo.table import loop_table, turning
 from active_recon.meshes import load_mesh
 from active_recon.nodes.demo_watch import DemoWatch, watching
+from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.voxelise import voxelise
 import cv2
 import numpy as np
@@ -28,13 +30,18 @@ _ANSWER_S = 10.0
 
 @dataclass(frozen=True)
 class Demo:
-    """What to show: a mesh file, how many views, which policy chooses them, and its seed."""
+    """
+    What to show: a mesh file, how many views, which policy chooses them, and its seed.
+
+    With `view` the loop is shown in the browser too, and goes on until Ctrl-C.
+    """
 
     mesh: Path
     views: int = 5
     policy: str = 'attention'
     seed: int = 0
     output_dir: Path = Path('bags')
+    view: bool = False
 
 
 def run_demo(demo: Demo, console: Console) -> Path:
@@ -61,6 +68,8 @@ def run_demo(demo: Demo, console: Console) -> Path:
         nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
                                  'record_at_start': False})
         folder = Path(watch.ask('start', _START_S, check))
+        if demo.view:
+            _open_page(nodes, watch, console, check)
         try:
             _start_loop(nodes, demo, folder)
             _follow(watch, demo, title, console, check)
@@ -71,7 +80,28 @@ def run_demo(demo: Demo, console: Console) -> Path:
             if watch.views:
                 picture = run_picture(f'active_recon: {title}', watch.views, mesh, truth)
                 cv2.imwrite(str(folder / 'run.png'), picture[..., ::-1])
+        if demo.view:
+            _go_on(nodes, console)
     return demo.output_dir / folder.name
+
+
+def _open_page(nodes: NodeProcesses, watch: DemoWatch, console: Console,
+               check: Callable[[], None]) -> None:
+    """Wait for the page, for views taken before it is there would be missing on it."""
+    port = free_port()
+    nodes.start('viewer', {'port': port})
+    watch.until(lambda: is_served(port), _START_S, 'the page', check)
+    console.print(f'watch it at http://{HOST}:{port}')
+
+
+def _go_on(nodes: NodeProcesses, console: Console) -> None:
+    """Leave the loop and its page to who watches, until Ctrl-C."""
+    console.print('the bag is closed; the loop and its page go on until Ctrl-C')
+    with suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked:
+        while True:
+            raise_if_asked()
+            nodes.check()
+            time.sleep(0.1)
 
 
 def _start_loop(nodes: NodeProcesses, demo: Demo, folder: Path) -> None:

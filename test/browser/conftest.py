@@ -19,6 +19,7 @@ BUDGET_S = 30.0  # for what takes a second on an idle machine
 _FLAGS = (
     '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
     '--disable-background-networking', '--disable-component-update', '--disable-sync',
+    '--disable-features=BackForwardCache',  # a page that was left shall end
     '--use-angle=swiftshader', '--enable-unsafe-swiftshader')  # WebGL without a graphics card
 
 
@@ -88,8 +89,15 @@ def _changed_share(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> float
 
 
 @pytest.fixture(scope='session')
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def one_chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """Return a Chromium that knows nothing of any other."""
     browser = Browser(tmp_path_factory.mktemp('chromium'))
     yield browser
     browser.driver.quit()
+
+
+@pytest.fixture
+def chromium(one_chromium: Browser) -> Iterator[Browser]:
+    """Return the Chromium of the session, whose page is left when the test ends."""
+    yield one_chromium
+    one_chromium.driver.get('about:blank')

@@ -1,0 +1,51 @@
+"""`active-recon view`: the loop in the browser, live or from a bag."""
+
+from contextlib import suppress
+import os
+from pathlib import Path
+import sys
+import time
+from typing import Annotated
+
+from active_recon.viewer.address import DEFAULT_PORT, HIGHEST_PORT
+import typer
+
+
+def view(
+    bag: Annotated[Path | None, typer.Argument(
+        help='A bag to step through; without one, the loop that runs on this ROS domain.')] = None,
+    port: Annotated[int, typer.Option(
+        min=0, max=HIGHEST_PORT, help='Where the page is served, or at the next port that is '
+                                      'free, which is told; 0 for any.')] = DEFAULT_PORT,
+) -> None:
+    """
+    Show the loop in the browser, on a page of this machine alone.
+
+    The object as it takes shape, the views taken, where the camera goes next and why. The page
+    may be opened late, twice, or closed: the loop does not notice. Ctrl-C ends it.
+
+    For example: active-recon view, or active-recon view bags/2026-11-21_10-00-00
+    """
+    if bag is None:
+        # The node takes this process's place, and so hears its Ctrl-C
+        os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.viewer',
+                                  '--ros-args', '-p', f'port:={port}'])
+    _step_through(bag, port)
+
+
+def _step_through(bag: Path, port: int) -> None:
+    from active_recon.bags.reading import read_run
+    from active_recon.demo.interrupts import held_interrupts
+    from active_recon.viewer.page import UPDATES_PER_S
+    from active_recon.viewer.playback import Playback
+
+    playback = Playback(read_run(bag), port)
+    try:
+        typer.echo(f'{bag} is shown at {playback.page.url} until Ctrl-C')
+        with suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked:
+            while True:
+                raise_if_asked()
+                playback.draw(time.monotonic())
+                time.sleep(1 / UPDATES_PER_S)
+    finally:
+        playback.page.close()

@@ -1,0 +1,27 @@
+"""Where the page is served: on this machine, for this machine."""
+
+import socket
+
+from active_recon.errors import ConfigError
+
+HOST = '127.0.0.1'
+DEFAULT_PORT = 8080
+HIGHEST_PORT = 65000  # with room for the next free one
+
+
+def is_served(port: int) -> bool:
+    """Return whether somebody answers on a port of this machine."""
+    with socket.socket() as probe:
+        return probe.connect_ex((HOST, port)) == 0
+
+
+def free_port(first: int = DEFAULT_PORT) -> int:
+    """Return the first port from there on that nobody holds; raises ConfigError if none is."""
+    for port in range(first, HIGHEST_PORT + 1):
+        with socket.socket() as probe:
+            try:
+                probe.bind((HOST, port))
+            except OSError:
+                continue
+            return port
+    raise ConfigError(f'expected a free port from {first} to {HIGHEST_PORT}, but all are taken')

@@ -1,0 +1,156 @@
+"""The page: the loop in three dimensions, and beside it a panel of words, figures and controls."""
+
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+import math
+from typing import Any
+
+from active_recon.errors import ConfigError
+from active_recon.viewer.address import HIGHEST_PORT, HOST
+from active_recon.viewer.scene import Scene
+from active_recon.viewer.state import entropy_lines, LoopState
+import numpy as np
+import rich
+from viser import ClientHandle, uplot, ViserServer
+
+UPDATES_PER_S = 30.0
+_LOWEST, _HIGHEST = 0.02, 0.98  # below, nothing is published
+_FALLBACK_THRESHOLD = 0.5
+_LOOK_FROM = (2.1, -1.7, 2.5)  # sides of the voxel grid
+_LOOK_AT = (0.0, 0.0, -0.05)
+_LEGEND = """
+The blocks are what is held for occupied, the darker the surer. A coloured camera with a picture
+is a view that was taken, the grey one is where the camera is now, the yellow one where it shall
+look next. The bars around the turntable are what the planner expects of each direction, the best
+one yellow.
+"""
+
+
+def _entropy_scales(count: int) -> dict[str, uplot.Scale]:
+    """Return the axes' scales for so many views: room for one more on either side."""
+    return {'x': uplot.Scale(time=False, range=(0.0, count + 1.0))}
+
+
+def _step_back_from_a_narrow_window(client: ClientHandle) -> None:
+    if client.camera.aspect < 1:
+        with client.atomic():
+            client.camera.position = 1.5 * np.array(_LOOK_FROM)
+            client.camera.look_at = np.array(_LOOK_AT)
+
+
+class Page:
+    """
+    A page on 127.0.0.1 that shows one state of the loop after the other.
+
+    It is drawn, and asked for what was clicked, from one thread. `object_size` is the side of
+    the voxel grid in metres. Where the port is taken the next free one is used: `url` tells.
+    """
+
+    def __init__(self, title: str, object_size: float = 1.0, port: int = 0) -> None:
+        if not 0 <= port <= HIGHEST_PORT:
+            raise ConfigError(f'port: expected 0 (any) to {HIGHEST_PORT}, got {port}')
+        # viser tells its address on rich's own console, which nothing else here uses
+        rich.get_console().quiet = True
+        self._server = ViserServer(HOST, port, label=title, verbose=False)
+        self.url = f'http://{HOST}:{self._server.get_port()}'
+        self.port_taken = port not in (0, self._server.get_port())
+        self._clicked: deque[str] = deque()
+        self._server.gui.configure_theme(
+            control_width='medium', show_logo=False, show_share_button=False,
+            brand_color=(37, 99, 168))
+        self._server.gui.main_panel.dock_right()
+        self._server.initial_camera.position = _LOOK_FROM
+        self._server.initial_camera.look_at = _LOOK_AT
+        self._server.on_client_connect(_step_back_from_a_narrow_window)
+        self._scene = Scene(self._server.scene, object_size)
+        self._words = self._server.gui.add_markdown('')
+        self._controls = self._server.gui.add_folder('Controls')
+        self._build_figures()
+        self._buttons: dict[str, Any] = {}
+        self._told: Sequence[str] = ()
+        self._own_threshold = _FALLBACK_THRESHOLD
+        self._shown_views: object = None
+
+    def _build_figures(self) -> None:
+        gui = self._server.gui
+        with self._controls:
+            self._threshold: Any = gui.add_slider(
+                'Threshold', _LOWEST, _HIGHEST, 0.01, _FALLBACK_THRESHOLD,
+                hint='Cells that are occupied more probably than this are shown.')
+        # On a phone this panel begins as a bar to tap on, and leaves the room to the object
+        panel = gui.add_panel()
+        panel.dock_below(gui.main_panel)
+        with panel.add_tab('Entropy, nats'):
+            self._no_entropy = gui.add_markdown('How unsure the reconstruction is, view by view.')
+            self._entropy = gui.add_uplot(
+                (*entropy_lines(()),), ({'label': 'view'}, {
+                    'label': 'entropy', 'stroke': 'rgb(37, 99, 168)', 'width': 2,
+                    'points': {'show': True, 'size': 8, 'fill': 'rgb(37, 99, 168)'}}),
+                scales=_entropy_scales(0), legend={'show': False}, height=170, visible=False,
+                axes=({'incrs': (1.0, 2.0, 5.0)}, {'size': 60.0}), padding=(12, 24, 0, 0))
+        with panel.add_tab('What is shown'):
+            gui.add_markdown(_LEGEND)
+
+    def add_button(self, label: str, hint: str) -> None:
+        """Add a button, whose clicks `clicks` returns by its label."""
+        with self._controls:
+            button = self._server.gui.add_button(label, hint=hint)
+        button.on_click(lambda _: self._clicked.append(label))
+        self._buttons[label] = button
+
+    def enable(self, label: str, possible: bool) -> None:
+        """Let a button be clicked, or not."""
+        if self._buttons[label].disabled is possible:
+            self._buttons[label].disabled = not possible
+
+    def add_steps(self, count: int, what: str) -> Any:
+        """Add a slider from 1 to `count` and return it; its `value` is where it stands."""
+        with self._controls:
+            return self._server.gui.add_slider(
+                what, 1, max(count, 1), 1, 1, disabled=count < 2, order=-1)
+
+    def clicks(self) -> list[str]:
+        """Return the labels of the buttons clicked since the last call, in their order."""
+        clicked = []
+        with suppress(IndexError):
+            while True:
+                clicked.append(self._clicked.popleft())
+        return clicked
+
+    def tell(self, words: Sequence[str]) -> None:
+        """Show lines of words at the top of the panel."""
+        if words != self._told:
+            self._told = words
+            first, *rest = words
+            self._words.content = '\n\n'.join([f'**{first}**', *rest])
+
+    def draw(self, state: LoopState) -> None:
+        """Show a state; only what has changed since the last is sent."""
+        if not self._server.get_clients():  # nobody looks: whoever comes is shown what is then
+            return
+        if state.threshold is not None and self._threshold.value == self._own_threshold:
+            # The loop's own, until somebody moves the slider
+            self._own_threshold = min(max(state.threshold, _LOWEST), _HIGHEST)
+            self._threshold.value = self._own_threshold
+        with self._server.atomic():
+            self._scene.draw(state, self._threshold.value)
+        if state.views is not self._shown_views:
+            self._shown_views = state.views
+            numbers, entropies = entropy_lines(state.views)
+            known = any(not math.isnan(value) for value in entropies)
+            self._no_entropy.visible, self._entropy.visible = not known, known
+            if known:
+                self._entropy.data = (numbers, entropies)
+                self._entropy.scales = _entropy_scales(len(numbers))
+
+    def notify(self, title: str, words: str) -> None:
+        """Show a note for some seconds to whoever looks."""
+        for client in self._server.get_clients().values():
+            client.add_notification(title, words, auto_close_seconds=6.0)
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._server.stop()
+
+

@@ -1,0 +1,94 @@
+"""A recorded run on the page: its views one after the other, at will."""
+
+from collections.abc import Iterator
+
+from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun
+from active_recon.cameras import CANONICAL_DISTANCE, CANONICAL_ELEVATION, orbit_camera
+from active_recon.errors import DataError
+from active_recon.viewer.page import Page
+from active_recon.viewer.state import (
+    LoopState,
+    Observer,
+    own_threshold,
+    Scores,
+    TakenView,
+    thumbnail,
+)
+
+PLAY = 'Play'
+_STEP_S = 1.0  # while it plays
+
+
+def recorded_states(run: RecordedRun) -> list[LoopState]:
+    """Return what was known after each view of a run, all episodes in their order."""
+    return [state for episode in run.episodes for state in _episode_states(episode)]
+
+
+def _episode_states(episode: RecordedEpisode) -> Iterator[LoopState]:
+    observer = Observer()
+    observer.begin_episode(episode.id, episode.begin)
+    for view in episode.views:
+        grid = view.occupied if view.reconstruction is None else view.reconstruction
+        observer.take_view(
+            TakenView(view.stamp, view.camera, thumbnail(view.image), view.entropy), grid,
+            None if view.occupied is None else own_threshold(view.occupied))
+        if view.goal is not None:
+            _set_goal(observer, view.goal, 1.0 if grid is None else grid.size)
+        elif view is episode.views[-1]:
+            observer.set_done(view.stamp, episode.done)
+        yield observer.state
+
+
+def _set_goal(observer: Observer, goal: RecordedGoal, size: float) -> None:
+    observer.set_goal(goal.stamp, orbit_camera(
+        goal.azimuth, CANONICAL_ELEVATION, CANONICAL_DISTANCE * size))
+    if goal.candidates is not None and goal.scores is not None:
+        observer.set_scores(goal.stamp, Scores(goal.candidates, goal.scores))
+
+
+class Playback:
+    """
+    A page through which a run is stepped, or played, view by view; `draw` it again and again.
+
+    Raises DataError where the run has no view.
+    """
+
+    def __init__(self, run: RecordedRun, port: int = 0) -> None:
+        self._states = recorded_states(run)
+        if not self._states:
+            raise DataError(f'{run.path}: expected a run with views, but none was taken in it')
+        grid = self._states[-1].grid
+        self.page = Page(run.path.name, grid.size if grid is not None else 1.0, port)
+        self._step = self.page.add_steps(len(self._states), 'View')
+        self.page.add_button(PLAY, 'Show one view after the other, from here or from the first.')
+        self._stepped_at: float | None = None
+        self.told: list[str] = []
+
+    @property
+    def playing(self) -> bool:
+        """Whether one view follows the other by itself."""
+        return self._stepped_at is not None
+
+    def draw(self, now: float) -> None:
+        """Show the view that is chosen; `now` is any clock in seconds."""
+        if PLAY in self.page.clicks():
+            self._stepped_at = now
+            if self._step.value == len(self._states):
+                self._step.value = 1
+        if self._stepped_at is not None and now - self._stepped_at >= _STEP_S:
+            self._stepped_at = now if self._step.value < len(self._states) else None
+            self._step.value = min(self._step.value + 1, len(self._states))
+        state = self._states[self._step.value - 1]
+        self.told = self._words(state)
+        self.page.tell(self.told)
+        self.page.draw(state)
+
+    def _words(self, state: LoopState) -> list[str]:
+        episodes = list(dict.fromkeys(known.episode for known in self._states))
+        words = [f'View {len(state.views)} of '
+                 f'{sum(known.episode == state.episode for known in self._states)}']
+        if len(episodes) > 1:
+            words[0] += f', episode {episodes.index(state.episode) + 1} of {len(episodes)}'
+        if state.done:
+            words.append(f'The last one: {state.done.replace("_", " ")}.')
+        return words

@@ -1,0 +1,168 @@
+"""The loop in three dimensions; lengths are sides of the voxel grid, whatever its size."""
+
+import math
+from typing import Any
+
+from active_recon.cameras import azimuth_difference, Camera
+from active_recon.view_colors import Color, view_color
+from active_recon.viewer.state import LoopState, Scores, TakenView
+from active_recon.voxels import VoxelGrid
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
+import trimesh
+from viser import SceneApi
+from viser.transforms import SO3
+
+_NEXT_COLOR: Color = (250, 196, 0)
+_NOW_COLOR: Color = (120, 126, 138)
+_BAR_COLOR: Color = (176, 186, 204)
+_FLOOR = -0.5  # the grid's lowest side
+_BAR_RADIUS = 1.15  # outside of the cube, inside the cameras
+_BAR_HEIGHT = 0.3
+_FRUSTUM = 0.22
+_BOX: Any = trimesh.creation.box()
+_GAP = 0.93  # of a cell: the seams let the single voxels be told apart
+
+
+class Scene:
+    """What viser shows of a state; only what has changed since the last is sent."""
+
+    def __init__(self, scene: SceneApi, object_size: float) -> None:
+        self._scene = scene
+        self._size = object_size
+        self._shown = LoopState()
+        self._threshold = math.nan
+        self._views: list[Any] = []
+        self._now: Any = None
+        scene.configure_environment_map('studio', environment_intensity=0.1)
+        scene.add_cylinder('/turntable', 0.78, 0.02, (226, 229, 236), radial_segments=64,
+                           position=(0, 0, _FLOOR - 0.015), cast_shadow=False)
+        scene.add_label('/front', 'front', position=(0.88, 0, _FLOOR), anchor='center-center',
+                        font_screen_scale=0.8)
+
+    def draw(self, state: LoopState, threshold: float) -> None:
+        """Show a state, its cells above the threshold."""
+        before, self._shown = self._shown, state
+        if state.grid is not before.grid or threshold != self._threshold:
+            self._threshold = threshold
+            self._draw_grid(state.grid, threshold)
+        if state.views is not before.views:
+            self._draw_views(before.views, state.views)
+        if state.goal is not before.goal:
+            self._draw_goal(state.goal)
+        if state.scores is not before.scores:
+            self._draw_scores(state.scores)
+        if state.camera is not before.camera or state.picture is not before.picture:
+            self._draw_camera(state.camera, state.picture)
+
+    def _draw_grid(self, grid: VoxelGrid | None, threshold: float) -> None:
+        cells = None if grid is None else shown_cells(grid, threshold)
+        if cells is None or not len(cells):
+            self._remove('/occupancy')
+            return
+        assert grid is not None
+        self._boxes('/occupancy', cells[:, :3], _GAP * grid.cell_size / grid.size,
+                    certainty_colors(cells[:, 3]))
+
+    def _draw_scores(self, scores: Scores | None) -> None:
+        if scores is None:
+            self._remove('/scores')
+            return
+        heights = _BAR_HEIGHT * relative_scores(scores.scores)
+        centers = np.column_stack([
+            _BAR_RADIUS * np.cos(scores.azimuths), _BAR_RADIUS * np.sin(scores.azimuths),
+            _FLOOR + heights / 2])
+        colors = np.full((len(heights), 3), _BAR_COLOR, np.uint8)
+        colors[np.argmax(scores.scores)] = _NEXT_COLOR
+        self._boxes('/scores', centers, np.column_stack([
+            np.full_like(heights, 0.06), np.full_like(heights, 0.06), heights]), colors)
+
+    def _draw_views(self, before: tuple[TakenView, ...], views: tuple[TakenView, ...]) -> None:
+        kept = before == views[:len(before)]
+        if not kept:
+            for handle in self._views:
+                handle.remove()  # and with it its label
+            self._views.clear()
+        first = len(before) if kept else 0
+        for number, view in enumerate(views[first:], first + 1):
+            name, color = f'/views/{number}', view_color(number)
+            again = sum(_together(view, earlier) for earlier in views[:number - 1])
+            self._views.append(self._frustum(name, view.camera, color, view.image))
+            self._label(f'{name}/label', f'{number} · {math.degrees(view.camera.azimuth):.0f}°',
+                        again)
+
+    def _draw_goal(self, goal: Camera | None) -> None:
+        if goal is None:
+            self._remove('/goal')
+            return
+        self._frustum('/goal', goal, _NEXT_COLOR, None)
+        self._label('/goal/label', f'next · {math.degrees(goal.azimuth):.0f}°')
+
+    def _draw_camera(self, camera: Camera | None, picture: NDArray[np.uint8] | None) -> None:
+        if camera is None:
+            return
+        if self._now is None:
+            self._now = self._frustum('/camera', camera, _NOW_COLOR, picture, 0.8 * _FRUSTUM)
+            return
+        self._now.position = camera.position / self._size
+        self._now.wxyz = SO3.from_matrix(camera.pose[:3, :3]).wxyz
+        if picture is not None and picture is not self._now.image:
+            self._now.image = picture
+
+    def _frustum(self, name: str, camera: Camera, color: Color,
+                 image: NDArray[np.uint8] | None, scale: float = _FRUSTUM) -> Any:
+        lens = camera.intrinsics
+        return self._scene.add_camera_frustum(
+            name, 2 * math.atan(lens.height / 2 / lens.fy), lens.width / lens.height, scale=scale,
+            color=color, image=image, thickness=0.012, cast_shadow=False,
+            wxyz=SO3.from_matrix(camera.pose[:3, :3]).wxyz, position=camera.position / self._size)
+
+    def _label(self, name: str, words: str, others: int = 0) -> None:
+        # Above the camera, and above others' labels there: y is down in its optical frame
+        self._scene.add_label(
+            name, words, position=(0, -0.62 * _FRUSTUM - 0.1 * others, _FRUSTUM),
+            anchor='bottom-center', font_screen_scale=0.9)
+
+    def _boxes(self, name: str, centers: NDArray[np.floating], sides: Any,
+               colors: NDArray[np.uint8]) -> None:
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(centers), 1))
+        scales = np.broadcast_to(np.asarray(sides, np.float32), (len(centers), 3))
+        self._scene.add_batched_meshes_simple(
+            name, _BOX.vertices, _BOX.faces, upright, centers, batched_scales=scales,
+            batched_colors=colors, flat_shading=True, lod='off', cast_shadow=False,
+            receive_shadow=False)
+
+    def _remove(self, name: str) -> None:
+        self._scene.remove_by_name(name)  # which is no error where there is none
+
+
+def _together(view: TakenView, other: TakenView) -> bool:
+    apart = azimuth_difference(view.camera.azimuth, other.camera.azimuth)
+    return bool(abs(apart) < math.radians(7))
+
+
+def shown_cells(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
+    """
+    Return the cells above the threshold that can be seen from outside, (N, 4).
+
+    Each is x, y, z in sides of the grid, and its occupancy.
+    """
+    occupied = grid.occupied(threshold)
+    outside = np.where(binary_erosion(occupied), 0, grid.occupancy)
+    return VoxelGrid(outside.astype(np.float32)).points(threshold)
+
+
+def certainty_colors(occupancy: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return colours, (N, 3) RGB, from light (0, hardly occupied) to dark (1, certainly so)."""
+    shades = np.rint(235 - 195 * occupancy).astype(np.uint8)
+    return np.asarray(cv2.applyColorMap(shades, cv2.COLORMAP_VIRIDIS).reshape(-1, 3)[:, ::-1])
+
+
+def relative_scores(scores: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return scores between 0.05 (the least) and 1 (the best), for scores know no unit."""
+    low, high = float(scores.min()), float(scores.max())
+    share = (np.asarray(scores, np.float64) - low) / (high - low) if high > low else np.zeros(
+        len(scores))
+    return 0.05 + 0.95 * share

@@ -1,0 +1,33 @@
+"""The RViz configuration: it listens to what the loop publishes, as the loop publishes it."""
+
+from pathlib import Path
+
+from active_recon.nodes.recorder import TOPICS
+from msg_tools.cameras import OBJECT_FRAME
+import pytest
+import yaml
+
+_PATH = Path(__file__).parents[2] / 'rviz' / 'active_recon.rviz'
+CONFIG = yaml.safe_load(_PATH.read_text())['Visualization Manager']
+HEARD = {display['Name']: display['Topic'] for display in CONFIG['Displays'] if 'Topic' in display}
+STREAMED = {'/camera/image_raw', '/camera/pose'}
+
+
+def test_all_that_rviz_hears_is_published_by_the_loop():
+    published = {'/' + name.lstrip('/') for name in TOPICS}
+    assert {topic['Value'] for topic in HEARD.values()} <= published
+    assert {'/occupancy', '/probabilities', '/view', '/next_view', '/azimuth_scores',
+            '/camera/image_raw'} <= {topic['Value'] for topic in HEARD.values()}
+
+
+@pytest.mark.parametrize('name', HEARD)
+def test_rviz_finds_what_is_latched_and_asks_a_stream_for_no_more_than_it_has(name):
+    topic = HEARD[name]
+    streamed = topic['Value'] in STREAMED
+    assert topic['Durability Policy'] == ('Volatile' if streamed else 'Transient Local')
+    assert topic['Reliability Policy'] == ('Best Effort' if streamed else 'Reliable')
+
+
+def test_rviz_stands_in_the_objects_frame_and_needs_no_other():
+    assert CONFIG['Global Options']['Fixed Frame'] == OBJECT_FRAME
+    assert not [display for display in CONFIG['Displays'] if display['Class'].endswith('/TF')]

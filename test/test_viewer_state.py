@@ -1,0 +1,202 @@
+"""What is known of the loop, in whatever order it is heard, and the words that tell it."""
+
+from itertools import permutations
+
+from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.viewer.link import ago, link_words, TopicLink
+from active_recon.viewer.scene import certainty_colors, relative_scores, shown_cells
+from active_recon.viewer.state import (
+    entropy_lines,
+    LoopState,
+    Observer,
+    own_threshold,
+    Scores,
+    TakenView,
+    thumbnail,
+)
+from active_recon.voxels import VoxelGrid
+import numpy as np
+import pytest
+
+GRID = VoxelGrid(np.random.default_rng(0).random((8, 8, 8), np.float32))
+LATER_GRID = VoxelGrid(np.ones((8, 8, 8), np.float32))
+SCORES = Scores(AZIMUTHS, np.arange(24.0))
+TOPICS = {'image': '/camera/image_raw', 'view': '/view', 'occupancy': '/occupancy',
+          'goal': '/next_view'}
+
+
+def view(stamp, entropy=1.0):
+    return TakenView(stamp, orbit_camera(0.1 * stamp), None, entropy)
+
+
+def links(publishers=1, ago_s=None, **changed):
+    """Return the links to all topics alike, but for those given by their role."""
+    return {role: changed.get(role, TopicLink(topic, publishers, ago_s))
+            for role, topic in TOPICS.items()}
+
+
+def summary(state):
+    return (state.episode, [taken.stamp for taken in state.views], state.grid, state.threshold,
+            state.goal, state.scores, state.done)
+
+
+GOAL, FIRST, SECOND = orbit_camera(1.0), view(110), view(130)
+HEARD = (
+    lambda observer: observer.begin_episode('b', 100),
+    lambda observer: observer.take_view(FIRST, GRID, 0.4),
+    lambda observer: observer.set_goal(120, GOAL),
+    lambda observer: observer.set_scores(120, SCORES),
+    lambda observer: observer.take_view(SECOND, LATER_GRID, 0.4),
+    lambda observer: observer.set_done(130, 'max_views'))
+
+
+def heard_in(order):
+    observer = Observer()
+    observer.begin_episode('a', 10)
+    for hear in order:
+        hear(observer)
+    return summary(observer.state)
+
+
+def test_the_order_in_which_latched_messages_come_makes_no_difference():
+    assert {heard_in(order) == heard_in(HEARD) for order in permutations(HEARD)} == {True}
+    assert heard_in(HEARD) == (
+        'b', [110, 130], LATER_GRID, 0.4, None, SCORES, 'max_views')
+
+
+def test_what_is_stamped_before_the_episode_is_left_out():
+    observer = Observer()
+    observer.begin_episode('b', 100)
+    observer.take_view(view(99), GRID, 0.4)
+    observer.set_goal(98, GOAL)
+    observer.set_scores(98, SCORES)
+    observer.set_done(99, 'max_views')
+    assert summary(observer.state) == ('b', [], None, None, None, None, '')
+
+
+def test_a_new_episode_forgets_the_last_but_not_where_the_camera_is():
+    observer = Observer()
+    camera, picture = orbit_camera(2.0), np.zeros((4, 4, 3), np.uint8)
+    observer.begin_episode('a', 0)
+    observer.see(camera, picture)
+    observer.take_view(view(1), GRID, 0.4)
+    observer.set_goal(2, GOAL)
+    observer.set_scores(2, SCORES)
+    observer.begin_episode('b', 100)
+    assert summary(observer.state) == ('b', [], None, None, None, None, '')
+    assert observer.state.camera is camera
+    assert observer.state.picture is picture
+
+
+def test_an_episode_of_a_time_before_the_last_begins_with_nothing():
+    observer = Observer()
+    observer.begin_episode('a', 100)
+    observer.take_view(FIRST, GRID, 0.4)
+    observer.set_goal(120, GOAL)
+    observer.set_done(130, 'max_views')
+    observer.begin_episode('b', 10)
+    assert summary(observer.state) == ('b', [], None, None, None, None, '')
+    observer.set_goal(20, GOAL)
+    assert observer.state.goal is GOAL
+
+
+def test_an_episode_or_a_view_or_a_goal_heard_again_changes_nothing():
+    observer = Observer()
+    for _ in range(2):
+        observer.begin_episode('a', 0)
+        observer.take_view(FIRST, GRID, 0.4)
+        observer.set_goal(120, GOAL)
+        state = observer.state
+    observer.set_goal(120, orbit_camera(3.0))
+    assert observer.state is state
+    assert len(state.views) == 1
+
+
+def test_a_goal_after_the_end_takes_the_end_back():
+    observer = Observer()
+    observer.take_view(FIRST, GRID, 0.4)
+    observer.set_done(110, 'max_views')
+    observer.set_goal(120, GOAL)
+    assert (observer.state.done, observer.state.goal) == ('', GOAL)
+
+
+@pytest.mark.parametrize('threshold', [0.02, 0.3, 0.45, 0.9])
+def test_the_own_threshold_of_occupied_cells_keeps_all_of_them(threshold):
+    fine = VoxelGrid(np.linspace(0, 1, 32 ** 3, dtype=np.float32).reshape(32, 32, 32))
+    occupied = VoxelGrid(np.where(fine.occupied(threshold), fine.occupancy, 0))
+    found = own_threshold(occupied)
+    assert found == pytest.approx(threshold, abs=0.0101)
+    assert (fine.occupied(found) >= fine.occupied(threshold)).all()
+
+
+def test_a_grid_without_occupied_cells_has_no_own_threshold():
+    assert own_threshold(VoxelGrid(np.zeros((4, 4, 4), np.float32))) is None
+
+
+@pytest.mark.parametrize(('shape', 'small'), [
+    ((137, 137), (137, 137)), ((480, 640), (120, 160)), ((1080, 1), (160, 1)),
+    ((320, 160), (160, 80))])
+def test_a_thumbnail_keeps_the_proportions_within_160_pixels(shape, small):
+    assert thumbnail(np.zeros((*shape, 3), np.uint8)).shape == (*small, 3)
+
+
+def test_entropies_that_are_unknown_are_gaps_in_the_line():
+    numbers, entropies = entropy_lines([view(1, 5.0), view(2, None)])
+    np.testing.assert_array_equal(numbers, [1, 2])
+    np.testing.assert_array_equal(entropies, [5, np.nan])
+
+
+def test_only_cells_that_touch_the_outside_are_shown_whatever_the_grids_size():
+    full = VoxelGrid(np.ones((8, 8, 8), np.float32), 0.25)
+    cells = shown_cells(full, 0.5)
+    assert len(cells) == 8 ** 3 - 6 ** 3
+    assert np.abs(cells[:, :3]).max() == pytest.approx(0.5 - 1 / 16)
+
+
+def test_a_higher_threshold_never_shows_a_cell_outside_of_those_above_a_lower_one():
+    for low, high in ((0.1, 0.4), (0.4, 0.8)):
+        assert (GRID.occupied(high) <= GRID.occupied(low)).all()
+        assert shown_cells(GRID, high)[:, 3].min() > high
+
+
+def test_surer_cells_are_darker():
+    colors = certainty_colors(np.linspace(0, 1, 20, dtype=np.float32)).astype(int)
+    assert (np.diff(colors @ [0.3, 0.59, 0.11]) < 0).all()
+
+
+@pytest.mark.parametrize('scores', [np.arange(24.0), -np.arange(24.0), np.full(24, 7.0)])
+def test_bars_keep_the_order_of_the_scores_whatever_their_unit(scores):
+    heights = relative_scores(scores)
+    assert ((heights > 0) & (heights <= 1)).all()
+    np.testing.assert_allclose(heights, relative_scores(3 * scores - 5))
+    assert np.argmax(heights) == np.argmax(scores)
+
+
+def test_a_link_to_nobody_says_what_it_waits_for():
+    assert link_words(links(publishers=0), LoopState()) == [
+        'Waiting for a loop: nobody publishes on /camera/image_raw, /view, /occupancy, '
+        '/next_view yet.']
+
+
+def test_a_missing_publisher_is_named_and_whether_it_was_ever_there():
+    words = link_words(links(
+        occupancy=TopicLink('/occupancy', 0), goal=TopicLink('/next_view', 0, 4.0)), LoopState())
+    assert words == ['No view in this episode yet.', 'No publisher on /occupancy yet.',
+                     'No publisher on /next_view any more.']
+
+
+def test_the_last_view_the_end_and_a_silent_camera_are_told():
+    state = LoopState(views=(view(1), view(2)))
+    assert link_words(links(ago_s=1.2), state) == ['2 views, the last 1 s ago.']
+    assert link_words(links(ago_s=1.2), LoopState(views=(view(1),))) == [
+        '1 view, the last 1 s ago.']
+    done = LoopState('1f', (view(1), view(2)), done='entropy_settled')
+    assert link_words(links(ago_s=130), done) == [
+        'Done (entropy settled): 2 views, the last 2 min ago.',
+        'The camera has been silent for 2 min.', 'Episode 1f.']
+
+
+@pytest.mark.parametrize(('seconds', 'words'), [
+    (0.2, '0 s'), (59.4, '59 s'), (61, '1 min'), (3500, '58 min'), (7300, '2 h')])
+def test_spans_of_time_are_told_in_whole_units(seconds, words):
+    assert ago(seconds) == words
