@@ -3,26 +3,23 @@
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.bag_topics import with_topics
 from active_recon.cli.progress import progress_bar
-from active_recon.cli.topics import (
-    AzimuthTopic,
-    CameraInfoTopic,
-    ImageTopic,
-    JointName,
-    ObjectFrame,
-    TurnedObject,
-)
 from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
     from active_recon.bags.run import RecordedRun
+    from active_recon.bags.topics import Topics
     from active_recon.report.subject import Subject
 
 
+@with_topics
 def report(
     bags: Annotated[list[Path], typer.Argument(
-        help='Bags: folders or files, MCAP or sqlite3. Several stand side by side.')],
+        metavar='BAG', help='rosbag2 folders, or MCAP or sqlite3 files. Several stand side by '
+                            'side.')],
+    topics: 'Topics',
     out: Annotated[Path | None, typer.Option(
         help='Where the page goes; default: report.html in the first bag.')] = None,
     truth: Annotated[list[Path] | None, typer.Option(
@@ -35,12 +32,6 @@ def report(
     model: Annotated[str | None, typer.Option(
         help='What rebuilds the shapes where a bag holds none: a model that ships, or a '
              '.safetensors file.')] = None,
-    image: ImageTopic = '',
-    camera_info: CameraInfoTopic = '',
-    azimuth: AzimuthTopic = '',
-    joint: JointName = '',
-    turned_object: TurnedObject = False,
-    object_frame: ObjectFrame = 'object',
 ) -> None:
     """
     Write recorded runs as one HTML page that opens in any browser, with no network.
@@ -51,7 +42,6 @@ def report(
     Example: active-recon report bags/2026-11-21_10-00-00 --out run.html
     """
     from active_recon.bags.reading import read_run
-    from active_recon.bags.topics import Topics
     from active_recon.report.page import report_page, write_page
 
     truths = truth or []
@@ -59,7 +49,6 @@ def report(
         raise ConfigError('--truth: expected one for all bags or one for each of '
                           f'{len(bags)}, got {len(truths)}')
     path = out or (bags[0] if bags[0].is_dir() else bags[0].parent) / 'report.html'
-    topics = Topics(image, camera_info, azimuth, joint, turned_object, object_frame)
     subjects: list[Subject] = []
     with progress_bar('reading', len(bags)) as advance:
         for index, bag in enumerate(bags):
