@@ -93,14 +93,18 @@ def type_name(msg):
     return f'{type(msg).__module__.split(".")[0]}/msg/{type(msg).__name__}'
 
 
-def write_bag(folder, messages, max_bytes=None, parameters=None):
-    """Write (time, topic, message) into a bag, and return its folder."""
+def write_bag(folder, messages, max_bytes=None, parameters=None, one_by_one=False):
+    """
+    Write (time, topic, message) into a bag, and return its folder.
+
+    Within a chunk the writer sorts by time, unless each message has one of its own.
+    """
     with BagWriter(folder, max_bytes) as bag:
         if parameters:
             bag.attach_parameters('/reconstructor', parameters)
         for time, topic, msg in messages:
             bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
             bag.write(topic, serialize_message(msg), time + DELAY, time)
-            if max_bytes:
+            if max_bytes or one_by_one:
                 bag.flush()  # a file may end wherever a chunk does
     return folder

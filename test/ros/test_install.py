@@ -26,7 +26,7 @@ pytestmark = pytest.mark.ros
 
 ROOT = Path(__file__).parents[2]
 COLCON = Path(sys.prefix, 'colcon')  # where `make test` puts it
-NODES = {'reconstructor', 'recorder', 'turntable_camera', 'view_planner'}
+NODES = {'reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer'}
 PUBLISHED = {f'/diagnostics of /{node}' for node in NODES} | {'/episode', '/camera/image_raw'}
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 START_BUDGET_S = 60.0
@@ -99,7 +99,7 @@ def test_ament_index_finds_the_package(install, tmp_path):
     assert Path(found.strip()) == install.prefix
 
 
-def test_executables_are_the_four_nodes_and_the_command(install):
+def test_executables_are_the_five_nodes_and_the_command(install):
     assert {path.name for path in install.executables.iterdir()} == NODES | {'active-recon'}
     assert all(os.access(path, os.X_OK) for path in install.executables.iterdir())
 
