@@ -18,6 +18,8 @@ VIEW_COUNT = 24
 AZIMUTHS: NDArray[np.float64] = np.arange(VIEW_COUNT) * TURN / VIEW_COUNT
 """Azimuths of the rendered views, radians, (24,)."""
 CANONICAL_ELEVATION = math.radians(30)
+ELEVATION_TOLERANCE = math.radians(5)
+"""A camera further off the canonical elevation is warned of: the network never saw it."""
 CANONICAL_DISTANCE = 2.1
 """Distance of the canonical camera in sides of the voxel grid: the grid's sphere just fits."""
 

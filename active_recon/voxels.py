@@ -81,6 +81,11 @@ class VoxelGrid:
         above: NDArray[np.bool_] = self.occupancy > threshold
         return above
 
+    def above(self, threshold: float) -> 'VoxelGrid':
+        """Return the grid with 0 where it is not above the threshold: what a cloud tells."""
+        occupancy = np.where(self.occupied(threshold), self.occupancy, np.float32(0))
+        return VoxelGrid(np.ascontiguousarray(occupancy), self.size)
+
     def entropy(self) -> float:
         """Return the entropy of all cells in nats: -sum(p log p + (1 - p) log(1 - p))."""
         return float(entropy(self.occupancy.astype(np.float64)))

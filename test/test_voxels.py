@@ -223,3 +223,11 @@ def test_a_ball_turned_is_the_same_ball():
     occupancy = ball(0.35).occupancy
     back = turned(occupancy, 0.7)
     assert iou(back > 0.5, occupancy > 0.5) > 0.97
+
+
+def test_what_is_above_a_threshold_stays_and_the_rest_is_empty():
+    grid = VoxelGrid(PROBABILITIES, 0.3)
+    above = grid.above(0.6)
+    assert above.size == grid.size
+    assert np.array_equal(above.occupied(0), grid.occupied(0.6))
+    assert np.array_equal(above.occupancy[above.occupied(0)], grid.occupancy[grid.occupied(0.6)])

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from active_recon.bags.replay import cells_above, ReplayedEpisode, ReplayedView
+from active_recon.bags.replay import ReplayedEpisode, ReplayedView
 from active_recon.bags.run import RecordedGoal
 from active_recon.cameras import azimuth_difference, wrap_azimuth
 from active_recon.planner import Goal
@@ -126,7 +126,7 @@ def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, fl
     told = recorded.occupancy > 0
     apart = np.where(told, np.abs(recorded.occupancy - grid.occupancy),
                      np.maximum(grid.occupancy - np.float32(above), 0))
-    return np.array_equal(recorded.occupancy, cells_above(grid, above)), float(apart.max())
+    return np.array_equal(recorded.occupancy, grid.above(above).occupancy), float(apart.max())
 
 
 def _largest(recorded: np.ndarray, replayed: np.ndarray) -> float:

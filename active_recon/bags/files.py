@@ -4,6 +4,7 @@ from contextlib import suppress
 from itertools import count
 import os
 from pathlib import Path
+import re
 
 
 def write_whole(path: Path, text: str) -> None:
@@ -20,6 +21,15 @@ def write_whole(path: Path, text: str) -> None:
             unfinished.unlink()
         raise
     sync_folder(path.parent)
+
+
+def mcap_files(folder: Path) -> list[Path]:
+    """Return the MCAP files of a folder in the order in which rosbag2 numbers them."""
+    def number(path: Path) -> tuple[int, str]:
+        found = re.search(r'_(\d+)$', path.stem)
+        return int(found[1]) if found else 0, path.name
+
+    return sorted(folder.glob('*.mcap'), key=number)
 
 
 def free_name(path: Path, ending: str) -> Path:

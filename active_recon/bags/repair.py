@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 import fcntl
 import os
 from pathlib import Path
-import re
 from typing import Any
 
-from active_recon.bags.files import free_name, sync_folder, write_whole
+from active_recon.bags.files import free_name, mcap_files, sync_folder, write_whole
 from active_recon.bags.metadata import (
     bag_information,
     Contents,
@@ -67,12 +66,7 @@ def bag_files(bag: Path) -> list[Path]:
     """Return a bag's files in the order in which they were recorded; DataError on no bag."""
     if bag.is_file():
         return [bag]
-
-    def number(path: Path) -> tuple[int, str]:
-        found = re.search(r'_(\d+)$', path.stem)
-        return int(found[1]) if found else 0, path.name
-
-    files = sorted(bag.glob('*.mcap'), key=number)
+    files = mcap_files(bag)
     if not files:
         raise DataError(f'{bag}: expected a bag, a folder of MCAP files or one of them, '
                         'but there is none', 'no_bag')

@@ -8,10 +8,7 @@ import hashlib
 from active_recon.bags.run import RecordedEpisode, RecordedRun, RecordedView
 from active_recon.planner import Decision, Goal, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
-from active_recon.voxels import VoxelGrid
 from msg_tools.voxels import FLOOR
-import numpy as np
-from numpy.typing import NDArray
 import torch
 
 
@@ -66,13 +63,7 @@ def _replay_episode(episode: RecordedEpisode, reconstructor: Reconstructor,
 def decide(planner: Planner, reconstruction: Reconstruction, azimuth: float) -> Decision:
     """Return what the planner decides of what its node hears: no cells of next to no occupancy."""
     grid = reconstruction.grid
-    heard = VoxelGrid(cells_above(grid, FLOOR), grid.size)
-    return planner.add_view(reconstruction.latent, azimuth, heard.entropy())
-
-
-def cells_above(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
-    """Return the occupancies above a threshold, 0 elsewhere: what a published cloud tells."""
-    return np.ascontiguousarray(np.where(grid.occupied(threshold), grid.occupancy, np.float32(0)))
+    return planner.add_view(reconstruction.latent, azimuth, grid.above(FLOOR).entropy())
 
 
 def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:

@@ -2,18 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from active_recon.bags.metadata import QosProfile
+from active_recon.bags.parameters import node_parameters
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun
-from active_recon.bags.settings import node_parameters
+from active_recon.bags.whole_bag import whole_bag, write_message
 from active_recon.bags.writer import BagWriter
-from active_recon.errors import RecordingError
 from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
 from msg_tools.loop import goal_to_msgs, image_to_msgs, view_to_msgs
-from msg_tools.serialization import message_bytes, type_name
-from rosbags.typesys import get_typestore, Stores
 
 _UNNAMED = 'unnamed'  # of a bag without episodes: on the wire each has an id
 _LATCHED = QosProfile(durability='transient_local')
@@ -27,19 +24,8 @@ def write_run(run: RecordedRun, folder: Path) -> None:
     What a view or a goal does not tell when it was received bears its stamp. Raises
     RecordingError where the folder exists or the disk is full.
     """
-    if folder.exists():
-        raise RecordingError(f'expected to write a new bag in {folder}, but it exists: '
-                             'nothing is overwritten', 'bag_not_begun')
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=f'.{folder.name}-', dir=folder.parent) as beside:
-            unfinished = Path(beside) / folder.name
-            with BagWriter(unfinished) as bag:
-                _write(run, bag)
-            unfinished.rename(folder)
-    except OSError as error:
-        raise RecordingError(f'expected to write a new bag in {folder}, but: {error}',
-                             'bag_not_begun') from error
+    with whole_bag(folder) as bag:
+        _write(run, bag)
 
 
 def _write(run: RecordedRun, bag: BagWriter) -> None:
@@ -47,14 +33,10 @@ def _write(run: RecordedRun, bag: BagWriter) -> None:
     for node, parameters in run.parameters.items():
         bag.attach_parameters(node, parameters)
     size = node_parameters(run, 'reconstructor').get('object_size', 1.0)
-    definitions = get_typestore(Stores.ROS2_JAZZY)
     messages = (found for episode in run.episodes for found in _messages(episode, size))
     for received, topic, stamp, msg in sorted(messages, key=lambda found: found[0]):
-        kind = type_name(msg)
         qos = _STREAM if topic.startswith('camera/') else _LATCHED
-        definition, _ = definitions.generate_msgdef(kind, ros_version=2)
-        bag.add_topic(f'/{topic}', kind, definition, (qos,))
-        bag.write(f'/{topic}', message_bytes(msg), received, stamp)
+        write_message(bag, f'/{topic}', msg, received, stamp, qos)
 
 
 def _messages(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str, int, Any]]:

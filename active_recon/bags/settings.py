@@ -6,17 +6,13 @@ import math
 from pathlib import Path
 from typing import Any
 
+from active_recon.bags.parameters import node_parameters
 from active_recon.bags.run import RecordedRun
-from active_recon.errors import DataError, WeightsError
+from active_recon.errors import WeightsError
 from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
 
-_KINDS: Mapping[str, type] = {
-    'weights': str, 'policy': str, 'threads': int, 'seed': int, 'max_views': int,
-    'object_size': float, 'object_yaw': float, 'threshold': float, 'entropy_tolerance': float,
-    'goal_tolerance': float}
-_RANGES = {'threads': (1, 256), 'seed': (0, 2**32 - 1), 'max_views': (1, 1000)}  # as the nodes'
 _OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
 _OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw')
 
@@ -84,30 +80,6 @@ def recorded_settings(run: RecordedRun, weights: Path | None = None, instead: bo
         planner['weights'] = found if same else Path(own) if own else SHIPPED
     return Settings(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
                     of_reconstructor.get('threads', 1))
-
-
-def node_parameters(run: RecordedRun, node: str) -> dict[str, Any]:
-    """
-    Return the parameters of a node, in whatever namespace; empty where the bag has none.
-
-    Raises DataError where one of those that a replay needs is not of its kind.
-    """
-    found = next((values for name, values in run.parameters.items()
-                  if name.rpartition('/')[2] == node), {})
-    return {name: _checked(run.path, name, value) for name, value in found.items()}
-
-
-def _checked(path: Path, name: str, value: Any) -> Any:
-    kind = _KINDS.get(name, object)
-    if kind is float and type(value) is int:
-        return float(value)
-    low, high = _RANGES.get(name, (None, None))
-    if kind is not object and type(value) is not kind or low is not None and not (
-            low <= value <= high):
-        within = '' if low is None else f' from {low} to {high}'
-        raise DataError(f'{path}: its parameter {name}: expected {kind.__name__}{within}, '
-                        f'got {value!r}')
-    return value
 
 
 def _given(parameters: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:

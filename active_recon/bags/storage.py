@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from active_recon.bags.files import mcap_files
 from active_recon.bags.mcap_bag import McapBag
 from active_recon.bags.metadata import yaml_mapping
 from active_recon.bags.raw import Bag
@@ -16,7 +17,7 @@ def open_bag(path: Path) -> Bag:
         raise DataError(f'{path}: expected a bag, but there is nothing')
     if not path.is_dir():
         return McapBag(path, [path]) if _is_mcap(path) else OtherBag(path)
-    files = sorted(path.glob('*.mcap'), key=lambda file: (len(file.name), file.name))
+    files = mcap_files(path)
     if (path / 'metadata.yaml').exists():
         named = _named_files(path)
         if named is None:

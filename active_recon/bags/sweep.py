@@ -2,22 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 import time
 
 from active_recon import __version__
 from active_recon.bags.metadata import QosProfile
+from active_recon.bags.whole_bag import whole_bag, write_message
 from active_recon.bags.writer import BagWriter
-from active_recon.errors import RecordingError
 from active_recon.shown_object import ShownObject
 from msg_tools.loop import image_to_msgs
-from msg_tools.serialization import message_bytes
-from rosbags.typesys import get_typestore, Stores
 
-POSE, INFO, IMAGE = '/camera/pose', '/camera/camera_info', '/camera/image_raw'
-TYPES = {POSE: 'geometry_msgs/msg/PoseStamped',
-         INFO: 'sensor_msgs/msg/CameraInfo',
-         IMAGE: 'sensor_msgs/msg/Image'}
 IMAGES_EACH = 3
 """At each azimuth, so that the camera is seen to stand still."""
 _PERIOD_NS = 100_000_000
@@ -34,36 +27,16 @@ def record_sweep(shown: ShownObject, folder: Path, begin: int | None = None,
     metres. `advance` is called after each view. The folder appears when the bag is complete;
     RecordingError where it is there already, or the disk full.
     """
-    folder = folder.absolute()
-    if folder.exists():
-        raise RecordingError(f'expected to begin a new bag in {folder}, but: it exists already',
-                             'bag_not_begun')
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix='.', dir=folder.parent) as unfinished:
-            stamp = begin if begin is not None else (
-                time.time_ns() - len(shown.images) * IMAGES_EACH * _PERIOD_NS)
-            with _announced(Path(unfinished) / folder.name, shown.name) as bag:
-                bag.attach_parameters('/turntable_camera', {'object_size': object_size})
-                for index in range(len(shown.images)):
-                    for _ in range(IMAGES_EACH):
-                        _write_view(bag, shown, index, stamp)
-                        stamp += _PERIOD_NS
-                    advance()
-            bag.folder.rename(folder)
-    except OSError as error:
-        raise RecordingError(f'expected to write a bag into {folder}, but: {error}',
-                             'bag_not_begun') from error
-
-
-def _announced(folder: Path, name: str) -> BagWriter:
-    definitions = get_typestore(Stores.ROS2_JAZZY)
-    bag = BagWriter(folder)
-    bag.add_provenance({'version': __version__, 'object': name})
-    for topic, type_name in TYPES.items():
-        text, _ = definitions.generate_msgdef(type_name, ros_version=2)
-        bag.add_topic(topic, type_name, text, (QosProfile(),))
-    return bag
+    stamp = begin if begin is not None else (
+        time.time_ns() - len(shown.images) * IMAGES_EACH * _PERIOD_NS)
+    with whole_bag(folder) as bag:
+        bag.add_provenance({'version': __version__, 'object': shown.name})
+        bag.attach_parameters('/turntable_camera', {'object_size': object_size})
+        for index in range(len(shown.images)):
+            for _ in range(IMAGES_EACH):
+                _write_view(bag, shown, index, stamp)
+                stamp += _PERIOD_NS
+            advance()
 
 
 def _write_view(bag: BagWriter, shown: ShownObject, index: int, stamp: int) -> None:
@@ -71,4 +44,4 @@ def _write_view(bag: BagWriter, shown: ShownObject, index: int, stamp: int) -> N
     messages = image_to_msgs(stamp, shown.images[index], shown.cameras[index])
     for number, (topic, msg) in enumerate(messages.items(), start=1):
         received = stamp + number * _STEP_NS
-        bag.write(f'/{topic}', message_bytes(msg), received, received - _STEP_NS)
+        write_message(bag, f'/{topic}', msg, received, received - _STEP_NS, QosProfile())

@@ -6,15 +6,15 @@ import math
 from pathlib import Path
 
 from active_recon import __version__
-from active_recon.bags.replay import cells_above, decide
+from active_recon.bags.parameters import node_parameters
+from active_recon.bags.replay import decide
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
-from active_recon.bags.settings import node_parameters, Settings
+from active_recon.bags.settings import Settings
 from active_recon.cameras import azimuth_difference, wrap_azimuth
 from active_recon.errors import DataError
 from active_recon.planner import Goal, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import GOAL_TOLERANCE
-from active_recon.voxels import VoxelGrid
 from msg_tools.voxels import FLOOR
 import numpy as np
 
@@ -148,8 +148,7 @@ def _known(view: RecordedView, reconstruction: Reconstruction, threshold: float)
     """Return the view with what the reconstructor would have published of it."""
     grid = reconstruction.grid
     return replace(
-        view, reconstruction=VoxelGrid(cells_above(grid, FLOOR), grid.size),
-        occupied=VoxelGrid(cells_above(grid, threshold), grid.size),
+        view, reconstruction=grid.above(FLOOR), occupied=grid.above(threshold),
         latent=reconstruction.latent, entropy=grid.entropy())
 
 

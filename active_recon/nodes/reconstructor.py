@@ -10,6 +10,7 @@ from active_recon.cameras import (
     CANONICAL_DISTANCE,
     CANONICAL_ELEVATION,
     CANONICAL_INTRINSICS,
+    ELEVATION_TOLERANCE,
     orbit_camera,
 )
 from active_recon.errors import ConfigError, DataError, MessageError
@@ -18,7 +19,7 @@ from active_recon.nodes.parameters import declare, tell
 from active_recon.nodes.qos import HEARD, HEARD_OFTEN, LATCHED
 from active_recon.nodes.run import one_line, run_node
 from active_recon.reconstructor import Reconstruction, Reconstructor
-from active_recon.view_gate import TAKE_VIEWS, ViewGate
+from active_recon.view_gate import GOAL_TOLERANCE, TAKE_VIEWS, ViewGate
 from active_recon.voxels import MESH_FORMATS, write_mesh
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import intrinsics_from_msg, OBJECT_FRAME, pose_from_msg, pose_to_msg
@@ -35,8 +36,6 @@ from std_msgs.msg import Float64, Header
 from std_srvs.srv import Trigger
 import torch
 
-_ELEVATION_TOLERANCE = math.radians(5)
-
 
 class ReconstructorNode(Node):
     """Fold the views that the gate lets through into the reconstruction and publish it."""
@@ -46,7 +45,7 @@ class ReconstructorNode(Node):
         self._reconstructor = self._load()
         self._gate = ViewGate(
             declare(self, 'take_views', 'auto', 'which images become views', choices=TAKE_VIEWS),
-            declare(self, 'goal_tolerance', 0.14, 'rad from a goal that still reach it',
+            declare(self, 'goal_tolerance', GOAL_TOLERANCE, 'rad from a goal that still reach it',
                     0.0, math.pi),
             declare(self, 'min_view_separation', 0.2, 'rad between views without goals',
                     0.0, math.pi))
@@ -171,7 +170,7 @@ class ReconstructorNode(Node):
 
     def _warn_of(self, camera: Camera) -> None:
         away = camera.elevation - CANONICAL_ELEVATION
-        if abs(away) > _ELEVATION_TOLERANCE:
+        if abs(away) > ELEVATION_TOLERANCE:
             self._diagnostics.warn('elevation', (
                 'expected views from an elevation of 30 degrees, as the network was trained with, '
                 f'got {math.degrees(camera.elevation):.1f}; the reconstruction will be worse'))

@@ -4,13 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
-from active_recon.cameras import azimuth_difference, CANONICAL_ELEVATION
+from active_recon.bags.parameters import node_parameters
+from active_recon.cameras import azimuth_difference, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import degrees, Subject
+from active_recon.view_gate import GOAL_TOLERANCE
 
-GOAL_TOLERANCE = 0.14
-"""Radians, where the reconstructor's parameter was not recorded."""
-ELEVATION_TOLERANCE = math.radians(5)
 _STOPPED = {
     'max_views': ('view limit', 'It stopped because it had taken as many views as it was '
                                 'allowed.'),
@@ -82,8 +81,8 @@ def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
 
 
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
-    parameters = subject.run.parameters.get('reconstructor', {})
-    tolerance = float(parameters.get('goal_tolerance', GOAL_TOLERANCE))
+    parameters = node_parameters(subject.run, 'reconstructor')
+    tolerance = parameters.get('goal_tolerance', GOAL_TOLERANCE)
     for number, (view, goal) in enumerate(zip(subject.views, subject.goals, strict=True), 1):
         away = goal and abs(float(azimuth_difference(view.camera.azimuth, goal.azimuth)))
         if away and away > tolerance:

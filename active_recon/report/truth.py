@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from active_recon.bags.parameters import node_parameters
 from active_recon.bags.run import RecordedEpisode, RecordedRun
 from active_recon.errors import ConfigError
 from active_recon.meshes import load_mesh
@@ -35,13 +36,13 @@ def read_truth(path: Path, run: RecordedRun) -> NDArray[np.bool_]:
     if side != resolution:
         raise ConfigError(f'{path}: expected {resolution} cells a side, as {run.path.name} has, '
                           f'got {side}')
-    yaw = float(run.parameters.get('reconstructor', {}).get('object_yaw', 0.0))
+    yaw = node_parameters(run, 'reconstructor').get('object_yaw', 0.0)
     return VoxelGrid(turned(grid.occupancy, yaw)).occupied(0.5)
 
 
 def known_truth(run: RecordedRun) -> NDArray[np.bool_] | None:
     """Return the true cells where the camera says that it showed an object that ships."""
-    camera = run.parameters.get('turntable_camera', {})
+    camera = node_parameters(run, 'turntable_camera')
     mesh = Path(str(camera.get('mesh', '')))
     ships = mesh.parts[-3:-1] == ('active_recon', 'objects') and mesh.stem in shipped_objects()
     if not ships or camera.get('up') or camera.get('front'):
@@ -65,9 +66,8 @@ def _reconstructed(episode: RecordedEpisode, reconstructor: 'Reconstructor') -> 
     views = []
     for view in episode.views:
         grid = reconstructor.add_view(view.image, view.camera).grid
-        occupied = np.where(grid.occupied(reconstructor.threshold), grid.occupancy, 0)
         views.append(replace(view, reconstruction=grid, entropy=grid.entropy(),
-                             occupied=VoxelGrid(occupied, grid.size)))
+                             occupied=grid.above(reconstructor.threshold)))
     return replace(episode, views=views)
 
 

@@ -1,0 +1,38 @@
+"""The parameters of a node, as a bag tells them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from active_recon.bags.run import RecordedRun
+from active_recon.errors import DataError
+
+_KINDS: Mapping[str, type] = {
+    'weights': str, 'policy': str, 'threads': int, 'seed': int, 'max_views': int,
+    'object_size': float, 'object_yaw': float, 'threshold': float, 'entropy_tolerance': float,
+    'goal_tolerance': float}
+_RANGES = {'threads': (1, 256), 'seed': (0, 2**32 - 1), 'max_views': (1, 1000)}  # as the nodes'
+
+
+def node_parameters(run: RecordedRun, node: str) -> dict[str, Any]:
+    """
+    Return the parameters of a node, in whatever namespace; empty where the bag has none.
+
+    Raises DataError where one of those that a replay needs is not of its kind.
+    """
+    found = next((values for name, values in run.parameters.items()
+                  if name.rpartition('/')[2] == node), {})
+    return {name: _checked(run.path, name, value) for name, value in found.items()}
+
+
+def _checked(path: Path, name: str, value: Any) -> Any:
+    kind = _KINDS.get(name, object)
+    if kind is float and type(value) is int:
+        return float(value)
+    low, high = _RANGES.get(name, (None, None))
+    if kind is not object and type(value) is not kind or low is not None and not (
+            low <= value <= high):
+        within = '' if low is None else f' from {low} to {high}'
+        raise DataError(f'{path}: its parameter {name}: expected {kind.__name__}{within}, '
+                        f'got {value!r}')
+    return value
