@@ -39,11 +39,11 @@ golden: .venv/installed  ## the golden run anew, once weights or loop have chang
 
 test: lint chromium .venv/colcon/installed  ## style, types, and every test but the long ones; ARGS go to pytest
 	@echo '== testing; the long tests run with `make test-full`'
-	@$(BIN)/python -m pytest -m 'not slow' $(ARGS)
+	@$(BIN)/python test/side_by_side.py -m 'not slow' $(ARGS)
 
 test-full: lint chromium .venv/colcon/installed  ## every test, high counts and soak too
 	@echo '== testing everything'
-	@$(BIN)/python -m pytest $(ARGS)
+	@$(BIN)/python test/side_by_side.py $(ARGS)
 
 # The pages are tested in Debian's Chromium, which only root can install.
 chromium:

@@ -1,14 +1,16 @@
 """Real nodes as processes, on a private domain of this machine, and a bench that talks to them."""
 
 from collections.abc import Callable, Iterator
+import fcntl
 import os
 from pathlib import Path
 import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from typing import Any
+from typing import Any, IO
 
 from active_recon.cameras import CANONICAL_ELEVATION, orbit_camera
 from diagnostic_msgs.msg import DiagnosticArray
@@ -163,7 +165,7 @@ class Bench:
 @pytest.fixture(scope='session')
 def ros_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """Return a domain that no other session uses, heard on this machine only."""
-    domain = 1 + os.getpid() % 100
+    domain, lock = _domain_of_its_own()
     patch = pytest.MonkeyPatch()
     patch.setenv('ROS_DOMAIN_ID', str(domain))
     patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -173,6 +175,22 @@ def ros_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     patch.setenv('OMP_NUM_THREADS', '1')
     yield domain
     patch.undo()
+    lock.close()
+
+
+def _domain_of_its_own() -> tuple[int, IO[str]]:
+    """Return a domain, and the file whose lock keeps other sessions of this machine out of it."""
+    folder = Path(tempfile.gettempdir()) / 'active_recon_domains'
+    folder.mkdir(exist_ok=True)
+    for domain in range(1, 41):  # a demo that runs beside takes a higher one
+        lock = (folder / str(domain)).open('w')
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+        else:
+            return domain, lock
+    raise AssertionError(f'expected a free ROS domain, but all in {folder} are locked')
 
 
 @pytest.fixture(scope='session')

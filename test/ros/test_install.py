@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 import os
 from pathlib import Path
-import random
 import shutil
 import signal
 import subprocess
@@ -114,12 +113,13 @@ def test_modules_and_their_data_come_from_the_install(install, source, tmp_path)
         assert shipped <= {path.name for path in Path(found[0], folder).iterdir()}
 
 
-def test_every_executable_publishes_and_ends_when_asked(install, tmp_path, monkeypatch):
+def test_every_executable_publishes_and_ends_when_asked(
+        install, ros_domain, tmp_path, monkeypatch):
     mesh = tmp_path / 'box.ply'
     trimesh.creation.box().export(mesh)
     parameters = {'turntable_camera': f'mesh:={mesh}', 'recorder': f'output_dir:={tmp_path}/bags',
                   'reconstructor': f'output_dir:={tmp_path}'}
-    private = {'ROS_DOMAIN_ID': str(random.randint(1, 101)),  # whose ports nothing else takes
+    private = {'ROS_DOMAIN_ID': str(ros_domain),
                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_LOG_DIR': str(tmp_path)}
     for name, value in private.items():
         monkeypatch.setenv(name, value)
