@@ -6,7 +6,7 @@ from active_recon.bags.writer import BagWriter
 from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.voxels import VoxelGrid
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
-from msg_tools.diagnostics import diagnostics_to_msg
+from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
 from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
 from msg_tools.goals import scores_to_msg, view_goal_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
@@ -51,7 +51,7 @@ class LoopRun:
             now = self._view(number, now)
         self._say(now, '/done', done_to_msg(self.stamps[-1], 'max_views'))
         self._say(now + 1, '/diagnostics', diagnostics_to_msg(
-            '/reconstructor', {'views': count}, '', stamp_from_nanoseconds(now)))
+            NodeStatus('/reconstructor', {'views': count}), stamp_from_nanoseconds(now)))
         self.end = now + PERIOD
 
     def _say(self, time, topic, msg):

@@ -1,10 +1,8 @@
-"""Voxels, episodes, counters and stamps between ROS and the core."""
+"""Voxels, episodes and stamps between ROS and the core."""
 
 from active_recon.errors import DataError, MessageError
 from active_recon.voxels import VoxelGrid
-from diagnostic_msgs.msg import DiagnosticStatus
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
-from msg_tools.diagnostics import counts_from_msg, diagnostics_to_msg
 from msg_tools.episodes import (
     done_from_msg,
     done_to_msg,
@@ -60,13 +58,3 @@ def test_an_episode_and_its_end_come_back_as_they_were():
     assert done_from_msg(done_to_msg(7, 'max_views')) == (7, 'max_views')
     with pytest.raises(MessageError, match='unique id'):
         episode_from_msg(Header())
-
-
-def test_counters_come_back_and_a_problem_is_a_warning():
-    counts = {'images': 3, 'refused/frame': 1}
-    stamp = stamp_from_nanoseconds(1)
-    msg = diagnostics_to_msg('/node', counts, 'refused: why', stamp)
-    assert counts_from_msg(msg, '/node') == counts
-    assert counts_from_msg(msg, '/other') == {}
-    assert msg.status[0].level == DiagnosticStatus.WARN
-    assert diagnostics_to_msg('/node', {}, '', stamp).status[0].level == DiagnosticStatus.OK

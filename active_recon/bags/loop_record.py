@@ -16,7 +16,7 @@ from active_recon.bags.message_types import (
 from active_recon.bags.raw import Bag, RawMessage
 from active_recon.errors import ActiveReconError, DataError
 from msg_tools.cameras import pose_from_msg
-from msg_tools.diagnostics import counts_from_msg
+from msg_tools.diagnostics import diagnostics_from_msg
 from msg_tools.episodes import done_from_msg, episode_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, scores_from_msg, view_goal_from_msg
 from msg_tools.images import latent_from_msg
@@ -100,12 +100,8 @@ class LoopRecord:
     def _count(self, message: RawMessage) -> None:
         if message.type_name != DIAGNOSTICS:
             return
-        msg = read_message(message)
-        for status in msg.status:
-            try:
-                self.counters[status.name.lstrip('/')] = counts_from_msg(msg, status.name)
-            except ValueError:  # another's diagnostics, which are no counters
-                continue
+        for name, status in diagnostics_from_msg(read_message(message)).items():
+            self.counters[name.lstrip('/')] = dict(status.counts)
 
 
 def _scores_from_msg(msg: Any) -> tuple[NDArray[np.float64], NDArray[np.float32]]:

@@ -1,41 +1,70 @@
-"""What a node used and what it refused: counted, said in the log, published once a second."""
+"""What a node did, refused and found wrong: counted, said in the log, told on `/diagnostics`."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+import math
+import socket
 import time
 
 from active_recon.errors import ActiveReconError
 from active_recon.nodes.run import one_line
+from active_recon.rates import Durations, Rate
 from diagnostic_msgs.msg import DiagnosticArray
-from msg_tools.diagnostics import diagnostics_to_msg
+from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
 from msg_tools.stamps import stamp_from_nanoseconds
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 LOG_EVERY_S = 10.0
+TELL_EVERY_S = 1.0
+NEWS_WITHIN_S = 0.1
 
 
 class Diagnostics:
     """
-    The counters of one node, on `/diagnostics`.
+    The state of one node, on `/diagnostics`: once a second, and what is new at once.
 
     What is refused is counted by its kind. The first of a kind is logged at once, a stream of
-    them once in `LOG_EVERY_S` seconds, with the number of those left unsaid.
+    them once in `LOG_EVERY_S` seconds, with the number of those left unsaid. What is counted
+    under a name of `rates` is told per second as well.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, rates: Sequence[str] = ()) -> None:
         self._node = node
         self._counts: Counter[str] = Counter()
+        self._rates = {name: Rate(time.monotonic()) for name in rates}
+        self._latency = Durations()
+        self._facts: dict[str, str] = {}
         self._unsaid: Counter[str] = Counter()
         self._said_at: dict[str, float] = {}
-        self._problem = ''
+        self._last_problem = ''
+        self._troubles: dict[str, str] = {}
         self._failure = ''
+        self._news = True
+        self._told_at = -math.inf
+        self._host = socket.gethostname()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        node.create_timer(1.0, self._publish)
+        # By the system's clock: a clock of a simulation that stands still is worth telling too.
+        node.create_timer(NEWS_WITHIN_S, self._tell_if_due,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def count(self, what: str, by: int = 1) -> None:
         """Count something that is no refusal, for example a view taken in."""
         self._counts[what] += by
+        if what in self._rates:
+            self._rates[what].add(time.monotonic())
+
+    def took_since(self, stamp: int) -> None:
+        """Note the latency of what was just published, from its stamp in nanoseconds to now."""
+        self._latency.add((self._node.get_clock().now().nanoseconds - stamp) / 1e9)
+
+    def tell(self, fact: str, value: str) -> None:
+        """Set a fact of the node's state, its name beginning with a capital."""
+        if self._facts.get(fact) != value:
+            self._facts[fact] = value
+            self._news = True
 
     def refuse(self, error: ActiveReconError) -> None:
         """Count what was refused and say it in one line."""
@@ -45,14 +74,29 @@ class Diagnostics:
         """Count what was used although it may do harm, and say why in one line."""
         self._say(f'warned/{kind}', message)
 
+    def begin_trouble(self, kind: str, message: str) -> None:
+        """Warn of a state that is wrong until `end_trouble`; count and say its beginning."""
+        if kind not in self._troubles:
+            self._say(f'warned/{kind}', message)
+        self._troubles[kind] = message
+
+    def end_trouble(self, kind: str) -> None:
+        """Take back the warning of a state, and say so; nothing where there was none."""
+        message = self._troubles.pop(kind, None)
+        if message is not None:
+            self._news = True
+            self._node.get_logger().info(f'over: {message}')
+
     def fail(self, kind: str, message: str) -> None:
         """Say as an error what the node does no more; it stays the state until `recover`."""
         self._counts[f'refused/{kind}'] += 1
         self._failure = message
+        self._news = True
         self._node.get_logger().error(message)
 
     def recover(self) -> None:
         """Take back what `fail` said: the node does it again."""
+        self._news = self._news or self._failure != ''
         self._failure = ''
 
     @contextmanager
@@ -65,7 +109,8 @@ class Diagnostics:
 
     def _say(self, key: str, message: str) -> None:
         self._counts[key] += 1
-        self._problem = message
+        self._last_problem = message
+        self._news = True
         now = time.monotonic()
         if now - self._said_at.get(key, -LOG_EVERY_S) < LOG_EVERY_S:
             self._unsaid[key] += 1
@@ -75,10 +120,29 @@ class Diagnostics:
         self._said_at[key] = now
         self._node.get_logger().warning(f'{message}{more}')
 
-    def _publish(self) -> None:
-        """Publish the counters; the level is WARN where something was refused since."""
-        now = stamp_from_nanoseconds(self._node.get_clock().now().nanoseconds)
-        name = self._node.get_fully_qualified_name()
-        self._publisher.publish(
-            diagnostics_to_msg(name, self._counts, self._problem, now, self._failure))
-        self._problem = ''
+    def _tell_if_due(self) -> None:
+        """Publish what is new, and in any case once a second."""
+        now = time.monotonic()
+        regular = now - self._told_at >= TELL_EVERY_S
+        if not regular and not self._news:
+            return
+        status = self._status(now)
+        self._publisher.publish(diagnostics_to_msg(
+            status, stamp_from_nanoseconds(self._node.get_clock().now().nanoseconds)))
+        self._news = False
+        if regular:
+            # Not before: a warning lasts up to a second, so that who looks now and then sees it.
+            self._last_problem = ''
+            self._told_at = now
+
+    def _status(self, now: float) -> NodeStatus:
+        facts = dict(self._facts)
+        for what, rate in self._rates.items():
+            facts[f'{what.capitalize()} per second'] = f'{rate.per_second(now):.2f}'
+        for percent in (50, 99):
+            latency = self._latency.percentile(percent)
+            if not math.isnan(latency):
+                facts[f'Latency p{percent} (ms)'] = f'{1e3 * latency:.1f}'
+        problems = dict.fromkeys(filter(None, [*self._troubles.values(), self._last_problem]))
+        return NodeStatus(self._node.get_fully_qualified_name(), self._counts, facts,
+                          '; '.join(problems), self._failure, self._host)

@@ -1,6 +1,6 @@
 """Real nodes as processes, on a private domain of this machine, and a bench that talks to them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 import fcntl
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ from active_recon.cameras import CANONICAL_ELEVATION, orbit_camera
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs
-from msg_tools.diagnostics import counts_from_msg
+from msg_tools.diagnostics import diagnostics_from_msg, NodeStatus
 from msg_tools.images import image_to_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 import numpy as np
@@ -102,16 +102,19 @@ class Bench:
         self.node = rclpy.create_node('bench')
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
-        self._counts: dict[str, dict[str, int]] = {}
-        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._on_counts, 10)
+        self._states: dict[str, NodeStatus] = {}
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
 
-    def _on_counts(self, msg: DiagnosticArray) -> None:
-        for status in msg.status:
-            self._counts[status.name] = counts_from_msg(msg, status.name)
+    def _on_diagnostics(self, msg: DiagnosticArray) -> None:
+        self._states |= diagnostics_from_msg(msg)
 
-    def counts(self, name: str) -> dict[str, int]:
+    def state(self, name: str) -> NodeStatus:
+        """Return what a node told of itself last, nothing before the first time."""
+        return self._states.get(f'/{name}', NodeStatus(f'/{name}'))
+
+    def counts(self, name: str) -> Mapping[str, int]:
         """Return the counters that a node published last."""
-        return self._counts.get(f'/{name}', {})
+        return self.state(name).counts
 
     def hear(self, kind: type, topic: str, qos: QoSProfile = STREAM) -> list[Any]:
         """Return a list that grows by what is heard."""
