@@ -1,0 +1,149 @@
+"""The object is told from the room by a mask, by an image of the empty scene, or by a colour."""
+
+from active_recon.background import off_color, off_reference, on_white
+from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.errors import ConfigError, ViewError
+from active_recon.rendering import composite, Renderer
+from active_recon.shapes import make_shape
+from active_recon.voxels import iou
+import cv2
+import numpy as np
+import pytest
+
+SIDE = 320
+GREEN = (30, 170, 70)
+OBJECTS = [('chair', 0), ('table', 1), ('lamp', 0), ('car', 0), ('sofa', 2)]
+
+
+@pytest.fixture(params=OBJECTS, ids=lambda shape: shape[0])
+def shown(request):
+    """Return an object alone, (SIDE, SIDE, 4)."""
+    camera = orbit_camera(0.9, intrinsics=CANONICAL_INTRINSICS.resized(SIDE, SIDE))
+    return Renderer(make_shape(*request.param)).render(camera)
+
+
+def truth(rgba):
+    return rgba[..., 3] > 127
+
+
+def grainy(image, rng):
+    return np.clip(image + rng.normal(0, 3, image.shape), 0, 255).astype(np.uint8)
+
+
+def clutter(rng, side=SIDE):
+    """Return boxes of all colours, (side, side, 3)."""
+    scene = np.full((side, side, 3), 150, np.uint8)
+    for _ in range(40):
+        corner = rng.integers(0, side, 2)
+        cv2.rectangle(scene, corner.tolist(), (corner + rng.integers(5, side // 3, 2)).tolist(),
+                      rng.integers(0, 256, 3).tolist(), -1)
+    return scene
+
+
+def uneven(color, side=SIDE):
+    """Return a wall of one colour, twice as bright at one corner as at the other."""
+    light = np.add.outer(np.linspace(0.6, 0.9, side), np.linspace(0, 0.3, side))
+    return np.clip(np.asarray(color) * light[..., None], 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize('seed', range(2))
+def test_an_object_before_clutter_is_found_by_an_image_of_the_clutter_alone(shown, seed):
+    rng = np.random.default_rng(seed)
+    scene = clutter(rng)
+    found = off_reference(grainy(composite(shown, scene), rng), grainy(scene, rng))
+    assert iou(found, truth(shown), (-2, -1)) > 0.95
+
+
+def test_an_object_before_a_wall_in_uneven_light_is_found_by_the_wall_s_color(shown):
+    rng = np.random.default_rng(0)
+    found = off_color(grainy(composite(shown, uneven(GREEN)), rng), GREEN)
+    assert iou(found, truth(shown), (-2, -1)) > 0.95
+
+
+def test_what_is_found_in_an_image_of_another_size_is_the_same(shown):
+    large = cv2.resize(composite(shown, uneven(GREEN)), (2000, 1500))
+    found = off_color(large, GREEN)
+    assert found.shape == (1500, 2000)
+    expected = cv2.resize(truth(shown).astype(np.uint8), (2000, 1500)) > 0
+    assert iou(found, expected, (-2, -1)) > 0.95
+
+
+def test_the_background_becomes_white_and_the_object_stays(shown):
+    image, mask = composite(shown, clutter(np.random.default_rng(0))), truth(shown)
+    whitened = on_white(image, mask)
+    np.testing.assert_array_equal(whitened[mask], image[mask])
+    assert (whitened[~mask] == 255).all()
+    assert whitened.dtype == np.uint8
+
+
+def test_holes_through_the_object_show_the_background():
+    ring = np.zeros((SIDE, SIDE, 4), np.uint8)
+    cv2.circle(ring, (160, 160), 90, (200, 40, 40, 255), 30)
+    found = off_color(composite(ring, uneven(GREEN)), GREEN)
+    assert not found[160, 160]
+    assert iou(found, truth(ring), (-2, -1)) > 0.99
+
+
+def test_a_speck_of_noise_is_no_part_of_the_object():
+    image = np.full((SIDE, SIDE, 3), 128, np.uint8)
+    reference = image.copy()
+    image[100:200, 100:200] = 250, 30, 30
+    image[10:13, 10:13] = 250, 30, 30
+    assert not off_reference(image, reference)[:50, :50].any()
+
+
+def test_a_weak_shadow_is_no_part_of_the_object():
+    reference = np.full((SIDE, SIDE, 3), 180, np.uint8)
+    image = reference.copy()
+    image[100:200, 200:300] = 165
+    image[100:200, 100:200] = 40, 60, 160
+    found = off_reference(image, reference)
+    assert found[150, 150]
+    assert not found[150, 250]
+
+
+def test_an_image_of_the_empty_scene_has_no_object():
+    rng = np.random.default_rng(1)
+    scene = clutter(rng)
+    for image in (scene, grainy(scene, rng)):
+        with pytest.raises(ViewError, match='nothing does from the empty scene') as refusal:
+            off_reference(image, scene)
+        assert refusal.value.kind == 'no_object'
+    with pytest.raises(ViewError, match=r'nothing does from the color \[30, 170, 70\]') as refusal:
+        off_color(uneven(GREEN), GREEN)
+    assert refusal.value.kind == 'no_object'
+
+
+def test_a_scene_that_changed_as_a_whole_is_refused():
+    image = np.full((64, 64, 3), 200, np.uint8)
+    for find in (lambda: off_reference(image, image // 4), lambda: off_color(image, (255, 0, 0))):
+        with pytest.raises(ViewError, match='all of the image stands out') as refusal:
+            find()
+        assert refusal.value.kind == 'no_background'
+
+
+def test_a_reference_of_another_size_is_refused():
+    with pytest.raises(ViewError, match='size, 48 x 64, got 64 x 48.*capture_background') as error:
+        off_reference(np.zeros((64, 48, 3), np.uint8), np.zeros((48, 64, 3), np.uint8))
+    assert error.value.kind == 'reference'
+
+
+@pytest.mark.parametrize(('mask', 'kind', 'said'), [
+    (np.ones((64, 47), np.bool_), 'mask', 'size, 64 x 48, got 64 x 47'),
+    (np.zeros((64, 48), np.bool_), 'no_object', 'all background'),
+])
+def test_a_mask_that_cannot_be_used_is_refused(mask, kind, said):
+    with pytest.raises(ViewError, match=said) as refusal:
+        on_white(np.zeros((64, 48, 3), np.uint8), mask)
+    assert refusal.value.kind == kind
+
+
+@pytest.mark.parametrize(('color', 'tolerance', 'said'), [
+    ((1, 2), 10, 'background_color: .*got'), ((0, 0, 0), 10, 'background_color'),
+    ((0, 256, 0), 10, 'background_color'), ((0, -1, 0), 10, 'background_color'),
+    (GREEN, 0.0, 'background_tolerance: .*got 0.0'),
+    (GREEN, float('nan'), 'background_tolerance'),
+])
+def test_a_color_key_that_cannot_be_used_is_refused(color, tolerance, said):
+    with pytest.raises(ConfigError, match=said):
+        off_color(np.zeros((64, 48, 3), np.uint8), color, tolerance)
