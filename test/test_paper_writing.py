@@ -5,11 +5,12 @@ import json
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.evaluation.statistics import Interval
+from active_recon.models.weights import find_weights
 from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.document import write_document
 from active_recon.paper.results import Claim, Column, PUBLISHED, Result, Table
 from active_recon.paper.study import Objects, Study
-from active_recon.paper.writing import is_current, read_result, write_result
+from active_recon.paper.writing import is_current, provenance, read_result, write_result
 from active_recon.reporting import silent
 import numpy as np
 import pytest
@@ -139,3 +140,8 @@ def test_silence_takes_every_step():
 def test_results_are_ready_for_json(study):
     write_result(study, 'table9', INPUTS, result())
     assert json.loads((study.out / 'table9.json').read_text())['figures'] == {'iou': [0.5]}
+
+
+def test_weights_that_ship_are_named_without_the_folder_they_happen_to_lie_in(study):
+    told = provenance(study, {}, {'ours': find_weights()})['weights']['ours']
+    assert told['file'] == '2d3d-attention.safetensors, which ships'

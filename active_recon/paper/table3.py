@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from active_recon.evaluation.statistics import Interval, mean_interval, Values
+from active_recon.evaluation.statistics import mean_interval, Values
 from active_recon.models.weights import read_card
 from active_recon.paper import published
 from active_recon.paper.claims import all_larger, FAILS, HOLDS, larger, OPEN
@@ -21,7 +21,7 @@ from active_recon.paper.comparison import (
 )
 from active_recon.paper.measured import Measured
 from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
-from active_recon.paper.results import Claim, Column, plain, Result, Table
+from active_recon.paper.results import Cell, Claim, Column, plain, Result, Table
 from active_recon.paper.spreads import per_view, unweighted
 from active_recon.paper.study import REAL, Study
 from active_recon.paper.systems import JOINT, TWO_STAGE
@@ -48,14 +48,15 @@ def measured_on(study: Study) -> list[str]:
 def make(study: Study) -> Result:
     """Measure every system on every folder, and the two answers that know no detail."""
     rows, names = compared(study), measured_on(study)
-    found = {name: {row.label: seen_at_random(study, row, name) for row in rows}
+    found = {name: {row.label: seen_at_random(study, row, name) for row in rows
+                    if study.objects(name, resolution=row.resolution).present}
              for name in names}
     plain_answers = baselines(study, names)
     categories = next(iter(found['test'].values())).categories
     single = {label: one.iou[..., 0] for label, one in found['test'].items()}
     tables = [category_table(single | plain_answers['test'], categories)]
     if len(names) > 1:
-        tables.append(_real_table(found, plain_answers, names[1:]))
+        tables.append(real_table(found, plain_answers, names[1:]))
     tables += [views_table(found[name], name) for name in names]
     tables += [yaw_table(study, rows), cost_table(study, rows)]
     octree = octree_table(study, rows)
@@ -69,10 +70,10 @@ def make(study: Study) -> Result:
         'over categories weighs every category alike, the mean over objects every object. Beside '
         "the systems stand two answers that know nothing of an image's detail: the mean shape of "
         "the object's category, which is told the category, and the training shape whose image "
-        'is nearest. A system of 64 cells a side is measured against a truth of 64, and not '
-        f'compared. {_last_row(rows)}Where the published columns have a mean, it is ours, of the '
-        'thirteen printed figures. Brackets are 95 % intervals over objects and starts. Over '
-        'several views, all systems see the same random ones.')
+        'is nearest. A system of 64 cells a side is measured against a truth of 64, where there '
+        f'is one, and not compared. {_last_row(rows)}Where the published columns have a mean, it '
+        'is ours, of the thirteen printed figures. Brackets are 95 % intervals over '
+        'objects and starts. Over several views, all systems see the same random ones.')
     return Result('Table 3: single-view reconstruction by category', text, tables, told,
                   _picture(found['test'], categories), {
                       'iou': {name: {label: [plain(value) for value in per_view(one.iou)]
@@ -144,15 +145,20 @@ def category_table(single: Mapping[str, Values], categories: NDArray[np.str_]) -
                  [*names, UNWEIGHTED, WEIGHTED], own + theirs)
 
 
-def _real_table(found: Mapping[str, Mapping[str, Measured]],
-                plain_answers: Mapping[str, Mapping[str, Values]],
-                names: Sequence[str]) -> Table:
+def real_table(found: Mapping[str, Mapping[str, Measured]],
+               plain_answers: Mapping[str, Mapping[str, Values]],
+               names: Sequence[str]) -> Table:
+    """Return the IoU of one view on folders of real models, empty where a truth is too coarse."""
     columns = []
-    for label in (*found[names[0]], *plain_answers[names[0]]):
-        cells: list[Interval] = []
+    labels = dict.fromkeys(label for name in names for label in found[name])
+    for label in (*labels, *plain_answers[names[0]]):
+        cells: list[Cell] = []
         for name in names:
             values = (found[name][label].iou[..., 0] if label in found[name]
-                      else plain_answers[name][label])
+                      else plain_answers[name].get(label))
+            if values is None:  # no truth as fine as what the system predicts
+                cells += [None, None]
+                continue
             categories = next(iter(found[name].values())).categories
             cells += [unweighted(values, categories), mean_interval(values)]
         columns.append(Column(label, cells))

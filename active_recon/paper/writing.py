@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import DataError
-from active_recon.models.weights import read_card, weights_hash
+from active_recon.models.weights import FOLDER, read_card, weights_hash
 from active_recon.paper.claims import sentences
 from active_recon.paper.results import Claim, Result
 from active_recon.paper.study import Objects, Study
@@ -29,7 +29,8 @@ def provenance(study: Study, sets: Mapping[str, Objects], weights: Mapping[str, 
 
 def _origin(weights: Path) -> dict[str, Any]:
     card = read_card(weights)
-    return {'file': str(weights), 'sha256': weights_hash(weights),
+    file = f'{weights.name}, which ships' if weights.parent == FOLDER else str(weights)
+    return {'file': file, 'sha256': weights_hash(weights),
             'threshold': card.get('threshold'), 'views seen in training': views_seen(card)}
 
 
