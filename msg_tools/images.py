@@ -1,67 +1,52 @@
 """Camera images and latents to and from sensor_msgs/Image."""
 
 import array
-from io import BytesIO
 import re
 from typing import Any
 
 from active_recon.errors import MessageError
+import cv2
 import numpy as np
 from numpy.typing import NDArray
-import PIL.Image
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 _BYTE: np.dtype[Any] = np.dtype(np.uint8)
 _FLOAT: np.dtype[Any] = np.dtype(np.float32)
 ENCODINGS = {'rgb8': (_BYTE, 3), 'bgr8': (_BYTE, 3), 'rgba8': (_BYTE, 4), 'bgra8': (_BYTE, 4),
-             'mono8': (_BYTE, 1), '32FC3': (_FLOAT, 3)}
-
-MOST_PIXELS = 1 << 26
-"""Compressed images of more are refused: a small file may claim any size."""
+             'mono8': (_BYTE, 1), '8UC3': (_BYTE, 3), '32FC3': (_FLOAT, 3)}
+_TO_RGB = {'bgr8': cv2.COLOR_BGR2RGB, '8UC3': cv2.COLOR_BGR2RGB, 'mono8': cv2.COLOR_GRAY2RGB,
+           'rgba8': cv2.COLOR_RGBA2RGB, 'bgra8': cv2.COLOR_BGRA2RGB}
 
 
 def image_from_msg(msg: Image) -> NDArray[np.uint8]:
     """
     Return a camera's image, (height, width, 3) uint8 RGB.
 
-    Reads rgb8, bgr8, mono8, rgba8 and bgra8 (what is transparent becomes white), and 32FC3, RGB in
-    [0, 1]. Raises MessageError on another encoding, an image of no size, one with fewer bytes
-    than its size asks for, and values of 32FC3 that are NaN or out of range.
+    Reads rgb8, bgr8, mono8, rgba8 and bgra8 (what is transparent becomes white), 8UC3 as OpenCV's
+    blue, green, red, and 32FC3, RGB in [0, 1]. An image of rgb8 is the message's own memory and
+    changes with it. Raises MessageError as `image_size_from_msg` does, and on values of 32FC3
+    that are NaN or out of range.
     """
-    if msg.encoding not in ENCODINGS:
-        raise MessageError(f'expected an image encoded as one of {", ".join(ENCODINGS)}, '
-                           f'got {msg.encoding!r}', 'encoding')
-    dtype, channels = ENCODINGS[msg.encoding]
+    dtype, channels = _layout(msg)
     pixels = _pixels(msg, dtype, channels)
     if msg.encoding == '32FC3':
         return _from_float(pixels)
-    if channels == 1:
-        return np.repeat(pixels, 3, axis=2)
-    color = pixels[..., 2::-1] if msg.encoding.startswith('bgr') else pixels[..., :3]
-    return _over_white(color, pixels[..., 3:]) if channels == 4 else np.ascontiguousarray(color)
+    if msg.encoding == 'rgb8':
+        return pixels
+    color = np.asarray(cv2.cvtColor(pixels, _TO_RGB[msg.encoding]), np.uint8)
+    return over_white(color, pixels[..., 3]) if channels == 4 else color
 
 
-def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
+def image_size_from_msg(msg: Image) -> tuple[int, int]:
     """
-    Return a camera's image, (height, width, 3) uint8 RGB; what is transparent becomes white.
+    Return height and width of a camera's image, its pixels unread.
 
-    Reads JPEG and PNG. Raises MessageError on anything else, and on images of more than
-    `MOST_PIXELS` before they are unpacked.
+    Raises MessageError on an encoding that `image_from_msg` does not read, an image of no size,
+    and one with fewer bytes than its size asks for.
     """
-    try:
-        with PIL.Image.open(BytesIO(msg.data), formats=('JPEG', 'PNG')) as image:
-            if image.width * image.height > MOST_PIXELS:
-                raise MessageError(f'expected an image of at most {MOST_PIXELS} pixels, got '
-                                   f'{image.height} x {image.width}', 'image_size')
-            if image.has_transparency_data:
-                pixels = np.asarray(image.convert('RGBA'))
-                return _over_white(pixels[..., :3], pixels[..., 3:])
-            return np.asarray(image.convert('RGB'))
-    except (OSError, ValueError, SyntaxError, PIL.Image.DecompressionBombError,
-            PIL.Image.DecompressionBombWarning) as error:
-        raise MessageError('expected a compressed image as JPEG or PNG, got '
-                           f'{msg.format!r}: {error}', 'encoding') from error
+    _check_size(msg, *_layout(msg))
+    return int(msg.height), int(msg.width)
 
 
 def image_to_msg(image: NDArray[np.uint8], header: Header) -> Image:
@@ -86,17 +71,35 @@ def latent_to_msg(latent: NDArray[np.float32], header: Header) -> Image:
     return _image_msg(latent.transpose(1, 2, 0), f'32FC{len(latent)}', header)
 
 
+def over_white(color: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a picture, (H, W, 3), of straight alpha, (H, W), laid on white."""
+    if alpha.min() == 255:
+        return color
+    # 255 - (255 - color) alpha / 255: with odd 255 no value is halfway, so rounding is exact
+    alphas = cv2.cvtColor(alpha, cv2.COLOR_GRAY2RGB)
+    shade = cv2.multiply(cv2.bitwise_not(color), alphas, scale=1 / 255)
+    return np.asarray(cv2.bitwise_not(shade), np.uint8)
+
+
 def _image_msg(pixels: NDArray[Any], encoding: str,
                header: Header) -> Image:
     height, width, channels = pixels.shape
     # An array.array is handed over in microseconds, any other sequence is copied byte by byte.
-    data = array.array('B', np.ascontiguousarray(pixels).tobytes())
+    data = array.array('B')
+    data.frombytes(np.ascontiguousarray(pixels).reshape(-1).view(np.uint8).data)
     return Image(header=header, height=height, width=width, encoding=encoding,
                  step=width * channels * pixels.itemsize, data=data)
 
 
-def _pixels(msg: Image, dtype: np.dtype[Any], channels: int) -> NDArray[Any]:
-    """Return the message's pixels, (height, width, channels), rows unpadded."""
+def _layout(msg: Image) -> tuple[np.dtype[Any], int]:
+    """Return the type of the numbers and how many of them are a pixel."""
+    if msg.encoding not in ENCODINGS:
+        raise MessageError(f'expected an image encoded as one of {", ".join(ENCODINGS)}, '
+                           f'got {msg.encoding!r}', 'encoding')
+    return ENCODINGS[msg.encoding]
+
+
+def _check_size(msg: Image, dtype: np.dtype[Any], channels: int) -> None:
     if msg.height == 0 or msg.width == 0:
         raise MessageError('expected an image with a height and a width above 0, '
                            f'got {msg.height} x {msg.width}', 'image_size')
@@ -108,9 +111,17 @@ def _pixels(msg: Image, dtype: np.dtype[Any], channels: int) -> NDArray[Any]:
     if len(msg.data) < expected:
         raise MessageError(f'expected {expected} bytes for {msg.height} rows of {msg.step}, '
                            f'got {len(msg.data)}', 'image_bytes')
-    rows = np.frombuffer(msg.data, np.uint8, expected).reshape(msg.height, msg.step)[:, :row]
-    ordered = dtype.newbyteorder('>' if msg.is_bigendian else '<')
-    return np.ascontiguousarray(rows).view(ordered).reshape(msg.height, msg.width, channels)
+
+
+def _pixels(msg: Image, dtype: np.dtype[Any], channels: int) -> NDArray[Any]:
+    """Return the message's pixels, (height, width, channels), in its memory where that can be."""
+    _check_size(msg, dtype, channels)
+    rows = np.frombuffer(msg.data, np.uint8, msg.step * msg.height).reshape(msg.height, msg.step)
+    row = rows[:, :msg.width * channels * dtype.itemsize]
+    if dtype != _BYTE:
+        ordered = dtype.newbyteorder('>' if msg.is_bigendian else '<')
+        row = np.ascontiguousarray(row).view(ordered)
+    return row.reshape(msg.height, msg.width, channels)
 
 
 def _from_float(pixels: NDArray[Any]) -> NDArray[np.uint8]:
@@ -120,10 +131,3 @@ def _from_float(pixels: NDArray[Any]) -> NDArray[np.uint8]:
                            f'{lowest} to {highest}', 'image_values')
     scaled: NDArray[np.uint8] = np.rint(pixels * np.float32(255)).astype(np.uint8)
     return scaled
-
-
-def _over_white(color: NDArray[Any],
-                alpha: NDArray[Any]) -> NDArray[np.uint8]:
-    opacity = alpha.astype(np.float32) / 255
-    mixed: NDArray[np.uint8] = np.rint(color * opacity + 255 * (1 - opacity)).astype(np.uint8)
-    return mixed

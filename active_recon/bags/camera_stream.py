@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 from active_recon.bags.message_types import (
-    COMPRESSED_IMAGE,
     FLOAT,
     JOINT_STATE,
     POSE,
@@ -17,9 +16,9 @@ from active_recon.bags.topics import CameraTopics, Topics
 from active_recon.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.errors import DataError, MessageError
 from active_recon.reporting import Advance, Reporting, silent
+from msg_tools.camera_images import pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
 from msg_tools.goals import joint_position_from_msg
-from msg_tools.images import compressed_image_from_msg, image_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.views import View, ViewJoiner
 import numpy as np
@@ -79,8 +78,7 @@ class CameraStream:
                 joiner.add_pose(*self._poses[fed])
                 fed += 1
             try:
-                image = (compressed_image_from_msg(msg)
-                         if message.type_name == COMPRESSED_IMAGE else image_from_msg(msg))
+                image = pixels_from_msg(msg)
                 joiner.add_intrinsics(time, self._lens(time, *image.shape[:2]))
                 joiner.add_image(time, image, now=0)
             except MessageError as error:
