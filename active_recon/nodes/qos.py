@@ -3,7 +3,8 @@
 from collections.abc import Iterable
 
 from active_recon.bags.metadata import QosProfile
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.duration import Infinite
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -32,3 +33,15 @@ def common_profile(offered: Iterable[QosProfile], depth: int) -> QoSProfile:
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE))
+
+
+def profile_words(profile: QoSProfile) -> str:
+    """Return what decides whether two profiles fit, in words."""
+    words = [profile.reliability.name, profile.durability.name]
+    if 0 < profile.deadline.nanoseconds < Infinite.nanoseconds:
+        words.append(f'deadline {profile.deadline.nanoseconds / 1e9:g} s')
+    if profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC:
+        words.append('liveliness manual by topic')
+    if 0 < profile.liveliness_lease_duration.nanoseconds < Infinite.nanoseconds:
+        words.append(f'lease {profile.liveliness_lease_duration.nanoseconds / 1e9:g} s')
+    return ', '.join(words).lower().replace('_', ' ')

@@ -14,9 +14,9 @@ from active_recon.nodes.definitions import message_class, message_definition
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import declare
 from active_recon.nodes.qos import common_profile, offered_profile
+from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.node import Node
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
@@ -31,7 +31,7 @@ FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second
 QUEUE = 1000  # messages that may wait while the disk is slow
 
 
-class RecorderNode(Node):
+class RecorderNode(QosWarnings):
     """Write the messages of each topic into an MCAP bag, with the QoS they were offered."""
 
     def __init__(self) -> None:

@@ -9,6 +9,7 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import declare, tell
 from active_recon.nodes.qos import HEARD, STREAM
+from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
 from active_recon.shown_object import rendered_object, ShownObject, stored_object
 from active_recon.turntable import Turntable
@@ -17,7 +18,6 @@ from msg_tools.cameras import camera_to_msgs, OBJECT_FRAME
 from msg_tools.goals import azimuth_goal_from_msg
 from msg_tools.images import image_to_msg
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Header
@@ -27,7 +27,7 @@ ANSWER_S = 2.0
 """For so long the reconstructor may take to begin an episode."""
 
 
-class TurntableCameraNode(Node):
+class TurntableCameraNode(QosWarnings):
     """Stream image, camera info and pose, also while it turns to a goal."""
 
     def __init__(self) -> None:

@@ -10,6 +10,7 @@ from active_recon.cameras import Camera, CANONICAL_INTRINSICS
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import declare
 from active_recon.nodes.qos import HEARD, LATCHED
+from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import run_node
 from active_recon.viewer.address import DEFAULT_PORT, HIGHEST_PORT
 from active_recon.viewer.link import link_words, TopicLink
@@ -26,7 +27,6 @@ from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.client import Client
-from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
@@ -40,7 +40,7 @@ _TELL_EVERY_S = 0.5
 _IMAGES_KEPT = 64
 
 
-class ViewerNode(Node):
+class ViewerNode(QosWarnings):
     """Follow the loop from outside and draw what is known of it; ask for what is clicked."""
 
     def __init__(self) -> None:
