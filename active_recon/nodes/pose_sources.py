@@ -1,0 +1,159 @@
+"""Where the camera's poses come from: a topic, the joint of a turntable, or tf2."""
+
+from collections import deque
+from collections.abc import Callable
+from importlib import import_module
+import time
+from typing import Any, Protocol
+
+from active_recon.errors import ConfigError, MessageError
+from active_recon.nodes.diagnostics import Diagnostics
+from active_recon.nodes.qos import HEARD_OFTEN, STREAM
+from active_recon.turntable_pose import FixedCamera
+from geometry_msgs.msg import Point, Pose, PoseStamped
+from msg_tools.cameras import pose_to_msg
+from msg_tools.goals import joint_position_from_msg
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+POSE_SOURCES = ('topic', 'turntable_joint', 'tf')
+LOOK_UP_EVERY_S = 0.02
+TF_PATIENCE_S = 0.5
+"""For so long an image waits for its transform."""
+_WAITING = 32  # images
+
+Take = Callable[[PoseStamped], None]
+
+
+class PoseSource(Protocol):
+    """
+    What hands on the camera's poses in the object frame, from when it is made until `close`.
+
+    Every pose but those of the topic itself is published on `camera/pose` as well, for the
+    planner, the viewer and the bags.
+    """
+
+    def image_came(self, header: Header) -> None:
+        """Hear of an image, by its stamp and the frame of its camera."""
+
+    def close(self) -> None:
+        """Hear nothing any more."""
+
+
+class TopicPoses:
+    """The poses that others publish on `camera/pose`."""
+
+    def __init__(self, node: Node, take: Take) -> None:
+        self._node = node
+        self._heard = node.create_subscription(PoseStamped, 'camera/pose', take, HEARD_OFTEN)
+
+    def image_came(self, header: Header) -> None:
+        """Leave it to the joiner, which interpolates."""
+
+    def close(self) -> None:
+        self._node.destroy_subscription(self._heard)
+
+
+class TurntablePoses:
+    """The poses of a fixed camera around an object that `turntable/joint_states` turns."""
+
+    def __init__(self, node: Node, take: Take, diagnostics: Diagnostics, camera: FixedCamera,
+                 joint: str, object_frame: str) -> None:
+        self._node = node
+        self._take = take
+        self._diagnostics = diagnostics
+        self._camera = camera
+        self._joint = joint
+        self._object_frame = object_frame
+        self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
+        self._heard = node.create_subscription(
+            JointState, 'turntable/joint_states', self._on_joint, HEARD_OFTEN)
+
+    def _on_joint(self, msg: JointState) -> None:
+        with self._diagnostics.refusing():
+            pose = self._camera.pose_at(joint_position_from_msg(msg, self._joint))
+            header = Header(stamp=msg.header.stamp, frame_id=self._object_frame)
+            told = pose_to_msg(pose, header)
+            self._publisher.publish(told)
+            self._take(told)
+
+    def image_came(self, header: Header) -> None:
+        """Leave it to the joiner, which interpolates."""
+
+    def close(self) -> None:
+        self._node.destroy_subscription(self._heard)
+        self._node.destroy_publisher(self._publisher)
+
+
+class TfPoses:
+    """
+    The poses that tf2 tells at each image's stamp, of the frame that the image names.
+
+    tf2 interpolates by itself. Raises ConfigError where it is not installed.
+    """
+
+    def __init__(self, node: Node, take: Take, diagnostics: Diagnostics,
+                 object_frame: str) -> None:
+        self._tf = _tf2_ros()
+        self._node = node
+        self._take = take
+        self._diagnostics = diagnostics
+        self._object_frame = object_frame
+        self._waiting: deque[tuple[Header, float]] = deque(maxlen=_WAITING)
+        self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
+        self._buffer = self._tf.Buffer()
+        self._listener = self._tf.TransformListener(self._buffer, node)
+        self._timer = node.create_timer(LOOK_UP_EVERY_S, self._look_up)
+
+    def image_came(self, header: Header) -> None:
+        """Look the image's pose up, now or when its transform has come."""
+        self._waiting.append((header, time.monotonic()))
+        self._look_up()
+
+    def _look_up(self) -> None:
+        waiting, now = list(self._waiting), time.monotonic()
+        self._waiting.clear()
+        for header, since in waiting:
+            try:
+                found = self._buffer.lookup_transform(
+                    self._object_frame, header.frame_id, Time.from_msg(header.stamp))
+            except self._tf.TransformException as error:
+                if now - since < TF_PATIENCE_S:
+                    self._waiting.append((header, since))
+                else:
+                    self._diagnostics.refuse(MessageError(
+                        f"expected tf to tell the pose of the image's frame {header.frame_id!r} "
+                        f'in {self._object_frame!r} at its stamp: {error}', 'tf'))
+            else:
+                self._tell(found.transform, header)
+
+    def _tell(self, transform: Any, header: Header) -> None:
+        place = transform.translation
+        told = PoseStamped(
+            header=Header(stamp=header.stamp, frame_id=self._object_frame),
+            pose=Pose(position=Point(x=place.x, y=place.y, z=place.z),
+                      orientation=transform.rotation))
+        self._publisher.publish(told)
+        self._take(told)
+
+    def close(self) -> None:
+        self._node.destroy_timer(self._timer)
+        self._listener.unregister()
+        self._node.destroy_publisher(self._publisher)
+
+
+def require_tf() -> None:
+    """Raise ConfigError where tf2 is not installed."""
+    _tf2_ros()
+
+
+def _tf2_ros() -> Any:
+    try:
+        return import_module('tf2_ros')  # a full ROS has it, the wheels have not
+    except ImportError as error:
+        raise ConfigError(
+            'parameter pose_source: expected tf2_ros to be installed where it is tf, but there is '
+            f'none ({error}); install ros-jazzy-tf2-ros-py, or use topic or turntable_joint'
+        ) from error
