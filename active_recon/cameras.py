@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import math
 
 from active_recon.errors import ViewError
+from active_recon.lenses import Distortion
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -43,7 +44,11 @@ def nearest_view(azimuth: float, azimuths: ArrayLike = AZIMUTHS) -> int:
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """A pinhole: focal lengths and principal point in pixels, image size in pixels."""
+    """
+    A lens: focal lengths and principal point in pixels, image size in pixels, and how it bends.
+
+    `distortion` is None where it bends nothing: a pinhole.
+    """
 
     fx: float
     fy: float
@@ -51,6 +56,7 @@ class Intrinsics:
     cy: float
     width: int
     height: int
+    distortion: Distortion | None = None
 
     @property
     def matrix(self) -> NDArray[np.float64]:
@@ -58,10 +64,10 @@ class Intrinsics:
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
 
     def resized(self, width: int, height: int) -> 'Intrinsics':
-        """Return the same pinhole seen on an image of another size."""
+        """Return the same lens seen on an image of another size."""
         across, down = width / self.width, height / self.height
         return Intrinsics(self.fx * across, self.fy * down, self.cx * across, self.cy * down,
-                          width, height)
+                          width, height, self.distortion)
 
 
 _FOCAL = 35 / 32 * 137  # R2N2's lens and sensor, verified by reprojection
@@ -70,7 +76,7 @@ CANONICAL_INTRINSICS = Intrinsics(_FOCAL, _FOCAL, 68.5, 68.5, 137, 137)
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pose in the object frame, (4, 4) object from optical frame, and a pinhole."""
+    """A pose in the object frame, (4, 4) object from optical frame, and a lens."""
 
     pose: NDArray[np.float64]
     intrinsics: Intrinsics = CANONICAL_INTRINSICS
@@ -119,10 +125,16 @@ class Camera:
         Project points of the object frame, P^s ~ T P^w (section 3.2).
 
         Takes (N, 3) metres; returns pixels (N, 2), where the centre of the first pixel is
-        (0.5, 0.5), and depths along the optical axis (N,).
+        (0.5, 0.5), and depths along the optical axis (N,). What lies behind the camera (a depth
+        of 0 or less) has no pixel, and numbers without a meaning stand in its place.
         """
         transform = self.object_to_camera
         optical = np.asarray(points, np.float64) @ transform[:3, :3].T + transform[:3, 3]
+        if self.intrinsics.distortion is not None:
+            depth = np.where(optical[:, 2:] > 0, optical[:, 2:], np.nan)
+            bent = self.intrinsics.distortion.bend(optical[:, :2] / depth)
+            lens = self.intrinsics
+            return bent * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[:, 2]
         image = optical @ self.intrinsics.matrix.T
         return image[:, :2] / image[:, 2:], optical[:, 2]
 
@@ -138,9 +150,13 @@ class Camera:
         across = (np.arange(lens.width) + 0.5 - lens.cx) / lens.fx
         down = (np.arange(lens.height) + 0.5 - lens.cy) / lens.fy
         right, below, forward = self.pose[:3, :3].T
-        rays: NDArray[np.float64] = (
-            across[None, :, None] * right + down[:, None, None] * below + forward)
-        return rays
+        if lens.distortion is None:
+            rays: NDArray[np.float64] = (
+                across[None, :, None] * right + down[:, None, None] * below + forward)
+            return rays
+        seen = np.stack(np.meshgrid(across, down), axis=-1)
+        straight = lens.distortion.straighten(seen.reshape(-1, 2)).reshape(seen.shape)
+        return np.asarray(straight[..., :1] * right + straight[..., 1:] * below + forward)
 
 
 def orbit_camera(

@@ -59,7 +59,8 @@ class Renderer:
         """Return left, top, right, bottom of the pixels that the mesh can touch."""
         lens = camera.intrinsics
         pixels, depth = camera.project(self._vertices)
-        if depth.min() <= 1e-3:  # the camera stands inside: nothing can be left out
+        # Where the camera stands inside, or its lens bends, nothing can be left out
+        if depth.min() <= 1e-3 or lens.distortion is not None:
             return 0, 0, lens.width, lens.height
         left, top = np.maximum(np.floor(pixels.min(axis=0)).astype(int), 0)
         right, bottom = np.ceil(pixels.max(axis=0)).astype(int)

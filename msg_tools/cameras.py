@@ -6,7 +6,8 @@ image's corner (the centre of the first pixel is 0.5), ROS from the first pixel'
 """
 
 from active_recon.cameras import Camera, Intrinsics
-from active_recon.errors import MessageError
+from active_recon.errors import MessageError, ViewError
+from active_recon.lenses import Distortion, MODELS
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,11 @@ _LARGEST = 1e9  # metres or pixels: what is computed with more may overflow
 
 def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
     """
-    Return the pinhole of `k`; distortion is not modelled, so a wide lens wants rectified images.
+    Return the lens of `k` and `d` as the image has it, after `roi` and `binning`.
 
-    Raises MessageError where the size is 0 or a focal length is not above 0 and finite.
+    Coefficients of distortion that are all zero, or none, are a pinhole. Raises MessageError where
+    the size is 0, a focal length is not above 0 and finite, the distortion is of an unknown model,
+    or the region lies outside of the sensor.
     """
     fx, cx, fy, cy = (float(msg.k[index]) for index in (0, 2, 4, 5))
     if msg.width == 0 or msg.height == 0:
@@ -31,18 +34,49 @@ def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
     if not _sensible(fx, fy, cx, cy) or fx <= 0 or fy <= 0:
         raise MessageError('expected camera info of a calibrated camera with finite focal lengths '
                            f'above 0, got fx {fx}, fy {fy}, cx {cx}, cy {cy}', 'camera_info')
-    return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, int(msg.width), int(msg.height))
+    left, top, width, height = _region(msg)
+    across, down = max(int(msg.binning_x), 1), max(int(msg.binning_y), 1)
+    if width < across or height < down:
+        raise MessageError(f'expected binning that leaves an image of {height} x {width}, got '
+                           f'binning_y {down}, binning_x {across}', 'camera_info')
+    return Intrinsics(fx / across, fy / down, (cx + 0.5 - left) / across, (cy + 0.5 - top) / down,
+                      width // across, height // down, _distortion(msg))
 
 
 def intrinsics_to_msg(intrinsics: Intrinsics, header: Header) -> CameraInfo:
-    """Return a pinhole without distortion as CameraInfo."""
+    """Return a lens as the CameraInfo of a camera that neither crops nor bins."""
     fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx - 0.5, intrinsics.cy - 0.5
+    bent = intrinsics.distortion
     return CameraInfo(
         header=header, width=intrinsics.width, height=intrinsics.height,
-        distortion_model='plumb_bob', d=[0.0] * 5,
+        distortion_model=bent.model if bent else 'plumb_bob',
+        d=list(bent.coefficients) if bent else [0.0] * 5,
         k=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
         r=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         p=[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0])
+
+
+def _region(msg: CameraInfo) -> tuple[int, int, int, int]:
+    """Return left, top, width and height of the sensor's part that the image shows."""
+    roi = msg.roi
+    left, top = int(roi.x_offset), int(roi.y_offset)
+    width = int(roi.width) or int(msg.width) - left
+    height = int(roi.height) or int(msg.height) - top
+    if min(width, height) <= 0 or left + width > msg.width or top + height > msg.height:
+        raise MessageError(
+            f"expected a region of interest within the sensor's {msg.height} x {msg.width}, got "
+            f'{roi.height} x {roi.width} at {top}, {left}', 'camera_info')
+    return left, top, width, height
+
+
+def _distortion(msg: CameraInfo) -> Distortion | None:
+    coefficients = tuple(float(value) for value in msg.d)
+    if not any(coefficients) and msg.distortion_model in ('', *MODELS):
+        return None
+    try:
+        return Distortion(msg.distortion_model, coefficients)
+    except ViewError as error:
+        raise MessageError(str(error), error.kind) from error
 
 
 def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.float64]:

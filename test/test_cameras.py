@@ -14,6 +14,7 @@ from active_recon.cameras import (
     wrap_azimuth,
 )
 from active_recon.errors import ViewError
+from active_recon.lenses import Distortion
 import numpy as np
 import pytest
 
@@ -80,8 +81,13 @@ def test_the_origin_is_in_the_middle_of_the_image_at_the_camera_s_distance(camer
     np.testing.assert_allclose(depths, [camera.distance])
 
 
+BENT = [Camera(orbit_camera(1.0).pose, Intrinsics(90, 95, 70, 66, 137, 137, distortion))
+        for distortion in (Distortion('plumb_bob', (-0.28, 0.07, 0.001, -0.002, 0.01)),
+                           Distortion('equidistant', (0.05, -0.02, 0.01, -0.004)))]
+
+
 @pytest.mark.parametrize('samples', [1, 2])
-@pytest.mark.parametrize('camera', CAMERAS)
+@pytest.mark.parametrize('camera', CAMERAS + BENT)
 def test_a_ray_is_projected_to_the_pixel_that_it_came_from(camera, samples):
     rays = camera.ray_directions(samples)
     assert rays.shape == (137 * samples, 137 * samples, 3)

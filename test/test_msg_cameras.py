@@ -2,10 +2,23 @@
 
 import math
 
-from active_recon.cameras import AZIMUTHS, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
+from active_recon.cameras import (
+    AZIMUTHS,
+    Camera,
+    CANONICAL_INTRINSICS,
+    Intrinsics,
+    orbit_camera,
+)
 from active_recon.errors import MessageError
+from active_recon.lenses import Distortion
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import camera_from_msgs, camera_to_msgs, intrinsics_from_msg, pose_from_msg
+from msg_tools.cameras import (
+    camera_from_msgs,
+    camera_to_msgs,
+    intrinsics_from_msg,
+    intrinsics_to_msg,
+    pose_from_msg,
+)
 from msg_tools.goals import (
     azimuth_goal_from_msg,
     azimuth_goal_to_msg,
@@ -16,7 +29,7 @@ from msg_tools.goals import (
 )
 import numpy as np
 import pytest
-from sensor_msgs.msg import CameraInfo, JointState
+from sensor_msgs.msg import CameraInfo, JointState, RegionOfInterest
 from std_msgs.msg import Header
 
 OBJECT = Header(frame_id='object')
@@ -37,6 +50,80 @@ def test_ros_counts_pixels_from_the_first_ones_centre():
     info, _ = camera_to_msgs(orbit_camera(0.0), Header())
     assert info.k[2] == CANONICAL_INTRINSICS.cx - 0.5
     assert list(info.p[:3]) == list(info.k[:3])
+
+
+LENSES = {
+    'pinhole': None,
+    'plumb_bob': Distortion('plumb_bob', (-0.28, 0.07, 0.001, -0.002, 0.01)),
+    'four coefficients': Distortion('plumb_bob', (-0.28, 0.07, 0.001, -0.002)),
+    'rational_polynomial': Distortion('rational_polynomial', tuple(np.linspace(-0.3, 0.4, 8))),
+    'equidistant': Distortion('equidistant', (0.05, -0.02, 0.01, -0.004))}
+
+
+@pytest.mark.parametrize('distortion', LENSES.values(), ids=LENSES)
+def test_a_lens_comes_back_exactly_in_both_directions(distortion):
+    lens = Intrinsics(500.25, 510.1, 321.3, 239.9, 640, 480, distortion)
+    info = intrinsics_to_msg(lens, OBJECT)
+    assert intrinsics_from_msg(info) == lens
+    assert intrinsics_to_msg(intrinsics_from_msg(info), OBJECT) == info
+
+
+@pytest.mark.parametrize('model', ['', 'plumb_bob', 'rational_polynomial', 'equidistant'])
+@pytest.mark.parametrize('count', [0, 4, 5, 8])
+def test_coefficients_that_are_all_zero_are_a_pinhole(model, count):
+    info = intrinsics_to_msg(CANONICAL_INTRINSICS, OBJECT)
+    info.distortion_model, info.d = model, [0.0] * count
+    assert intrinsics_from_msg(info) == CANONICAL_INTRINSICS
+
+
+@pytest.mark.parametrize(('model', 'coefficients', 'said'), [
+    ('', [0.1] * 5, "model out of plumb_bob.*got ''"),
+    ('fov', [0.0] * 5, "model out of plumb_bob.*got 'fov'"),
+    ('plumb_bob', [0.1], 'expected 4 or 5 coefficients of plumb_bob, got 1'),
+    ('equidistant', [math.nan] * 4, 'finite coefficients')])
+def test_a_distortion_of_no_known_lens_is_refused(model, coefficients, said):
+    info = intrinsics_to_msg(CANONICAL_INTRINSICS, OBJECT)
+    info.distortion_model, info.d = model, coefficients
+    with pytest.raises(MessageError, match=said) as caught:
+        intrinsics_from_msg(info)
+    assert caught.value.kind == 'camera_info'
+
+
+def cropped(roi, binning=(0, 0)):
+    info = intrinsics_to_msg(Intrinsics(500, 510, 320, 250, 640, 480), OBJECT)
+    info.roi, (info.binning_x, info.binning_y) = roi, binning
+    return info
+
+
+@pytest.mark.parametrize('distortion', [None, LENSES['plumb_bob']], ids=['straight', 'bent'])
+def test_a_region_and_binning_show_every_point_where_the_image_has_it(distortion):
+    info = cropped(RegionOfInterest(x_offset=100, y_offset=60, width=400, height=300), (2, 3))
+    info.d = list(distortion.coefficients) if distortion else []
+    lens = intrinsics_from_msg(info)
+    assert (lens.width, lens.height) == (200, 100)
+    points = np.random.default_rng(0).uniform(-0.3, 0.3, (50, 3))
+    pose = orbit_camera(0.4).pose
+    full = Camera(pose, Intrinsics(500, 510, 320, 250, 640, 480, distortion)).project(points)[0]
+    found = Camera(pose, lens).project(points)[0]
+    np.testing.assert_allclose(found, (full - [100, 60]) / [2, 3], atol=1e-9)
+
+
+def test_a_region_that_says_no_size_and_binning_of_0_or_1_are_the_whole_image():
+    whole = cropped(RegionOfInterest())
+    for binning in ((0, 0), (1, 1), (0, 1)):
+        assert intrinsics_from_msg(cropped(RegionOfInterest(), binning)) == (
+            intrinsics_from_msg(whole))
+
+
+@pytest.mark.parametrize(('info', 'said'), [
+    (cropped(RegionOfInterest(x_offset=600, width=100, height=10)), 'region.*480 x 640.*10 x 100'),
+    (cropped(RegionOfInterest(x_offset=2**32 - 1, y_offset=2**32 - 1)), 'region of interest'),
+    (cropped(RegionOfInterest(width=2**32 - 1, height=2**32 - 1)), 'region of interest'),
+    (cropped(RegionOfInterest(), (2**32 - 1, 1)), 'binning_x 4294967295')])
+def test_a_region_or_binning_that_leaves_no_image_is_refused(info, said):
+    with pytest.raises(MessageError, match=said) as caught:
+        intrinsics_from_msg(info)
+    assert caught.value.kind == 'camera_info'
 
 
 def test_a_quaternion_of_any_length_is_read():

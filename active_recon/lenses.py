@@ -1,0 +1,101 @@
+"""How a lens bends the image of a pinhole: ROS's distortion models, computed by OpenCV."""
+
+from dataclasses import dataclass
+from functools import cached_property
+import math
+
+from active_recon.errors import ViewError
+import cv2
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+MODELS = {'plumb_bob': (4, 5), 'rational_polynomial': (8, 12, 14), 'equidistant': (4,)}
+"""Each model's numbers of coefficients, in OpenCV's order: k1, k2, p1, p2, k3, k4, ..."""
+_LARGEST = 1e6  # no lens has it, and its sixth power can still be computed
+_STEP = 1e-6
+_WITHIN = 0.9999  # at the very end of its reach a model may divide by 0
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """
+    A model out of `MODELS` and its coefficients.
+
+    It acts on points of the image plane at depth 1, (N, 2), x right and y down. Raises ViewError
+    on another model, another number of coefficients, and those that are not finite.
+    """
+
+    model: str
+    coefficients: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what no lens has."""
+        if self.model not in MODELS:
+            raise ViewError(f'expected a distortion model out of {", ".join(MODELS)}, got '
+                            f'{self.model!r}; publish rectified images instead', 'camera_info')
+        counts, given = MODELS[self.model], len(self.coefficients)
+        if given not in counts:
+            raise ViewError(f'expected {" or ".join(map(str, counts))} coefficients of '
+                            f'{self.model}, got {given}', 'camera_info')
+        if not all(abs(value) <= _LARGEST for value in self.coefficients):
+            raise ViewError('expected finite coefficients of distortion, got '
+                            f'{self.coefficients}', 'camera_info')
+
+    def bend(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Return where the lens shows points of the pinhole's plane, (N, 2).
+
+        Further out than the model goes, where its curve turns back to the centre, points go on
+        outwards, so that what the lens cannot see is never shown inside its image.
+        """
+        radius = np.linalg.norm(points, axis=1, keepdims=True)
+        beyond = np.maximum(radius - self.reach, 0.0)
+        outwards = points / np.maximum(radius, 1e-12)
+        bent = self._modelled(points - beyond * outwards)
+        return np.asarray(bent + beyond * outwards)
+
+    def straighten(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points of the pinhole's plane that the lens shows there: bend's inverse."""
+        found = points.copy()
+        for _ in range(50):  # Newton's steps; a handful is enough for any lens
+            wrong = self.bend(found) - points
+            if np.abs(wrong).max(initial=0.0) < 1e-12:
+                break
+            across, down = ((self.bend(found + step) - self.bend(found - step)) / (2 * _STEP)
+                            for step in np.eye(2) * _STEP)
+            determinant = across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0]
+            found[:, 0] -= (wrong[:, 0] * down[:, 1] - wrong[:, 1] * down[:, 0]) / determinant
+            found[:, 1] -= (wrong[:, 1] * across[:, 0] - wrong[:, 0] * across[:, 1]) / determinant
+        return found
+
+    @cached_property
+    def reach(self) -> float:
+        """The radius in the pinhole's plane up to which the model's curve runs outwards."""
+        k = self.coefficients
+        if self.model == 'equidistant':
+            angle = math.sqrt(_first_root(Polynomial([1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]])))
+            return _WITHIN * (math.tan(angle) if angle < math.pi / 2 - 1e-3 else 1e3)
+        # r N(s) / D(s), s the square of the radius r, turns back where its derivative is 0
+        s, n, d = Polynomial([0, 1]), Polynomial([1, *k[:2], *k[4:5]]), Polynomial([1, *k[5:8]])
+        turns = (n + 2 * s * n.deriv()) * d - 2 * s * n * d.deriv()
+        return _WITHIN * math.sqrt(min(_first_root(turns), _first_root(d)))
+
+    def _modelled(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not len(points):
+            return points
+        pinhole, coefficients = np.eye(3), np.array(self.coefficients)
+        if self.model == 'equidistant':
+            bent = cv2.fisheye.distortPoints(points[:, None], pinhole, coefficients)
+        else:
+            rays = np.column_stack([points, np.ones(len(points))])
+            bent = cv2.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), pinhole,
+                                     coefficients)[0]
+        return np.asarray(bent, np.float64).reshape(-1, 2)
+
+
+def _first_root(polynomial: Polynomial) -> float:
+    """Return the smallest root above 0; a million where there is none."""
+    roots = polynomial.trim().roots()
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    return float(min(real[real > 1e-9], default=1e6))

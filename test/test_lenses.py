@@ -1,0 +1,71 @@
+"""Lenses bend straight lines, and the bend can be undone."""
+
+import math
+
+from active_recon.errors import ViewError
+from active_recon.lenses import Distortion
+import numpy as np
+import pytest
+
+LENSES = {
+    'barrel': Distortion('plumb_bob', (-0.28, 0.07, 0.001, -0.002, 0.01)),
+    'pincushion': Distortion('plumb_bob', (0.2, 0.1, 0.0, 0.0)),
+    'rational': Distortion('rational_polynomial',
+                           (0.5, -0.2, 1e-4, -2e-4, -0.01, 0.8, -0.1, -0.05)),
+    'fisheye': Distortion('equidistant', (0.05, -0.02, 0.01, -0.004)),
+}
+EACH = pytest.mark.parametrize('lens', LENSES.values(), ids=LENSES)
+
+
+def points(reach=0.6, count=500):
+    return np.random.default_rng(0).uniform(-reach, reach, (count, 2))
+
+
+@EACH
+def test_what_is_bent_and_straightened_is_where_it_was(lens):
+    np.testing.assert_allclose(lens.straighten(lens.bend(points())), points(), atol=1e-9)
+
+
+@EACH
+def test_the_middle_stays_and_near_it_next_to_nothing_moves(lens):
+    np.testing.assert_allclose(lens.bend(np.zeros((1, 2))), [[0, 0]], atol=1e-12)
+    near = points(1e-3)
+    np.testing.assert_allclose(lens.bend(near), near, atol=2e-8)
+
+
+def test_a_lens_without_coefficients_is_a_pinhole_or_counts_angles():
+    np.testing.assert_allclose(Distortion('plumb_bob', (0.0,) * 5).bend(points()), points())
+    angles = Distortion('equidistant', (0.0,) * 4).bend(np.array([[math.tan(1.2), 0.0]]))
+    np.testing.assert_allclose(angles, [[1.2, 0.0]])
+
+
+@EACH
+def test_the_further_out_a_point_is_the_further_out_the_lens_shows_it(lens):
+    radii = np.linspace(0, 50, 20_001)
+    for angle in np.linspace(0, math.tau, 7):
+        line = radii[:, None] * [math.cos(angle), math.sin(angle)]
+        shown = np.linalg.norm(lens.bend(line), axis=1)
+        assert (np.diff(shown) > -1e-3 * np.diff(radii)).all()
+
+
+def test_a_curve_that_turns_back_is_followed_to_where_it_does():
+    assert Distortion('plumb_bob', (-0.3, 0.0, 0.0, 0.0)).reach == pytest.approx(
+        math.sqrt(1 / 0.9), rel=1e-3)
+    assert Distortion('equidistant', (-0.2, 0.0, 0.0, 0.0)).reach == pytest.approx(
+        math.tan(math.sqrt(1 / 0.6)), rel=1e-3)
+    assert Distortion('rational_polynomial', (0, 0, 0, 0, 0, 0, 0, 0)).reach > 999
+    pole = Distortion('rational_polynomial', (0, 0, 0, 0, 0, -4.0, 0, 0))
+    assert pole.reach == pytest.approx(0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize(('model', 'coefficients', 'said'), [
+    ('kannala_brandt', (0.1,) * 4, "plumb_bob.*got 'kannala_brandt'; publish rectified"),
+    ('', (0.1,) * 5, "got ''"),
+    ('plumb_bob', (0.1,) * 3, 'expected 4 or 5 coefficients of plumb_bob, got 3'),
+    ('equidistant', (0.1,) * 5, 'expected 4 coefficients of equidistant, got 5'),
+    ('plumb_bob', (math.nan,) * 5, 'finite coefficients.*nan'),
+    ('plumb_bob', (1e30,) * 5, 'finite coefficients')])
+def test_what_no_lens_has_is_refused(model, coefficients, said):
+    with pytest.raises(ViewError, match=said) as caught:
+        Distortion(model, coefficients)
+    assert caught.value.kind == 'camera_info'
