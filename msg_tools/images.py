@@ -1,4 +1,4 @@
-"""Camera images and latents to and from sensor_msgs/Image."""
+"""Camera images, masks and latents to and from sensor_msgs/Image."""
 
 import array
 import re
@@ -15,6 +15,7 @@ _BYTE: np.dtype[Any] = np.dtype(np.uint8)
 _FLOAT: np.dtype[Any] = np.dtype(np.float32)
 ENCODINGS = {'rgb8': (_BYTE, 3), 'bgr8': (_BYTE, 3), 'rgba8': (_BYTE, 4), 'bgra8': (_BYTE, 4),
              'mono8': (_BYTE, 1), '8UC3': (_BYTE, 3), '32FC3': (_FLOAT, 3)}
+MASK_ENCODINGS = ('mono8', '8UC1')
 _TO_RGB = {'bgr8': cv2.COLOR_BGR2RGB, '8UC3': cv2.COLOR_BGR2RGB, 'mono8': cv2.COLOR_GRAY2RGB,
            'rgba8': cv2.COLOR_RGBA2RGB, 'bgra8': cv2.COLOR_BGRA2RGB}
 
@@ -69,6 +70,23 @@ def latent_from_msg(msg: Image) -> NDArray[np.float32]:
 def latent_to_msg(latent: NDArray[np.float32], header: Header) -> Image:
     """Return a latent, (C, h, w) float32, as an image of encoding 32FC<C>."""
     return _image_msg(latent.transpose(1, 2, 0), f'32FC{len(latent)}', header)
+
+
+def mask_from_msg(msg: Image) -> NDArray[np.bool_]:
+    """
+    Return where a mask has the object, (height, width): where it is not 0.
+
+    Raises MessageError where it is not mono8 (8UC1 is the same), has no size, or too few bytes.
+    """
+    if msg.encoding not in MASK_ENCODINGS:
+        raise MessageError(f'expected a mask encoded as {" or ".join(MASK_ENCODINGS)}, '
+                           f'got {msg.encoding!r}', 'mask')
+    return np.asarray(_pixels(msg, _BYTE, 1)[..., 0] != 0)
+
+
+def mask_to_msg(mask: NDArray[np.bool_], header: Header) -> Image:
+    """Return a mask, (height, width), as mono8: 255 where the object is, else 0."""
+    return _image_msg(mask[..., None] * np.uint8(255), 'mono8', header)
 
 
 def over_white(color: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Images and latents between ROS and numpy."""
+"""Images, masks and latents between ROS and numpy."""
 
 import array
 
@@ -10,6 +10,8 @@ from msg_tools.images import (
     image_to_msg,
     latent_from_msg,
     latent_to_msg,
+    mask_from_msg,
+    mask_to_msg,
 )
 import numpy as np
 import pytest
@@ -114,6 +116,22 @@ def test_what_is_no_image_is_refused_in_plain_words(msg, kind, said):
     else:
         with pytest.raises(MessageError, match=said):
             image_size_from_msg(msg)
+
+
+@pytest.mark.parametrize('padding', [0, 3])
+def test_a_mask_comes_back_as_it_was_whatever_its_object_is_painted_with(padding):
+    mask = np.random.default_rng(1).random((4, 6)) < 0.5
+    msg = mask_to_msg(mask, Header(frame_id='camera'))
+    assert (msg.encoding, msg.header.frame_id) == ('mono8', 'camera')
+    np.testing.assert_array_equal(mask_from_msg(msg), mask)
+    painted = message(mask[..., None] * np.uint8(1), '8UC1', padding)
+    np.testing.assert_array_equal(mask_from_msg(painted), mask)
+
+
+def test_a_mask_of_colors_is_refused():
+    with pytest.raises(MessageError, match="a mask encoded as mono8 or 8UC1, got 'rgb8'") as error:
+        mask_from_msg(image_to_msg(RGB, Header()))
+    assert error.value.kind == 'mask'
 
 
 def test_a_latent_comes_back_as_it_was():

@@ -8,9 +8,10 @@ from active_recon.bags.reading import read_run
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import DataError
 from active_recon.voxels import VoxelGrid
-from loop_bags import BEGIN, DELAY, LENS, LoopRun, STILL, type_name, write_bag
+from loop_bags import BEGIN, DELAY, header, LENS, LoopRun, STILL, type_name, write_bag
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.episodes import done_to_msg
+from msg_tools.images import image_to_msg
 from msg_tools.voxels import FIELDS
 import numpy as np
 import pytest
@@ -66,6 +67,16 @@ def test_what_the_loop_published_is_what_is_read(loop, bag):
     assert run.counters == {'reconstructor': {'views': 3}}
     assert (run.begin, run.end) == (BEGIN + DELAY, loop.messages[-1][0] + DELAY)
     assert sum(topic.count for topic in run.topics) == len(loop.messages)
+
+
+def test_a_view_whose_background_was_taken_away_is_read_as_the_network_saw_it(loop, tmp_path):
+    cleared = 255 - loop.images[1]
+    image = image_to_msg(cleared, header(loop.stamps[1], 'camera'))
+    bag = write_bag(tmp_path / 'bag', [*loop.messages, (loop.end, '/view_image', image)])
+    first, second, third = (view.image for view in only(read_run(bag)).views)
+    np.testing.assert_array_equal(second, cleared)
+    for view, image in ((first, loop.images[0]), (third, loop.images[2])):
+        np.testing.assert_array_equal(view, image)
 
 
 def test_each_goal_follows_the_view_that_it_was_decided_upon(loop, bag):

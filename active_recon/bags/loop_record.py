@@ -19,7 +19,7 @@ from msg_tools.cameras import pose_from_msg
 from msg_tools.diagnostics import diagnostics_from_msg
 from msg_tools.episodes import done_from_msg, episode_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, scores_from_msg, view_goal_from_msg
-from msg_tools.images import latent_from_msg
+from msg_tools.images import image_from_msg, latent_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 LOOP = {'episode': HEADER, 'view': POSE, 'occupancy': CLOUD, 'probabilities': CLOUD,
         'latent': IMAGE, 'entropy': FLOAT, 'next_view': POSE, 'next_azimuth': JOINT_STATE,
-        'azimuth_scores': CLOUD, 'done': HEADER}
+        'azimuth_scores': CLOUD, 'done': HEADER, 'view_image': IMAGE}
 """The loop's own topics and their types."""
 _DIAGNOSTICS = '/diagnostics'
 
@@ -56,6 +56,7 @@ class LoopRecord:
             'occupancy': lambda msg: voxel_grid_from_msg(msg, object_size),
             'probabilities': lambda msg: voxel_grid_from_msg(msg, object_size),
             'latent': latent_from_msg,
+            'view_image': image_from_msg,
             'entropy': lambda msg: float(msg.data),
             'next_view': lambda msg: view_goal_from_msg(msg, object_frame),
             'next_azimuth': azimuth_goal_from_msg,

@@ -117,6 +117,7 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
     def part(role: str) -> Any:
         return parts.get(role, {}).get(view.stamp)
 
-    return RecordedView(view.stamp, view.image, view.camera, part('probabilities'),
-                        part('occupancy'), part('latent'), part('entropy'), goal, received,
-                        (part('done') or (0, ''))[1])
+    cleared = part('view_image')  # where the background was taken away, the network saw this
+    return RecordedView(view.stamp, view.image if cleared is None else cleared, view.camera,
+                        part('probabilities'), part('occupancy'), part('latent'), part('entropy'),
+                        goal, received, (part('done') or (0, ''))[1])

@@ -84,7 +84,9 @@ def _found(present: Sequence[TopicSummary], name: str, usual: str, types: Sequen
            what: str, option: str, required: bool = True) -> TopicSummary | None:
     """Return the topic of that name, else the one that has the usual name, else the only one."""
     fitting = [topic for topic in present if topic.type_name in types and topic.count
-               and not topic.name.endswith(('/latent', '/next_view', '/next_azimuth', '/entropy'))]
+               and not topic.name.endswith((
+                   '/latent', '/view_image', '/camera/mask', '/next_view', '/next_azimuth',
+                   '/entropy'))]
     if name:
         fitting = [topic for topic in present if topic.name == name and topic.type_name in types]
     elif named := [topic for topic in fitting if topic.name.endswith(f'/{usual}')]:

@@ -21,9 +21,9 @@ from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
 DIAGNOSTICS = '/diagnostics'
-TOPICS = ['camera/image_raw', 'camera/camera_info', 'camera/pose', 'view', 'occupancy',
-          'probabilities', 'latent', 'entropy', 'episode', 'next_view', 'next_azimuth',
-          'azimuth_scores', 'done', DIAGNOSTICS]
+TOPICS = ['camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'view',
+          'view_image', 'occupancy', 'probabilities', 'latent', 'entropy', 'episode', 'next_view',
+          'next_azimuth', 'azimuth_scores', 'done', DIAGNOSTICS]
 MADE_IT = ('weights_sha256', 'config_sha256', 'policy', 'seed', 'object')
 """The parameters of the loop's nodes that say what made the bag."""
 WATCH_EVERY_S = 0.1
