@@ -1,6 +1,7 @@
 """What in an image is the object: by a mask, an image of the empty scene, or a colour key."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from active_recon.errors import ConfigError, ViewError
 import cv2
@@ -11,6 +12,8 @@ BACKGROUNDS = ('as_is', 'mask', 'reference', 'color')
 """Left as it is; from a mask; from an image of the empty scene; from the background's colour."""
 COLOR_TOLERANCE = 10.0
 """A colour this near to a shade of the background's is background, CIE76 units of L*a*b*."""
+GREEN_SCREEN = (0, 177, 64)
+"""Red, green and blue of the usual cloth."""
 
 _SEARCHED_SIDE = 1024  # pixels: in a larger image the object is found on a smaller one
 _STANDS_OUT = 7.0  # units of L*a*b*: above the noise of a camera
@@ -20,6 +23,57 @@ _EDGE = 0.35  # of what its neighbours stand out: less is a pixel that shows a b
 _SMALLEST_PART = 0.02  # of the object's largest part; smaller ones are noise
 _LARGEST_HOLE = 0.005  # of the object; through a larger one the background is seen
 _SMALLEST_OBJECT, _LARGEST_OBJECT = 0.0005, 0.95  # of the image
+
+
+@dataclass(frozen=True)
+class Background:
+    """
+    How the object is told from its background: one of `BACKGROUNDS`.
+
+    `color` (red, green, blue, 0 to 255) and `tolerance` are of the colour key. Raises ConfigError
+    where one of them cannot be used.
+    """
+
+    how: str = 'as_is'
+    color: tuple[int, ...] = GREEN_SCREEN
+    tolerance: float = COLOR_TOLERANCE
+
+    def __post_init__(self) -> None:
+        """Refuse a word that is none of them, and a colour that is no colour."""
+        if self.how not in BACKGROUNDS:
+            raise ConfigError(f'background: expected one of {", ".join(BACKGROUNDS)}, '
+                              f'got {self.how!r}')
+        check_color(self.color, self.tolerance)
+
+    def cleared(self, image: NDArray[np.uint8], mask: NDArray[np.bool_] | None = None,
+                reference: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+        """
+        Return an image, (H, W, 3) uint8 RGB, with its background white; `as_is`: as it is.
+
+        `mask` is (H, W), `reference` an image of the empty scene, (H, W, 3). Raises ViewError
+        where the one that is needed is missing, and as the functions below do.
+        """
+        if self.how == 'as_is':
+            return image
+        if self.how == 'color':
+            return on_white(image, off_color(image, self.color, self.tolerance))
+        if self.how == 'mask':
+            if mask is None:
+                raise ViewError('expected a mask with the image, got none', 'no_mask')
+            return on_white(image, mask)
+        if reference is None:
+            raise ViewError('expected an image of the empty scene before the first view, got '
+                            'none; empty the scene and call capture_background', 'no_reference')
+        return on_white(image, off_reference(image, reference))
+
+
+def check_color(color: Sequence[int], tolerance: float) -> None:
+    """Raise ConfigError where a colour key, as of `off_color`, cannot be used."""
+    if len(color) != 3 or not all(0 <= value <= 255 for value in color) or not any(color):
+        raise ConfigError('background_color: expected red, green and blue, each from 0 to 255 '
+                          f'and one above 0, got {list(color)}')
+    if not 0 < tolerance < np.inf:
+        raise ConfigError(f'background_tolerance: expected a number above 0, got {tolerance}')
 
 
 def on_white(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -65,11 +119,7 @@ def off_color(image: NDArray[np.uint8], color: Sequence[int],
     where colour or tolerance cannot be used, ViewError where nothing stands out from the colour
     and where all but everything does.
     """
-    if len(color) != 3 or not all(0 <= value <= 255 for value in color) or not any(color):
-        raise ConfigError('background_color: expected red, green and blue, each from 0 to 255 '
-                          f'and one above 0, got {list(color)}')
-    if not 0 < tolerance < np.inf:
-        raise ConfigError(f'background_tolerance: expected a number above 0, got {tolerance}')
+    check_color(color, tolerance)
     pixels = _smoothed(_searched(image))
     key = np.asarray(color, np.float32)
     brightness = np.clip(pixels.astype(np.float32) @ (key / (key @ key)), *_SHADES)

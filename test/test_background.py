@@ -1,6 +1,6 @@
 """The object is told from the room by a mask, by an image of the empty scene, or by a colour."""
 
-from active_recon.background import off_color, off_reference, on_white
+from active_recon.background import Background, off_color, off_reference, on_white
 from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.errors import ConfigError, ViewError
 from active_recon.rendering import composite, Renderer
@@ -145,5 +145,36 @@ def test_a_mask_that_cannot_be_used_is_refused(mask, kind, said):
     (GREEN, float('nan'), 'background_tolerance'),
 ])
 def test_a_color_key_that_cannot_be_used_is_refused(color, tolerance, said):
-    with pytest.raises(ConfigError, match=said):
-        off_color(np.zeros((64, 48, 3), np.uint8), color, tolerance)
+    for make in (Background, lambda *key: off_color(np.zeros((64, 48, 3), np.uint8), *key[1:])):
+        with pytest.raises(ConfigError, match=said):
+            make('color', color, tolerance)
+
+
+def test_each_way_to_tell_the_background_makes_it_white(shown):
+    scene, mask = uneven(GREEN), truth(shown)
+    image = composite(shown, scene)
+    np.testing.assert_array_equal(Background('mask').cleared(image, mask=mask),
+                                  on_white(image, mask))
+    np.testing.assert_array_equal(Background('color', GREEN).cleared(image),
+                                  on_white(image, off_color(image, GREEN)))
+    np.testing.assert_array_equal(Background('reference').cleared(image, reference=scene),
+                                  on_white(image, off_reference(image, scene)))
+
+
+def test_an_image_that_is_to_stay_as_it_is_stays_so():
+    image = uneven(GREEN)
+    assert Background().cleared(image, np.zeros((SIDE, SIDE), np.bool_), image) is image
+
+
+@pytest.mark.parametrize(('how', 'kind', 'said'), [
+    ('mask', 'no_mask', 'expected a mask with the image, got none'),
+    ('reference', 'no_reference', 'empty the scene and call capture_background')])
+def test_what_is_needed_to_tell_the_background_is_asked_for(how, kind, said):
+    with pytest.raises(ViewError, match=said) as refusal:
+        Background(how).cleared(uneven(GREEN))
+    assert refusal.value.kind == kind
+
+
+def test_a_way_to_tell_the_background_that_nobody_knows_is_refused():
+    with pytest.raises(ConfigError, match="background: expected one of as_is.*got 'magic'"):
+        Background('magic')
