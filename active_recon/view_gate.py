@@ -4,13 +4,9 @@ from dataclasses import dataclass
 
 from active_recon.cameras import azimuth_difference, Camera
 from active_recon.errors import ConfigError
-import numpy as np
+from active_recon.stillness import Stillness
 
 TAKE_VIEWS = ('auto', 'at_goal', 'by_separation', 'all')
-STILL_ANGLE = 0.01
-"""A still camera has not moved by more, radians as seen from the object or turned in place."""
-STILL_TIME = 0.08
-"""For so long, seconds: two images of a stream of 10 Hz."""
 GOAL_TOLERANCE = 0.14
 """An azimuth this near to a goal reaches it, radians: 24 rendered views can be 7.5 degrees off."""
 
@@ -46,7 +42,12 @@ class ViewGate:
         self._goal: _Goal | None = None
         self._goal_taken = False
         self._last_azimuth: float | None = None
-        self._rest: tuple[int, Camera] | None = None
+        self._stillness = Stillness()
+
+    @property
+    def open_goal(self) -> float | None:
+        """The azimuth of the goal that has no view yet, radians, None where there is none."""
+        return None if self._goal is None or self._goal_taken else self._goal.azimuth
 
     def set_goal(self, azimuth: float, stamp: int) -> None:
         """Ask for a view at an azimuth; the stamp (nanoseconds) tells goals apart."""
@@ -61,12 +62,13 @@ class ViewGate:
         It is to be told of every image, and of each that became a view by `took`.
         `goals_expected` tells `auto` that someone is there who gives goals.
         """
-        still = self._is_still(camera, stamp)
+        self._stillness.add(camera, stamp)
         if self._take_views == 'all':
             return True
         by_goal = self._take_views == 'at_goal' or (
             self._take_views == 'auto' and (goals_expected or self._goal is not None))
-        return still and (self._at_new_goal(camera) if by_goal else self._is_separate(camera))
+        return self._stillness.is_still and (
+            self._at_new_goal(camera) if by_goal else self._is_separate(camera))
 
     def took(self, camera: Camera) -> None:
         """Note that the image of this camera became a view."""
@@ -74,9 +76,9 @@ class ViewGate:
         self._last_azimuth = camera.azimuth
 
     def _at_new_goal(self, camera: Camera) -> bool:
-        if self._goal is None or self._goal_taken:
+        if self.open_goal is None:
             return False
-        away = abs(azimuth_difference(camera.azimuth, self._goal.azimuth))
+        away = abs(azimuth_difference(camera.azimuth, self.open_goal))
         return bool(away <= self._goal_tolerance)
 
     def _is_separate(self, camera: Camera) -> bool:
@@ -84,16 +86,3 @@ class ViewGate:
             return True
         away = abs(azimuth_difference(camera.azimuth, self._last_azimuth))
         return bool(away >= self._min_view_separation)
-
-    def _is_still(self, camera: Camera, stamp: int) -> bool:
-        """Return whether the camera has stayed near one pose for STILL_TIME."""
-        if self._rest is None or _moved(self._rest[1], camera) > STILL_ANGLE:
-            self._rest = stamp, camera
-        return stamp - self._rest[0] >= STILL_TIME * 1e9
-
-
-def _moved(a: Camera, b: Camera) -> float:
-    """Return the larger of the angle moved, as seen from the object, and the angle turned."""
-    shift = float(np.linalg.norm(a.position - b.position)) / a.distance
-    cosine = (np.trace(a.pose[:3, :3].T @ b.pose[:3, :3]) - 1) / 2
-    return max(shift, float(np.arccos(np.clip(cosine, -1, 1))))

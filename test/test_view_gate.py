@@ -92,3 +92,14 @@ def test_an_episode_begins_without_goal_and_view():
 def test_an_unknown_way_to_take_views_is_refused():
     with pytest.raises(ConfigError, match="expected one of auto.*got 'sometimes'"):
         ViewGate('sometimes')
+
+
+def test_poses_that_jump_are_of_no_still_camera_until_half_a_second_after():
+    gate = ViewGate('by_separation')
+    jumping = [0.05 * (-1) ** index for index in range(20)]
+    assert offer(gate, [*jumping, *[1.0] * 10]) == [25]
+
+
+def test_a_camera_that_rests_between_two_ways_does_not_jump():
+    gate = ViewGate('by_separation', min_view_separation=0.2)
+    assert offer(gate, [0, 0, 1, 1, 0, 0, 1, 1]) == [1, 3, 5, 7]

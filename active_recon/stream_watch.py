@@ -1,0 +1,105 @@
+"""What no single message of a camera shows: that others are missing, late, or come no more."""
+
+from collections import deque
+from collections.abc import Iterator
+from statistics import median
+
+STREAMS = ('images', 'camera_info', 'poses')
+SILENT_S = 0.5
+"""A stream is silent after this time without a message, or after three of its periods."""
+LATE_S = 0.15
+"""An image is late that comes so long after the camera info or the pose of its stamp."""
+WINDOW_S = 1.5
+"""What is missing or late is counted over this time."""
+_PERIODS = 10
+_SHORTEST_PERIOD_S = 0.002
+_AT_LEAST, _SHARE = 2, 0.1
+
+
+class StreamWatch:
+    """
+    Told of every message that comes, tells what is wrong with the streams as a whole.
+
+    Stamps are nanoseconds, `now` is any clock in seconds that never runs backwards. What comes
+    irregularly, for example now and then by hand, is no stream and never missed.
+    """
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin anew, as if nothing had come yet."""
+        self._arrivals: dict[str, deque[float]] = {
+            stream: deque(maxlen=_PERIODS + 1) for stream in STREAMS}
+        self._periods: dict[str, float] = {}
+        self._moments: dict[int, dict[str, float]] = {}
+
+    def heard(self, stream: str, stamp: int, now: float) -> None:
+        """Note a message of one of STREAMS, whether or not it can be used."""
+        self._moments.setdefault(stamp, {}).setdefault(stream, now)
+        arrivals = self._arrivals[stream]
+        arrivals.append(now)
+        if len(arrivals) > _PERIODS:
+            self._note_period(stream)
+
+    def found(self, now: float) -> dict[str, str]:
+        """Return what is wrong now: a short word of each fault, and a sentence."""
+        self._forget(now - WINDOW_S)
+        return {**self._silent(now), **dict(self._missing()), **dict(self._late())}
+
+    def _note_period(self, stream: str) -> None:
+        """Keep the period of a stream that comes regularly; one that no longer does has none."""
+        arrivals = list(self._arrivals[stream])
+        periods = [b - a for a, b in zip(arrivals, arrivals[1:], strict=False)]
+        typical = median(periods)
+        regular = sum(typical / 3 <= period <= 3 * typical for period in periods)
+        if typical >= _SHORTEST_PERIOD_S and regular >= 0.8 * len(periods):
+            self._periods[stream] = typical
+        else:
+            self._periods.pop(stream, None)
+
+    def _silent(self, now: float) -> dict[str, str]:
+        since = {stream: now - self._arrivals[stream][-1] for stream in self._periods}
+        silent = {stream: time for stream, time in since.items()
+                  if time > max(SILENT_S, 3 * self._periods[stream])}
+        if len(silent) == len(STREAMS):
+            return {'silent_camera': (
+                'expected images, camera info and poses of a camera that streamed so far, nothing '
+                f'has come for {min(silent.values()):.1f} s; is it running and connected?')}
+        return {f'silent_{stream}': (
+            f'expected {_NAMES[stream]} every {self._periods[stream]:.2g} s as before, none came '
+            f'for {time:.1f} s; is what sends them still running?')
+            for stream, time in silent.items()}
+
+    def _missing(self) -> Iterator[tuple[str, str]]:
+        stamps = {stream: {stamp for stamp, came in self._moments.items() if stream in came}
+                  for stream in STREAMS}
+        of_camera = stamps['images'] | stamps['camera_info']
+        expected = {'images': stamps['camera_info']}
+        # A tracker's poses have stamps of their own, and then none belongs to an image
+        if 2 * len(stamps['poses'] & of_camera) >= len(stamps['poses']):
+            expected['poses'] = of_camera
+        for stream, awaited in expected.items():
+            last = max(stamps[stream], default=0)  # later ones may be on their way
+            due = {stamp for stamp in awaited if stamp < last}
+            lost = len(due - stamps[stream])
+            if lost >= max(_AT_LEAST, _SHARE * len(due)):
+                yield f'missing_{stream}', (
+                    f'expected {_NAMES[stream]} of the same stamps as the rest that the camera '
+                    f'sends, {lost} of the last {len(due)} did not come; is the network too slow?')
+
+    def _late(self) -> Iterator[tuple[str, str]]:
+        behind = [came['images'] - min(came.values())
+                  for came in self._moments.values() if 'images' in came and len(came) > 1]
+        late = [time for time in behind if time > LATE_S]
+        if len(late) >= max(_AT_LEAST, _SHARE * len(behind)):
+            yield 'late_images', (
+                f'expected images soon after what else has their stamp, {len(late)} of the last '
+                f'{len(behind)} came {median(late):.2f} s later; views are taken that much later')
+
+    def _forget(self, before: float) -> None:
+        self._moments = {stamp: came for stamp, came in self._moments.items()
+                         if max(came.values()) >= before}
+
+
+_NAMES = {'images': 'images', 'camera_info': 'camera infos', 'poses': 'poses'}

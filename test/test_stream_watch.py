@@ -1,0 +1,130 @@
+"""What is told of a camera's streams as a whole."""
+
+from active_recon.stream_watch import STREAMS, StreamWatch, WINDOW_S
+import numpy as np
+import pytest
+
+MS = 1_000_000
+RATES = [5.0, 10.0, 30.0, 100.0]
+
+
+class Streams:
+    """A camera at a rate, heard by a watch, its faults in the test's hand."""
+
+    def __init__(self, rate=30.0):
+        self.watch = StreamWatch()
+        self.period = 1 / rate
+        self.now = 100.0
+
+    def run(self, seconds, lost=lambda stream, number: False, late_s=0.0, pose_shift=0):
+        """Go on for a while; return the first time from now at which each fault was found."""
+        began, found, waiting = self.now, {}, []
+        for number in range(round(seconds / self.period)):
+            stamp = round(self.now * 1e9)
+            for stream in ('poses', 'camera_info', 'images'):
+                if not lost(stream, number):
+                    due = self.now + (late_s if stream == 'images' else 0)
+                    waiting.append((due, stream, stamp + pose_shift * (stream == 'poses')))
+            for entry in [entry for entry in waiting if entry[0] <= self.now]:
+                waiting.remove(entry)
+                self.watch.heard(entry[1], entry[2], self.now)
+            for kind in self.watch.found(self.now):
+                found.setdefault(kind, self.now - began)
+            self.now += self.period
+        return found
+
+
+@pytest.mark.parametrize('rate', [1.0, *RATES])
+def test_nothing_is_found_wrong_with_a_steady_camera(rate):
+    assert not Streams(rate).run(40 / rate + 3)
+
+
+@pytest.mark.parametrize('rate', RATES)
+@pytest.mark.parametrize('stream', STREAMS)
+def test_a_stream_that_ends_is_told_within_a_second_by_its_name_and_no_more_when_it_is_back(
+        rate, stream):
+    streams = Streams(rate)
+    streams.run(3.0)
+    found = streams.run(2.0, lambda which, _: which == stream)
+    assert found.keys() == {f'silent_{stream}'}
+    assert 0.3 < found[f'silent_{stream}'] <= 1.0
+    streams.run(2 * WINDOW_S)
+    assert not streams.watch.found(streams.now)
+
+
+def test_a_camera_that_is_gone_is_one_fault_and_not_three():
+    streams = Streams()
+    streams.run(3.0)
+    assert streams.run(2.0, lambda *_: True).keys() == {'silent_camera'}
+
+
+def test_a_slow_stream_is_silent_after_three_of_its_periods_only():
+    streams = Streams(rate=1.0)
+    streams.run(12.0)
+    assert not streams.watch.found(streams.now + 1.5)
+    assert streams.watch.found(streams.now + 3.5).keys() == {'silent_camera'}
+
+
+@pytest.mark.parametrize('arrivals', [
+    np.cumsum(np.random.default_rng(0).choice([0.0005, 1.0], 40)),
+    np.cumsum(np.tile([0.0004, 0.0006, 0.0003, 0.0005, 1.0], 8)),
+    [0.0, 0.1, 0.2, 0.3], []], ids=['now and then', 'in bursts', 'a few', 'none'])
+def test_what_does_not_come_regularly_is_not_missed(arrivals):
+    watch = StreamWatch()
+    for now in arrivals:
+        for stream in STREAMS:
+            watch.heard(stream, round(now * 1e9), now)
+    assert not watch.found(100.0)
+
+
+@pytest.mark.parametrize('rate', [10.0, 30.0, 100.0])
+@pytest.mark.parametrize('stream', ['images', 'poses'])
+def test_a_third_that_is_missing_is_told_within_a_second_or_so_and_no_more_when_it_comes_again(
+        rate, stream):
+    streams = Streams(rate)
+    streams.run(3.0)
+    found = streams.run(3.0, lambda which, number: which == stream and number % 3 == 2)
+    assert found.keys() == {f'missing_{stream}'}
+    assert found[f'missing_{stream}'] <= 1.2
+    streams.run(2 * WINDOW_S)
+    assert not streams.watch.found(streams.now)
+
+
+def test_a_message_lost_now_and_then_is_not_told():
+    streams = Streams()
+    assert not streams.run(20.0, lambda which, number: which == 'images' and number % 40 == 39)
+
+
+def test_a_tracker_whose_poses_have_stamps_of_their_own_misses_none():
+    streams = Streams()
+    assert not streams.run(5.0, pose_shift=5 * MS)
+    assert streams.run(3.0, lambda which, number: which == 'images' and number % 3 == 2,
+                       pose_shift=5 * MS).keys() == {'missing_images'}
+
+
+@pytest.mark.parametrize('late_s', [0.2, 0.4, 1.0])
+def test_images_that_come_late_are_told_within_a_second_or_so_of_the_first(late_s):
+    streams = Streams()
+    streams.run(3.0)
+    found = streams.run(5.0, late_s=late_s)
+    assert found['late_images'] <= late_s + 0.5
+    assert streams.watch.found(streams.now).keys() == {'late_images'}
+
+
+def test_images_a_little_behind_their_poses_are_not_late():
+    assert not Streams().run(5.0, late_s=0.07)
+
+
+def test_after_clear_nothing_is_missed_before_it_has_come_anew():
+    streams = Streams()
+    streams.run(3.0)
+    streams.watch.clear()
+    assert not streams.watch.found(streams.now + 10.0)
+
+
+def test_memory_is_bounded_by_the_window():
+    streams = Streams(100.0)
+    streams.run(2.0)
+    size = len(streams.watch._moments)
+    streams.run(20.0)
+    assert len(streams.watch._moments) <= size
