@@ -5,16 +5,21 @@ import math
 from pathlib import Path
 from typing import Any
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN, wrap_azimuth
+from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view, TURN, wrap_azimuth
 from active_recon.errors import ConfigError, ViewError
-from active_recon.policies import Choice, load_policy, Policy
+from active_recon.motion import MotionLimits, worth
+from active_recon.policies import load_policy, Policy
 import numpy as np
 from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Where to look next, and what the policy thinks of every candidate (more is better)."""
+    """
+    Where to look next, and what every candidate that can be reached is worth (more is better).
+
+    The azimuth itself may lie between the candidates, (N,); azimuths in radians.
+    """
 
     azimuth: float
     candidates: NDArray[np.float64]
@@ -23,7 +28,11 @@ class Goal:
 
 @dataclass(frozen=True)
 class Decision:
-    """A goal, or the reason why none is needed: max_views or entropy_settled."""
+    """
+    A goal, or the reason why there is none.
+
+    That is max_views, entropy_settled, no_reachable_azimuth or stopped.
+    """
 
     goal: Goal | None
     reason: str = ''
@@ -34,11 +43,15 @@ class Planner:
     Decides after every view of an episode: where next, or that it is enough.
 
     Azimuths come and go in the object frame. `object_yaw` is the azimuth of the object's front
-    (radians): a learned policy thinks relative to the front.
+    (radians): a learned policy thinks relative to the front. A goal is what the policy chooses,
+    or the best of the candidates where the camera cannot go there, was there already, or has too
+    long a way: `motion_weight` is what half a turn costs, beside 1 for what lies between the
+    policy's worst and best candidate. An azimuth is asked for again only when no other is left.
     """
 
     def __init__(self, policy: Policy, max_views: int = 5, entropy_tolerance: float = 0.01,
-                 object_yaw: float = 0.0) -> None:
+                 object_yaw: float = 0.0, limits: MotionLimits | None = None,
+                 motion_weight: float = 0.0) -> None:
         if max_views < 1:
             raise ConfigError(f'max_views: expected 1 or more, got {max_views}')
         if not 0 <= entropy_tolerance < 1:
@@ -46,36 +59,45 @@ class Planner:
                               f'{entropy_tolerance}')
         if not math.isfinite(object_yaw):
             raise ConfigError(f'object_yaw: expected finite radians, got {object_yaw}')
+        if not 0 <= motion_weight < math.inf:
+            raise ConfigError(f'motion_weight: expected 0 or more, got {motion_weight}')
         self._policy = policy
         self._max_views = max_views
         self._entropy_tolerance = entropy_tolerance
         self._yaw = object_yaw
-        self._candidates = (AZIMUTHS + object_yaw) % TURN
+        self._limits = limits or MotionLimits()
+        self._motion_weight = motion_weight
+        self._candidates = self._limits.candidates((AZIMUTHS + object_yaw) % TURN)
         self.reset()
 
     @classmethod
     def load(cls, policy: str = 'attention', weights: Path | None = None, seed: int = 0,
              max_views: int = 5, entropy_tolerance: float = 0.01, object_yaw: float = 0.0,
-             device: str = 'cpu') -> 'Planner':
+             device: str = 'cpu', limits: MotionLimits | None = None,
+             motion_weight: float = 0.0) -> 'Planner':
         """Build the planner of a policy's name; raises ConfigError and WeightsError."""
         rng = np.random.default_rng(seed)
         return cls(load_policy(policy, weights, rng, max_views, device), max_views,
-                   entropy_tolerance, object_yaw)
+                   entropy_tolerance, object_yaw, limits, motion_weight)
 
     def reset(self) -> None:
         """Forget the episode."""
         self._taken: list[float] = []
         self._entropies: list[float] = []
         self._state: Any = None
+        self._wanted: tuple[float, NDArray[np.float32]] | None = None
+        self._failed: set[int] = set()
+        self._stopped = False
         self._goal: Goal | None = None
 
     def first_goal(self, azimuth: float) -> Goal:
-        """Return the goal of the view that no policy chooses: the first."""
+        """Return the goal of the view that no policy chooses: there, or as near as can be."""
         if not math.isfinite(azimuth):
             raise ViewError(f'expected a finite azimuth, got {azimuth}', 'azimuth')
         away = azimuth_difference(self._candidates, azimuth)
-        self._goal = Goal(wrap_azimuth(azimuth), self._candidates,
-                          -np.abs(away).astype(np.float32))
+        self._wanted = wrap_azimuth(azimuth), -np.abs(away).astype(np.float32)
+        self._goal = self._best(azimuth)
+        assert self._goal is not None, 'limits leave an azimuth, and none has failed yet'
         return self._goal
 
     def add_view(self, latent: NDArray[np.float32], azimuth: float, entropy: float) -> Decision:
@@ -96,22 +118,72 @@ class Planner:
             latent[None], np.array([taken]) - self._yaw, self._state)
         self._taken = taken
         self._entropies.append(entropy)
-        self._goal = self._in_object_frame(choice)
+        self._wanted = (wrap_azimuth(float(choice.azimuth[0]) + self._yaw),
+                        self._at_candidates(choice.scores[0]))
+        self._goal = self._best(azimuth)
+        if self._stopped:
+            return self.stop()
         if len(self._taken) >= self._max_views:
             return Decision(None, 'max_views')
         if self._settled():
             return Decision(None, 'entropy_settled')
-        return Decision(self._goal)
+        return self._goal_or_none()
+
+    def give_up(self, azimuth: float | None = None) -> Decision:
+        """
+        Leave the goal's azimuth out for the episode and decide on the next best.
+
+        `azimuth` is where the camera is, radians; None: where the last view was taken. Raises
+        ViewError where there is no goal.
+        """
+        failed = nearest_view(self.plan().azimuth, self._candidates)
+        self._failed.add(failed)
+        if azimuth is None or not math.isfinite(azimuth):
+            azimuth = self._taken[-1] if self._taken else self.plan().azimuth
+        self._goal = self._best(azimuth)
+        return self._goal_or_none()
+
+    def stop(self) -> Decision:
+        """End the episode for a reason from outside; `plan` still tells where next."""
+        self._stopped = True
+        return Decision(None, 'stopped')
 
     def plan(self) -> Goal:
         """Return the goal after the views so far, whether or not the episode is done."""
         if self._goal is None:
-            raise ViewError('expected a view before a plan; this episode has none yet', 'plan')
+            raise ViewError(
+                'expected an azimuth that can be reached; every one was given up in this episode'
+                if self._wanted else
+                'expected a view before a plan; this episode has none yet', 'plan')
         return self._goal
 
-    def _in_object_frame(self, choice: Choice) -> Goal:
-        return Goal(wrap_azimuth(float(choice.azimuth[0]) + self._yaw), self._candidates,
-                    choice.scores[0])
+    def _goal_or_none(self) -> Decision:
+        return Decision(self._goal, '' if self._goal else 'no_reachable_azimuth')
+
+    def _best(self, azimuth: float) -> Goal | None:
+        """Return the best goal for a camera that is at an azimuth; None where none is left."""
+        assert self._wanted is not None
+        choice, scores = self._wanted
+        options = np.append(choice, self._candidates)
+        nearest = np.array([nearest_view(choice, self._candidates),
+                            *range(len(self._candidates))])
+        open_ = self._limits.allows(options) & ~np.isin(nearest, list(self._failed))
+        taken = [nearest_view(view, self._candidates) for view in self._taken]
+        fresh = open_ & ~np.isin(nearest, taken)
+        travel = np.abs(azimuth_difference(options, azimuth))
+        value = worth(np.append(scores.max(), scores), travel,
+                      self._motion_weight if self._taken else 0.0)
+        if not open_.any():
+            return None
+        best = int(np.where(fresh if fresh.any() else open_, value, -np.inf).argmax())
+        return Goal(float(options[best]), self._candidates[open_[1:]], value[1:][open_[1:]])
+
+    def _at_candidates(self, scores: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return a policy's scores of its 24 azimuths at the candidates, interpolated."""
+        if self._candidates.shape == AZIMUTHS.shape and not self._limits.reachable_azimuths:
+            return scores
+        return np.interp(self._candidates - self._yaw, AZIMUTHS, scores,
+                         period=TURN).astype(np.float32)
 
     def _settled(self) -> bool:
         """Whether the last two views each changed the entropy by no more than the tolerance."""
