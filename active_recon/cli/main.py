@@ -3,6 +3,7 @@
 import sys
 
 from active_recon.cli.bag import bag
+from active_recon.cli.calibrate import calibrate
 from active_recon.cli.demo import demo
 from active_recon.cli.evaluate import evaluate
 from active_recon.cli.making import dataset, render
@@ -20,8 +21,8 @@ import typer
 app = typer.Typer(
     help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, view, report, replay, play, record_sweep, render, train, evaluate, paper,
-                sheet):
+for command in (demo, calibrate, view, report, replay, play, record_sweep, render, train,
+                evaluate, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

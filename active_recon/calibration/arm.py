@@ -1,0 +1,80 @@
+"""A camera on an arm before a board that lies still: hand-eye calibration."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from active_recon.calibration.board import Detection
+from active_recon.calibration.fit import fit, ImageFit, parameters_of, rigid
+from active_recon.calibration.lens import Lens
+from active_recon.errors import DataError
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+FEWEST_IMAGES = 5
+_LEAST_TURN = math.radians(10)
+_SCALE_TOLERANCE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class ArmFit:
+    """The camera on its mount and the board before the arm: mount from camera, base from board."""
+
+    mount_from_camera: NDArray[np.float64]
+    base_from_board: NDArray[np.float64]
+    images: list[ImageFit]
+
+
+def fit_arm(seen: Sequence[Detection], lens: Lens, mounts: NDArray[np.float64]) -> ArmFit:
+    """
+    Find where on an arm's mount the camera sits.
+
+    `mounts`: base from mount of each image, (N, 4, 4). Raises DataError where the images are too
+    few, the poses do not tell it, or contradict the images.
+    """
+    if len(seen) < FEWEST_IMAGES:
+        raise DataError(f'expected {FEWEST_IMAGES} images from known poses or more, got '
+                        f'{len(seen)}', 'too_few_images')
+    boards = np.stack([lens.board_pose(one) for one in seen])
+    mount_from_camera = _hand_eye(mounts, boards)
+    start = np.concatenate([parameters_of(mount_from_camera),
+                            parameters_of(mounts[0] @ mount_from_camera @ boards[0])])
+
+    def board_poses(parameters: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        camera = rigid(parameters[:3], parameters[3:6])
+        board = rigid(parameters[6:9], parameters[9:])
+        return [np.linalg.inv(mount @ camera) @ board for mount in mounts]
+
+    found, images = fit(seen, lens, board_poses, start)
+    return ArmFit(rigid(found[:3], found[3:6]), rigid(found[6:9], found[9:]), images)
+
+
+def _hand_eye(mounts: NDArray[np.float64], boards: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    Return mount from camera, after Park and Martin 1994; OpenCV 5 no longer has it.
+
+    With `a` the mount's motion and `b` the camera's between two images, a X = X b.
+    """
+    first, second = np.triu_indices(len(mounts), 1)
+    a = np.linalg.inv(mounts[second]) @ mounts[first]
+    b = boards[second] @ np.linalg.inv(boards[first])
+    turn_a = Rotation.from_matrix(a[:, :3, :3]).as_rotvec()
+    turn_b = Rotation.from_matrix(b[:, :3, :3]).as_rotvec()
+    clear = np.linalg.norm(turn_b, axis=1) < math.radians(170)  # a half turn has two axes
+    if not clear.any() or np.linalg.svd(turn_b[clear])[1][1] < _LEAST_TURN:
+        raise DataError('expected poses that turn the camera about two axes, by '
+                        f'{math.degrees(_LEAST_TURN):.0f} degrees or more about each', 'poses')
+    rotation = Rotation.align_vectors(turn_a[clear], turn_b[clear])[0].as_matrix()
+    # (R_a - 1) t_x - scale R_x t_b = -t_a: were the squares of another size, it would show
+    left = np.concatenate([a[:, :3, :3] - np.eye(3),
+                           -(b[:, :3, 3] @ rotation.T)[..., None]], axis=2)
+    solved = np.linalg.lstsq(left.reshape(-1, 4), -a[:, :3, 3].ravel(), rcond=None)[0]
+    if abs(solved[3] - 1) > _SCALE_TOLERANCE:
+        raise DataError("expected the arm's poses and the board to have one scale, but by the "
+                        f'poses the squares are {solved[3]:.3g} times as large as was told; '
+                        'measure a square, and see that the poses are those of the mount in the '
+                        "arm's base frame, in metres, their quaternions x y z w", 'scale')
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, solved[:3]
+    return pose

@@ -1,0 +1,96 @@
+"""A turntable's axis and angles, from the board's pose in each image: where the fit starts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from active_recon.cameras import azimuth_difference
+from active_recon.errors import DataError
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+_LEAST_TURN = math.radians(20)
+_LARGEST_TILT = math.radians(60)
+_ANGLE_TOLERANCE = math.radians(5)
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """
+    A turntable's axis in the camera's frame.
+
+    - up: unit vector along the axis, away from the plate, (3,)
+    - center: where the axis meets the board's height, metres, (3,)
+    - turned: of each image, counter-clockwise seen from above, from the first, radians, (N,)
+    """
+
+    up: NDArray[np.float64]
+    center: NDArray[np.float64]
+    turned: NDArray[np.float64]
+
+
+def find_axis(poses: NDArray[np.float64]) -> Axis:
+    """
+    Find the axis about which a board turned, from camera from board, (N, 4, 4).
+
+    Raises DataError where the board hardly turned, or does not lie on the plate.
+    """
+    turns = Rotation.from_matrix(poses[:, :3, :3])
+    first, second = np.triu_indices(len(poses), 1)
+    between = (turns[second] * turns[first].inv()).as_rotvec()
+    if np.linalg.norm(between, axis=1).max() < _LEAST_TURN:
+        raise DataError(f'expected a table that turns by {math.degrees(_LEAST_TURN):.0f} degrees '
+                        'or more between the images, but the board hardly turned', 'angles')
+    up = np.linalg.eigh(between.T @ between)[1][:, -1]
+    facing = -poses[:, :3, 2].mean(0)  # the board's z points into the paper
+    up *= np.sign(facing @ up)
+    if facing @ up < math.cos(_LARGEST_TILT) * np.linalg.norm(facing):
+        raise DataError('expected a board that lies on the table, but it stands at '
+                        f'{_angle_deg(facing, up):.0f} degrees to it', 'board_tilt')
+    x, y, z, w = (turns * turns[0].inv()).as_quat().T
+    turned = 2 * np.arctan2(np.stack([x, y, z], axis=1) @ up, w)
+    return Axis(up, _center(poses, up, turned), np.asarray(azimuth_difference(turned, 0)))
+
+
+def _center(poses: NDArray[np.float64], up: NDArray[np.float64], turned: NDArray[np.float64]
+            ) -> NDArray[np.float64]:
+    """Return the point of the axis about which the board's origin went round, at its height."""
+    about = Rotation.from_rotvec(turned[:, None] * up).as_matrix()
+    corner = poses[:, :3, 3]
+    left = (np.eye(3) - about).reshape(-1, 3)
+    right = (corner - about @ corner[0]).ravel()
+    center = np.linalg.lstsq(left, right, rcond=1e-6)[0]
+    return np.asarray(center + up * (up @ (corner.mean(0) - center)))
+
+
+def direction_of(turned: NDArray[np.float64], angles: NDArray[np.float64],
+                 names: Sequence[str]) -> int:
+    """
+    Return +1 where the table's angles grow counter-clockwise seen from above, else -1.
+
+    - turned: as the images show it, counter-clockwise, radians, (N,)
+    - angles: as the table tells it, radians, (N,)
+
+    Raises DataError where that cannot be told, or where an image contradicts its angle.
+    """
+    agreement = {direction: abs(np.exp(1j * (turned - direction * angles)).mean())
+                 for direction in (1, -1)}
+    direction = max(agreement, key=lambda one: agreement[one])
+    offset = np.angle(np.exp(1j * (turned - direction * angles)).mean())
+    off = np.asarray(azimuth_difference(turned - direction * angles, offset))
+    worst = int(np.argmax(np.abs(off)))
+    if abs(off[worst]) > _ANGLE_TOLERANCE:
+        raise DataError(
+            f'{names[worst]}: expected the table at {math.degrees(angles[worst]):.1f} degrees, '
+            f'as was told, but the board stands {abs(math.degrees(off[worst])):.1f} degrees off '
+            'that; are the angles or the step right, and are the images in the order of their '
+            'names?', 'angles')
+    if agreement[direction] - agreement[-direction] < 0.01:
+        raise DataError('expected angles that tell which way the table turns; half turns alone '
+                        'do not', 'direction')
+    return direction
+
+
+def _angle_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    return math.degrees(math.acos(float(a @ b) / float(np.linalg.norm(a) * np.linalg.norm(b))))

@@ -1,0 +1,153 @@
+"""Calibrations from their images to the parameters of the nodes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from active_recon.calibration.arm import FEWEST_IMAGES as FEWEST_OF_ARM
+from active_recon.calibration.arm import fit_arm
+from active_recon.calibration.board import Board, detect_all, Detection
+from active_recon.calibration.files import read_image
+from active_recon.calibration.fit import ImageFit
+from active_recon.calibration.lens import estimate_lens, Lens, read_lens
+from active_recon.calibration.outcome import Calibration, quaternion_of
+from active_recon.calibration.placement import Placement
+from active_recon.calibration.remarks import (
+    DIRECTION_UNKNOWN,
+    LENS_HALF_KNOWN,
+    of_cube,
+    of_elevation,
+    of_errors,
+    of_missing,
+)
+from active_recon.calibration.turntable import FEWEST_IMAGES as FEWEST_OF_TABLE
+from active_recon.calibration.turntable import fit_turntable
+from active_recon.cameras import Camera
+from active_recon.errors import DataError
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The names of an arm's tf frames."""
+
+    base: str = 'base_link'
+    mount: str = 'tool0'
+    camera: str = 'camera_optical_frame'
+    object: str = 'object'
+
+
+@dataclass(frozen=True)
+class BoardImages:
+    """
+    Images of a board.
+
+    The lens is that of the file `camera_info`; without one it is estimated from the same images
+    and from `lens_paths`, more images of the board in any pose.
+    """
+
+    board: Board
+    paths: Sequence[Path]
+    camera_info: Path | None = None
+    lens_paths: Sequence[Path] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    seen: list[Detection]
+    lens: Lens
+    remarks: list[str]
+
+
+def calibrate_turntable(images: BoardImages, placement: Placement,
+                        angles: Mapping[str, float] | None = None) -> Calibration:
+    """
+    Find a fixed camera beside a turntable.
+
+    `angles`: of the table, by the image's name, radians; None where they are not known. Raises
+    DataError where the images do not tell it or contradict the angles.
+    """
+    look = _look_at(images, FEWEST_OF_TABLE)
+    told = None if angles is None else np.array([angles[one.name] for one in look.seen])
+    found = fit_turntable(look.seen, look.lens, told)
+    pose = placement.on_table(found)
+    camera = Camera(pose)
+    reconstructor: dict[str, Any] = {
+        'object_size': placement.object_size, 'pose_source': 'turntable_joint',
+        'camera_position': _rounded(pose[:3, 3]),
+        'camera_orientation': _rounded(quaternion_of(pose))}
+    remarks = [*look.remarks, *of_elevation(camera)]
+    if found.direction is None:
+        remarks.append(DIRECTION_UNKNOWN)
+    else:
+        reconstructor['turntable_direction'] = found.direction
+    planner = {'object_size': placement.object_size, 'elevation': round(camera.elevation, 5),
+               'distance': round(camera.distance, 5)}
+    object_from_board = pose @ found.camera_from_table @ found.table_from_board
+    board_from_object = np.asarray(np.linalg.inv(object_from_board), np.float64)
+    return _calibration(found.images, look.lens, board_from_object, placement, remarks,
+                        {'reconstructor': reconstructor, 'view_planner': planner}, {})
+
+
+def calibrate_arm(images: BoardImages, placement: Placement,
+                  mounts: Mapping[str, NDArray[np.float64]], frames: Frames) -> Calibration:
+    """
+    Find a camera on an arm, and the object's frame before it.
+
+    `mounts`: base from mount, (4, 4), by the image's name. Raises DataError as `fit_arm` does.
+    """
+    look = _look_at(images, FEWEST_OF_ARM)
+    found = fit_arm(look.seen, look.lens, np.stack([mounts[one.name] for one in look.seen]))
+    board_from_object = placement.on_board(images.board)
+    size: dict[str, Any] = {
+        'object_size': placement.object_size, 'object_frame': frames.object}
+    return _calibration(
+        found.images, look.lens, board_from_object, placement, look.remarks,
+        {'reconstructor': {**size, 'pose_source': 'tf'}, 'view_planner': size},
+        {(frames.base, frames.object): found.base_from_board @ board_from_object,
+         (frames.mount, frames.camera): found.mount_from_camera})
+
+
+def _look_at(images: BoardImages, fewest: int) -> _Look:
+    seen, missing = _detect(images.board, images.paths, fewest)
+    more = _detect(images.board, images.lens_paths, 1)[0] if images.lens_paths else []
+    for other in more[:1]:
+        _same_size(seen[0], other.size, other.name)
+    remarks = of_missing(missing)
+    if images.camera_info is not None:
+        lens = read_lens(images.camera_info)
+        _same_size(seen[0], lens.size, str(images.camera_info))
+        return _Look(seen, lens, remarks)
+    estimated = estimate_lens([*seen, *more])
+    if not estimated.whole:
+        remarks.append(LENS_HALF_KNOWN)
+    return _Look(seen, estimated.lens, remarks)
+
+
+def _detect(board: Board, paths: Sequence[Path], fewest: int
+            ) -> tuple[list[Detection], list[str]]:
+    return detect_all(board, ((path.name, read_image(path)) for path in paths), fewest)
+
+
+def _same_size(first: Detection, size: tuple[int, int], name: str) -> None:
+    if size != first.size:
+        raise DataError(f'{name}: expected the size of the other images, {first.size[0]} x '
+                        f'{first.size[1]} of {first.name}, got {size[0]} x {size[1]}',
+                        'image_size')
+
+
+def _calibration(images: list[ImageFit], lens: Lens, board_from_object: NDArray[np.float64],
+                 placement: Placement, remarks: list[str],
+                 parameters: Mapping[str, Mapping[str, Any]],
+                 transforms: Mapping[tuple[str, str], NDArray[np.float64]]) -> Calibration:
+    size = placement.object_size
+    return Calibration(
+        lens, images, board_from_object, size, parameters,
+        [*remarks, *of_errors(images), *of_cube(images, lens, board_from_object, size)],
+        transforms)
+
+
+def _rounded(values: NDArray[np.float64]) -> list[float]:
+    return [round(float(value), 6) for value in values]

@@ -1,0 +1,107 @@
+"""What a calibration reads: images by their names, and the angle or the pose of each."""
+
+import csv
+from pathlib import Path
+import re
+
+from active_recon.errors import DataError
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
+
+
+def image_paths(places: list[Path]) -> list[Path]:
+    """
+    Return the image files, those of folders among them, in the order of their names.
+
+    A number in a name counts as a number: 2 before 10. Raises DataError where there is none, or
+    two have one name.
+    """
+    paths = [path for place in places
+             for path in (place.iterdir() if place.is_dir() else [place])
+             if not place.is_dir() or path.suffix.lower() in SUFFIXES]
+    if not paths:
+        raise DataError(f'{", ".join(map(str, places))}: expected images '
+                        f'({", ".join(SUFFIXES)}), found none')
+    names = [path.name for path in paths]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise DataError(f'expected images of different names, got {twice[0]} twice')
+    return sorted(paths, key=_in_order)
+
+
+def _in_order(path: Path) -> list[tuple[int, str]]:
+    return [(int(part), '') if part.isdigit() else (0, part)
+            for part in re.split(r'(\d+)', path.name)]
+
+
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """Return an image as it lies in the file, (H, W, 3) uint8 BGR; raises DataError."""
+    # As the camera's driver publishes it: a viewer's turn by EXIF is not for the network's eyes
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if image is None:
+        raise DataError(f'{path}: expected an image, got a file that OpenCV cannot read')
+    return np.asarray(image, np.uint8)
+
+
+def read_angles(path: Path, names: list[str]) -> dict[str, float]:
+    """Return the table's angle in each image, radians; the file has degrees, see `_rows`."""
+    return {name: float(np.radians(row[0])) for name, row in _rows(path, names, 1).items()}
+
+
+def read_poses(path: Path, names: list[str]) -> dict[str, NDArray[np.float64]]:
+    """Return the pose of each image, (4, 4); the file has x, y, z, qx, qy, qz, qw, see `_rows`."""
+    poses = {}
+    for name, row in _rows(path, names, 7).items():
+        if abs(np.linalg.norm(row[3:]) - 1) > 0.01:
+            raise DataError(f'{path}: expected a unit quaternion of {name}, got {row[3:]}')
+        pose = np.eye(4)
+        pose[:3, :3] = Rotation.from_quat(row[3:]).as_matrix()
+        pose[:3, 3] = row[:3]
+        poses[name] = pose
+    return poses
+
+
+def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
+    """
+    Return so many numbers for each image from a CSV file.
+
+    A row begins with the image's name, or the rows have the numbers alone, one for each image in
+    the order of the names. A first row of words is a heading. Raises DataError that names the row.
+    """
+    try:
+        with path.open(newline='') as lines:
+            rows = [(number, [cell.strip() for cell in row])
+                    for number, row in enumerate(csv.reader(lines), 1) if any(row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DataError(f'{path}: expected a CSV file: {error}') from error
+    if rows and _numbers(rows[0][1][-1:]) is None:
+        rows = rows[1:]
+    named, unnamed = {}, []
+    for number, row in rows:
+        values = _numbers(row[-count:])
+        if values is None or not count <= len(row) <= count + 1:
+            raise DataError(f'{path}, line {number}: expected {count} numbers, or an image and '
+                            f'{count} numbers, got {", ".join(row)}')
+        if len(row) > count:
+            named[Path(row[0]).name] = values
+        else:
+            unnamed.append(values)
+    if unnamed and (named or len(unnamed) != len(names)):
+        raise DataError(f'{path}: expected a row for each of the {len(names)} images, or rows '
+                        f'that begin with their names, got {len(unnamed)} without a name')
+    found = dict(zip(names, unnamed, strict=True)) if unnamed else named
+    if missing := [name for name in names if name not in found]:
+        raise DataError(f'{path}: expected a row of every image, found none of '
+                        f'{", ".join(missing)}')
+    return {name: found[name] for name in names}
+
+
+def _numbers(cells: list[str]) -> list[float] | None:
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() else None

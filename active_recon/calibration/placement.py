@@ -1,0 +1,79 @@
+"""From what was fitted to the object frame: its origin half the object's cube above the plate."""
+
+from dataclasses import dataclass
+
+from active_recon.calibration.board import Board
+from active_recon.calibration.turntable import TurntableFit
+from active_recon.cameras import Camera
+from active_recon.errors import ConfigError, DataError
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+
+@dataclass(frozen=True)
+class Placement:
+    """
+    Where the object's cube stands.
+
+    - object_size: the side of the cube, metres
+    - board_thickness: of the board's face above the plate on which the object will stand, metres
+    - azimuth_at_zero: of the camera at table angle 0, radians; it says where the object frame's
+      x, an object's front, points
+    """
+
+    object_size: float
+    board_thickness: float = 0.0
+    azimuth_at_zero: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a cube without a size."""
+        if not 0 < self.object_size < np.inf:
+            raise ConfigError('object_size: expected metres above 0, got '
+                              f'{self.object_size}')
+
+    @property
+    def above_board(self) -> float:
+        """Metres from the board's face up to the cube's centre."""
+        return self.object_size / 2 - self.board_thickness
+
+    def on_table(self, found: TurntableFit) -> NDArray[np.float64]:
+        """
+        Return the camera's pose in the object frame at table angle 0, (4, 4).
+
+        Raises DataError where the camera stands below the plate.
+        """
+        height = found.board_height + self.above_board
+        camera = Camera(_moved(0, 0, -height) @ np.linalg.inv(found.camera_from_table))
+        if camera.position[2] < -self.object_size / 2:
+            raise DataError('expected a camera above the plate, got one '
+                            f'{-camera.position[2] - self.object_size / 2:.3f} m below it',
+                            'below')
+        turn = np.eye(4)
+        turn[:3, :3] = Rotation.from_euler(
+            'z', self.azimuth_at_zero - camera.azimuth).as_matrix()
+        pose: NDArray[np.float64] = turn @ camera.pose
+        return pose
+
+    def on_board(self, board: Board) -> NDArray[np.float64]:
+        """
+        Return board from object, (4, 4), of a board that lies still.
+
+        The cube stands on the board's middle, its front towards the ends of the board's rows.
+        """
+        face_up = np.diag([1.0, -1.0, -1.0, 1.0])
+        middle = _moved(board.columns * board.square / 2, board.rows * board.square / 2, 0)
+        pose: NDArray[np.float64] = middle @ face_up @ _moved(0, 0, self.above_board)
+        return pose
+
+
+def cube_corners(object_size: float) -> NDArray[np.float64]:
+    """Return the corners of the object's cube in its frame, metres, (8, 3)."""
+    return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+                    ) * object_size / 2
+
+
+def _moved(x: float, y: float, z: float) -> NDArray[np.float64]:
+    pose = np.eye(4)
+    pose[:3, 3] = x, y, z
+    return pose

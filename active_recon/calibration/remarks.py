@@ -1,0 +1,56 @@
+"""What to know before relying on a calibration, in plain words."""
+
+from collections.abc import Sequence
+import math
+
+from active_recon.calibration.fit import ImageFit, overall_error
+from active_recon.calibration.lens import Lens
+from active_recon.calibration.placement import cube_corners
+from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+import numpy as np
+from numpy.typing import NDArray
+
+_GOOD_ERROR = 1.0  # pixels
+_MUCH_WORSE = 3.0  # than the overall error
+
+LENS_HALF_KNOWN = (
+    "The lens's centre and distortion are taken as ideal: a flat board on a table does not tell "
+    'them. Give --camera-info, or by --lens-images ten images of the board tilted in the hand.')
+DIRECTION_UNKNOWN = (
+    'Which way the angle of the table grows is not known: give --step-deg or --angles-deg, or '
+    'set turntable_direction to 1 (counter-clockwise seen from above) or -1.')
+
+
+def of_missing(names: Sequence[str]) -> list[str]:
+    """Return what to say of images in which the board is not seen."""
+    return [f'The board is not seen in {", ".join(names)}.'] if names else []
+
+
+def of_elevation(camera: Camera) -> list[str]:
+    """Return what to say of a camera that the networks never saw."""
+    if abs(camera.elevation - CANONICAL_ELEVATION) <= ELEVATION_TOLERANCE:
+        return []
+    return [f'The camera stands at an elevation of {math.degrees(camera.elevation):.0f} degrees; '
+            f'the networks know {math.degrees(CANONICAL_ELEVATION):.0f}.']
+
+
+def of_errors(images: Sequence[ImageFit]) -> list[str]:
+    """Return what to say of a large error, and of images far worse than the others."""
+    error = overall_error(images)
+    remarks = [] if error <= _GOOD_ERROR else [
+        f'An error of {error:.1f} pixels is much: below {_GOOD_ERROR:g} is usual. Is the board '
+        'flat, and are the images sharp?']
+    worse = [one.seen.name for one in images if one.error > _MUCH_WORSE * error]
+    return remarks + ([f'Much worse than the others: {", ".join(worse)}.'] if worse else [])
+
+
+def of_cube(images: Sequence[ImageFit], lens: Lens, board_from_object: NDArray[np.float64],
+            object_size: float) -> list[str]:
+    """Return what to say where the object's cube is not in an image."""
+    corners = cube_corners(object_size)
+    for one in images:
+        pixels = lens.project(corners, one.camera_from_board @ board_from_object)
+        if pixels.min() < 0 or (pixels > lens.size).any():
+            return [f"The object's cube of {object_size:g} m is not wholly in the image "
+                    f'{one.seen.name}, nor perhaps in others.']
+    return []

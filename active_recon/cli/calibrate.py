@@ -1,0 +1,115 @@
+"""`active-recon calibrate`: where the camera stands around the object, from images of a board."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+from active_recon.errors import ConfigError
+import typer
+
+
+def calibrate(
+    images: Annotated[list[Path] | None, typer.Argument(
+        help='Images of the board, or folders of them.', show_default=False)] = None,
+    object_size: Annotated[float | None, typer.Option(
+        help="Side of the object's cube, m.", show_default=False)] = None,
+    out: Annotated[Path, typer.Option(
+        help='The folder for calibration.yaml, calibration.png and camera_info.yaml.'
+    )] = Path('calibration'),
+    print_board: Annotated[Path | None, typer.Option(
+        help='Write the board as an image (PNG), to be printed at its true size.')] = None,
+    squares: Annotated[str, typer.Option(help='Of the board, COLUMNSxROWS.')] = '7x5',
+    square_mm: Annotated[float, typer.Option(help='Side of a square, measured on paper.')] = 30.0,
+    marker_mm: Annotated[float | None, typer.Option(
+        help='Side of a marker; default: 3/4 of a square.')] = None,
+    dictionary: Annotated[str, typer.Option(help='Of the markers, such as 5x5_100.')] = '4x4_50',
+    board_thickness_mm: Annotated[float, typer.Option(
+        help='How high the printed face lies above the plate.')] = 0.0,
+    step_deg: Annotated[float | None, typer.Option(
+        help="The table's angle from each image to the next, in the order of their names; the "
+             'first is at 0.')] = None,
+    angles_deg: Annotated[Path | None, typer.Option(
+        help="A CSV file of the table's angles: image, degrees.")] = None,
+    camera_azimuth_deg: Annotated[float, typer.Option(
+        help="Of the camera at the table's angle 0; at 0 the object's front faces it.")] = 0.0,
+    poses: Annotated[Path | None, typer.Option(
+        help="A CSV file of an arm's poses instead of a turntable, the camera's mount in the "
+             'base frame: image, x, y, z, qx, qy, qz, qw.')] = None,
+    camera_info: Annotated[Path | None, typer.Option(
+        help="The lens, as ROS's camera_calibration writes it (YAML); default: estimated.")
+    ] = None,
+    lens_images: Annotated[list[Path] | None, typer.Option(
+        help='More images of the board, tilted every way, or folders of them, to estimate the '
+             'lens from.')] = None,
+    base_frame: Annotated[str, typer.Option(help="Of an arm: its base's tf frame.")] = 'base_link',
+    mount_frame: Annotated[str, typer.Option(help='The frame of the poses.')] = 'tool0',
+    camera_frame: Annotated[str, typer.Option(
+        help="The camera's optical frame.")] = 'camera_optical_frame',
+) -> None:
+    """
+    Find the camera beside a turntable, or on an arm, from images of a ChArUco board.
+
+    Lay the board on the table and turn it in steps under the fixed camera; or let it lie and move
+    the arm. What is found is written as parameters of reconstructor and view_planner.
+
+    For example: active-recon calibrate --print-board board.png, and then
+    active-recon calibrate images/ --step-deg 15 --object-size 0.25
+    """
+    from active_recon.calibration.board import Board
+
+    columns, rows = _squares(squares)
+    marker = 0.75 * square_mm if marker_mm is None else marker_mm
+    board = Board(columns, rows, square_mm / 1e3, marker / 1e3, dictionary)
+    if print_board is not None:
+        board.save(print_board)
+        width, height = board.printed_size()
+        typer.echo(f'wrote {print_board}: print it at 100 %, not fitted to the page, and measure '
+                   f'it: {columns} x {rows} squares are {width * 1e3:.1f} x {height * 1e3:.1f} '
+                   'mm. Where they are not, give the side of a square by --square-mm.')
+        return
+    if not images or object_size is None:
+        raise ConfigError('calibrate: expected images of the board and --object-size, or '
+                          '--print-board')
+
+    from active_recon.calibration.calibration import (
+        BoardImages,
+        calibrate_arm,
+        calibrate_turntable,
+        Frames,
+    )
+    from active_recon.calibration.files import image_paths, read_angles, read_poses
+    from active_recon.calibration.placement import Placement
+
+    if sum(one is not None for one in (step_deg, angles_deg, poses)) > 1:
+        raise ConfigError('calibrate: expected one of --step-deg, --angles-deg and --poses')
+    paths = image_paths(images)
+    names = [path.name for path in paths]
+    placement = Placement(
+        object_size, board_thickness_mm / 1e3, math.radians(camera_azimuth_deg))
+    seen = BoardImages(board, paths, camera_info, image_paths(lens_images) if lens_images else ())
+    if poses is not None:
+        found = calibrate_arm(seen, placement, read_poses(poses, names),
+                              Frames(base_frame, mount_frame, camera_frame))
+    else:
+        angles = None if angles_deg is None else read_angles(angles_deg, names)
+        if step_deg is not None:
+            angles = {name: math.radians(step_deg) * index for index, name in enumerate(names)}
+        found = calibrate_turntable(seen, placement, angles)
+    found.save(out, paths)
+    for one in found.images:
+        typer.echo(f'{one.seen.name}: {len(one.seen.points)} corners, {one.error:.2f} pixels')
+    for remark in found.remarks:
+        typer.echo(f'note: {remark}')
+    typer.echo(f'reprojection error {found.error:.2f} pixels (RMS), drawn in '
+               f'{out / "calibration.png"}')
+    for command in found.static_transforms():
+        typer.echo(command)
+    typer.echo(f'wrote {out / "calibration.yaml"}: ros2 run active_recon reconstructor '
+               f'--ros-args --params-file {out / "calibration.yaml"}, and view_planner likewise')
+
+
+def _squares(words: str) -> tuple[int, int]:
+    columns, _, rows = words.lower().partition('x')
+    if not (columns.isdecimal() and rows.isdecimal()):
+        raise ConfigError(f'--squares: expected COLUMNSxROWS, such as 7x5, got {words!r}')
+    return int(columns), int(rows)
