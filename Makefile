@@ -20,7 +20,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full bench chromium lint clean
+.PHONY: help venv demo golden test test-full bench soak chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -59,6 +59,10 @@ chromium:
 bench: .venv/installed  ## the figures of the README's table, measured here
 	@echo '== measuring'
 	@$(BIN)/python -m benchmarks $(ARGS)
+
+soak: .venv/installed  ## an hour of the loop, for docs/soak.md; ARGS='--minutes 5' for less
+	@echo '== soaking'
+	@$(BIN)/python -m benchmarks.soak $(ARGS)
 
 lint: .venv/installed  ## ruff and mypy
 	@echo '== checking the style and the types'

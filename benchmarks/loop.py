@@ -15,6 +15,7 @@ from active_recon.meshes import load_mesh
 from active_recon.rendering import composite, Renderer
 from benchmarks.core import OBJECTS
 from benchmarks.figures import Figure
+from benchmarks.memory import peak_mb
 
 _READY_STARTS = 5
 _VIEWS = 200
@@ -32,7 +33,7 @@ def reconstructor_figures() -> list[Figure]:
             ready.append(seconds)
             if len(ready) == _READY_STARTS:
                 latency_ms = _latencies_ms()
-                memory_mb = [_peak_memory_mb(process)]
+                memory_mb = [peak_mb(process)]
     return [
         Figure('image published to occupancy received, p95', 'ms', latency_ms, 50, percentile=95),
         Figure('reconstructor ready after its start', 's', ready, 3),
@@ -122,11 +123,3 @@ def _latencies_ms() -> list[float]:
     node.destroy_node()
     rclpy.try_shutdown(context=context)
     return latencies
-
-
-def _peak_memory_mb(pid: int) -> float:
-    """Return the most that a process has held in memory, MB."""
-    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
-        if line.startswith('VmHWM'):
-            return int(line.split()[1]) / 1e3
-    raise RuntimeError(f'no memory figure for process {pid}')

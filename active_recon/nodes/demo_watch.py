@@ -1,11 +1,11 @@
 """The demo's own node: it follows the loop from outside and asks for the mesh and the bag."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 import time
 
 from active_recon.cameras import Camera
-from active_recon.errors import ActiveReconError
+from active_recon.nodes.loop_watch import joined_domain, LoopWatch
 from active_recon.nodes.qos import LATCHED
 from active_recon.seen_view import SeenView
 from active_recon.voxels import iou, VoxelGrid
@@ -19,21 +19,16 @@ from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
 from numpy.typing import NDArray
-import rclpy
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
-from std_srvs.srv import Trigger
 
 _IMAGES_KEPT = 64
-_SPIN_S = 0.05
 
 
-class DemoWatch:
+class DemoWatch(LoopWatch):
     """
     What has been seen of the loop so far.
 
@@ -43,12 +38,11 @@ class DemoWatch:
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor,
                  truth: NDArray[np.bool_]) -> None:
+        super().__init__(node, executor)
         self.views: list[SeenView] = []
         self.azimuth: float | None = None
         self.goal: float | None = None
         self.done = ''
-        self._node = node
-        self._executor = executor
         self._truth = truth
         self._images: dict[int, NDArray[np.uint8]] = {}
         self._joiner = StampJoiner(('view', 'occupancy', 'probabilities'))
@@ -62,32 +56,9 @@ class DemoWatch:
                 (Header, 'done', self._on_done, LATCHED)):
             node.create_subscription(kind, topic, callback, qos)
 
-    def until(self, condition: Callable[[], bool], budget_s: float, awaited: str,
-              meanwhile: Callable[[], None]) -> None:
-        """Take in messages until the condition holds; ActiveReconError after the budget."""
-        deadline = time.monotonic() + budget_s
-        while not condition():
-            if time.monotonic() > deadline:
-                raise ActiveReconError(f'expected {awaited} within {budget_s:g} s, '
-                                       'but it did not come')
-            self._executor.spin_once(timeout_sec=_SPIN_S)
-            meanwhile()
-
     def has_views(self, count: int) -> bool:
         """Return whether as many views have been seen."""
         return len(self.views) >= count
-
-    def ask(self, service: str, budget_s: float, meanwhile: Callable[[], None]) -> str:
-        """Call a Trigger service and return its message; ActiveReconError where it refuses."""
-        client = self._node.create_client(Trigger, service)
-        self.until(client.service_is_ready, budget_s, f'the service {service}', meanwhile)
-        answer = client.call_async(Trigger.Request())
-        self.until(answer.done, budget_s, f'an answer of {service}', meanwhile)
-        result = answer.result()
-        self._node.destroy_client(client)
-        if not result.success:
-            raise ActiveReconError(f'{service} answered: {result.message}')
-        return str(result.message)
 
     def _on_image(self, msg: Image) -> None:
         self._images[nanoseconds_from_stamp(msg.header.stamp)] = image_from_msg(msg)
@@ -129,15 +100,5 @@ class DemoWatch:
 @contextmanager
 def watching(truth: NDArray[np.bool_]) -> Iterator[DemoWatch]:
     """Join the domain that the environment names, (X, Y, Z) the object's true voxels."""
-    context = Context()
-    # Ctrl-C stays Python's own: it ends whatever waits here, and the demo cleans up.
-    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
-    node = Node('demo', context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    try:
+    with joined_domain('demo') as (node, executor):
         yield DemoWatch(node, executor, truth)
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown(context=context)

@@ -1,48 +1,36 @@
-"""Hours in minutes: many episodes of one loop, its memory flat and every episode whole."""
+"""The loop over a long time, as `make soak` runs it for an hour, here for a minute and a half."""
 
-from functools import partial
-from pathlib import Path
+import json
+import os
+import subprocess
+import sys
 
-from conftest import LATCHED
-from msg_tools.stamps import nanoseconds_from_stamp
+from conftest import ROOT
 import pytest
-from std_msgs.msg import Header
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
-EPISODES, WARM_UP = 60, 15
-VIEWS = 5
-GROWTH_MB = 8.0
+pytestmark = pytest.mark.ros
 
 
-def memory_mb(process):
-    """Return what a node holds in memory now."""
-    status = Path(f'/proc/{process.pid}/status').read_text()
-    return int(status.split('VmRSS:')[1].split()[0]) / 1e3
+@pytest.fixture(scope='module')
+def soaked(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('soak')
+    done = subprocess.run(
+        [sys.executable, '-m', 'benchmarks.soak', '--minutes', '1.4', '--output-dir', folder],
+        cwd=ROOT, env={**os.environ, 'PYTHONPATH': str(ROOT)}, capture_output=True, text=True)
+    assert (folder / 'soak.json').is_file(), done.stderr
+    assert done.stdout.strip() == (folder / 'soak.md').read_text().strip()
+    return json.loads((folder / 'soak.json').read_text())
 
 
-def test_sixty_episodes_end_whole_and_leave_memory_flat(bench, start_node, box, tmp_path):
-    start = {
-        'recorder': partial(start_node, output_dir=tmp_path),
-        'turntable_camera': partial(start_node, mesh=box, rate=30.0, time_scale=20.0),
-        'reconstructor': partial(start_node, take_views='at_goal', output_dir=tmp_path),
-        'view_planner': partial(start_node, max_views=VIEWS, entropy_tolerance=0.0)}
-    done = bench.hear(Header, 'done', LATCHED)
-    episodes = bench.hear(Header, 'episode', LATCHED)
-    nodes = {name: begin(name) for name, begin in start.items()}
-    before = {}
-    for number in range(EPISODES):
-        answer = bench.call('start_episode')
-        assert answer.success
-        bench.until(lambda name=answer.message: episodes and episodes[-1].frame_id == name,
-                    f'episode {number}')
-        begin = nanoseconds_from_stamp(episodes[-1].stamp)
-        bench.until(lambda begin=begin: any(
-            end.frame_id and nanoseconds_from_stamp(end.stamp) > begin for end in done),
-            f'the end of episode {number}')
-        if number + 1 == WARM_UP:
-            before = {name: memory_mb(node) for name, node in nodes.items()}
-    grown = {name: memory_mb(node) - before[name] for name, node in nodes.items()}
-    assert all(growth < GROWTH_MB for growth in grown.values()), grown
-    assert all(node.running for node in nodes.values())
-    bench.until(lambda: bench.counts('reconstructor').get('views', 0) >= EPISODES * VIEWS,
-                'the count of all views')
+def test_every_episode_of_a_long_run_is_whole_and_recorded(soaked):
+    assert not soaked['broken_by']
+    assert soaked['episodes'] >= 2
+    assert soaked['whole'] == soaked['episodes']
+    assert soaked['recorded_views'] >= soaked['views'] == 5 * soaked['whole']
+
+
+def test_memory_is_flat_once_the_loop_is_warm(soaked):
+    growth = {name: use['growth_mb'] for name, use in soaked['memory'].items()}
+    assert set(growth) == {'recorder', 'turntable_camera', 'reconstructor', 'view_planner'}
+    assert growth['reconstructor'] < 5, growth
+    assert all(each < 10 for each in growth.values()), growth

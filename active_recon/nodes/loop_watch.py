@@ -1,0 +1,63 @@
+"""Following the loop from outside, in the process that started its nodes."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import time
+
+from active_recon.errors import ActiveReconError
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+_SPIN_S = 0.05
+
+
+class LoopWatch:
+    """Waits for what the loop does, and asks it to do things; its node hears nothing by itself."""
+
+    def __init__(self, node: Node, executor: SingleThreadedExecutor) -> None:
+        self._node = node
+        self._executor = executor
+
+    def until(self, condition: Callable[[], bool], budget_s: float, awaited: str,
+              meanwhile: Callable[[], None]) -> None:
+        """Take in messages until the condition holds; ActiveReconError after the budget."""
+        deadline = time.monotonic() + budget_s
+        while not condition():
+            if time.monotonic() > deadline:
+                raise ActiveReconError(f'expected {awaited} within {budget_s:g} s, '
+                                       'but it did not come')
+            self._executor.spin_once(timeout_sec=_SPIN_S)
+            meanwhile()
+
+    def ask(self, service: str, budget_s: float, meanwhile: Callable[[], None]) -> str:
+        """Call a Trigger service and return its message; ActiveReconError where it refuses."""
+        client = self._node.create_client(Trigger, service)
+        self.until(client.service_is_ready, budget_s, f'the service {service}', meanwhile)
+        answer = client.call_async(Trigger.Request())
+        self.until(answer.done, budget_s, f'an answer of {service}', meanwhile)
+        result = answer.result()
+        self._node.destroy_client(client)
+        if not result.success:
+            raise ActiveReconError(f'{service} answered: {result.message}')
+        return str(result.message)
+
+
+@contextmanager
+def joined_domain(name: str) -> Iterator[tuple[Node, SingleThreadedExecutor]]:
+    """Join the domain that the environment names, with a node and what spins it."""
+    context = Context()
+    # Ctrl-C stays Python's own: it ends whatever waits here, and who waits cleans up.
+    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    node = Node(name, context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    try:
+        yield node, executor
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
