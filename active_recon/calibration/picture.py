@@ -24,9 +24,9 @@ def picture_of(images: Sequence[ImageFit], lens: Lens, board_from_object: NDArra
     """
     Return up to six of the images with what was fitted drawn into them, (H, W, 3) uint8 BGR.
 
-    Circles are corners as they were seen, crosses where the fit puts them; the line is the
-    object frame's z axis from the plate to the top of the object's cube. `read` gives an image
-    of that name.
+    Circles are corners as they were seen, crosses where the fit puts them; the thick lines run
+    along the axis, from the plate to the top of the object's cube, and to the middle of its
+    front. `read` gives an image of that name.
     """
     chosen = np.unique(np.linspace(0, len(images) - 1, _TILES).round().astype(int))
     tiles = [_tile(images[index], lens, board_from_object, object_size, read)
@@ -48,7 +48,9 @@ def _tile(one: ImageFit, lens: Lens, board_from_object: NDArray[np.float64], obj
     half = object_size / 2
     for start, end in _edges(cube_corners(object_size)):
         _line(tile, scale, lens, pose, start, end, _CUBE)
-    _line(tile, scale, lens, pose, np.array([0, 0, -half]), np.array([0, 0, half]), _AXIS)
+    foot = np.array([0, 0, -half])
+    for way in (np.array([0, 0, object_size]), np.array([half, 0, 0])):
+        _line(tile, scale, lens, pose, foot, foot + way, _AXIS, 2)
     for seen, fitted in zip(one.seen.pixels, one.fitted, strict=True):
         cv2.circle(tile, _place(seen, scale), 5 << _SHIFT, _SEEN, 1, cv2.LINE_AA, _SHIFT)
         x, y = _place(fitted, scale)
@@ -56,10 +58,9 @@ def _tile(one: ImageFit, lens: Lens, board_from_object: NDArray[np.float64], obj
         for arm in ((reach, reach), (reach, -reach)):
             cv2.line(tile, (x - arm[0], y - arm[1]), (x + arm[0], y + arm[1]), _FITTED, 1,
                      cv2.LINE_AA, _SHIFT)
-    words = f'{one.seen.name}  {one.error:.2f} px'
-    for color, thickness in (((255, 255, 255), 4), ((0, 0, 0), 1)):
-        cv2.putText(tile, words, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, color, thickness,
-                    cv2.LINE_AA)
+    tile[:28] = 255
+    cv2.putText(tile, f'{one.seen.name}  {one.error:.2f} px', (10, 20),
+                cv2.FONT_HERSHEY_SIMPLEX, 0.6, (0, 0, 0), 1, cv2.LINE_AA)
     return tile
 
 
@@ -69,13 +70,14 @@ def _edges(corners: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDAr
 
 
 def _line(tile: NDArray[np.uint8], scale: float, lens: Lens, pose: NDArray[np.float64],
-          start: NDArray[np.float64], end: NDArray[np.float64], color: tuple[int, ...]) -> None:
+          start: NDArray[np.float64], end: NDArray[np.float64], color: tuple[int, ...],
+          thickness: int = 1) -> None:
     """Draw a line of the object frame as the lens bends it, where it is before the camera."""
     points = np.linspace(start, end, 20)
     if (points @ pose[2, :3] + pose[2, 3]).min() <= 0:
         return
     places = np.array([_place(pixel, scale) for pixel in lens.project(points, pose)])
-    cv2.polylines(tile, [places], False, color, 1, cv2.LINE_AA, _SHIFT)
+    cv2.polylines(tile, [places], False, color, thickness, cv2.LINE_AA, _SHIFT)
 
 
 def _place(pixel: NDArray[np.float64], scale: float) -> tuple[int, int]:
