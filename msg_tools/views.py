@@ -1,27 +1,35 @@
-"""A view out of three streams: the image, its camera info and its pose, joined on stamps."""
+"""A view out of its streams: image, camera info, pose and mask, joined on their stamps."""
 
 import bisect
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import MessageError
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
+from sensor_msgs.msg import Image
 
 _KEPT = 1024  # poses: five seconds of a fast tracker
 _WAITING = 32  # images
+Part = TypeVar('Part')
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """An image, (H, W, 3) uint8 RGB, and the camera that took it, at a stamp in nanoseconds."""
+    """
+    An image, (H, W, 3) uint8 RGB, and the camera that took it, at a stamp in nanoseconds.
+
+    With the mask of its object, still unread, where masks are joined.
+    """
 
     stamp: int
     image: NDArray[np.uint8]
     camera: Camera
+    mask: Image | None = None
 
 
 class ViewJoiner:
@@ -30,12 +38,14 @@ class ViewJoiner:
 
     The camera info is that of the image's stamp. The pose is too, or is interpolated between its
     neighbours, each at most `max_pose_gap` seconds away. An image waits for them until they can
-    no longer come: a later one is there, or `patience` seconds have passed.
+    no longer come: a later one is there, or `patience` seconds have passed. With `masks` it waits
+    for the mask of its stamp in the same way.
     """
 
-    def __init__(self, max_pose_gap: float, patience: float = 0.5) -> None:
+    def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False) -> None:
         self._gap = round(max_pose_gap * 1e9)
         self._patience = patience
+        self._with_masks = masks
         self.clear()
 
     def clear(self) -> None:
@@ -43,6 +53,7 @@ class ViewJoiner:
         self._last_image = -1
         self._images: deque[tuple[int, NDArray[np.uint8], float]] = deque()
         self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_WAITING)
+        self._masks: deque[tuple[int, Image]] = deque(maxlen=_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
 
     def add_image(self, stamp: int, image: NDArray[np.uint8], now: float) -> None:
@@ -60,6 +71,10 @@ class ViewJoiner:
     def add_intrinsics(self, stamp: int, intrinsics: Intrinsics) -> None:
         self._intrinsics.append((stamp, intrinsics))
 
+    def add_mask(self, stamp: int, mask: Image) -> None:
+        """Take in the mask of the image of that stamp, as it came."""
+        self._masks.append((stamp, mask))
+
     def add_pose(self, stamp: int, pose: NDArray[np.float64]) -> None:
         """Take in a pose, (4, 4), object from optical frame."""
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
@@ -71,9 +86,14 @@ class ViewJoiner:
             stamp, image, arrived = self._images[0]
             late = now - arrived > self._patience or len(self._images) > _WAITING
             try:
-                intrinsics = self._intrinsics_at(stamp, late)
+                intrinsics = _of_stamp(self._intrinsics, stamp, late, 'camera info',
+                                       'no_camera_info')
                 pose = self._pose_at(stamp, late) if intrinsics else None
                 if intrinsics is None or pose is None:
+                    return
+                mask = (_of_stamp(self._masks, stamp, late, 'a mask', 'no_mask')
+                        if self._with_masks else None)
+                if self._with_masks and mask is None:
                     return
                 height, width = image.shape[:2]
                 if (intrinsics.height, intrinsics.width) != (height, width):
@@ -85,19 +105,7 @@ class ViewJoiner:
                 yield error
                 continue
             self._images.popleft()
-            yield View(stamp, image, Camera(pose, intrinsics))
-
-    def _intrinsics_at(self, stamp: int, late: bool) -> Intrinsics | None:
-        """Return the camera info of that stamp, None while it may still come."""
-        for known, intrinsics in reversed(self._intrinsics):
-            if known == stamp:
-                return intrinsics
-        if late or (self._intrinsics and self._intrinsics[-1][0] > stamp):
-            came = (f'the last is of {_seconds(self._intrinsics[-1][0])}' if self._intrinsics
-                    else 'none came')
-            raise MessageError("expected camera info of the image's stamp, "
-                               f'{_seconds(stamp)}, {came}', 'no_camera_info')
-        return None
+            yield View(stamp, image, Camera(pose, intrinsics), mask)
 
     def _pose_at(self, stamp: int, late: bool) -> NDArray[np.float64] | None:
         """Return the pose at that stamp, None while it or its later neighbour may still come."""
@@ -128,6 +136,19 @@ def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
     pose[:3, :3] = Slerp([0, 1], rotations)(fraction).as_matrix()
     pose[:3, 3] = (1 - fraction) * start[:3, 3] + fraction * end[:3, 3]
     return pose
+
+
+def _of_stamp(parts: Sequence[tuple[int, Part]], stamp: int, late: bool, what: str,
+              kind: str) -> Part | None:
+    """Return the part of that stamp, None while it may still come."""
+    for known, part in reversed(parts):
+        if known == stamp:
+            return part
+    if late or (parts and parts[-1][0] > stamp):
+        came = f'the last is of {_seconds(parts[-1][0])}' if parts else 'none came'
+        raise MessageError(f"expected {what} of the image's stamp, {_seconds(stamp)}, {came}",
+                           kind)
+    return None
 
 
 def _seconds(stamp: int) -> str:

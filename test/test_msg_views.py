@@ -8,6 +8,7 @@ from msg_tools.joins import StampJoiner
 from msg_tools.views import interpolated, ViewJoiner
 import numpy as np
 import pytest
+from sensor_msgs.msg import Image
 
 MS = 1_000_000
 IMAGE = np.zeros((137, 137, 3), np.uint8)
@@ -93,6 +94,43 @@ def test_an_image_without_camera_info_is_refused_once_later_info_came():
     joiner.add_pose(0, pose(1.0))
     joiner.add_intrinsics(1, CANONICAL_INTRINSICS)
     assert only_error(joiner).kind == 'no_camera_info'
+
+
+@pytest.mark.parametrize('order', list(permutations(range(4))))
+def test_with_masks_an_image_waits_for_its_own(order):
+    joiner = ViewJoiner(max_pose_gap=0.1, masks=True)
+    mask = Image(height=137)
+    arrivals = (lambda: joiner.add_image(5, IMAGE, 0.0),
+                lambda: joiner.add_intrinsics(5, CANONICAL_INTRINSICS),
+                lambda: joiner.add_pose(5, pose(1.0)), lambda: joiner.add_mask(5, mask))
+    for index in order:
+        assert not drain(joiner)
+        arrivals[index]()
+    view, = drain(joiner)
+    assert view.mask is mask
+
+
+@pytest.mark.parametrize(('later', 'now', 'came'), [
+    (True, 0.0, 'the last is of'), (False, 0.6, 'none came')])
+def test_an_image_whose_mask_can_no_longer_come_is_refused(later, now, came):
+    joiner = ViewJoiner(max_pose_gap=0.1, patience=0.5, masks=True)
+    joiner.add_image(0, IMAGE, 0.0)
+    joiner.add_intrinsics(0, CANONICAL_INTRINSICS)
+    joiner.add_pose(0, pose(1.0))
+    if later:
+        joiner.add_mask(1, Image())
+    error = only_error(joiner, now)
+    assert error.kind == 'no_mask'
+    assert "expected a mask of the image's stamp" in str(error) and came in str(error)
+
+
+def test_without_masks_none_is_waited_for():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    joiner.add_mask(0, Image())
+    joiner.add_image(0, IMAGE, 0.0)
+    joiner.add_intrinsics(0, CANONICAL_INTRINSICS)
+    joiner.add_pose(0, pose(1.0))
+    assert drain(joiner)[0].mask is None
 
 
 def test_camera_info_of_another_size_is_refused_and_the_next_view_is_joined():
