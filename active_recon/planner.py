@@ -8,7 +8,7 @@ from typing import Any
 from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view, TURN, wrap_azimuth
 from active_recon.errors import ConfigError, ViewError
 from active_recon.motion import MotionLimits, worth
-from active_recon.policies import load_policy, Policy
+from active_recon.policies import Choice, load_policy, Policy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,12 +83,34 @@ class Planner:
     def reset(self) -> None:
         """Forget the episode."""
         self._taken: list[float] = []
+        self._latents: list[NDArray[np.float32]] = []
         self._entropies: list[float] = []
         self._state: Any = None
+        self._choice: Choice | None = None
         self._wanted: tuple[float, NDArray[np.float32]] | None = None
         self._failed: set[int] = set()
         self._stopped = False
         self._goal: Goal | None = None
+
+    def go_on_from(self, other: 'Planner') -> None:
+        """
+        Take over what another planner has seen of the episode, as if it had always been this one.
+
+        Raises ViewError where this planner's policy cannot use it, and then is good for nothing.
+        """
+        self._taken, self._latents = list(other._taken), list(other._latents)
+        self._entropies, self._stopped = list(other._entropies), other._stopped
+        self._failed = {nearest_view(float(other._candidates[each]), self._candidates)
+                        for each in other._failed}
+        if self._policy is other._policy:
+            self._choice, self._state = other._choice, other._state
+        else:
+            for count, latent in enumerate(self._latents, 1):
+                self._choose(latent, self._taken[:count])
+        if self._taken:
+            self._aim(self._taken[-1])
+        elif other._wanted is not None:
+            self.first_goal(other._wanted[0])
 
     def first_goal(self, azimuth: float) -> Goal:
         """Return the goal of the view that no policy chooses: there, or as near as can be."""
@@ -114,13 +136,11 @@ class Planner:
             raise ViewError('expected a finite latent, azimuth and entropy, got azimuth '
                             f'{azimuth} and entropy {entropy}', 'latent')
         taken = [*self._taken, azimuth]
-        choice, self._state = self._policy.choose(
-            latent[None], np.array([taken]) - self._yaw, self._state)
+        self._choose(latent, taken)
         self._taken = taken
+        self._latents.append(latent)
         self._entropies.append(entropy)
-        self._wanted = (wrap_azimuth(float(choice.azimuth[0]) + self._yaw),
-                        self._at_candidates(choice.scores[0]))
-        self._goal = self._best(azimuth)
+        self._aim(azimuth)
         if self._stopped:
             return self.stop()
         if len(self._taken) >= self._max_views:
@@ -156,6 +176,18 @@ class Planner:
                 if self._wanted else
                 'expected a view before a plan; this episode has none yet', 'plan')
         return self._goal
+
+    def _choose(self, latent: NDArray[np.float32], taken: list[float]) -> None:
+        """Let the policy choose after a view."""
+        self._choice, self._state = self._policy.choose(
+            latent[None], np.array([taken]) - self._yaw, self._state)
+
+    def _aim(self, azimuth: float) -> None:
+        """Make the best of the policy's choice for a camera that is at an azimuth."""
+        assert self._choice is not None
+        self._wanted = (wrap_azimuth(float(self._choice.azimuth[0]) + self._yaw),
+                        self._at_candidates(self._choice.scores[0]))
+        self._goal = self._best(azimuth)
 
     def _goal_or_none(self) -> Decision:
         return Decision(self._goal, '' if self._goal else 'no_reachable_azimuth')

@@ -34,11 +34,10 @@ class Reconstructor:
                  object_yaw: float = 0.0, weights_hash: str = '', config_hash: str = '') -> None:
         if not object_size > 0:
             raise ConfigError(f'object_size: expected metres above 0, got {object_size}')
-        if not 0 < threshold < 1:
-            raise ConfigError(f'threshold: expected a probability in (0, 1), got {threshold}')
         if not math.isfinite(object_yaw):
             raise ConfigError(f'object_yaw: expected finite radians, got {object_yaw}')
-        self.threshold = threshold
+        self._own_threshold = threshold
+        self.set_threshold(threshold)
         self.object_size = object_size
         self.object_yaw = object_yaw
         self.weights_hash = weights_hash
@@ -51,14 +50,22 @@ class Reconstructor:
              object_yaw: float = 0.0, threshold: float | None = None) -> 'Reconstructor':
         """Read weights (None: those that ship); raises WeightsError and ConfigError."""
         bundle = load_weights(weights, device)
-        return cls(TorchRuntime(bundle.reconstruction),
-                   bundle.threshold if threshold is None else threshold,
-                   object_size, object_yaw, weights_hash(weights), config_hash(bundle.config))
+        reconstructor = cls(TorchRuntime(bundle.reconstruction), bundle.threshold, object_size,
+                            object_yaw, weights_hash(weights), config_hash(bundle.config))
+        reconstructor.set_threshold(threshold)
+        return reconstructor
 
     @property
     def view_count(self) -> int:
         """Views folded in since the episode began."""
         return self._view_count
+
+    def set_threshold(self, threshold: float | None) -> None:
+        """Set the occupancy above which a cell is occupied, None for the weights' own."""
+        threshold = self._own_threshold if threshold is None else threshold
+        if not 0 < threshold < 1:
+            raise ConfigError(f'threshold: expected a probability in (0, 1), got {threshold}')
+        self.threshold = threshold
 
     def reset(self) -> None:
         """Forget the episode."""

@@ -15,12 +15,22 @@ class Turntable:
     """
 
     def __init__(self, azimuth: float = 0.0, speed: float = 1.0, time_scale: float = 1.0) -> None:
-        if not (math.isfinite(azimuth) and 0 < speed < math.inf and 0 < time_scale < math.inf):
-            raise ConfigError('turntable: expected a finite azimuth, speed and time scale above '
-                              f'0, got {azimuth}, {speed} and {time_scale}')
+        if not math.isfinite(azimuth):
+            raise ConfigError(f'turntable: expected a finite azimuth, got {azimuth}')
         self._start = wrap_azimuth(azimuth)
         self._way = 0.0
         self._left_at = 0.0
+        self.set_speed(speed, time_scale, 0.0)
+
+    def set_speed(self, speed: float, time_scale: float, now: float) -> None:
+        """Go on at another speed from where the camera is now."""
+        if not (0 < speed < math.inf and 0 < time_scale < math.inf):
+            raise ConfigError('turntable: expected a finite speed and time scale above 0, got '
+                              f'{speed} and {time_scale}')
+        if self._way:
+            here = self.azimuth_at(now)
+            self._way -= float(azimuth_difference(here, self._start))
+            self._start, self._left_at = here, now
         self._rate = speed * time_scale
 
     def turn_to(self, azimuth: float, now: float) -> None:

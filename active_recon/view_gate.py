@@ -24,7 +24,7 @@ class ViewGate:
     `take_views` is `at_goal` (once for each goal, the camera still and its azimuth within
     `goal_tolerance` radians), `by_separation` (the camera still and its azimuth at least
     `min_view_separation` radians from the last view), `all`, or `auto`: at_goal where goals are
-    given or expected, else by_separation.
+    given or expected, else by_separation. All three may be changed in mid-episode.
     """
 
     def __init__(self, take_views: str = 'auto', goal_tolerance: float = GOAL_TOLERANCE,
@@ -32,9 +32,9 @@ class ViewGate:
         if take_views not in TAKE_VIEWS:
             raise ConfigError(f'take_views: expected one of {", ".join(TAKE_VIEWS)}, '
                               f'got {take_views!r}')
-        self._take_views = take_views
-        self._goal_tolerance = goal_tolerance
-        self._min_view_separation = min_view_separation
+        self.take_views = take_views
+        self.goal_tolerance = goal_tolerance
+        self.min_view_separation = min_view_separation
         self.reset()
 
     def reset(self) -> None:
@@ -63,10 +63,10 @@ class ViewGate:
         `goals_expected` tells `auto` that someone is there who gives goals.
         """
         self._stillness.add(camera, stamp)
-        if self._take_views == 'all':
+        if self.take_views == 'all':
             return True
-        by_goal = self._take_views == 'at_goal' or (
-            self._take_views == 'auto' and (goals_expected or self._goal is not None))
+        by_goal = self.take_views == 'at_goal' or (
+            self.take_views == 'auto' and (goals_expected or self._goal is not None))
         return self._stillness.is_still and (
             self._at_new_goal(camera) if by_goal else self._is_separate(camera))
 
@@ -79,10 +79,10 @@ class ViewGate:
         if self.open_goal is None:
             return False
         away = abs(azimuth_difference(camera.azimuth, self.open_goal))
-        return bool(away <= self._goal_tolerance)
+        return bool(away <= self.goal_tolerance)
 
     def _is_separate(self, camera: Camera) -> bool:
         if self._last_azimuth is None:
             return True
         away = abs(azimuth_difference(camera.azimuth, self._last_azimuth))
-        return bool(away >= self._min_view_separation)
+        return bool(away >= self.min_view_separation)

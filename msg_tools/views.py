@@ -39,11 +39,11 @@ class ViewJoiner:
     The camera info is that of the image's stamp. The pose is too, or is interpolated between its
     neighbours, each at most `max_pose_gap` seconds away. An image waits for them until they can
     no longer come: a later one is there, or `patience` seconds have passed. With `masks` it waits
-    for the mask of its stamp in the same way.
+    for the mask of its stamp in the same way. `max_pose_gap` may be changed at any time.
     """
 
     def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False) -> None:
-        self._gap = round(max_pose_gap * 1e9)
+        self.max_pose_gap = max_pose_gap
         self._patience = patience
         self._with_masks = masks
         self.clear()
@@ -116,7 +116,7 @@ class ViewJoiner:
                 return pose
             if after > 0:
                 earlier, pose_before = self._poses[after - 1]
-                if max(later - stamp, stamp - earlier) <= self._gap:
+                if max(later - stamp, stamp - earlier) <= round(self.max_pose_gap * 1e9):
                     return interpolated(pose_before, pose, (stamp - earlier) / (later - earlier))
             late = True
         if not late:
@@ -125,7 +125,7 @@ class ViewJoiner:
         came = f'the nearest is {min(distances) / 1e9:.3f} s away' if distances else 'none came'
         raise MessageError(
             f"expected a pose of the image's stamp, {_seconds(stamp)}, or one before and one "
-            f'after it within {self._gap / 1e9:g} s, {came}', 'no_pose')
+            f'after it within {self.max_pose_gap:g} s, {came}', 'no_pose')
 
 
 def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],

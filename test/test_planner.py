@@ -6,7 +6,7 @@ from active_recon.cameras import azimuth_difference, AZIMUTHS
 from active_recon.errors import ConfigError, ViewError
 from active_recon.planner import Planner
 from active_recon.policies.attention import AttentionPolicy
-from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
+from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 import numpy as np
 import pytest
 
@@ -149,3 +149,45 @@ def test_it_is_loaded_by_the_name_of_its_policy_and_repeats_with_its_seed():
     assert goals[0] == goals[1] != goals[2]
     with pytest.raises(ConfigError, match='policy: expected one of'):
         Planner.load('best')
+
+
+def seen(planner, count):
+    """Follow the planner's goals for so many views."""
+    azimuth = planner.first_goal(1.0).azimuth
+    for number in range(count):
+        latent = np.random.default_rng(number).normal(size=LATENT.shape).astype(np.float32)
+        azimuth = planner.add_view(latent, azimuth, 100.0 / (number + 1)).goal.azimuth
+    return planner
+
+
+@pytest.mark.parametrize('policy', [
+    lambda: RandomPolicy(np.random.default_rng(3)), FarthestPolicy, lambda: UniformPolicy(7)])
+def test_a_planner_goes_on_from_what_another_has_seen_as_if_it_had_been_there(policy):
+    before = seen(Planner(UniformPolicy(5), max_views=9), 3)
+    after = Planner(policy(), max_views=9)
+    after.go_on_from(before)
+    always = Planner(policy(), max_views=9)
+    for number, azimuth in enumerate(before._taken):
+        latent = np.random.default_rng(number).normal(size=LATENT.shape).astype(np.float32)
+        always.add_view(latent, azimuth, 100.0 / (number + 1))
+    assert after.plan().azimuth == always.plan().azimuth
+    one, other = (each.add_view(LATENT, 2.0, 20.0) for each in (after, always))
+    assert one.goal.azimuth == other.goal.azimuth
+
+
+def test_a_planner_that_goes_on_with_the_same_policy_draws_nothing_anew():
+    policy = RandomPolicy(np.random.default_rng(3))
+    before = seen(Planner(policy, max_views=9), 2)
+    goal = before.plan()
+    after = Planner(policy, max_views=3)
+    after.go_on_from(before)
+    assert after.plan().azimuth == goal.azimuth
+    assert after.add_view(LATENT, 2.0, 20.0).reason == 'max_views'
+
+
+def test_a_first_goal_that_is_open_stays_the_plan_of_the_planner_that_goes_on():
+    before = Planner(UniformPolicy(5))
+    goal = before.first_goal(1.0)
+    after = Planner(FarthestPolicy())
+    after.go_on_from(before)
+    assert after.plan().azimuth == goal.azimuth

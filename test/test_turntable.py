@@ -54,10 +54,24 @@ def test_a_goal_that_is_not_finite_is_refused_and_the_last_one_stays(goal):
     assert turntable.azimuth_at(2.0) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize('settings', [{'speed': 0.0}, {'time_scale': -1.0}, {'azimuth': math.nan}])
-def test_a_turntable_that_cannot_turn_is_refused(settings):
-    with pytest.raises(ConfigError, match='expected a finite azimuth'):
+@pytest.mark.parametrize(('settings', 'said'), [
+    ({'speed': 0.0}, 'a finite speed and time scale above 0, got 0.0 and 1.0'),
+    ({'time_scale': -1.0}, 'a finite speed and time scale above 0, got 1.0 and -1.0'),
+    ({'azimuth': math.nan}, 'a finite azimuth, got nan')])
+def test_a_turntable_that_cannot_turn_is_refused(settings, said):
+    with pytest.raises(ConfigError, match=f'expected {said}'):
         Turntable(**settings)
+
+
+def test_another_speed_counts_from_where_the_camera_is():
+    turntable = Turntable(azimuth=6.0, speed=1.0)
+    turntable.turn_to(1.0, now=0.0)
+    turntable.set_speed(0.1, 1.0, now=0.5)
+    assert azimuth_difference(turntable.azimuth_at(0.5), 6.5) == pytest.approx(0)
+    assert azimuth_difference(turntable.azimuth_at(1.5), 6.6) == pytest.approx(0)
+    assert azimuth_difference(turntable.azimuth_at(100.0), 1.0) == pytest.approx(0)
+    turntable.set_speed(2.0, 1.0, now=101.0)
+    assert azimuth_difference(turntable.azimuth_at(200.0), 1.0) == pytest.approx(0)
 
 
 @pytest.fixture(scope='module')

@@ -1,70 +1,201 @@
-"""Parameters with a description and a range, refused at start where they are out of it."""
+"""
+A node's parameters, declared as data: a frozen dataclass, each field made by `parameter`.
 
-from collections.abc import Sequence
+The dataclass says all that is to be known of them, without a running node; `Parameters` declares
+them to ROS, refuses what is out of range, and applies what is changed while the node runs.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
 import math
-from typing import TypeVar
+from typing import Any, Generic, get_args, get_origin, get_type_hints, TypeVar
 
-from active_recon.errors import ConfigError
-from rcl_interfaces.msg import ParameterDescriptor
+from active_recon.errors import ActiveReconError, ConfigError
+from active_recon.nodes.run import one_line
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
-Value = TypeVar('Value', bool, int, float, str)
+NEW_START = 'a change needs a new start'
+Settings = TypeVar('Settings')
+Commit = Callable[[], None]
 
 
-def declare(
-    node: Node,
-    name: str,
-    default: Value,
-    description: str,
-    low: float | None = None,
-    high: float | None = None,
-    choices: Sequence[str] = (),
-) -> Value:
+def parameter(default: object, description: str, *, low: float | None = None,
+              high: float | None = None, choices: Sequence[str] = (),
+              changeable: bool = False) -> Any:
     """
-    Declare a parameter that is read once, at start, and return its value.
+    Return the field of a parameter: bool, int, float, str, or a tuple of floats or strings.
 
-    `low` and `high` are the ends of its range, both inside it and given together; `choices` are
-    the words a string may be. A default of NaN stands for 'not given' and may be passed as such.
-    Raises ConfigError that names the parameter, what was expected and what came.
+    `low` and `high` are the ends of its range, both inside it and given together; of a tuple they
+    are those of its elements. `choices` are the words that a string may be. A default of NaN
+    stands for 'not given' and may be passed as such. One that is `changeable` may change while
+    the node runs.
     """
-    expected = _expected(default, low, high, choices)
-    # `speed:=2` reaches ROS as an integer, which is what its user wrote for 2.0.
-    descriptor = ParameterDescriptor(
-        description=description, read_only=True, dynamic_typing=True,
-        additional_constraints=f'expected {expected}')
-    value = node.declare_parameter(name, default, descriptor).value
-    if isinstance(default, float) and type(value) is int:
-        value = float(value)
-    if type(value) is not type(default) or not _within(value, default, low, high, choices):
-        raise ConfigError(f'parameter {name}: expected {expected}, got {value!r}')
-    return value
+    return field(default=default, metadata={
+        'description': description, 'low': low, 'high': high, 'choices': tuple(choices),
+        'changeable': changeable})
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What is declared of one parameter: its field, read."""
+
+    name: str
+    kind: type
+    of: type | None
+    default: Any
+    description: str
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+    changeable: bool
+
+    @property
+    def expected(self) -> str:
+        """What a value has to be, in words."""
+        kind = self.of or self.kind
+        if self.choices:
+            one = f'one of {", ".join(self.choices)}'
+        elif kind in (bool, str):
+            one = 'a string' if kind is str else 'true or false'
+        else:
+            between = '' if self.low is None else f' from {self.low:g} to {self.high:g}'
+            absent = ', or nan' if self._may_be_nan else ''
+            one = f'{"an integer" if kind is int else "a number"}{between}{absent}'
+        return f'a list, each {one}' if self.of else one
+
+    def checked(self, value: Any) -> Any:
+        """Return the value as its kind; ConfigError where it is another or out of range."""
+        if self.of is not None and (value is None or isinstance(value, Sequence)):
+            # An empty list has no type in ROS
+            elements = tuple(_as(self.of, element) for element in value or ())
+            if not isinstance(value, str) and all(map(self._allows, elements)):
+                return elements
+        elif self.of is None and self._allows(_as(self.kind, value)):
+            return _as(self.kind, value)
+        raise ConfigError(f'parameter {self.name}: expected {self.expected}, got {value!r}')
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return what ROS is told."""
+        descriptor = ParameterDescriptor(
+            # `speed:=2` reaches ROS as an integer, which is what its user wrote for 2.0.
+            description=self.description, read_only=not self.changeable, dynamic_typing=True,
+            additional_constraints=f'expected {self.expected}'
+            + ('' if self.changeable else f'; {NEW_START}'))
+        # ROS lets no NaN through a range, so what may be NaN has its range in words alone.
+        if self.low is not None and self.high is not None and not (self._may_be_nan or self.of):
+            if self.kind is int:
+                descriptor.integer_range = [
+                    IntegerRange(from_value=int(self.low), to_value=int(self.high))]
+            else:
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=float(self.low), to_value=float(self.high))]
+        return descriptor
+
+    @property
+    def _may_be_nan(self) -> bool:
+        return isinstance(self.default, float) and math.isnan(self.default)
+
+    def _allows(self, value: object) -> bool:
+        if type(value) is not (self.of or self.kind):
+            return False
+        if isinstance(value, str):
+            return not self.choices or value in self.choices
+        if isinstance(value, float) and math.isnan(value):
+            return self._may_be_nan
+        if isinstance(value, int | float) and self.low is not None and self.high is not None:
+            return self.low <= value <= self.high
+        return not isinstance(value, float) or math.isfinite(value)
+
+
+def _as(kind: type, value: object) -> object:
+    """Return an integer as a float where a float is wanted, all else as it is."""
+    return float(value) if kind is float and type(value) is int else value
+
+
+def declared(settings: type) -> Iterator[Declared]:
+    """Yield the parameters of a dataclass of settings, in their order."""
+    kinds = get_type_hints(settings)
+    for each in fields(settings):
+        kind = kinds[each.name]
+        of = get_args(kind)[0] if get_origin(kind) is tuple else None
+        yield Declared(each.name, kind, of, each.default, **each.metadata)
+
+
+class Parameters(Generic[Settings]):
+    """
+    The parameters of one running node; `now` holds their values.
+
+    Raises ConfigError, which names the parameter, what was expected and what came.
+    """
+
+    def __init__(self, node: Node, settings: type[Settings]) -> None:
+        self._declared = {each.name: each for each in declared(settings)}
+        self._prepare: Callable[[Settings], Commit | None] = lambda _settings: None
+        self._waiting: tuple[Settings, Commit | None] | None = None
+        values = {}
+        for name, each in self._declared.items():
+            default = list(each.default) if each.of else each.default
+            given = node.declare_parameter(name, default, ParameterDescriptor(dynamic_typing=True))
+            values[name] = each.checked(given.value)
+            node.set_descriptor(name, each.descriptor())
+        self.now = settings(**values)
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def on_change(self, prepare: Callable[[Settings], Commit | None]) -> None:
+        """
+        Let `prepare` see all changes of a request together, before any is made.
+
+        It is called with the new settings and raises ActiveReconError to refuse them; otherwise it
+        returns what puts them into effect, or None where there is nothing to do. That is called
+        when `now` has changed.
+        """
+        self._prepare = prepare
+
+    def _check(self, request: list[Parameter]) -> SetParametersResult:
+        try:
+            changes = {each.name: self._declared[each.name].checked(each.value)
+                       for each in request if each.name in self._declared}
+            settings = replace(self.now, **changes)  # type: ignore[type-var]
+            commit = self._prepare(settings) if changes else None
+        except ActiveReconError as error:
+            return SetParametersResult(successful=False, reason=one_line(error))
+        self._waiting = settings, commit
+        return SetParametersResult(successful=True)
+
+    def _apply(self, _request: list[Parameter]) -> None:
+        if self._waiting is None:
+            return
+        self.now, commit = self._waiting
+        self._waiting = None
+        if commit is not None:
+            commit()
+
+
+class ReadOnlySaysWhy:
+    """A node of which a read-only parameter, when it is set, says what to do instead."""
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set all parameters or none; see rclpy's Node."""
+        node: Any = super()
+        result: SetParametersResult = node.set_parameters_atomically(parameter_list)
+        if not result.successful and 'read-only' in result.reason:
+            result.reason = f'{result.reason.rstrip(".")}; {NEW_START}'
+        return result
 
 
 def tell(node: Node, name: str, value: str, description: str) -> None:
-    """Tell a fact about the node as a parameter that nobody can set."""
+    """Tell a fact about the node as a parameter that nobody can set; told anew, it is replaced."""
+    if node.has_parameter(name):
+        node.describe_parameter(name).read_only = False  # else ROS forgets it no more
+        node.undeclare_parameter(name)
     node.declare_parameter(
         name, value, ParameterDescriptor(description=description, read_only=True),
         ignore_override=True)
-
-
-def _expected(default: object, low: float | None, high: float | None,
-              choices: Sequence[str]) -> str:
-    if choices:
-        return f'one of {", ".join(choices)}'
-    if isinstance(default, str | bool):
-        return 'a string' if isinstance(default, str) else 'true or false'
-    number = 'an integer' if isinstance(default, int) else 'a number'
-    between = '' if low is None else f' from {low:g} to {high:g}'
-    absent = ', or nan' if isinstance(default, float) and math.isnan(default) else ''
-    return f'{number}{between}{absent}'
-
-
-def _within(value: object, default: object, low: float | None, high: float | None,
-            choices: Sequence[str]) -> bool:
-    if isinstance(value, str):
-        return not choices or value in choices
-    if isinstance(value, float) and math.isnan(value):
-        return isinstance(default, float) and math.isnan(default)
-    if isinstance(value, int | float) and low is not None and high is not None:
-        return low <= value <= high
-    return not isinstance(value, float) or math.isfinite(value)

@@ -9,9 +9,10 @@ from active_recon.bags.raw import RawMessage
 from active_recon.bags.storage import open_bag
 from active_recon.errors import ConfigError
 from active_recon.nodes.definitions import message_class
-from active_recon.nodes.parameters import declare
+from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
 from active_recon.nodes.qos import common_profile
 from active_recon.nodes.run import run_node
+from active_recon.nodes.settings.player import PlayerSettings
 from msg_tools.stamps import stamp_from_nanoseconds
 from rclpy.clock import Clock as SystemClock
 from rclpy.clock_type import ClockType
@@ -29,15 +30,14 @@ _SAY_EVERY_S = 10.0
 _QUEUE = 100
 
 
-class PlayerNode(Node):
+class PlayerNode(ReadOnlySaysWhy, Node):
     """Publish a bag's messages once, then end the process."""
 
     def __init__(self) -> None:
         super().__init__('player')
-        bag = Path(declare(self, 'bag', '', 'the bag to play'))
-        self._rate = declare(self, 'rate', 1.0, 'how much faster than it was recorded')
-        topics = played_topics(bag, self._rate, declare(
-            self, 'topics', '', 'those to play, with commas between; empty for all'))
+        settings = Parameters(self, PlayerSettings).now
+        bag, self._rate = Path(settings.bag), settings.rate
+        topics = played_topics(bag, self._rate, settings.topics)
         self._out = {}
         for topic in topics:
             try:

@@ -14,15 +14,16 @@ from active_recon.cameras import (
     orbit_camera,
 )
 from active_recon.errors import ConfigError, DataError, MessageError
-from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import declare, tell
+from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
+from active_recon.nodes.parameters import Commit, Parameters, tell
 from active_recon.nodes.qos import HEARD, HEARD_OFTEN, LATCHED
-from active_recon.nodes.run import one_line, run_node
+from active_recon.nodes.run import one_line
+from active_recon.nodes.settings.reconstructor import ReconstructorSettings
 from active_recon.reconstructor import Reconstruction, Reconstructor
-from active_recon.view_gate import GOAL_TOLERANCE, TAKE_VIEWS, ViewGate
-from active_recon.voxels import MESH_FORMATS, write_mesh
+from active_recon.view_gate import ViewGate
+from active_recon.voxels import write_mesh
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import intrinsics_from_msg, OBJECT_FRAME, pose_from_msg, pose_to_msg
+from msg_tools.cameras import intrinsics_from_msg, pose_from_msg, pose_to_msg
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.images import image_from_msg, latent_to_msg
@@ -30,70 +31,57 @@ from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 from msg_tools.views import View, ViewJoiner
 from msg_tools.voxels import FLOOR, voxel_grid_to_msg
 import numpy as np
-from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Float64, Header
 from std_srvs.srv import Trigger
 import torch
 
 
-class ReconstructorNode(Node):
+class ReconstructorNode(ManagedNode):
     """Fold the views that the gate lets through into the reconstruction and publish it."""
 
     def __init__(self) -> None:
         super().__init__('reconstructor')
-        self._reconstructor = self._load()
-        self._gate = ViewGate(
-            declare(self, 'take_views', 'auto', 'which images become views', choices=TAKE_VIEWS),
-            declare(self, 'goal_tolerance', GOAL_TOLERANCE, 'rad from a goal that still reach it',
-                    0.0, math.pi),
-            declare(self, 'min_view_separation', 0.2, 'rad between views without goals',
-                    0.0, math.pi))
-        self._joiner = ViewJoiner(declare(
-            self, 'max_pose_gap', 0.1, 's from an image to a pose that is interpolated',
-            0.0, 10.0))
-        self._output_dir = Path(declare(self, 'output_dir', '.', 'where meshes are saved'))
-        self._mesh_format = declare(
-            self, 'mesh_format', 'ply', 'the format of saved meshes', choices=MESH_FORMATS)
-        self._object_frame = declare(
-            self, 'object_frame', OBJECT_FRAME, 'the frame in which poses are expected')
-        self._reconstruction: Reconstruction | None = None
-        self._diagnostics = Diagnostics(self)
+        self._settings = Parameters(self, ReconstructorSettings)
+        self._settings.on_change(self._change)
 
+    def configure(self) -> None:
+        """Load the network, and offer what comes of it."""
+        settings = self._settings.now
+        self._reconstructor = self._load(settings)
+        self._joiner = ViewJoiner(settings.max_pose_gap)
+        self._gate = ViewGate(
+            settings.take_views, settings.goal_tolerance, settings.min_view_separation)
+        self._object_frame = settings.object_frame
+        self._reconstruction: Reconstruction | None = None
         self._view_pub = self.create_publisher(PoseStamped, 'view', LATCHED)
         self._occupancy_pub = self.create_publisher(PointCloud2, 'occupancy', LATCHED)
         self._probabilities_pub = self.create_publisher(PointCloud2, 'probabilities', LATCHED)
         self._latent_pub = self.create_publisher(Image, 'latent', LATCHED)
         self._entropy_pub = self.create_publisher(Float64, 'entropy', LATCHED)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED)
+        self.create_service(Trigger, 'start_episode', self._on_start)
+        self.create_service(Trigger, 'save_mesh', self._on_save)
+
+    def activate(self) -> None:
+        """Begin an episode, and hear the camera."""
         self._begin_episode()
         self.create_subscription(Image, 'camera/image_raw', self._on_image, HEARD)
         self.create_subscription(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
         self.create_subscription(PoseStamped, 'camera/pose', self._on_pose, HEARD_OFTEN)
         self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
         self.create_timer(0.1, self._take_in)  # what has waited in vain is refused
-        self.create_service(Trigger, 'start_episode', self._on_start)
-        self.create_service(Trigger, 'save_mesh', self._on_save)
-        self.get_logger().info('ready')
 
-    def _load(self) -> Reconstructor:
+    def _load(self, settings: ReconstructorSettings) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
         # One by default: with more, the slowest of the loop's busy cores holds up every view.
-        torch.set_num_threads(declare(self, 'threads', 1, 'CPU threads of the network', 1, 256))
-        weights = declare(self, 'weights', '', 'a weights file; empty for those that ship')
-        device = declare(self, 'device', 'cpu', 'where the network runs', choices=('cpu', 'cuda'))
-        if device == 'cuda' and not torch.cuda.is_available():
+        torch.set_num_threads(settings.threads)
+        if settings.device == 'cuda' and not torch.cuda.is_available():
             raise ConfigError('parameter device: expected a device that torch can use, got cuda, '
                               'but this torch finds none; use cpu')
-        threshold = declare(self, 'threshold', math.nan,
-                            "occupancy above which a cell is occupied; nan for the weights' own",
-                            0.01, 0.99)
         reconstructor = Reconstructor.load(
-            Path(weights) if weights else None, device,
-            declare(self, 'object_size', 1.0, 'side of the voxel grid, m', 0.001, 1000.0),
-            declare(self, 'object_yaw', 0.0, "azimuth of the object's front, rad",
-                    -2 * math.pi, 2 * math.pi),
-            None if math.isnan(threshold) else threshold)
+            Path(settings.weights) if settings.weights else None, settings.device,
+            settings.object_size, settings.object_yaw, _given(settings.threshold))
         tell(self, 'weights_sha256', reconstructor.weights_hash, 'the hash of the weights')
         tell(self, 'config_sha256', reconstructor.config_hash, "the hash of the network's sizes")
         lens = CANONICAL_INTRINSICS
@@ -101,6 +89,20 @@ class ReconstructorNode(Node):
         distance = CANONICAL_DISTANCE * reconstructor.object_size
         reconstructor.add_view(blank, orbit_camera(0.0, distance=distance))
         return reconstructor
+
+    def _change(self, settings: ReconstructorSettings) -> Commit | None:
+        """Return what puts settings into effect that changed while the node runs."""
+        if not self.is_configured:
+            return None
+
+        def commit() -> None:
+            self._reconstructor.set_threshold(_given(settings.threshold))
+            self._joiner.max_pose_gap = settings.max_pose_gap
+            self._gate.take_views = settings.take_views
+            self._gate.goal_tolerance = settings.goal_tolerance
+            self._gate.min_view_separation = settings.min_view_separation
+
+        return commit
 
     def _begin_episode(self) -> None:
         self._reconstructor.reset()
@@ -177,6 +179,9 @@ class ReconstructorNode(Node):
 
     def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the new episode's id."""
+        if not self.is_active:
+            response.message = 'expected an active node to begin an episode; this one is inactive'
+            return response
         self._begin_episode()
         response.success = True
         response.message = self._episode.id
@@ -187,8 +192,9 @@ class ReconstructorNode(Node):
         if self._reconstruction is None:
             response.message = 'expected a view before a mesh; this episode has none yet'
             return response
-        name = f'{self._episode.id}-{self._reconstructor.view_count}.{self._mesh_format}'
-        path = (self._output_dir / name).absolute()
+        settings = self._settings.now
+        name = f'{self._episode.id}-{self._reconstructor.view_count}.{settings.mesh_format}'
+        path = (Path(settings.output_dir) / name).absolute()
         try:
             write_mesh(self._reconstruction.grid.mesh(self._reconstructor.threshold), path)
         except (DataError, OSError) as error:
@@ -199,9 +205,14 @@ class ReconstructorNode(Node):
         return response
 
 
+def _given(value: float) -> float | None:
+    """Return a parameter's value, None where it was not given."""
+    return None if math.isnan(value) else value
+
+
 def main(args: list[str] | None = None) -> None:
     """Run the reconstructor until it is asked to stop."""
-    run_node(ReconstructorNode, args)
+    run_managed_node(ReconstructorNode, args)
 
 
 if __name__ == '__main__':

@@ -8,22 +8,18 @@ from pathlib import Path
 from active_recon import __version__
 from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
-from active_recon.errors import ConfigError, RecordingError
+from active_recon.errors import RecordingError
 from active_recon.nodes.asked_parameters import AskedParameters
 from active_recon.nodes.definitions import message_class, message_definition
 from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import declare
+from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
 from active_recon.nodes.qos import common_profile, offered_profile
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
-from rcl_interfaces.msg import ParameterDescriptor
+from active_recon.nodes.settings.recorder import DIAGNOSTICS, RecorderSettings
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
-DIAGNOSTICS = '/diagnostics'
-TOPICS = ['camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'view',
-          'view_image', 'occupancy', 'probabilities', 'latent', 'entropy', 'episode', 'next_view',
-          'next_azimuth', 'azimuth_scores', 'done', DIAGNOSTICS]
 MADE_IT = ('weights_sha256', 'config_sha256', 'policy', 'seed', 'object')
 """The parameters of the loop's nodes that say what made the bag."""
 WATCH_EVERY_S = 0.1
@@ -31,18 +27,15 @@ FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second
 QUEUE = 1000  # messages that may wait while the disk is slow
 
 
-class RecorderNode(QosWarnings):
+class RecorderNode(ReadOnlySaysWhy, QosWarnings):
     """Write the messages of each topic into an MCAP bag, with the QoS they were offered."""
 
     def __init__(self) -> None:
         super().__init__('recorder')
-        self._output_dir = Path(declare(
-            self, 'output_dir', 'bags', 'the folder in which each recording gets its own'))
-        at_start = declare(self, 'record_at_start', True, 'whether to record without being asked')
-        self._max_bytes = 1_000_000 * declare(
-            self, 'max_bag_size_mb', 1000, 'a longer recording is split into several files', 1,
-            1_000_000)
-        self._topics = [self.resolve_topic_name(name) for name in self._declare_topics()]
+        settings = Parameters(self, RecorderSettings).now
+        self._output_dir = Path(settings.output_dir)
+        self._max_bytes = 1_000_000 * settings.max_bag_size_mb
+        self._topics = [self.resolve_topic_name(name) for name in settings.topics]
         self._diagnostics = Diagnostics(self)
         self._bag: BagWriter | None = None
         self._offered: dict[str, tuple[QosProfile, ...]] = {}
@@ -52,16 +45,9 @@ class RecorderNode(QosWarnings):
         self.create_service(Trigger, 'stop', self._on_stop)
         self.create_timer(WATCH_EVERY_S, self._watch)
         self.create_timer(FLUSH_EVERY_S, self._flush)
-        if at_start:
+        if settings.record_at_start:
             self._begin()
         self.get_logger().info('ready')
-
-    def _declare_topics(self) -> list[str]:
-        topics = self.declare_parameter('topics', TOPICS, ParameterDescriptor(
-            description='the topics to record', read_only=True, dynamic_typing=True)).value
-        if not isinstance(topics, list) or not all(isinstance(name, str) for name in topics):
-            raise ConfigError(f'parameter topics: expected a list of names, got {topics!r}')
-        return topics
 
     def _begin(self) -> Path:
         """Begin a bag in a new folder named after the time."""

@@ -1,20 +1,20 @@
 """ROS shell of the simulated turntable: a stream of the views around an object."""
 
 from functools import partial
-import math
 from pathlib import Path
 
 from active_recon.datasets.layout import list_objects
-from active_recon.errors import ConfigError, DataError
+from active_recon.errors import DataError
 from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import declare, tell
+from active_recon.nodes.parameters import Commit, Parameters, ReadOnlySaysWhy, tell
 from active_recon.nodes.qos import HEARD, STREAM
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
+from active_recon.nodes.settings.turntable_camera import TurntableCameraSettings
 from active_recon.shown_object import rendered_object, ShownObject, stored_object
 from active_recon.turntable import Turntable
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import camera_to_msgs, OBJECT_FRAME
+from msg_tools.cameras import camera_to_msgs
 from msg_tools.goals import azimuth_goal_from_msg
 from msg_tools.images import image_to_msg
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -27,23 +27,17 @@ ANSWER_S = 2.0
 """For so long the reconstructor may take to begin an episode."""
 
 
-class TurntableCameraNode(QosWarnings):
+class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
     """Stream image, camera info and pose, also while it turns to a goal."""
 
     def __init__(self) -> None:
         super().__init__('turntable_camera')
+        self._settings = Parameters(self, TurntableCameraSettings)
+        self._settings.on_change(self._change)
+        settings = self._settings.now
         self._turntable = Turntable(
-            declare(self, 'start_azimuth', 0.0, 'of the camera at start, rad',
-                    -2 * math.pi, 2 * math.pi),
-            declare(self, 'speed', 1.0, 'of the turntable, rad/s', 0.001, 100.0),
-            declare(self, 'time_scale', 1.0, 'how much faster than the clock it turns',
-                    0.001, 1000.0))
-        self._object_frame = declare(
-            self, 'object_frame', OBJECT_FRAME, "the frame of the camera's pose")
-        self._camera_frame = declare(
-            self, 'camera_frame', 'camera_optical_frame', 'the frame of the images')
-        rate = declare(self, 'rate', 10.0, 'of the stream, Hz', 0.1, 1000.0)
-        self._objects = self._declare_objects()
+            settings.start_azimuth, settings.speed, settings.time_scale)
+        self._objects = _objects(settings)
         self._index = 0
         first = self._objects[0]()
         self._shown: ShownObject | None = first
@@ -57,27 +51,17 @@ class TurntableCameraNode(QosWarnings):
         # In a group of its own: while it waits for an answer, that answer must be let in.
         self.create_service(Trigger, 'next_object', self._on_next_object,
                             callback_group=MutuallyExclusiveCallbackGroup())
-        self.create_timer(1 / rate, self._show)
+        self._timer = self.create_timer(1 / settings.rate, self._show)
         self.get_logger().info('ready')
 
-    def _declare_objects(self) -> list[partial[ShownObject]]:
-        """Return what makes each object, for only one of them is held at a time."""
-        mesh = declare(self, 'mesh', '', 'a mesh file to show')
-        dataset = declare(self, 'dataset', '', 'a folder of rendered objects to show')
-        up = declare(self, 'up', '', "the mesh file's axis that is up; empty for its format's")
-        front = declare(self, 'front', '', "the mesh file's axis of the front; the same")
-        size = declare(self, 'object_size', 1.0, 'side of the voxel grid, m', 0.001, 1000.0)
-        background = declare(self, 'background', 255.0, 'grey behind the object', 0.0, 255.0)
-        if bool(mesh) == bool(dataset):
-            raise ConfigError('parameters mesh, dataset: expected one of them, got '
-                              f'{"both" if mesh else "neither"}')
-        if mesh:
-            return [partial(rendered_object, Path(mesh), size, background, up or None,
-                            front or None)]
-        folders = list_objects(Path(dataset))
-        if not folders:
-            raise DataError(f'{dataset}: expected a dataset with objects, got none')
-        return [partial(stored_object, folder, size, background) for folder in folders]
+    def _change(self, settings: TurntableCameraSettings) -> Commit:
+        """Return what puts settings into effect that changed while the node runs."""
+        def commit() -> None:
+            self._turntable.set_speed(settings.speed, settings.time_scale, self._now_s())
+            self._timer.timer_period_ns = round(1e9 / settings.rate)
+            self._timer.reset()
+
+        return commit
 
     def _now_s(self) -> float:
         return self.get_clock().now().nanoseconds / 1e9
@@ -87,8 +71,8 @@ class TurntableCameraNode(QosWarnings):
             return
         now = self.get_clock().now()
         image, camera = self._shown.seen_from(self._turntable.azimuth_at(now.nanoseconds / 1e9))
-        header = Header(stamp=now.to_msg(), frame_id=self._camera_frame)
-        info, pose = camera_to_msgs(camera, header, self._object_frame)
+        header = Header(stamp=now.to_msg(), frame_id=self._settings.now.camera_frame)
+        info, pose = camera_to_msgs(camera, header, self._settings.now.object_frame)
         # The image comes last: whoever hears it has what belongs to it.
         self._pose_pub.publish(pose)
         self._info_pub.publish(info)
@@ -132,6 +116,18 @@ class TurntableCameraNode(QosWarnings):
         answer = await answered
         self.destroy_timer(late)
         return answer is not None and answer.success
+
+
+def _objects(settings: TurntableCameraSettings) -> list[partial[ShownObject]]:
+    """Return what makes each object, for only one of them is held at a time."""
+    size, background = settings.object_size, settings.background
+    if settings.mesh:
+        return [partial(rendered_object, Path(settings.mesh), size, background,
+                        settings.up or None, settings.front or None)]
+    folders = list_objects(Path(settings.dataset))
+    if not folders:
+        raise DataError(f'{settings.dataset}: expected a dataset with objects, got none')
+    return [partial(stored_object, folder, size, background) for folder in folders]
 
 
 def main(args: list[str] | None = None) -> None:

@@ -4,23 +4,24 @@ import math
 from pathlib import Path
 from typing import Any
 
-from active_recon.cameras import Camera, CANONICAL_DISTANCE, CANONICAL_ELEVATION
+from active_recon.cameras import Camera, CANONICAL_DISTANCE
 from active_recon.errors import ActiveReconError
-from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import declare
+from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
+from active_recon.nodes.parameters import Commit, Parameters
 from active_recon.nodes.qos import HEARD, LATCHED
-from active_recon.nodes.run import one_line, run_node
+from active_recon.nodes.run import one_line
+from active_recon.nodes.settings.view_planner import ViewPlannerSettings
 from active_recon.planner import Goal, Planner
-from active_recon.policies import POLICIES
+from active_recon.policies import load_policy, Policy
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import OBJECT_FRAME, pose_from_msg
+from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
 from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_from_msg
-from rclpy.node import Node
+import numpy as np
 from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -31,64 +32,75 @@ REPEAT_S = 1.0
 """A goal whose view has not come is sent again, with its stamp: it may not have been heard."""
 
 
-class ViewPlannerNode(Node):
+MADE_OF = {'random': ('seed',), 'uniform': ('max_views',)}
+"""The parameters that a policy is made of, and that may change while the node runs."""
+
+
+class ViewPlannerNode(ManagedNode):
     """Ask for the first view of an episode, then for the next after each one, until done."""
 
     def __init__(self) -> None:
         super().__init__('view_planner')
-        self._object_size = declare(
-            self, 'object_size', 1.0, 'side of the voxel grid, m', 0.001, 1000.0)
-        self._elevation = declare(
-            self, 'elevation', CANONICAL_ELEVATION, "of the goals' cameras, rad", -1.5, 1.5)
-        distance = declare(
-            self, 'distance', math.nan, "of the goals' cameras, m; nan for 2.1 object_size",
-            0.001, 10000.0)
-        self._distance = (
-            CANONICAL_DISTANCE * self._object_size if math.isnan(distance) else distance)
-        self._start_azimuth = declare(
-            self, 'start_azimuth', math.nan, 'of the first view, rad; nan for where the camera is',
-            -2 * math.pi, 2 * math.pi)
-        self._frame = declare(
-            self, 'object_frame', OBJECT_FRAME, 'the frame of the object, in which poses count')
-        self._planner = self._load()
-        self._joiner = StampJoiner(('latent', 'view', 'probabilities'))
-        self._diagnostics = Diagnostics(self)
-        self._episode: Episode | None = None
-        self._early: tuple[int, dict[str, Any]] | None = None
-        self._begun_at = self.get_clock().now().nanoseconds
-        self._last_goal_stamp = 0
-        self._forget()
+        self._settings = Parameters(self, ViewPlannerSettings)
+        self._settings.on_change(self._change)
 
+    def configure(self) -> None:
+        """Load the policy, and offer its goals."""
+        settings = self._settings.now
+        self._frame = settings.object_frame
+        self._distance = (CANONICAL_DISTANCE * settings.object_size
+                          if math.isnan(settings.distance) else settings.distance)
+        self._policy = self._load(settings)
+        self._planner = self._planner_of(settings, self._policy)
+        self._joiner = StampJoiner(('latent', 'view', 'probabilities'))
+        self._last_goal_stamp = 0
         self._next_view_pub = self.create_publisher(PoseStamped, 'next_view', LATCHED)
         self._next_azimuth_pub = self.create_publisher(JointState, 'next_azimuth', LATCHED)
         self._scores_pub = self.create_publisher(PointCloud2, 'azimuth_scores', LATCHED)
         self._done_pub = self.create_publisher(Header, 'done', LATCHED)
+        self.create_service(Trigger, 'plan', self._on_plan)
+
+    def activate(self) -> None:
+        """Hear the reconstructor, and go on from what is latched."""
+        self._episode: Episode | None = None
+        self._early: tuple[int, dict[str, Any]] | None = None
+        self._begun_at = self.get_clock().now().nanoseconds
+        self._forget()
         self.create_subscription(PoseStamped, 'camera/pose', self._on_camera, HEARD)
         self.create_subscription(Image, 'latent', self._on_latent, LATCHED)
         self.create_subscription(PoseStamped, 'view', self._on_view, LATCHED)
         self.create_subscription(PointCloud2, 'probabilities', self._on_probabilities, LATCHED)
         self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
-        self.create_service(Trigger, 'plan', self._on_plan)
         self.create_timer(0.1, self._ask_first)
         self.create_timer(REPEAT_S, self._repeat)
-        self.get_logger().info('ready')
 
-    def _load(self) -> Planner:
-        policy = declare(
-            self, 'policy', 'attention', 'how the next view is chosen', choices=POLICIES)
-        weights = declare(self, 'weights', '', 'a weights file; empty for those that ship')
-        threads = declare(self, 'threads', 1, 'CPU threads of the network', 1, 256)
-        if policy == 'attention':  # the others need no network, and so not the time to load torch
+    def _load(self, settings: ViewPlannerSettings) -> Policy:
+        if settings.policy == 'attention':  # only this one needs torch, and the time to load it
             import torch
-            torch.set_num_threads(threads)
-        return Planner.load(
-            policy, Path(weights) if weights else None,
-            declare(self, 'seed', 0, 'of the policy random', 0, 2**32 - 1),
-            declare(self, 'max_views', 5, 'views after which an episode is done', 1, 1000),
-            declare(self, 'entropy_tolerance', 0.01, 'share by which the entropy may still change '
-                    'when it has settled; 0 to go on until max_views', 0.0, 0.99),
-            declare(self, 'object_yaw', 0.0, "azimuth of the object's front, rad",
-                    -2 * math.pi, 2 * math.pi))
+            torch.set_num_threads(settings.threads)
+        return load_policy(
+            settings.policy, Path(settings.weights) if settings.weights else None,
+            np.random.default_rng(settings.seed), settings.max_views)
+
+    def _planner_of(self, settings: ViewPlannerSettings, policy: Policy) -> Planner:
+        return Planner(
+            policy, settings.max_views, settings.entropy_tolerance, settings.object_yaw)
+
+    def _change(self, settings: ViewPlannerSettings) -> Commit | None:
+        """Return what puts settings into effect that changed while the node runs."""
+        if not self.is_configured:
+            return None
+        before = self._settings.now
+        is_same = all(getattr(before, name) == getattr(settings, name)
+                      for name in ('policy', *MADE_OF.get(settings.policy, ())))
+        policy = self._policy if is_same else self._load(settings)
+        planner = self._planner_of(settings, policy)
+        planner.go_on_from(self._planner)
+
+        def commit() -> None:
+            self._policy, self._planner = policy, planner
+
+        return commit
 
     def _forget(self) -> None:
         """Begin with no camera, no goal and no view."""
@@ -128,8 +140,8 @@ class ViewPlannerNode(Node):
         waited = self.get_clock().now().nanoseconds - self._heard_at
         if older and waited < FIND_VIEWS_S * 1e9:
             return
-        azimuth = (
-            self._camera_azimuth if math.isnan(self._start_azimuth) else self._start_azimuth)
+        start = self._settings.now.start_azimuth
+        azimuth = self._camera_azimuth if math.isnan(start) else start
         if not math.isnan(azimuth):
             self._ask(self._planner.first_goal(azimuth))
 
@@ -143,7 +155,7 @@ class ViewPlannerNode(Node):
 
     def _on_probabilities(self, msg: PointCloud2) -> None:
         with self._diagnostics.refusing():
-            grid = voxel_grid_from_msg(msg, self._object_size)
+            grid = voxel_grid_from_msg(msg, self._settings.now.object_size)
             self._join('probabilities', msg.header, grid.entropy())
 
     def _join(self, name: str, header: Header, part: Any) -> None:
@@ -178,12 +190,12 @@ class ViewPlannerNode(Node):
         self._last_goal_stamp = max(now, self._last_goal_stamp + 1)
         header = Header(stamp=stamp_from_nanoseconds(self._last_goal_stamp), frame_id=self._frame)
         self._asked = (
-            view_goal_to_msg(goal.azimuth, self._elevation, self._distance, header),
+            view_goal_to_msg(goal.azimuth, self._settings.now.elevation, self._distance, header),
             azimuth_goal_to_msg(goal.azimuth, header))
         self._started = True
         self._diagnostics.count('goals')
         self._scores_pub.publish(scores_to_msg(
-            goal.candidates, goal.scores, self._elevation, self._distance, header))
+            goal.candidates, goal.scores, self._settings.now.elevation, self._distance, header))
         self._repeat()
 
     def _repeat(self) -> None:
@@ -210,7 +222,7 @@ class ViewPlannerNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the view planner until it is asked to stop."""
-    run_node(ViewPlannerNode, args)
+    run_managed_node(ViewPlannerNode, args)
 
 
 if __name__ == '__main__':

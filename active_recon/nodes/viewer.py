@@ -8,16 +8,16 @@ from typing import Any
 
 from active_recon.cameras import Camera, CANONICAL_INTRINSICS
 from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import declare
+from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
 from active_recon.nodes.qos import HEARD, LATCHED
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import run_node
-from active_recon.viewer.address import DEFAULT_PORT, HIGHEST_PORT
+from active_recon.nodes.settings.viewer import ViewerSettings
 from active_recon.viewer.link import link_words, TopicLink
 from active_recon.viewer.page import Page, UPDATES_PER_S
 from active_recon.viewer.state import Observer, own_threshold, Scores, TakenView, thumbnail
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import intrinsics_from_msg, OBJECT_FRAME, pose_from_msg
+from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
 from msg_tools.episodes import done_from_msg, episode_from_msg
 from msg_tools.goals import scores_from_msg
 from msg_tools.images import image_from_msg
@@ -40,23 +40,21 @@ _TELL_EVERY_S = 0.5
 _IMAGES_KEPT = 64
 
 
-class ViewerNode(QosWarnings):
+class ViewerNode(ReadOnlySaysWhy, QosWarnings):
     """Follow the loop from outside and draw what is known of it; ask for what is clicked."""
 
     def __init__(self) -> None:
         super().__init__('viewer')
-        port = declare(self, 'port', DEFAULT_PORT, 'where the page is served, if it is free; 0 '
-                       'for any that is', 0, HIGHEST_PORT)
-        self._size = declare(self, 'object_size', 1.0, 'side of the voxel grid, m', 0.001, 1000.0)
-        self._frame = declare(
-            self, 'object_frame', OBJECT_FRAME, 'the frame of the object, in which poses count')
+        settings = Parameters(self, ViewerSettings).now
+        self._size = settings.object_size
+        self._frame = settings.object_frame
         self._observer = Observer()
         self._joiner = StampJoiner(('view', 'occupancy', 'probabilities'))
         self._images: dict[int, NDArray[np.uint8]] = {}
         self._intrinsics = CANONICAL_INTRINSICS
         self._heard_at: dict[str, float] = {}
         self._diagnostics = Diagnostics(self)
-        self._page = Page('active_recon, live', self._size, port)
+        self._page = Page('active_recon, live', self._size, settings.port)
         self._askable: dict[str, Client] = {}
         for service, (label, hint) in BUTTONS.items():
             self._page.add_button(label, hint)
@@ -75,7 +73,7 @@ class ViewerNode(QosWarnings):
         self.create_timer(1 / UPDATES_PER_S, self._draw)
         self.create_timer(_TELL_EVERY_S, self._tell)
         if self._page.port_taken:
-            self.get_logger().warning(f'port {port} is taken, so the page is at another')
+            self.get_logger().warning(f'port {settings.port} is taken, so the page is at another')
         self.get_logger().info(f'the page is at {self._page.url}')
         self.get_logger().info('ready')
 

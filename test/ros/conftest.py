@@ -143,13 +143,17 @@ class Bench:
 
     def call(self, service: str) -> Trigger.Response:
         """Call a Trigger service and return its answer."""
-        client = self.node.create_client(Trigger, service)
+        return self.ask(Trigger, service)
+
+    def ask(self, kind: type, service: str, request: Any = None) -> Any:
+        """Call a service of any kind and return its answer."""
+        client = self.node.create_client(kind, service)
         self.until(client.service_is_ready, f'the service {service}')
         try:
             for _ in range(round(BUDGET_S / SEND_AGAIN_S)):
                 # A request may go to the service of a node that has just ended, or before the
                 # service knows where to answer
-                answer = client.call_async(Trigger.Request())
+                answer = client.call_async(kind.Request() if request is None else request)
                 if self.within(SEND_AGAIN_S, answer.done):
                     return answer.result()
         finally:

@@ -1,15 +1,10 @@
 """A node that cannot start says why in one line, with what was expected, and ends."""
 
-import math
 import re
 
-from active_recon.errors import ConfigError
 from active_recon.models.weights import SHIPPED
-from active_recon.nodes.parameters import declare
 import numpy as np
 import pytest
-from rclpy.node import Node
-from rclpy.parameter import Parameter
 from safetensors.numpy import save_file
 import trimesh
 
@@ -37,37 +32,6 @@ def refusal(start_node, name, **parameters):
 ])
 def test_a_parameter_out_of_range_is_refused_with_its_range(start_node, name, parameters, said):
     assert re.search(f'parameters? {said}', refusal(start_node, name, **parameters))
-
-
-@pytest.mark.parametrize(('given', 'rule', 'said'), [
-    ('fast', {'default': 1.0, 'low': 0.0, 'high': 2.0}, "a number from 0 to 2, got 'fast'"),
-    (3, {'default': 1.0, 'low': 0.0, 'high': 2.0}, 'a number from 0 to 2, got 3.0'),
-    (math.nan, {'default': 1.0, 'low': 0.0, 'high': 2.0}, 'a number from 0 to 2, got nan'),
-    (math.inf, {'default': math.nan}, 'a number, or nan, got inf'),
-    (1.5, {'default': 1, 'low': 0, 'high': 2}, 'an integer from 0 to 2, got 1.5'),
-    (True, {'default': 1, 'low': 0, 'high': 2}, 'an integer from 0 to 2, got True'),
-    ('c', {'default': 'a', 'choices': ('a', 'b')}, "one of a, b, got 'c'"),
-    (1, {'default': True}, 'true or false, got 1')])
-def test_a_value_of_another_kind_or_out_of_range_is_refused(ros, given, rule, said):
-    node = Node('declares', parameter_overrides=[Parameter('it', value=given)])
-    try:
-        with pytest.raises(ConfigError, match=f'parameter it: expected {said}'):
-            declare(node, 'it', description='', **rule)
-    finally:
-        node.destroy_node()
-
-
-@pytest.mark.parametrize(('given', 'rule'), [
-    (2, {'default': 1.0, 'low': 0.0, 'high': 2.0}), (math.nan, {'default': math.nan}),
-    (0, {'default': 1, 'low': 0, 'high': 2}), ('b', {'default': 'a', 'choices': ('a', 'b')})])
-def test_the_ends_of_a_range_are_inside_and_an_integer_may_stand_for_a_number(ros, given, rule):
-    node = Node('declares', parameter_overrides=[Parameter('it', value=given)])
-    try:
-        value = declare(node, 'it', description='', **rule)
-    finally:
-        node.destroy_node()
-    assert type(value) is type(rule['default'])
-    assert value == given or math.isnan(given)
 
 
 def missing_weights(folder):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from active_recon.nodes.recorder import TOPICS
+from active_recon.nodes.settings.recorder import TOPICS
 from msg_tools.cameras import OBJECT_FRAME
 import pytest
 import yaml

@@ -1,0 +1,37 @@
+"""The parameters of the reconstructor."""
+
+from dataclasses import dataclass
+import math
+
+from active_recon.nodes.parameters import parameter
+from active_recon.nodes.settings.shared import (
+    CubeSettings,
+    FrontSettings,
+    ManagedSettings,
+    NetworkSettings,
+)
+from active_recon.view_gate import GOAL_TOLERANCE, TAKE_VIEWS
+from active_recon.voxels import MESH_FORMATS
+
+
+@dataclass(frozen=True)
+class ReconstructorSettings(FrontSettings, CubeSettings, NetworkSettings, ManagedSettings):
+    """What the reconstructor is told."""
+
+    device: str = parameter('cpu', 'where the network runs', choices=('cpu', 'cuda'))
+    threshold: float = parameter(
+        math.nan, "occupancy above which a cell is occupied; nan for the weights' own",
+        low=0.01, high=0.99, changeable=True)
+    take_views: str = parameter(
+        'auto', 'which images become views', choices=TAKE_VIEWS, changeable=True)
+    goal_tolerance: float = parameter(
+        GOAL_TOLERANCE, 'rad from a goal that still reach it', low=0.0, high=math.pi,
+        changeable=True)
+    min_view_separation: float = parameter(
+        0.2, 'rad between views while there are no goals', low=0.0, high=math.pi, changeable=True)
+    max_pose_gap: float = parameter(
+        0.1, 's from an image to a pose that is interpolated', low=0.0, high=10.0,
+        changeable=True)
+    output_dir: str = parameter('.', 'where meshes are saved')
+    mesh_format: str = parameter(
+        'ply', 'the format of saved meshes', choices=MESH_FORMATS, changeable=True)

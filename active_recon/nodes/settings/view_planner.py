@@ -1,0 +1,35 @@
+"""The parameters of the view planner."""
+
+from dataclasses import dataclass
+import math
+
+from active_recon.cameras import CANONICAL_ELEVATION
+from active_recon.nodes.parameters import parameter
+from active_recon.nodes.settings.shared import (
+    CubeSettings,
+    FrontSettings,
+    ManagedSettings,
+    NetworkSettings,
+)
+from active_recon.policies import POLICIES
+
+
+@dataclass(frozen=True)
+class ViewPlannerSettings(FrontSettings, CubeSettings, NetworkSettings, ManagedSettings):
+    """What the view planner is told."""
+
+    policy: str = parameter(
+        'attention', 'how the next view is chosen', choices=POLICIES, changeable=True)
+    seed: int = parameter(0, 'of the policy random', low=0, high=2**32 - 1, changeable=True)
+    max_views: int = parameter(
+        5, 'views after which an episode is done', low=1, high=1000, changeable=True)
+    entropy_tolerance: float = parameter(
+        0.01, 'share by which the entropy may still change, twice in a row, when it has settled; '
+        '0 to go on until max_views', low=0.0, high=0.99, changeable=True)
+    start_azimuth: float = parameter(
+        math.nan, 'of the first view, rad; nan for where the camera is',
+        low=-2 * math.pi, high=2 * math.pi)
+    elevation: float = parameter(
+        CANONICAL_ELEVATION, "of the goals' cameras, rad", low=-1.5, high=1.5)
+    distance: float = parameter(
+        math.nan, "of the goals' cameras, m; nan for 2.1 object_size", low=0.001, high=10000.0)

@@ -1,0 +1,148 @@
+"""Parameters declared as data: what a value may be, and what ROS is told of it."""
+
+from dataclasses import make_dataclass
+import math
+
+from active_recon.errors import ConfigError
+from active_recon.nodes.parameters import NEW_START, parameter, Parameters, ReadOnlySaysWhy, tell
+import pytest
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+pytestmark = pytest.mark.ros
+
+
+class ToldNode(ReadOnlySaysWhy, Node):
+    """A node that is given values for its parameters at start."""
+
+    def __init__(self, **given):
+        super().__init__('told', parameter_overrides=[
+            Parameter(name, value=value) for name, value in given.items()])
+
+
+@pytest.fixture
+def told(ros):
+    nodes = []
+
+    def make(**given):
+        nodes.append(ToldNode(**given))
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+
+
+def settings_of(**declared):
+    """Return a dataclass of settings, from pairs of a type and a parameter."""
+    return make_dataclass(
+        'Settings', [(name, *each) for name, each in declared.items()], frozen=True)
+
+
+NUMBER = float, parameter(1.0, 'a number', low=0.0, high=2.0)
+COUNT = int, parameter(1, 'a count', low=0, high=2)
+NOT_GIVEN = float, parameter(math.nan, 'a number, if any', low=0.0, high=2.0)
+WORD = str, parameter('a', 'a word', choices=('a', 'b'))
+FLAG = bool, parameter(True, 'a flag')
+NUMBERS = tuple[float, ...], parameter((), 'numbers', low=-1.0, high=1.0)
+WORDS = tuple[str, ...], parameter(('a',), 'words')
+
+
+@pytest.mark.parametrize(('given', 'declared', 'said'), [
+    ('fast', NUMBER, "a number from 0 to 2, got 'fast'"),
+    (3, NUMBER, 'a number from 0 to 2, got 3'),
+    (math.nan, NUMBER, 'a number from 0 to 2, got nan'),
+    (math.inf, NOT_GIVEN, 'a number from 0 to 2, or nan, got inf'),
+    (1.5, COUNT, 'an integer from 0 to 2, got 1.5'),
+    (True, COUNT, 'an integer from 0 to 2, got True'),
+    ('c', WORD, "one of a, b, got 'c'"),
+    (1, FLAG, 'true or false, got 1'),
+    ([0.5, 2.0], NUMBERS, r'a list, each a number from -1 to 1, got \[0.5, 2.0\]'),
+    ('abc', WORDS, "a list, each a string, got 'abc'"),
+    ([1, 2], WORDS, r'a list, each a string, got \[1, 2\]')])
+def test_a_value_of_another_kind_or_out_of_range_is_refused(told, given, declared, said):
+    with pytest.raises(ConfigError, match=f'parameter it: expected {said}'):
+        Parameters(told(it=given), settings_of(it=declared))
+
+
+@pytest.mark.parametrize(('given', 'declared', 'value'), [
+    (2, NUMBER, 2.0), (0.0, NUMBER, 0.0), (0, COUNT, 0), ('b', WORD, 'b'), (False, FLAG, False),
+    ([0, 1], NUMBERS, (0.0, 1.0)), ([], NUMBERS, ()), (['x', 'y'], WORDS, ('x', 'y')),
+    ([], WORDS, ())])
+def test_the_ends_of_a_range_are_inside_and_an_integer_may_stand_for_a_number(
+        told, given, declared, value):
+    settings = Parameters(told(it=given), settings_of(it=declared)).now
+    assert settings.it == value
+    assert type(settings.it) is type(value)
+
+
+def test_a_number_that_is_not_given_is_nan(told):
+    assert math.isnan(Parameters(told(), settings_of(it=NOT_GIVEN)).now.it)
+    assert math.isnan(Parameters(told(it=math.nan), settings_of(it=NOT_GIVEN)).now.it)
+
+
+def test_ros_is_told_the_range_the_choices_and_what_needs_a_new_start(told):
+    node = told()
+    changing = int, parameter(3, 'changes', low=1, high=5, changeable=True)
+    Parameters(node, settings_of(number=NUMBER, word=WORD, changing=changing))
+    number, word, count = node.describe_parameters(['number', 'word', 'changing'])
+    assert (number.floating_point_range[0].from_value,
+            number.floating_point_range[0].to_value) == (0.0, 2.0)
+    assert (count.integer_range[0].from_value, count.integer_range[0].to_value) == (1, 5)
+    assert number.read_only and not count.read_only
+    assert number.description == 'a number'
+    assert word.additional_constraints == f'expected one of a, b; {NEW_START}'
+
+
+def changeable(node):
+    """Declare two parameters that may change; return them and what was put into effect."""
+    applied = []
+
+    def prepare(settings):
+        if settings.low > settings.high:
+            raise ConfigError('expected low below high')
+        return lambda: applied.append((settings.low, settings.high))
+
+    parameters = Parameters(node, settings_of(
+        low=(int, parameter(1, 'the low end', low=0, high=9, changeable=True)),
+        high=(int, parameter(2, 'the high end', low=0, high=9, changeable=True)),
+        fixed=(int, parameter(0, 'fixed'))))
+    parameters.on_change(prepare)
+    return parameters, applied
+
+
+def test_changes_that_come_together_are_checked_together_and_applied_as_one(told):
+    node = told()
+    parameters, applied = changeable(node)
+    assert not node.set_parameters_atomically([Parameter('low', value=5)]).successful
+    assert node.set_parameters_atomically(
+        [Parameter('low', value=5), Parameter('high', value=6)]).successful
+    assert applied == [(5, 6)]
+    assert (parameters.now.low, parameters.now.high) == (5, 6)
+
+
+@pytest.mark.parametrize(('changes', 'said'), [
+    ({'low': 9}, 'expected low below high'),
+    ({'low': 'x'}, "parameter low: expected an integer from 0 to 9, got 'x'"),
+    ({'low': None}, 'parameter low: expected an integer from 0 to 9, got None'),
+    ({'high': 10}, 'out of range'),
+    ({'low': 2, 'fixed': 1}, NEW_START)])
+def test_a_change_that_is_refused_says_why_and_changes_nothing(told, changes, said):
+    node = told()
+    parameters, applied = changeable(node)
+    before = parameters.now
+    result = node.set_parameters_atomically(
+        [Parameter(name, value=value) for name, value in changes.items()])
+    assert not result.successful
+    assert said in result.reason
+    assert not applied
+    assert parameters.now == before
+    assert [each.value for each in node.get_parameters(['low', 'high', 'fixed'])] == [1, 2, 0]
+
+
+def test_a_fact_is_told_anew_and_set_by_nobody(told):
+    node = told(fact='mine')
+    tell(node, 'fact', 'first', 'a fact')
+    tell(node, 'fact', 'second', 'a fact')
+    assert not node.set_parameters_atomically([Parameter('fact', value='mine')]).successful
+    assert node.get_parameter('fact').value == 'second'
