@@ -4,16 +4,15 @@ from functools import cache
 import math
 
 from active_recon.calibration.board import Board
-from active_recon.calibration.lens import Lens
-from active_recon.cameras import Camera, orbit_camera
+from active_recon.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.lenses import Distortion
 import cv2
 import numpy as np
 
 BOARD = Board(columns=9, rows=7, square=0.03, marker=0.0225)
-SIZE = (640, 480)
-LENS = Lens(np.array([[730.0, 0, 319.5], [0, 730, 239.5], [0, 0, 1]]), np.zeros(5), SIZE)
-WIDE = Lens(np.array([[530.0, 0, 325.0], [0, 532, 233.0], [0, 0, 1]]),
-            np.array([-0.18, 0.06, 0.001, -0.0015, 0.0]), SIZE)
+LENS = Intrinsics(730, 730, 320, 240, 640, 480)
+WIDE = Intrinsics(530, 532, 325.5, 233.5, 640, 480,
+                  Distortion('plumb_bob', (-0.18, 0.06, 0.001, -0.0015, 0.0)))
 _PIXELS_PER_MM = 4
 _SAMPLES = 2
 
@@ -28,7 +27,8 @@ def render(lens, camera_from_board, noise=0.0, board=BOARD, seed=0):
     onto = np.array([[scale, 0, margin - 0.5], [0, scale, margin - 0.5], [0, 0, 1]]) @ onto
     there = cv2.perspectiveTransform(_rays(lens), onto)
     seen = cv2.remap(sheet, there, None, cv2.INTER_LINEAR, borderValue=120)
-    seen = cv2.resize(seen, lens.size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    seen = cv2.resize(seen, (lens.width, lens.height), interpolation=cv2.INTER_AREA)
+    seen = seen.astype(np.float32)
     if noise:
         seen = cv2.GaussianBlur(seen, (0, 0), 0.7)
         seen += np.random.default_rng(seed).normal(0, noise, seen.shape)
@@ -38,11 +38,13 @@ def render(lens, camera_from_board, noise=0.0, board=BOARD, seed=0):
 @cache
 def _rays(lens):
     """Return the ray of each sample, (H, W, 2) float32, at depth 1."""
-    width, height = lens.size
-    places = (np.indices((height * _SAMPLES, width * _SAMPLES))[::-1] + 0.5) / _SAMPLES - 0.5
+    shape = lens.height * _SAMPLES, lens.width * _SAMPLES
+    places = (np.indices(shape)[::-1] + 0.5) / _SAMPLES
+    # OpenCV itself bends the image, by whose means our lenses are to be found again
+    bent = np.array(lens.distortion.coefficients if lens.distortion else (0.0,) * 5)
     rays = cv2.undistortPoints(places.reshape(2, -1).T[:, None].astype(np.float32),
-                               lens.matrix, lens.distortion)
-    return rays.reshape(*places.shape[1:], 2)
+                               lens.matrix, bent)
+    return rays.reshape(*shape, 2)
 
 
 def fixed_camera(elevation_deg=35.0, distance=0.5, height=0.0, aside=0.02):

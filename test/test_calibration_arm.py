@@ -6,6 +6,7 @@ import re
 from active_recon.calibration.arm import fit_arm
 from active_recon.calibration.board import detect_all
 from active_recon.calibration.fit import overall_error, rigid
+from active_recon.calibration.lens import write_lens
 from active_recon.calibration.placement import Placement
 from active_recon.cameras import orbit_camera
 from active_recon.cli.main import app
@@ -126,7 +127,7 @@ def test_the_command_writes_the_transforms_of_camera_and_object(tmp_path):
         numbers = (*mount[:3, 3], *Rotation.from_matrix(mount[:3, :3]).as_quat())
         rows.append(','.join([f'{index}.png', *map(str, numbers)]))
     (tmp_path / 'poses.csv').write_text('\n'.join(rows))
-    LENS.save(tmp_path / 'lens.yaml')
+    write_lens(LENS, tmp_path / 'lens.yaml')
     result = CliRunner().invoke(app, [
         'calibrate', str(tmp_path / 'images'), '--poses', str(tmp_path / 'poses.csv'),
         '--camera-info', str(tmp_path / 'lens.yaml'), '--object-size', str(SIZE),

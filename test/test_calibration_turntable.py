@@ -1,14 +1,16 @@
 """A fixed camera beside a turntable is found again from rendered boards whose answer is known."""
 
+from dataclasses import replace
 import math
 
-from active_recon.calibration.board import detect_all
+from active_recon.calibration.board import detect_all, Detection
 from active_recon.calibration.fit import overall_error
-from active_recon.calibration.lens import estimate_lens, Lens, read_lens
+from active_recon.calibration.lens import estimate_lens, project, read_lens, write_lens
 from active_recon.calibration.placement import Placement
 from active_recon.calibration.turntable import fit_turntable
 from active_recon.cameras import azimuth_difference, Camera
 from active_recon.errors import ConfigError, DataError
+from active_recon.lenses import Distortion
 from active_recon.turntable_pose import FixedCamera
 import cv2
 import numpy as np
@@ -107,7 +109,7 @@ def test_a_point_of_the_turned_object_is_seen_where_the_parameters_say(found):
     board_at_zero = pose @ found.camera_from_table @ found.table_from_board
     for angle, image in zip(ANGLES, found.images, strict=True):
         camera = FixedCamera(pose, found.direction).pose_at(angle)
-        pixels = LENS.project(image.seen.points, np.linalg.inv(camera) @ board_at_zero)
+        pixels = project(LENS, image.seen.points, np.linalg.inv(camera) @ board_at_zero)
         np.testing.assert_allclose(pixels, image.fitted, atol=1e-6)
 
 
@@ -173,7 +175,7 @@ def test_a_cube_without_a_size_is_refused(size):
 def test_a_flat_board_on_a_table_tells_the_focal_length_alone(seen):
     estimated = estimate_lens(seen)
     assert not estimated.whole
-    assert estimated.lens.matrix[0, 0] == pytest.approx(LENS.matrix[0, 0], rel=0.01)
+    assert estimated.lens.fx == pytest.approx(LENS.fx, rel=0.01)
     found = fit_turntable(seen, estimated.lens, ANGLES)
     assert_same_camera(Placement(SIZE).on_table(found), true_pose(), metres=3e-3)
 
@@ -189,21 +191,37 @@ def test_boards_held_every_way_tell_the_whole_lens():
     estimated = estimate_lens(detect_all(BOARD, held, 8)[0])
     assert estimated.whole
     corners = np.random.default_rng(0).uniform([-0.2, -0.15, 0.5], [0.2, 0.15, 0.6], (50, 3))
-    np.testing.assert_allclose(estimated.lens.project(corners, np.eye(4)),
-                               WIDE.project(corners, np.eye(4)), atol=2.5)
+    np.testing.assert_allclose(project(estimated.lens, corners, np.eye(4)),
+                               project(WIDE, corners, np.eye(4)), atol=2.5)
 
 
 def test_a_lens_comes_back_from_its_file(tmp_path):
-    for lens in (WIDE, Lens(WIDE.matrix, np.arange(8) / 100, (640, 480))):
-        lens.save(tmp_path / 'camera_info.yaml')
-        back = read_lens(tmp_path / 'camera_info.yaml')
-        np.testing.assert_array_equal(back.matrix, lens.matrix)
-        np.testing.assert_array_equal(back.distortion, lens.distortion)
-        assert back.size == lens.size
+    coefficients = tuple(np.arange(8) / 100)
+    for lens in (LENS, WIDE, replace(WIDE, distortion=Distortion('rational_polynomial',
+                                                                 coefficients))):
+        write_lens(lens, tmp_path / 'camera_info.yaml')
+        assert read_lens(tmp_path / 'camera_info.yaml') == lens
+
+
+def test_a_lens_is_written_as_ros_counts_pixels_from_the_first_one_s_centre(tmp_path):
+    write_lens(LENS, tmp_path / 'lens.yaml')
+    text = (tmp_path / 'lens.yaml').read_text()
+    assert 'data: [730.0, 0.0, 319.5, 0.0, 730.0, 239.5, 0.0, 0.0, 1.0]' in text
+
+
+def test_a_fisheye_that_is_known_serves_too():
+    fisheye = replace(LENS, distortion=Distortion('equidistant', (-0.05, 0.01, 0.0, 0.0)))
+    camera = fixed_camera(aside=0.0).object_to_camera
+    seen = [Detection(str(index), BOARD.corners, project(
+        fisheye, BOARD.corners, camera @ on_table(angle)), (640, 480))
+        for index, angle in enumerate(ANGLES)]
+    found = fit_turntable(seen, fisheye, ANGLES)
+    assert_same_camera(Placement(SIZE).on_table(found),
+                       true_pose(camera=fixed_camera(aside=0.0)), 1e-5, 1e-3)
 
 
 @pytest.mark.parametrize(('old', 'new', 'said'), [
-    ('plumb_bob', 'equidistant', 'got equidistant with 5'),
+    ('plumb_bob', 'equidistant', 'expected 4 coefficients of equidistant, got 5'),
     ('camera_matrix', 'matrix', 'as ROS.s camera_calibration writes it'),
     ('[530.0', '[.nan', 'expected a calibrated camera'),
     ('[530.0', '[0.0', 'expected a calibrated camera'),
@@ -211,7 +229,7 @@ def test_a_lens_comes_back_from_its_file(tmp_path):
 ])
 def test_a_file_that_is_no_lens_is_refused(tmp_path, old, new, said):
     path = tmp_path / 'lens.yaml'
-    WIDE.save(path)
+    write_lens(WIDE, path)
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))

@@ -2,6 +2,7 @@
 
 import math
 
+from active_recon.calibration.lens import project, write_lens
 from active_recon.cameras import Camera
 from active_recon.cli.main import app
 from active_recon.turntable_pose import FixedCamera
@@ -31,7 +32,7 @@ def folder(tmp_path_factory):
     """Return a folder of a board on a table that turns clockwise, seen by a known lens."""
     folder = tmp_path_factory.mktemp('calibrate')
     (folder / 'images').mkdir()
-    LENS.save(folder / 'lens.yaml')
+    write_lens(LENS, folder / 'lens.yaml')
     for index in range(9):
         pose = np.linalg.inv(fixed_camera().pose) @ on_table(-math.radians(STEP_DEG * index))
         cv2.imwrite(str(folder / 'images' / f'table{index + 5}.png'), render(LENS, pose))
@@ -75,7 +76,7 @@ def test_every_image_and_its_error_is_told(written, folder):
 def test_the_picture_shows_the_axis_where_it_is(written, folder):
     picture = cv2.imread(str(folder / 'out' / 'calibration.png'))
     assert picture.shape == (2 * 480, 3 * 640, 3)
-    x, y = LENS.project(np.zeros((1, 3)), fixed_camera().object_to_camera)[0].round().astype(int)
+    x, y = project(LENS, np.zeros((1, 3)), fixed_camera().object_to_camera)[0].astype(int)
     around = picture[y - 3:y + 4, x - 3:x + 4].astype(int)
     plain = render(LENS, np.linalg.inv(fixed_camera().pose) @ on_table(0.0))
     assert np.abs(around - plain[y - 3:y + 4, x - 3:x + 4]).max() > 60

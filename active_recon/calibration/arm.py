@@ -6,7 +6,8 @@ import math
 
 from active_recon.calibration.board import Detection
 from active_recon.calibration.fit import fit, ImageFit, parameters_of, rigid
-from active_recon.calibration.lens import Lens
+from active_recon.calibration.lens import board_pose
+from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ class ArmFit:
     images: list[ImageFit]
 
 
-def fit_arm(seen: Sequence[Detection], lens: Lens, mounts: NDArray[np.float64]) -> ArmFit:
+def fit_arm(seen: Sequence[Detection], lens: Intrinsics, mounts: NDArray[np.float64]) -> ArmFit:
     """
     Find where on an arm's mount the camera sits.
 
@@ -36,7 +37,7 @@ def fit_arm(seen: Sequence[Detection], lens: Lens, mounts: NDArray[np.float64]) 
     if len(seen) < FEWEST_IMAGES:
         raise DataError(f'expected {FEWEST_IMAGES} images from known poses or more, got '
                         f'{len(seen)}', 'too_few_images')
-    boards = np.stack([lens.board_pose(one) for one in seen])
+    boards = np.stack([board_pose(lens, one) for one in seen])
     mount_from_camera = _hand_eye(mounts, boards)
     start = np.concatenate([parameters_of(mount_from_camera),
                             parameters_of(mounts[0] @ mount_from_camera @ boards[0])])

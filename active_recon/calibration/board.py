@@ -110,7 +110,8 @@ class Board:
         if self._charuco.checkCharucoCornersCollinear(ids):
             return None
         return Detection(name, self.corners[ids],
-                         np.asarray(corners, np.float64).reshape(-1, 2),
+                         # OpenCV counts from the first pixel's centre, we from its corner
+                         np.asarray(corners, np.float64).reshape(-1, 2) + 0.5,
                          (image.shape[1], image.shape[0]))
 
 
@@ -120,7 +121,7 @@ class Detection:
     The board in one image.
 
     - points: the corners that are seen, in the board's frame, metres, (N, 3)
-    - pixels: where they are seen, (N, 2)
+    - pixels: where they are seen, (N, 2), the centre of the first pixel being (0.5, 0.5)
     - size: the image's width and height, pixels
     """
 

@@ -10,7 +10,7 @@ from active_recon.calibration.arm import fit_arm
 from active_recon.calibration.board import Board, detect_all, Detection
 from active_recon.calibration.files import read_image
 from active_recon.calibration.fit import ImageFit
-from active_recon.calibration.lens import estimate_lens, Lens, read_lens
+from active_recon.calibration.lens import estimate_lens, read_lens
 from active_recon.calibration.outcome import Calibration, quaternion_of
 from active_recon.calibration.placement import Placement
 from active_recon.calibration.remarks import (
@@ -23,7 +23,7 @@ from active_recon.calibration.remarks import (
 )
 from active_recon.calibration.turntable import FEWEST_IMAGES as FEWEST_OF_TABLE
 from active_recon.calibration.turntable import fit_turntable
-from active_recon.cameras import Camera
+from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import DataError
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +57,7 @@ class BoardImages:
 @dataclass(frozen=True, eq=False)
 class _Look:
     seen: list[Detection]
-    lens: Lens
+    lens: Intrinsics
     remarks: list[str]
 
 
@@ -118,7 +118,7 @@ def _look_at(images: BoardImages, fewest: int) -> _Look:
     remarks = of_missing(missing)
     if images.camera_info is not None:
         lens = read_lens(images.camera_info)
-        _same_size(seen[0], lens.size, str(images.camera_info))
+        _same_size(seen[0], (lens.width, lens.height), str(images.camera_info))
         return _Look(seen, lens, remarks)
     estimated = estimate_lens([*seen, *more])
     if not estimated.whole:
@@ -138,7 +138,7 @@ def _same_size(first: Detection, size: tuple[int, int], name: str) -> None:
                         'image_size')
 
 
-def _calibration(images: list[ImageFit], lens: Lens, board_from_object: NDArray[np.float64],
+def _calibration(images: list[ImageFit], lens: Intrinsics, board_from_object: NDArray[np.float64],
                  placement: Placement, remarks: list[str],
                  parameters: Mapping[str, Mapping[str, Any]],
                  transforms: Mapping[tuple[str, str], NDArray[np.float64]]) -> Calibration:

@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from active_recon.calibration.board import Detection
-from active_recon.calibration.lens import Lens
+from active_recon.calibration.lens import project
+from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 _LARGEST_ERROR = 5.0  # pixels
 _OUTLIER = 1.0  # pixels
+_BEHIND = 1e4  # pixels, for what a step too far has put behind the camera
 
 BoardPoses = Callable[[NDArray[np.float64]], Sequence[NDArray[np.float64]]]
 """From parameters, (P,), to camera from board of each image, (4, 4)."""
@@ -42,7 +44,7 @@ def overall_error(images: Sequence[ImageFit]) -> float:
     return root_mean_square(np.concatenate([one.fitted - one.seen.pixels for one in images]))
 
 
-def fit(seen: Sequence[Detection], lens: Lens, poses: BoardPoses, start: NDArray[np.float64]
+def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses, start: NDArray[np.float64]
         ) -> tuple[NDArray[np.float64], list[ImageFit]]:
     """
     Find the parameters, (P,), under which the corners fall where they are seen.
@@ -51,12 +53,12 @@ def fit(seen: Sequence[Detection], lens: Lens, poses: BoardPoses, start: NDArray
     parameters leave several pixels.
     """
     def apart(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([
-            (lens.project(one.points, pose) - one.pixels).ravel()
-            for one, pose in zip(seen, poses(parameters), strict=True)])
+        off = [(project(lens, one.points, pose) - one.pixels).ravel()
+               for one, pose in zip(seen, poses(parameters), strict=True)]
+        return np.nan_to_num(np.concatenate(off), nan=_BEHIND)
 
     found = least_squares(apart, start, x_scale='jac', loss='soft_l1', f_scale=_OUTLIER).x
-    images = [ImageFit(one, lens.project(one.points, pose), pose)
+    images = [ImageFit(one, project(lens, one.points, pose), pose)
               for one, pose in zip(seen, poses(found), strict=True)]
     if (error := overall_error(images)) > _LARGEST_ERROR:
         worst = max(images, key=lambda one: one.error)

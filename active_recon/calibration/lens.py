@@ -7,86 +7,72 @@ import math
 from pathlib import Path
 
 from active_recon.calibration.board import Detection
-from active_recon.errors import DataError
+from active_recon.cameras import Camera, Intrinsics
+from active_recon.errors import DataError, ViewError
+from active_recon.lenses import Distortion
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 import yaml
 
-_MODELS = {'plumb_bob': 5, 'rational_polynomial': 8}
 _ENOUGH_TILT = math.radians(15)
 _FEW = (cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_ZERO_TANGENT_DIST
         | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3)
+_STRAIGHT = Distortion('plumb_bob', (0.0,) * 5)
 
 
-@dataclass(frozen=True, eq=False)
-class Lens:
-    """
-    OpenCV's camera matrix, (3, 3), and distortion, (5,) or (8,), of images of a size.
-
-    `size` is width and height in pixels.
-    """
-
-    matrix: NDArray[np.float64]
-    distortion: NDArray[np.float64]
-    size: tuple[int, int]
-
-    def board_pose(self, seen: Detection) -> NDArray[np.float64]:
-        """Return camera from board, (4, 4), by this image alone."""
-        _, turn, shift = cv2.solvePnP(seen.points, seen.pixels, self.matrix, self.distortion,
-                                      flags=cv2.SOLVEPNP_IPPE)
-        turn, shift = cv2.solvePnPRefineLM(
-            seen.points, seen.pixels, self.matrix, self.distortion, turn, shift)
-        pose = np.eye(4)
-        pose[:3, :3] = cv2.Rodrigues(turn)[0]
-        pose[:3, 3] = np.ravel(shift)
-        return pose
-
-    def project(self, points: NDArray[np.float64], pose: NDArray[np.float64]
-                ) -> NDArray[np.float64]:
-        """Return the pixels, (N, 2), of points (N, 3) under camera from points, (4, 4)."""
-        turn, _ = cv2.Rodrigues(pose[:3, :3])
-        pixels, _ = cv2.projectPoints(points, turn, pose[:3, 3], self.matrix, self.distortion)
-        return np.asarray(pixels, np.float64).reshape(-1, 2)
-
-    def save(self, path: Path) -> None:
-        """Write the lens in the format of ROS's camera_calibration."""
-        model = {count: name for name, count in _MODELS.items()}[self.distortion.size]
-        path.write_text(yaml.safe_dump({
-            'image_width': self.size[0], 'image_height': self.size[1], 'camera_name': 'camera',
-            'camera_matrix': _table(self.matrix),
-            'distortion_model': model,
-            'distortion_coefficients': _table(self.distortion[None]),
-            'rectification_matrix': _table(np.eye(3)),
-            'projection_matrix': _table(np.column_stack([self.matrix, np.zeros(3)])),
-        }, sort_keys=False, default_flow_style=None))
+def board_pose(lens: Intrinsics, seen: Detection) -> NDArray[np.float64]:
+    """Return camera from board, (4, 4), by one image alone."""
+    plane = (seen.pixels - [lens.cx, lens.cy]) / [lens.fx, lens.fy]
+    if lens.distortion is not None:
+        plane = lens.distortion.straighten(plane)
+    pinhole, none = np.eye(3), np.zeros(5)
+    _, turn, shift = cv2.solvePnP(seen.points, plane, pinhole, none, flags=cv2.SOLVEPNP_IPPE)
+    turn, shift = cv2.solvePnPRefineLM(seen.points, plane, pinhole, none, turn, shift)
+    pose = np.eye(4)
+    pose[:3, :3] = cv2.Rodrigues(turn)[0]
+    pose[:3, 3] = np.ravel(shift)
+    return pose
 
 
-def _table(values: NDArray[np.float64]) -> dict[str, object]:
-    rows, columns = values.shape
-    return {'rows': rows, 'cols': columns, 'data': values.ravel().tolist()}
+def project(lens: Intrinsics, points: NDArray[np.float64], pose: NDArray[np.float64]
+            ) -> NDArray[np.float64]:
+    """Return the pixels, (N, 2), of points (N, 3) under camera from points, (4, 4)."""
+    return Camera(np.asarray(np.linalg.inv(pose)), lens).project(points)[0]
 
 
-def read_lens(path: Path) -> Lens:
+def write_lens(lens: Intrinsics, path: Path) -> None:
+    """Write the lens in the format of ROS's camera_calibration."""
+    matrix = _as_ros_counts(lens)
+    bent = lens.distortion or _STRAIGHT
+    path.write_text(yaml.safe_dump({
+        'image_width': lens.width, 'image_height': lens.height, 'camera_name': 'camera',
+        'camera_matrix': _table(matrix),
+        'distortion_model': bent.model,
+        'distortion_coefficients': _table(np.array([bent.coefficients])),
+        'rectification_matrix': _table(np.eye(3)),
+        'projection_matrix': _table(np.column_stack([matrix, np.zeros(3)])),
+    }, sort_keys=False, default_flow_style=None))
+
+
+def read_lens(path: Path) -> Intrinsics:
     """Read ROS's calibration YAML; raises DataError where it is none, or of another model."""
     try:
         content = yaml.safe_load(path.read_text())
         matrix = np.array(content['camera_matrix']['data'], np.float64).reshape(3, 3)
-        distortion = np.array(content['distortion_coefficients']['data'], np.float64).ravel()
+        coefficients = tuple(map(float, content['distortion_coefficients']['data']))
         size = int(content['image_width']), int(content['image_height'])
-        model = content['distortion_model']
+        bent = Distortion(content['distortion_model'], coefficients)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError,
             ValueError) as error:
         raise DataError(f"{path}: expected a camera's calibration as ROS's camera_calibration "
                         f'writes it (YAML): {error!r}') from error
-    if _MODELS.get(model) != distortion.size:
-        raise DataError(f'{path}: expected plumb_bob with 5 or rational_polynomial with 8 '
-                        f'coefficients, got {model} with {distortion.size}')
-    if not (np.isfinite(matrix).all() and np.isfinite(distortion).all()
-            and matrix[0, 0] > 0 and matrix[1, 1] > 0 and min(size) > 0):
+    except ViewError as error:
+        raise DataError(f'{path}: {error}') from error
+    if not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1], *size) <= 0:
         raise DataError(f'{path}: expected a calibrated camera, got the matrix {matrix.tolist()} '
                         f'for images of {size[0]} x {size[1]}')
-    return Lens(matrix, distortion, size)
+    return _lens(matrix, bent if any(coefficients) else None, size)
 
 
 @dataclass(frozen=True)
@@ -98,7 +84,7 @@ class EstimatedLens:
     length alone, and centre and distortion are taken to be those of an ideal camera.
     """
 
-    lens: Lens
+    lens: Intrinsics
     whole: bool
 
 
@@ -110,17 +96,35 @@ def estimate_lens(seen: Sequence[Detection]) -> EstimatedLens:
     are, and one plane cannot tell centre and distortion from its tilt.
     """
     points = [one.points.astype(np.float32) for one in seen]
-    pixels = [one.pixels.astype(np.float32) for one in seen]
+    pixels = [(one.pixels - 0.5).astype(np.float32) for one in seen]
     width, height = size = seen[0].size
-    start = np.array([[width, 0, (width - 1) / 2], [0, width, (height - 1) / 2], [0, 0, 1.0]])
+    start = _as_ros_counts(Intrinsics(width, width, width / 2, height / 2, width, height))
     calibrate = partial(cv2.calibrateCamera, points, pixels, size)
-    _, matrix, distortion, turns, _ = calibrate(
+    _, matrix, _, turns, _ = calibrate(
         start, np.zeros(5), flags=cv2.CALIB_USE_INTRINSIC_GUESS | _FEW)
     normals = np.array([cv2.Rodrigues(turn)[0][:, 2] for turn in turns])
     middle = normals.mean(0) / np.linalg.norm(normals.mean(0))
-    whole = bool(np.arccos(np.clip(normals @ middle, -1, 1)).max() >= _ENOUGH_TILT)
-    if whole:
-        _, matrix, distortion, *_ = calibrate(
-            matrix, np.zeros(5), flags=cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_K3)
-    return EstimatedLens(Lens(np.asarray(matrix, np.float64),
-                              np.ravel(distortion).astype(np.float64)[:5], size), whole)
+    if np.arccos(np.clip(normals @ middle, -1, 1)).max() < _ENOUGH_TILT:
+        return EstimatedLens(_lens(matrix, None, size), False)
+    _, matrix, bent, *_ = calibrate(
+        matrix, np.zeros(5), flags=cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_K3)
+    coefficients = tuple(np.ravel(bent)[:5].tolist())
+    return EstimatedLens(_lens(matrix, Distortion('plumb_bob', coefficients), size), True)
+
+
+def _lens(matrix: ArrayLike, bent: Distortion | None, size: tuple[int, int]
+          ) -> Intrinsics:
+    # OpenCV and ROS count from the first pixel's centre, our cameras from its corner
+    (fx, _, cx), (_, fy, cy), _ = np.asarray(matrix, np.float64).tolist()
+    return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, *size, bent)
+
+
+def _as_ros_counts(lens: Intrinsics) -> NDArray[np.float64]:
+    matrix = lens.matrix
+    matrix[:2, 2] -= 0.5
+    return matrix
+
+
+def _table(values: NDArray[np.float64]) -> dict[str, object]:
+    rows, columns = values.shape
+    return {'rows': rows, 'cols': columns, 'data': values.ravel().tolist()}

@@ -7,8 +7,9 @@ from typing import Any
 
 from active_recon.calibration.files import read_image
 from active_recon.calibration.fit import ImageFit, overall_error
-from active_recon.calibration.lens import Lens
+from active_recon.calibration.lens import write_lens
 from active_recon.calibration.picture import picture_of
+from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
 import cv2
 import numpy as np
@@ -29,7 +30,7 @@ class Calibration:
     - transforms: of tf, (parent, child) to a pose (4, 4)
     """
 
-    lens: Lens
+    lens: Intrinsics
     images: list[ImageFit]
     board_from_object: NDArray[np.float64]
     object_size: float
@@ -50,7 +51,7 @@ class Calibration:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             (folder / 'calibration.yaml').write_text(self.as_yaml())
-            self.lens.save(folder / 'camera_info.yaml')
+            write_lens(self.lens, folder / 'camera_info.yaml')
             (folder / 'calibration.png').write_bytes(cv2.imencode('.png', picture)[1].tobytes())
         except OSError as error:
             raise DataError(f'{folder}: expected a folder to write to: {error}') from error

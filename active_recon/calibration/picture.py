@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 import math
 
 from active_recon.calibration.fit import ImageFit
-from active_recon.calibration.lens import Lens
+from active_recon.calibration.lens import project
 from active_recon.calibration.placement import cube_corners
+from active_recon.cameras import Intrinsics
 from active_recon.view_colors import view_color
 import cv2
 import numpy as np
@@ -18,9 +19,9 @@ _SHIFT = 4  # OpenCV draws in sixteenths of a pixel
 _SEEN, _FITTED, _AXIS, _CUBE = (view_color(number)[::-1] for number in (3, 2, 4, 1))
 
 
-def picture_of(images: Sequence[ImageFit], lens: Lens, board_from_object: NDArray[np.float64],
-               object_size: float, read: Callable[[str], NDArray[np.uint8]]
-               ) -> NDArray[np.uint8]:
+def picture_of(images: Sequence[ImageFit], lens: Intrinsics,
+               board_from_object: NDArray[np.float64], object_size: float,
+               read: Callable[[str], NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """
     Return up to six of the images with what was fitted drawn into them, (H, W, 3) uint8 BGR.
 
@@ -38,8 +39,8 @@ def picture_of(images: Sequence[ImageFit], lens: Lens, board_from_object: NDArra
     return np.concatenate(rows)
 
 
-def _tile(one: ImageFit, lens: Lens, board_from_object: NDArray[np.float64], object_size: float,
-          read: Callable[[str], NDArray[np.uint8]]) -> NDArray[np.uint8]:
+def _tile(one: ImageFit, lens: Intrinsics, board_from_object: NDArray[np.float64],
+          object_size: float, read: Callable[[str], NDArray[np.uint8]]) -> NDArray[np.uint8]:
     image = read(one.seen.name)
     scale = _WIDTH / image.shape[1]
     tile = np.asarray(cv2.resize(image, None, fx=scale, fy=scale,
@@ -69,18 +70,18 @@ def _edges(corners: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDAr
             if np.count_nonzero(a != b) == 1]
 
 
-def _line(tile: NDArray[np.uint8], scale: float, lens: Lens, pose: NDArray[np.float64],
+def _line(tile: NDArray[np.uint8], scale: float, lens: Intrinsics, pose: NDArray[np.float64],
           start: NDArray[np.float64], end: NDArray[np.float64], color: tuple[int, ...],
           thickness: int = 1) -> None:
     """Draw a line of the object frame as the lens bends it, where it is before the camera."""
     points = np.linspace(start, end, 20)
     if (points @ pose[2, :3] + pose[2, 3]).min() <= 0:
         return
-    places = np.array([_place(pixel, scale) for pixel in lens.project(points, pose)])
+    places = np.array([_place(pixel, scale) for pixel in project(lens, points, pose)])
     cv2.polylines(tile, [places], False, color, thickness, cv2.LINE_AA, _SHIFT)
 
 
 def _place(pixel: NDArray[np.float64], scale: float) -> tuple[int, int]:
     """Return OpenCV's fixed-point place of an image's pixel on a tile."""
-    x, y = ((pixel + 0.5) * scale - 0.5) * (1 << _SHIFT)
+    x, y = (pixel * scale - 0.5) * (1 << _SHIFT)
     return round(x), round(y)

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 import math
 
 from active_recon.calibration.fit import ImageFit, overall_error
-from active_recon.calibration.lens import Lens
+from active_recon.calibration.lens import project
 from active_recon.calibration.placement import cube_corners
-from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE, Intrinsics
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,13 +44,13 @@ def of_errors(images: Sequence[ImageFit]) -> list[str]:
     return remarks + ([f'Much worse than the others: {", ".join(worse)}.'] if worse else [])
 
 
-def of_cube(images: Sequence[ImageFit], lens: Lens, board_from_object: NDArray[np.float64],
+def of_cube(images: Sequence[ImageFit], lens: Intrinsics, board_from_object: NDArray[np.float64],
             object_size: float) -> list[str]:
     """Return what to say where the object's cube is not in an image."""
     corners = cube_corners(object_size)
     for one in images:
-        pixels = lens.project(corners, one.camera_from_board @ board_from_object)
-        if pixels.min() < 0 or (pixels > lens.size).any():
+        pixels = project(lens, corners, one.camera_from_board @ board_from_object)
+        if not ((pixels >= 0) & (pixels <= [lens.width, lens.height])).all():
             return [f"The object's cube of {object_size:g} m is not wholly in the image "
                     f'{one.seen.name}, nor perhaps in others.']
     return []

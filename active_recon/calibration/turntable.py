@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from active_recon.calibration.axis import direction_of, find_axis
 from active_recon.calibration.board import Detection
 from active_recon.calibration.fit import fit, ImageFit, parameters_of, rigid
-from active_recon.calibration.lens import Lens
+from active_recon.calibration.lens import board_pose
+from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ class TurntableFit:
         return float(corner @ normal / normal[2])
 
 
-def fit_turntable(seen: Sequence[Detection], lens: Lens,
+def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
                   angles: NDArray[np.float64] | None = None) -> TurntableFit:
     """
     Find a turntable's axis in the camera's frame.
@@ -54,7 +55,7 @@ def fit_turntable(seen: Sequence[Detection], lens: Lens,
     if len(seen) < FEWEST_IMAGES:
         raise DataError(f'expected {FEWEST_IMAGES} images of the turning board or more, got '
                         f'{len(seen)}', 'too_few_images')
-    poses = np.stack([lens.board_pose(one) for one in seen])
+    poses = np.stack([board_pose(lens, one) for one in seen])
     axis = find_axis(poses)
     if angles is None:
         direction, turned = None, axis.turned
