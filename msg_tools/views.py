@@ -101,11 +101,17 @@ class ViewJoiner:
                         f"expected camera info of the image's size, {height} x {width}, "
                         f'got {intrinsics.height} x {intrinsics.width}', 'camera_info')
             except MessageError as error:
-                self._images.popleft()
+                self._drop_first()
                 yield error
                 continue
-            self._images.popleft()
+            self._drop_first()
             yield View(stamp, image, Camera(pose, intrinsics), mask)
+
+    def _drop_first(self) -> None:
+        """Forget the first image, and the masks that no later one can want: they are large."""
+        stamp, _, _ = self._images.popleft()
+        while self._masks and self._masks[0][0] <= stamp:
+            self._masks.popleft()
 
     def _pose_at(self, stamp: int, late: bool) -> NDArray[np.float64] | None:
         """Return the pose at that stamp, None while it or its later neighbour may still come."""
