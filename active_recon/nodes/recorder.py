@@ -8,7 +8,7 @@ from pathlib import Path
 from active_recon import __version__
 from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
-from active_recon.errors import RecordingError
+from active_recon.errors import ActiveReconError, RecordingError
 from active_recon.nodes.asked_parameters import AskedParameters
 from active_recon.nodes.definitions import message_class, message_definition
 from active_recon.nodes.diagnostics import Diagnostics
@@ -17,6 +17,7 @@ from active_recon.nodes.qos import common_profile, offered_profile
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
 from active_recon.nodes.settings.recorder import DIAGNOSTICS, RecorderSettings
+from active_recon.output import output_path
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
@@ -53,7 +54,8 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
         """Begin a bag in a new folder named after the time."""
         now = datetime.now().strftime('%Y-%m-%d_%H-%M-%S')
         names = (now if again == 1 else f'{now}_{again}' for again in count(1))
-        folder = next(path for name in names if not (path := self._output_dir / name).exists())
+        folder = next(path for name in names
+                      if not (path := output_path(self._output_dir, name)).exists())
         bag = BagWriter(folder, self._max_bytes)
         bag.add_provenance({'version': __version__})
         own = self.get_parameters(list(self.get_parameters_by_prefix('')))
@@ -153,7 +155,7 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
         try:
             response.message = str(self._begin())
             response.success = True
-        except RecordingError as error:
+        except ActiveReconError as error:
             self._diagnostics.refuse(error)
             response.message = one_line(error)
         return response
