@@ -65,7 +65,8 @@ class Declared:
         elif kind in (bool, str):
             one = 'a string' if kind is str else 'true or false'
         else:
-            between = '' if self.low is None else f' from {self.low:g} to {self.high:g}'
+            between = ('' if self.low is None or self.high is None else
+                       f' from {number_words(self.low)} to {number_words(self.high)}')
             absent = ', or nan' if self._may_be_nan else ''
             one = f'{"an integer" if kind is int else "a number"}{between}{absent}'
         return f'a list, each {one}' if self.of else one
@@ -112,6 +113,11 @@ class Declared:
         if isinstance(value, int | float) and self.low is not None and self.high is not None:
             return self.low <= value <= self.high
         return not isinstance(value, float) or math.isfinite(value)
+
+
+def number_words(number: float) -> str:
+    """Return a number as it is told to people."""
+    return str(int(number)) if number == number // 1 else f'{number:.4g}'
 
 
 def _as(kind: type, value: object) -> object:
