@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from active_recon.errors import ConfigError, MessageError
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.qos import HEARD_OFTEN, STREAM
+from active_recon.nodes.settings.camera_pose import CameraPoseSettings
 from active_recon.turntable_pose import FixedCamera
 from geometry_msgs.msg import Point, Pose, PoseStamped
 from msg_tools.cameras import pose_to_msg
@@ -18,7 +19,6 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-POSE_SOURCES = ('topic', 'turntable_joint', 'tf')
 LOOK_UP_EVERY_S = 0.02
 TF_PATIENCE_S = 0.5
 """For so long an image waits for its transform."""
@@ -29,7 +29,7 @@ Take = Callable[[PoseStamped], None]
 
 class PoseSource(Protocol):
     """
-    What hands on the camera's poses in the object frame, from when it is made until `close`.
+    What hands on the camera's poses in the object frame.
 
     Every pose but those of the topic itself is published on `camera/pose` as well, for the
     planner, the viewer and the bags.
@@ -38,22 +38,34 @@ class PoseSource(Protocol):
     def image_came(self, header: Header) -> None:
         """Hear of an image, by its stamp and the frame of its camera."""
 
-    def close(self) -> None:
-        """Hear nothing any more."""
+
+def check_pose_source(settings: CameraPoseSettings) -> None:
+    """Raise ConfigError where the poses could not be had."""
+    if settings.pose_source == 'turntable_joint':
+        settings.as_fixed_camera()
+    elif settings.pose_source == 'tf':
+        _tf2_ros()
+
+
+def hear_poses(node: Node, settings: CameraPoseSettings, object_frame: str, take: Take,
+               diagnostics: Diagnostics) -> PoseSource:
+    """Return what hands the poses to `take` from now on; raises as `check_pose_source`."""
+    if settings.pose_source == 'turntable_joint':
+        return TurntablePoses(node, take, diagnostics, settings.as_fixed_camera(),
+                              settings.joint_name, object_frame)
+    if settings.pose_source == 'tf':
+        return TfPoses(node, take, diagnostics, object_frame)
+    return TopicPoses(node, take)
 
 
 class TopicPoses:
     """The poses that others publish on `camera/pose`."""
 
     def __init__(self, node: Node, take: Take) -> None:
-        self._node = node
-        self._heard = node.create_subscription(PoseStamped, 'camera/pose', take, HEARD_OFTEN)
+        node.create_subscription(PoseStamped, 'camera/pose', take, HEARD_OFTEN)
 
     def image_came(self, header: Header) -> None:
         """Leave it to the joiner, which interpolates."""
-
-    def close(self) -> None:
-        self._node.destroy_subscription(self._heard)
 
 
 class TurntablePoses:
@@ -61,14 +73,13 @@ class TurntablePoses:
 
     def __init__(self, node: Node, take: Take, diagnostics: Diagnostics, camera: FixedCamera,
                  joint: str, object_frame: str) -> None:
-        self._node = node
         self._take = take
         self._diagnostics = diagnostics
         self._camera = camera
         self._joint = joint
         self._object_frame = object_frame
         self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
-        self._heard = node.create_subscription(
+        node.create_subscription(
             JointState, 'turntable/joint_states', self._on_joint, HEARD_OFTEN)
 
     def _on_joint(self, msg: JointState) -> None:
@@ -82,10 +93,6 @@ class TurntablePoses:
     def image_came(self, header: Header) -> None:
         """Leave it to the joiner, which interpolates."""
 
-    def close(self) -> None:
-        self._node.destroy_subscription(self._heard)
-        self._node.destroy_publisher(self._publisher)
-
 
 class TfPoses:
     """
@@ -97,7 +104,6 @@ class TfPoses:
     def __init__(self, node: Node, take: Take, diagnostics: Diagnostics,
                  object_frame: str) -> None:
         self._tf = _tf2_ros()
-        self._node = node
         self._take = take
         self._diagnostics = diagnostics
         self._object_frame = object_frame
@@ -105,7 +111,7 @@ class TfPoses:
         self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
         self._buffer = self._tf.Buffer()
         self._listener = self._tf.TransformListener(self._buffer, node)
-        self._timer = node.create_timer(LOOK_UP_EVERY_S, self._look_up)
+        node.create_timer(LOOK_UP_EVERY_S, self._look_up)
 
     def image_came(self, header: Header) -> None:
         """Look the image's pose up, now or when its transform has come."""
@@ -137,16 +143,6 @@ class TfPoses:
                       orientation=transform.rotation))
         self._publisher.publish(told)
         self._take(told)
-
-    def close(self) -> None:
-        self._node.destroy_timer(self._timer)
-        self._listener.unregister()
-        self._node.destroy_publisher(self._publisher)
-
-
-def require_tf() -> None:
-    """Raise ConfigError where tf2 is not installed."""
-    _tf2_ros()
 
 
 def _tf2_ros() -> Any:

@@ -1,5 +1,6 @@
 """ROS shell of the reconstructor: views in, the object's occupancy out; it owns the episode."""
 
+from functools import partial
 import math
 from pathlib import Path
 import time
@@ -16,7 +17,9 @@ from active_recon.cameras import (
 from active_recon.errors import ConfigError, DataError, MessageError
 from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.parameters import Commit, Parameters, tell
-from active_recon.nodes.qos import HEARD, HEARD_OFTEN, LATCHED
+from active_recon.nodes.pose_sources import check_pose_source, hear_poses
+from active_recon.nodes.qos import HEARD, LATCHED
+from active_recon.nodes.reference_capture import ReferenceCapture
 from active_recon.nodes.run import one_line
 from active_recon.nodes.settings.reconstructor import ReconstructorSettings
 from active_recon.reconstructor import Reconstruction, Reconstructor
@@ -26,7 +29,7 @@ from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg, pose_to_msg
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
-from msg_tools.images import image_from_msg, latent_to_msg
+from msg_tools.images import image_from_msg, image_to_msg, latent_to_msg, mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 from msg_tools.views import View, ViewJoiner
 from msg_tools.voxels import FLOOR, voxel_grid_to_msg
@@ -44,17 +47,22 @@ class ReconstructorNode(ManagedNode):
         super().__init__('reconstructor')
         self._settings = Parameters(self, ReconstructorSettings)
         self._settings.on_change(self._change)
+        self._capture = ReferenceCapture(self)
 
     def configure(self) -> None:
         """Load the network, and offer what comes of it."""
         settings = self._settings.now
+        self._background = settings.as_background()
+        self.on_undo(self._capture.forget)
+        check_pose_source(settings)
         self._reconstructor = self._load(settings)
-        self._joiner = ViewJoiner(settings.max_pose_gap)
+        self._joiner = ViewJoiner(settings.max_pose_gap, masks=self._background.how == 'mask')
         self._gate = ViewGate(
             settings.take_views, settings.goal_tolerance, settings.min_view_separation)
         self._object_frame = settings.object_frame
         self._reconstruction: Reconstruction | None = None
         self._view_pub = self.create_publisher(PoseStamped, 'view', LATCHED)
+        self._view_image_pub = self.create_publisher(Image, 'view_image', LATCHED)
         self._occupancy_pub = self.create_publisher(PointCloud2, 'occupancy', LATCHED)
         self._probabilities_pub = self.create_publisher(PointCloud2, 'probabilities', LATCHED)
         self._latent_pub = self.create_publisher(Image, 'latent', LATCHED)
@@ -68,7 +76,10 @@ class ReconstructorNode(ManagedNode):
         self._begin_episode()
         self.create_subscription(Image, 'camera/image_raw', self._on_image, HEARD)
         self.create_subscription(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
-        self.create_subscription(PoseStamped, 'camera/pose', self._on_pose, HEARD_OFTEN)
+        if self._background.how == 'mask':
+            self.create_subscription(Image, 'camera/mask', self._on_mask, HEARD)
+        self._poses = hear_poses(
+            self, self._settings.now, self._object_frame, self._on_pose, self._diagnostics)
         self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
         self.create_timer(0.1, self._take_in)  # what has waited in vain is refused
 
@@ -92,10 +103,12 @@ class ReconstructorNode(ManagedNode):
 
     def _change(self, settings: ReconstructorSettings) -> Commit | None:
         """Return what puts settings into effect that changed while the node runs."""
+        background = settings.as_background()
         if not self.is_configured:
             return None
 
         def commit() -> None:
+            self._background = background
             self._reconstructor.set_threshold(_given(settings.threshold))
             self._joiner.max_pose_gap = settings.max_pose_gap
             self._gate.take_views = settings.take_views
@@ -117,18 +130,24 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.count('images')
         with self._diagnostics.refusing():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
+            self._capture.image_came(stamp, partial(image_from_msg, msg))
             if stamp < self._episode.begin:
                 raise MessageError(
                     'expected an image of this episode, which began at '
                     f'{self._episode.begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
                     'recording, play its clock and set use_sim_time', 'last_episode')
             self._joiner.add_image(stamp, image_from_msg(msg), time.monotonic())
+            self._poses.image_came(msg.header)
         self._take_in()
 
     def _on_camera_info(self, msg: CameraInfo) -> None:
         with self._diagnostics.refusing():
             self._joiner.add_intrinsics(
                 nanoseconds_from_stamp(msg.header.stamp), intrinsics_from_msg(msg))
+        self._take_in()
+
+    def _on_mask(self, msg: Image) -> None:
+        self._joiner.add_mask(nanoseconds_from_stamp(msg.header.stamp), msg)
         self._take_in()
 
     def _on_pose(self, msg: PoseStamped) -> None:
@@ -156,7 +175,9 @@ class ReconstructorNode(ManagedNode):
                     self._fold(view)
 
     def _fold(self, view: View) -> None:
-        reconstruction = self._reconstructor.add_view(view.image, view.camera)
+        mask = None if view.mask is None else mask_from_msg(view.mask)
+        image = self._background.cleared(view.image, mask, self._capture.reference)
+        reconstruction = self._reconstructor.add_view(image, view.camera)
         self._gate.took(view.camera)
         self._warn_of(view.camera)
         self._reconstruction = reconstruction
@@ -166,6 +187,8 @@ class ReconstructorNode(ManagedNode):
         self._occupancy_pub.publish(
             voxel_grid_to_msg(grid, self._reconstructor.threshold, header))
         self._latent_pub.publish(latent_to_msg(reconstruction.latent, header))
+        if image is not view.image:
+            self._view_image_pub.publish(image_to_msg(image, header))
         self._view_pub.publish(pose_to_msg(view.camera.pose, header))
         self._probabilities_pub.publish(voxel_grid_to_msg(grid, FLOOR, header))
         self._entropy_pub.publish(Float64(data=grid.entropy()))

@@ -3,18 +3,27 @@
 import sys
 from types import SimpleNamespace
 
-from active_recon.cameras import orbit_camera
+from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.errors import ConfigError
-from active_recon.nodes.pose_sources import TfPoses
+from active_recon.nodes.pose_sources import check_pose_source, TfPoses
+from active_recon.nodes.settings.reconstructor import ReconstructorSettings
+from active_recon.turntable_pose import FixedCamera
+from conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
 from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Vector3
-from msg_tools.cameras import pose_from_msg, pose_to_msg
+from msg_tools.cameras import intrinsics_to_msg, pose_from_msg, pose_to_msg
+from msg_tools.images import image_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
 pytestmark = pytest.mark.ros
 POSE = orbit_camera(1.2).pose
+ANGLE = 0.7
+TURNED = FixedCamera(POSE, -1).pose_at(ANGLE)
+IMAGE = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
 
 
 class TransformException(Exception):
@@ -40,7 +49,7 @@ def fake_tf(monkeypatch):
     monkeypatch.setattr(FakeBuffer, 'known', set())
     monkeypatch.setitem(sys.modules, 'tf2_ros', SimpleNamespace(
         Buffer=FakeBuffer, TransformException=TransformException,
-        TransformListener=lambda buffer, node: SimpleNamespace(unregister=lambda: None)))
+        TransformListener=lambda buffer, node: None))
     return FakeBuffer
 
 
@@ -49,8 +58,7 @@ def tf_poses(bench, fake_tf):
     """Return the source, what it handed on, and what it refused."""
     taken, refused = [], []
     source = TfPoses(bench.node, taken.append, SimpleNamespace(refuse=refused.append), 'object')
-    yield source, taken, refused
-    source.close()
+    return source, taken, refused
 
 
 def image_header(stamp, frame='camera'):
@@ -100,3 +108,127 @@ def test_where_tf2_is_missing_it_is_said_what_to_do(bench, monkeypatch):
     monkeypatch.setitem(sys.modules, 'tf2_ros', None)
     with pytest.raises(ConfigError, match='pose_source: expected tf2_ros.*ros-jazzy-tf2-ros-py'):
         TfPoses(bench.node, print, None, 'object')
+
+
+class Eye:
+    """A camera that shows one image, and something that tells where it stands."""
+
+    def __init__(self, bench, kind, topic):
+        self._bench = bench
+        self._place = bench.advertise(kind, topic) if topic else None
+        self._publishers = [bench.advertise(each, f'camera/{name}') for each, name in (
+            (CameraInfo, 'camera_info'), (Image, 'image_raw'))]
+        self.cells = bench.hear(PointCloud2, 'probabilities', LATCHED)
+
+    def show(self, place):
+        """Show the image until there is a view of it; return the cells of the first."""
+        for _ in range(round(BUDGET_S / SEND_AGAIN_S)):
+            header = Header(stamp=stamp_from_nanoseconds(self._bench.now()), frame_id='camera')
+            if self._place:
+                self._place.publish(place(header.stamp))
+            for publisher, msg in zip(self._publishers, (
+                    intrinsics_to_msg(CANONICAL_INTRINSICS, header), image_to_msg(IMAGE, header)),
+                    strict=True):
+                publisher.publish(msg)
+            if found := self._bench.within(SEND_AGAIN_S, lambda: self.cells):
+                return found[0].data
+        raise AssertionError('shown in vain')
+
+
+def start(start_node, **parameters):
+    return start_node('reconstructor', take_views='all', **parameters)
+
+
+def posed(stamp):
+    return pose_to_msg(TURNED, Header(stamp=stamp, frame_id='object'))
+
+
+def test_a_turntable_s_joint_gives_the_occupancy_that_the_poses_give(bench, start_node):
+    node = start(start_node)
+    expected = Eye(bench, PoseStamped, 'camera/pose').show(posed)
+    assert node.stop() == 0
+    bench.until(lambda: not bench.node.count_publishers('probabilities'), 'the end of the node')
+
+    start(start_node, pose_source='turntable_joint', joint_name='table', turntable_direction=-1,
+          camera_position=POSE[:3, 3].tolist(),
+          camera_orientation=Rotation.from_matrix(POSE[:3, :3]).as_quat().tolist())
+    poses = bench.hear(PoseStamped, 'camera/pose')
+    eye = Eye(bench, JointState, 'turntable/joint_states')
+    bench.until(lambda: bench.node.count_publishers('camera/pose') == 2, 'a publisher of poses')
+    cells = eye.show(lambda stamp: JointState(
+        header=Header(stamp=stamp), name=['arm', 'table'], position=[9.0, ANGLE]))
+    assert cells == expected
+    told = bench.until(lambda: poses and poses[-1], 'a pose')
+    np.testing.assert_allclose(pose_from_msg(told), TURNED, atol=1e-9)
+
+
+def test_a_joint_that_is_not_there_or_nowhere_is_refused_and_said(bench, start_node):
+    node = start(start_node, pose_source='turntable_joint', joint_name='table',
+                 camera_position=[1.0, 0.0, 1.0], camera_orientation=[0.0, 0.0, 0.0, 1.0])
+    joints = bench.advertise(JointState, 'turntable/joint_states')
+
+    def refused():
+        joints.publish(JointState(name=['arm'], position=[1.0]))
+        joints.publish(JointState(name=['table'], position=[float('nan')]))
+        return bench.counts('reconstructor').get('refused/joint', 0) > 1
+
+    bench.until(refused, 'both to be refused')
+    assert node.log('refused: expected a position of table, got 1 of arm')
+
+
+TF = """
+class TransformException(Exception):
+    pass
+
+
+class Buffer:
+    def lookup_transform(self, target, source, time):
+        from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+        assert (target, source) == ('object', 'camera')
+        return TransformStamped(transform=Transform(
+            translation=Vector3(x={0}, y={1}, z={2}),
+            rotation=Quaternion(x={3}, y={4}, z={5}, w={6})))
+
+
+class TransformListener:
+    def __init__(self, buffer, node):
+        pass
+"""
+
+
+@pytest.fixture
+def put_tf(tmp_path):
+    """Return what puts a module in the place of tf2_ros, for the first node of the test."""
+    def put(code):
+        (tmp_path / '0').mkdir()
+        (tmp_path / '0' / 'tf2_ros.py').write_text(code)
+    return put
+
+
+def test_a_view_is_taken_from_where_tf_says(bench, start_node, put_tf):
+    told = posed(stamp_from_nanoseconds(0)).pose
+    place, turn = told.position, told.orientation
+    put_tf(TF.format(place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
+    start(start_node, pose_source='tf')
+    views = bench.hear(PoseStamped, 'view', LATCHED)
+    Eye(bench, None, '').show(None)
+    view = bench.until(lambda: views, 'a view')[0]
+    np.testing.assert_allclose(pose_from_msg(view), TURNED, atol=1e-9)
+
+
+def test_a_node_that_is_to_ask_a_tf2_that_is_missing_does_not_start(start_node, put_tf):
+    put_tf('raise ImportError("no tf2_ros here")')
+    node = start_node('reconstructor', ready=False, pose_source='tf')
+    assert node.wait() == 1
+    line, = node.log()
+    assert 'pose_source: expected tf2_ros to be installed' in line
+
+
+@pytest.mark.parametrize(('parameters', 'said'), [
+    ({}, 'camera_position: expected x, y, z'),
+    ({'camera_position': (1.0, 0.0, 1.0), 'camera_orientation': (0.0, 0.0, 0.0, 2.0)},
+     'camera_orientation: expected'),
+])
+def test_a_turntable_whose_camera_nobody_placed_is_refused(parameters, said):
+    with pytest.raises(ConfigError, match=said):
+        check_pose_source(ReconstructorSettings(pose_source='turntable_joint', **parameters))

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 import math
 
 from active_recon.nodes.parameters import parameter
+from active_recon.nodes.settings.background import BackgroundSettings
+from active_recon.nodes.settings.camera_pose import CameraPoseSettings
 from active_recon.nodes.settings.shared import (
     CubeSettings,
     FrontSettings,
@@ -15,7 +17,8 @@ from active_recon.voxels import MESH_FORMATS
 
 
 @dataclass(frozen=True)
-class ReconstructorSettings(FrontSettings, CubeSettings, NetworkSettings, ManagedSettings):
+class ReconstructorSettings(BackgroundSettings, CameraPoseSettings, FrontSettings, CubeSettings,
+                            NetworkSettings, ManagedSettings):
     """What the reconstructor is told."""
 
     device: str = parameter('cpu', 'where the network runs', choices=('cpu', 'cuda'))
