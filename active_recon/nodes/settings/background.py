@@ -17,7 +17,7 @@ class BackgroundSettings:
     background_color: tuple[int, ...] = parameter(
         GREEN_SCREEN, "the background's red, green and blue", low=0, high=255, changeable=True)
     background_tolerance: float = parameter(
-        COLOR_TOLERANCE, 'distance in L*a*b* of colors that still are the background', low=0.1,
+        COLOR_TOLERANCE, 'CIE Lab distance of colors that still are the background', low=0.1,
         high=200.0, changeable=True)
 
     def as_background(self) -> Background:
