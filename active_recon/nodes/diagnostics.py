@@ -1,7 +1,7 @@
 """What a node did, refused and found wrong: counted, said in the log, told on `/diagnostics`."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 import math
 import socket
@@ -27,16 +27,13 @@ class Diagnostics:
     The state of one node, on `/diagnostics`: once a second, and what is new at once.
 
     What is refused is counted by its kind. The first of a kind is logged at once, a stream of
-    them once in `LOG_EVERY_S` seconds, with the number of those left unsaid. What is counted
-    under a name of `rates` is told per second as well.
+    them once in `LOG_EVERY_S` seconds, with the number of those left unsaid.
     """
 
-    def __init__(self, node: Node, rates: Sequence[str] = ()) -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self._counts: Counter[str] = Counter()
-        self._rates = {name: Rate(time.monotonic()) for name in rates}
-        self._latency = Durations()
-        self._facts: dict[str, str] = {}
+        self.forget()
         self._unsaid: Counter[str] = Counter()
         self._said_at: dict[str, float] = {}
         self._last_problem = ''
@@ -56,15 +53,24 @@ class Diagnostics:
         if what in self._rates:
             self._rates[what].add(time.monotonic())
 
+    def measure(self, *counted: str) -> None:
+        """Tell per second, too, what is counted under these names."""
+        self._rates |= {name: Rate(time.monotonic()) for name in counted}
+
+    def forget(self) -> None:
+        """Forget facts, rates and latencies; what was counted stays."""
+        self._facts: dict[str, str] = {}
+        self._rates: dict[str, Rate] = {}
+        self._latency = Durations()
+
     def took_since(self, stamp: int) -> None:
         """Note the latency of what was just published, from its stamp in nanoseconds to now."""
         self._latency.add((self._node.get_clock().now().nanoseconds - stamp) / 1e9)
 
-    def tell(self, fact: str, value: str) -> None:
+    def tell(self, fact: str, value: str, at_once: bool = True) -> None:
         """Set a fact of the node's state, its name beginning with a capital."""
-        if self._facts.get(fact) != value:
-            self._facts[fact] = value
-            self._news = True
+        self._news = self._news or (at_once and self._facts.get(fact) != value)
+        self._facts[fact] = value
 
     def refuse(self, error: ActiveReconError) -> None:
         """Count what was refused and say it in one line."""

@@ -35,6 +35,7 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         self.is_active = False
         super().__init__(name)
         self._diagnostics = Diagnostics(self)
+        self._tell_state()
 
     def configure(self) -> None:
         """Load, and offer topics and services."""
@@ -65,6 +66,7 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         self.is_configured = result == TransitionCallbackReturn.SUCCESS
         if not self.is_configured:
             self._free()
+        self._tell_state()
         return result
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -73,12 +75,14 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         self.is_active = result == TransitionCallbackReturn.SUCCESS
         if self.is_active:
             self.get_logger().info('ready')
+        self._tell_state()
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Hear nothing more."""
         self.is_active = False
         self._activated.close()
+        self._tell_state()
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -86,11 +90,14 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         self.on_deactivate(state)
         self.is_configured = False
         self._free()
+        self._tell_state()
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Free everything; what is left is a node that waits to be ended."""
-        return self.on_cleanup(state)
+        result = self.on_cleanup(state)
+        self._diagnostics.tell('State', 'finalized')
+        return result
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Free everything; the node can be configured again."""
@@ -118,8 +125,13 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         if not self._is_starting:  # then the process ends with it
             self._diagnostics.fail('transition', message)
 
+    def _tell_state(self) -> None:
+        self._diagnostics.tell('State', 'active' if self.is_active else
+                               'inactive' if self.is_configured else 'unconfigured')
+
     def _free(self) -> None:
         self._configured.close()
+        self._diagnostics.forget()
         for name in vars(self).keys() - self._before:
             delattr(self, name)
         gc.collect()

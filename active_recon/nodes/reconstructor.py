@@ -22,6 +22,7 @@ from active_recon.nodes.qos import HEARD, LATCHED
 from active_recon.nodes.reference_capture import ReferenceCapture
 from active_recon.nodes.run import one_line
 from active_recon.nodes.settings.reconstructor import ReconstructorSettings
+from active_recon.output import output_path
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import ViewGate
 from active_recon.voxels import write_mesh
@@ -68,6 +69,8 @@ class ReconstructorNode(ManagedNode):
         self._latent_pub = self.create_publisher(Image, 'latent', LATCHED)
         self._entropy_pub = self.create_publisher(Float64, 'entropy', LATCHED)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED)
+        self._diagnostics.measure('images', 'poses', 'views')
+        self._diagnostics.tell('Weights SHA-256', self._reconstructor.weights_hash)
         self.create_service(Trigger, 'start_episode', self._on_start)
         self.create_service(Trigger, 'save_mesh', self._on_save)
 
@@ -124,6 +127,8 @@ class ReconstructorNode(ManagedNode):
         self._reconstruction = None
         self._episode = Episode(uuid.uuid4().hex[:12], self.get_clock().now().nanoseconds)
         self._diagnostics.count('episodes')
+        self._diagnostics.tell('Episode', self._episode.id)
+        self._diagnostics.tell('Views of the episode', '0')
         self._episode_pub.publish(episode_to_msg(self._episode))
 
     def _on_image(self, msg: Image) -> None:
@@ -151,6 +156,7 @@ class ReconstructorNode(ManagedNode):
         self._take_in()
 
     def _on_pose(self, msg: PoseStamped) -> None:
+        self._diagnostics.count('poses')
         with self._diagnostics.refusing():
             self._joiner.add_pose(nanoseconds_from_stamp(msg.header.stamp),
                                   pose_from_msg(msg, self._object_frame))
@@ -186,6 +192,9 @@ class ReconstructorNode(ManagedNode):
         header = Header(stamp=stamp_from_nanoseconds(view.stamp), frame_id=self._object_frame)
         self._occupancy_pub.publish(
             voxel_grid_to_msg(grid, self._reconstructor.threshold, header))
+        self._diagnostics.took_since(view.stamp)
+        self._diagnostics.tell('Views of the episode', str(self._reconstructor.view_count),
+                               at_once=False)
         self._latent_pub.publish(latent_to_msg(reconstruction.latent, header))
         if image is not view.image:
             self._view_image_pub.publish(image_to_msg(image, header))
@@ -217,7 +226,7 @@ class ReconstructorNode(ManagedNode):
             return response
         settings = self._settings.now
         name = f'{self._episode.id}-{self._reconstructor.view_count}.{settings.mesh_format}'
-        path = (Path(settings.output_dir) / name).absolute()
+        path = output_path(Path(settings.output_dir), name)
         try:
             write_mesh(self._reconstruction.grid.mesh(self._reconstructor.threshold), path)
         except (DataError, OSError) as error:

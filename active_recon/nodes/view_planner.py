@@ -58,6 +58,7 @@ class ViewPlannerNode(ManagedNode):
         self._next_azimuth_pub = self.create_publisher(JointState, 'next_azimuth', LATCHED)
         self._scores_pub = self.create_publisher(PointCloud2, 'azimuth_scores', LATCHED)
         self._done_pub = self.create_publisher(Header, 'done', LATCHED)
+        self._diagnostics.measure('views', 'goals')
         self.create_service(Trigger, 'plan', self._on_plan)
 
     def activate(self) -> None:
@@ -120,7 +121,8 @@ class ViewPlannerNode(ManagedNode):
             self._episode = episode
             self._heard_at = self.get_clock().now().nanoseconds
             self._diagnostics.count('episodes')
-            self._done_pub.publish(done_to_msg(episode.begin, ''))
+            self._diagnostics.tell('Episode', episode.id)
+            self._tell_done(episode.begin, '')
             if self._early is not None:
                 self._decide(*self._early, episode)
                 self._early = None
@@ -177,11 +179,17 @@ class ViewPlannerNode(ManagedNode):
         self._diagnostics.count('views')
         if decision.goal is not None:
             self._ask(decision.goal)
+            self._diagnostics.took_since(stamp)
             return
         self._asked = None
         self._done = True
-        self._done_pub.publish(done_to_msg(stamp, decision.reason))
+        self._tell_done(stamp, decision.reason)
         self.get_logger().info(f'done: {decision.reason}')
+
+    def _tell_done(self, stamp: int, reason: str) -> None:
+        """Say why the episode is done, as of the stamp of a view; '' that it is not yet."""
+        self._done_pub.publish(done_to_msg(stamp, reason))
+        self._diagnostics.tell('Done', reason or 'not yet')
 
     def _ask(self, goal: Goal) -> None:
         """Publish a goal under a stamp of its own, its identity."""
@@ -213,7 +221,7 @@ class ViewPlannerNode(ManagedNode):
             return response
         if self._done and self._episode is not None:
             self._done = False
-            self._done_pub.publish(done_to_msg(self._episode.begin, ''))
+            self._tell_done(self._episode.begin, '')
         self._ask(goal)
         response.success = True
         response.message = f'{goal.azimuth:.6f}'

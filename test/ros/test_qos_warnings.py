@@ -34,6 +34,8 @@ def spoil(bench, kind, topic, profile, listens):
      'asks for (reliable, transient local)', '(reliable, volatile)'),
     ('turntable_camera', PoseStamped, 'camera/pose', HASTY, True,
      'asks for (reliable, volatile, deadline 0.25 s)', '(reliable, volatile)'),
+    ('view_planner', PoseStamped, 'view', PLAIN, False,
+     'offers (reliable, volatile)', '(reliable, transient local)'),
 ])
 def test_an_endpoint_that_does_not_fit_is_named_with_both_profiles_while_it_is_there(
         start, bench, name, kind, topic, profile, listens, theirs, ours):
