@@ -149,18 +149,19 @@ class Planner:
             return Decision(None, 'entropy_settled')
         return self._goal_or_none()
 
-    def give_up(self, azimuth: float | None = None) -> Decision:
+    def give_up(self, azimuth: float, camera: float | None = None) -> Decision:
         """
-        Leave the goal's azimuth out for the episode and decide on the next best.
+        Leave a goal's azimuth out for the episode and decide on the next best.
 
-        `azimuth` is where the camera is, radians; None: where the last view was taken. Raises
-        ViewError where there is no goal.
+        `camera` is the azimuth where it is, None: where the last view was taken; radians. Raises
+        ViewError where nothing was asked for yet.
         """
-        failed = nearest_view(self.plan().azimuth, self._candidates)
-        self._failed.add(failed)
-        if azimuth is None or not math.isfinite(azimuth):
-            azimuth = self._taken[-1] if self._taken else self.plan().azimuth
-        self._goal = self._best(azimuth)
+        if self._wanted is None:
+            raise ViewError('expected a goal before it is given up, got none', 'plan')
+        self._failed.add(nearest_view(azimuth, self._candidates))
+        if camera is None:
+            camera = self._taken[-1] if self._taken else azimuth
+        self._goal = self._best(camera)
         return self._goal_or_none()
 
     def stop(self) -> Decision:

@@ -49,10 +49,9 @@ class Stillness:
         """Seconds for which the camera has stayed near one pose."""
         return 0.0 if self._rest is None else (self._stamp - self._rest[0]) / 1e9
 
-    @property
-    def is_still(self) -> bool:
-        """Whether it has stayed there long enough, and its poses did not jump just before."""
-        return self.rested >= STILL_TIME and not self.jumps(UNSURE_TIME)
+    def is_still(self, settle_time: float = STILL_TIME) -> bool:
+        """Whether it has stayed for so many seconds, and its poses did not jump just before."""
+        return self.rested >= settle_time and not self.jumps(UNSURE_TIME)
 
     def jumps(self, seconds: float) -> int:
         """Return how often, in the time before the last pose, the poses jumped."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from active_recon.cameras import azimuth_difference, Camera
 from active_recon.errors import ConfigError
-from active_recon.stillness import Stillness
+from active_recon.stillness import STILL_TIME, Stillness
 
 TAKE_VIEWS = ('auto', 'at_goal', 'by_separation', 'all')
 GOAL_TOLERANCE = 0.14
@@ -24,17 +24,19 @@ class ViewGate:
     `take_views` is `at_goal` (once for each goal, the camera still and its azimuth within
     `goal_tolerance` radians), `by_separation` (the camera still and its azimuth at least
     `min_view_separation` radians from the last view), `all`, or `auto`: at_goal where goals are
-    given or expected, else by_separation. All three may be changed in mid-episode.
+    given or expected, else by_separation. A camera is still when it has rested for `settle_time`
+    seconds. All four may be changed in mid-episode.
     """
 
     def __init__(self, take_views: str = 'auto', goal_tolerance: float = GOAL_TOLERANCE,
-                 min_view_separation: float = 0.2) -> None:
+                 min_view_separation: float = 0.2, settle_time: float = STILL_TIME) -> None:
         if take_views not in TAKE_VIEWS:
             raise ConfigError(f'take_views: expected one of {", ".join(TAKE_VIEWS)}, '
                               f'got {take_views!r}')
         self.take_views = take_views
         self.goal_tolerance = goal_tolerance
         self.min_view_separation = min_view_separation
+        self.settle_time = settle_time
         self.reset()
 
     def reset(self) -> None:
@@ -67,7 +69,7 @@ class ViewGate:
             return True
         by_goal = self.take_views == 'at_goal' or (
             self.take_views == 'auto' and (goals_expected or self._goal is not None))
-        return self._stillness.is_still and (
+        return self._stillness.is_still(self.settle_time) and (
             self._at_new_goal(camera) if by_goal else self._is_separate(camera))
 
     def took(self, camera: Camera) -> None:

@@ -1,11 +1,12 @@
 """Runs of the loop on the core alone: what a recorder would have seen, and nothing is recorded."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
 from active_recon.cameras import orbit_camera, wrap_azimuth
 from active_recon.models.runtime import TorchRuntime
-from active_recon.planner import Planner
+from active_recon.planner import Decision, Planner
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import RandomPolicy
 from active_recon.reconstructor import Reconstructor
@@ -25,12 +26,29 @@ def goal_of(goal, stamp):
     return RecordedGoal(wrap_azimuth(goal.azimuth), stamp, goal.candidates, goal.scores, stamp)
 
 
-def episode_of(reconstructor, planner, begin, azimuth):
-    """Run the loop on the core alone and return what a recorder would have seen of it."""
+def episode_of(reconstructor, planner, begin, azimuth, given_up=()):
+    """
+    Run the loop on the core alone and return what a recorder would have seen of it.
+
+    `given_up`: how many goals are given up before the first view, after it, after the second, ...
+    """
+    def asked_for(decision, stamp):
+        """Return the goal that is followed at last, what was asked for, and why there is none."""
+        if decision.goal is None:
+            return None, None, decision.reason
+        goals = [goal_of(decision.goal, stamp)]
+        for _ in range(next(failing, 0)):
+            decision = planner.give_up(decision.goal.azimuth)
+            if decision.goal is None:
+                break
+            goals.append(goal_of(decision.goal, stamp + len(goals)))
+        return decision.goal, replace(goals[0], instead=goals[1:]), decision.reason
+
+    failing = iter(given_up)
     reconstructor.reset()
     planner.reset()
-    first = goal = planner.first_goal(azimuth)
-    views, stamp, done = [], begin, ''
+    goal, first, done = asked_for(Decision(planner.first_goal(azimuth)), begin)
+    views, stamp = [], begin
     while not done:
         stamp += SECOND
         camera = orbit_camera(goal.azimuth)
@@ -39,15 +57,15 @@ def episode_of(reconstructor, planner, begin, azimuth):
         heard, occupied = (grid_from_points(known.grid.points(above)) for above in (
             FLOOR, THRESHOLD))
         decision = planner.add_view(known.latent, camera.azimuth, heard.entropy())
-        goal, done = decision.goal, decision.reason
+        goal, asked, done = asked_for(decision, stamp + 1)
         views.append(RecordedView(
             stamp, image, camera, heard, occupied, known.latent, known.grid.entropy(),
-            None if goal is None else goal_of(goal, stamp + 1), {}))
-    return RecordedEpisode(f'from {begin}', begin, goal_of(first, begin), views, done)
+            asked, {}))
+    return RecordedEpisode(f'from {begin}', begin, first, views, done)
 
 
-def loop_of(network, policy):
-    return (Reconstructor(TorchRuntime(network), THRESHOLD), Planner(policy, 3, 0.0))
+def loop_of(network, policy, views=3, **motion):
+    return (Reconstructor(TorchRuntime(network), THRESHOLD), Planner(policy, views, 0.0, **motion))
 
 
 def policies(attention):

@@ -238,7 +238,7 @@ def test_a_goal_that_is_given_up_is_left_out_for_the_episode(planner, kind):
     count = int(MotionLimits((0.0, 2.0)).allows(AZIMUTHS).sum())
     made.add_view(LATENT, 0.01, 10.0)
     failed = made.plan()
-    following = made.give_up(0.5).goal
+    following = made.give_up(failed.azimuth, 0.5).goal
     assert nearest_view(following.azimuth) != nearest_view(failed.azimuth)
     goals = [following.azimuth]
     for _ in range(2 * count):
@@ -254,10 +254,10 @@ def test_when_every_azimuth_was_given_up_there_is_none_and_it_says_so(planner, k
     made = planner(kind, limits=MotionLimits(reachable_azimuths=[0.0, 1.0, 2.5]))
     first = made.first_goal(0.9)
     assert first.azimuth == 1.0
-    second = made.give_up().goal
+    second = made.give_up(first.azimuth).goal
     assert second.azimuth == 0.0
-    assert made.give_up(1.5).goal.azimuth == 2.5
-    decision = made.give_up()
+    assert made.give_up(second.azimuth, 1.5).goal.azimuth == 2.5
+    decision = made.give_up(2.5)
     assert (decision.goal, decision.reason) == (None, 'no_reachable_azimuth')
     with pytest.raises(ViewError, match='every one was given up'):
         made.plan()
@@ -269,8 +269,13 @@ def test_the_way_to_the_next_best_is_counted_from_where_the_camera_is(planner):
     for camera in (AZIMUTHS[3], AZIMUTHS[18]):
         made = planner('farthest', motion_weight=100.0)
         made.add_view(LATENT, AZIMUTHS[8], 10.0)
-        goals.append(nearest_view(made.give_up(camera).goal.azimuth))
+        goals.append(nearest_view(made.give_up(made.plan().azimuth, camera).goal.azimuth))
     assert goals == [3, 18]
+
+
+def test_what_was_never_asked_for_cannot_be_given_up(planner):
+    with pytest.raises(ViewError, match='expected a goal before it is given up'):
+        planner('farthest').give_up(1.0)
 
 
 def test_a_stopped_episode_stays_stopped_until_the_next(planner):

@@ -15,6 +15,7 @@ from active_recon.bags.settings import recorded_settings
 from active_recon.cameras import orbit_camera, wrap_azimuth
 from active_recon.errors import DataError, WeightsError
 from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
+from active_recon.motion import MotionLimits
 import numpy as np
 import pytest
 from recorded_runs import (
@@ -35,7 +36,7 @@ import torch
 def make_loop(request, network, attention):
     """Return what makes the core of the loop anew, its policy with its seed."""
     policy = policies(attention)[request.param]
-    return lambda: loop_of(network, policy())
+    return lambda **settings: loop_of(network, policy(), **settings)
 
 
 @pytest.fixture
@@ -173,6 +174,35 @@ def test_a_cell_at_the_edge_of_the_cloud_is_off_by_what_it_is_beyond_the_edge(ru
     assert found.largest == pytest.approx(beyond, abs=1e-6)
 
 
+LIMITED = {'views': 4, 'motion_weight': 0.3, 'limits': MotionLimits((-1.0, 2.0), [0.6, 1.1])}
+
+
+@pytest.mark.parametrize(('given_up', 'views', 'done'), [
+    ((0, 1, 2), 4, 'max_views'), ((2, 0, 1), 4, 'max_views'),
+    ((0, 1, 99), 2, 'no_reachable_azimuth')])
+def test_goals_that_were_given_up_are_left_out_again(make_loop, given_up, views, done):
+    episode = episode_of(*make_loop(**LIMITED), SECOND, 1.0, given_up)
+    assert (len(episode.views), episode.done) == (views, done)
+    again = replay(run_of([episode]), *make_loop(**LIMITED))
+    assert compare(again, THRESHOLD).verdict == SAME_BITS
+
+
+def test_a_run_under_limits_replays_otherwise_without_them(make_loop):
+    run = run_of([episode_of(*make_loop(**LIMITED), SECOND, 1.0)])
+    assert compare(replay(run, *make_loop(views=4)), THRESHOLD).verdict == DIFFERENT
+
+
+def test_an_end_that_a_service_asked_for_is_no_difference(run, make_loop):
+    first = run.episodes[0]
+    after_goal = replace(first, views=first.views[:2], done='stopped')
+    before_goal = replace(after_goal, views=[
+        first.views[0], replace(first.views[1], goal=None)])
+    for episode, decided in ((after_goal, 2), (before_goal, 1)):
+        found = compare(replay(run_of([episode]), *make_loop()), THRESHOLD)
+        assert found.verdict == SAME_BITS
+        assert found.deviations['stop'].compared == decided
+
+
 def test_threads_are_fixed_inside_and_as_before_outside():
     before = torch.get_num_threads()
     with computing_with(before + 1):
@@ -184,13 +214,18 @@ def test_settings_are_those_of_the_bag_and_what_it_lacks_is_the_cores():
     bag = replace(run_of([]), provenance={'weights_sha256': weights_hash()}, parameters={
         'reconstructor': {'weights': '', 'threshold': float('nan'), 'object_size': 0.25,
                           'threads': 2, 'take_views': 'at_goal'},
-        'view_planner': {'weights': '', 'policy': 'random', 'seed': 5, 'max_views': 3}})
+        'view_planner': {'weights': '', 'policy': 'random', 'seed': 5, 'max_views': 3,
+                         'motion_weight': 1, 'azimuth_range': [-1, 2.0],
+                         'forbidden_sectors': [0.6, 1.1], 'reachable_azimuths': []}})
     settings = recorded_settings(bag)
     assert settings.weights == SHIPPED
     assert settings.threads == 2
     assert settings.reconstructor == {'object_size': 0.25}
     assert settings.planner == {
-        'policy': 'random', 'seed': 5, 'max_views': 3, 'weights': SHIPPED}
+        'policy': 'random', 'seed': 5, 'max_views': 3, 'weights': SHIPPED, 'motion_weight': 1.0,
+        'azimuth_range': [-1.0, 2.0], 'forbidden_sectors': [0.6, 1.1], 'reachable_azimuths': []}
+    goal = settings.load_planner().first_goal(0.8)
+    assert goal.azimuth == pytest.approx(np.pi / 6)
     assert settings.load_reconstructor().object_size == 0.25
 
 
@@ -214,7 +249,8 @@ def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
 @pytest.mark.parametrize(('node', 'parameter', 'value'), [
     ('reconstructor', 'object_size', 'large'), ('reconstructor', 'threads', 0),
     ('reconstructor', 'weights', ['a']), ('view_planner', 'seed', -1),
-    ('view_planner', 'max_views', 10**9), ('view_planner', 'policy', 5)])
+    ('view_planner', 'max_views', 10**9), ('view_planner', 'policy', 5),
+    ('view_planner', 'azimuth_range', 'all'), ('view_planner', 'forbidden_sectors', ['a', 'b'])])
 def test_a_recorded_parameter_that_cannot_be_is_refused_by_its_name(node, parameter, value):
     bag = replace(run_of([]), parameters={f'/robot/{node}': {parameter: value}})
     with pytest.raises(DataError, match=f'parameter {parameter}: expected'):

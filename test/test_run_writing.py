@@ -42,6 +42,22 @@ def test_every_topic_of_the_loop_is_there_once_for_each_view_or_goal(run, bag):
         '/entropy': 3, '/next_view': 3, '/next_azimuth': 3, '/azimuth_scores': 3}
 
 
+@pytest.mark.parametrize(('given_up', 'done'), [
+    ((1, 2), 'max_views'), ((0, 99), 'no_reachable_azimuth')])
+def test_goals_that_were_given_up_and_the_end_come_back(
+        network, attention, tmp_path, given_up, done):
+    loop = loop_of(network, policies(attention)['random']())
+    written = episode_of(*loop, SECOND, 1.0, given_up)
+    write_run(run_of([written]), tmp_path / 'bag')
+    read, = read_run(tmp_path / 'bag').episodes
+    assert read.done == written.done == done
+    for number in (None, *range(len(written.views))):
+        before, after = (episode.given_up(None if number is None else episode.views[number])
+                         for episode in (written, read))
+        assert after == before
+    assert sum(len(read.given_up(view)) for view in (None, *read.views)) >= 3
+
+
 def test_numbers_come_back_as_they_were(run, bag):
     messages = messages_of(bag)
     views = run.episodes[0].views

@@ -89,6 +89,13 @@ def test_an_episode_begins_without_goal_and_view():
     assert offer(gate, [2, 2], start=10 * PERIOD) == [1]
 
 
+@pytest.mark.parametrize(('settle_time', 'taken'), [(0.0, 5), (0.08, 6), (0.25, 8), (0.3, 8)])
+def test_after_a_motion_the_camera_settles_before_an_image_becomes_a_view(settle_time, taken):
+    gate = ViewGate('at_goal', settle_time=settle_time)
+    gate.set_goal(1.0, stamp=1)
+    assert offer(gate, [0, 0, 0, 0.4, 0.7, *[1.0] * 8]) == [taken]
+
+
 def test_an_unknown_way_to_take_views_is_refused():
     with pytest.raises(ConfigError, match="expected one of auto.*got 'sometimes'"):
         ViewGate('sometimes')

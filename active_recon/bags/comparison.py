@@ -69,9 +69,8 @@ def compare(episodes: Sequence[ReplayedEpisode], threshold: float) -> Comparison
     """
     comparison = Comparison()
     for episode in episodes:
-        last = episode.views[-1] if episode.views else None
         for view in episode.views:
-            done = view.recorded.done or (episode.recorded.done if view is last else '')
+            done = episode.recorded.done_after(view.recorded)
             for name, same, apart in _deviations(view, done, threshold):
                 deviation = comparison.deviations[name]
                 deviation.compared += 1
@@ -99,7 +98,7 @@ def _deviations(view: ReplayedView, done: str,
                abs(recorded.entropy - entropy) / max(abs(recorded.entropy), 1e-9))
     if view.decision is None:
         return
-    if recorded.goal is not None or done:
+    if done != 'stopped' and (recorded.goal is not None or done):  # a service says no more when
         stopped_alike = view.decision.reason == done
         yield 'stop', stopped_alike, 0.0 if stopped_alike else np.inf
     if recorded.goal is not None and view.decision.goal is not None:

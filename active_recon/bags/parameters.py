@@ -10,7 +10,8 @@ from active_recon.errors import DataError
 _KINDS: Mapping[str, type] = {
     'weights': str, 'policy': str, 'threads': int, 'seed': int, 'max_views': int,
     'object_size': float, 'object_yaw': float, 'threshold': float, 'entropy_tolerance': float,
-    'goal_tolerance': float}
+    'goal_tolerance': float, 'motion_weight': float, 'azimuth_range': list,
+    'forbidden_sectors': list, 'reachable_azimuths': list}
 _RANGES = {'threads': (1, 256), 'seed': (0, 2**32 - 1), 'max_views': (1, 1000)}  # as the nodes'
 
 
@@ -29,10 +30,13 @@ def _checked(path: Path, name: str, value: Any) -> Any:
     kind = _KINDS.get(name, object)
     if kind is float and type(value) is int:
         return float(value)
+    if kind is list and type(value) is list and all(type(one) in (int, float) for one in value):
+        return [float(one) for one in value]
     low, high = _RANGES.get(name, (None, None))
-    if kind is not object and type(value) is not kind or low is not None and not (
-            low <= value <= high):
+    fits = kind is object or type(value) is kind is not list
+    if not fits or low is not None and not low <= value <= high:
+        expected = 'a list of numbers' if kind is list else kind.__name__
         within = '' if low is None else f' from {low} to {high}'
-        raise DataError(f'{path}: its parameter {name}: expected {kind.__name__}{within}, '
+        raise DataError(f'{path}: its parameter {name}: expected {expected}{within}, '
                         f'got {value!r}')
     return value

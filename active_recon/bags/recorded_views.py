@@ -3,6 +3,7 @@
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -81,11 +82,15 @@ def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
 def _episode(episode: Episode, views: Sequence[View], end: float, stream: CameraStream,
              record: LoopRecord) -> RecordedEpisode:
     """Return an episode, with each goal after the view that it was decided upon."""
-    decided: dict[int, RecordedGoal] = {}
+    asked: dict[int, list[RecordedGoal]] = {}
     published = [record.published['view'][view.stamp] for view in views]
     for goal in _goals(record, episode.begin, end):
         after = bisect_right(published, record.published['next_view'][goal.stamp])
-        decided.setdefault(after, goal)  # asked again by `plan`, it is no new decision
+        before = asked.setdefault(after, [])
+        if not before or before[-1].azimuth != goal.azimuth:  # else `plan` asked for it again
+            before.append(goal)
+    decided = {after: replace(first, instead=instead)
+               for after, (first, *instead) in asked.items()}
     reasons = [(record.published['done'][stamp], reason)
                for stamp, (_, reason) in record.parts['done'].items()
                if episode.begin <= stamp < end]

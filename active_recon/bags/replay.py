@@ -50,14 +50,23 @@ def _replay_episode(episode: RecordedEpisode, reconstructor: Reconstructor,
         planner.reset()
         if episode.first_goal is not None:
             first_goal = planner.first_goal(episode.first_goal.azimuth)
+            _give_up(planner, episode.given_up(None))
     views = []
     for view in sorted(episode.views, key=lambda view: view.stamp):
         reconstruction = reconstructor.add_view(view.image, view.camera)
         decision = None if planner is None else decide(
             planner, reconstruction, view.camera.azimuth)
+        if planner is not None:
+            _give_up(planner, episode.given_up(view))
         views.append(ReplayedView(view, reconstruction, decision))
         advance()
     return ReplayedEpisode(episode, first_goal, views)
+
+
+def _give_up(planner: Planner, azimuths: Sequence[float]) -> None:
+    """Leave out what the run left out: no clock tells again when a goal took too long."""
+    for azimuth in azimuths:
+        planner.give_up(azimuth)
 
 
 def decide(planner: Planner, reconstruction: Reconstruction, azimuth: float) -> Decision:

@@ -28,6 +28,7 @@ class RecordedGoal:
     - azimuth: radians, object frame; stamp: the goal's identity, nanoseconds
     - candidates (radians) and scores: (N,) each, None where they were not recorded
     - received: when the recorder received the goal, nanoseconds
+    - instead: the goals that followed as this one was given up, and then those, until a view came
     """
 
     azimuth: float
@@ -35,6 +36,7 @@ class RecordedGoal:
     candidates: NDArray[np.float64] | None
     scores: NDArray[np.float32] | None
     received: int
+    instead: Sequence['RecordedGoal'] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,24 @@ class RecordedEpisode:
     first_goal: RecordedGoal | None
     views: Sequence[RecordedView]
     done: str
+
+    def done_after(self, view: RecordedView) -> str:
+        """Return the reason where it was that view that ended the episode, else ''."""
+        ends = not view.done and view is self._last and view.goal is None
+        return self.done if ends else view.done
+
+    def given_up(self, view: RecordedView | None) -> list[float]:
+        """Return the azimuths of the goals given up after a view, None: before the first one."""
+        goal = view.goal if view else self.first_goal
+        if goal is None:
+            return []
+        asked = [goal.azimuth, *(later.azimuth for later in goal.instead)]
+        none_left = view is self._last and self.done == 'no_reachable_azimuth'
+        return asked if none_left else asked[:-1]
+
+    @property
+    def _last(self) -> RecordedView | None:
+        return max(self.views, key=lambda view: view.stamp, default=None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,6 +41,15 @@ def _write(run: RecordedRun, bag: BagWriter) -> None:
 
 def _messages(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str, int, Any]]:
     """Yield when each message was received, its topic, its stamp, and itself."""
+    received = episode.begin
+    for message in _of_views(episode, size):
+        received = max(received, message[0])
+        yield message
+    if episode.done and not any(map(episode.done_after, episode.views)):  # no view has ended it
+        yield received, 'done', received, done_to_msg(received, episode.done)
+
+
+def _of_views(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str, int, Any]]:
     begin = Episode(episode.id or _UNNAMED, episode.begin)
     yield episode.begin, 'episode', episode.begin, episode_to_msg(begin)
     yield episode.begin, 'done', episode.begin, done_to_msg(episode.begin, '')
@@ -50,14 +59,14 @@ def _messages(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str,
             view.stamp, view.camera, view.reconstruction, view.occupied, view.latent,
             view.entropy)
         yield from _at(messages, view.stamp, view.received)
-        if reason := view.done or (episode.done if view is episode.views[-1] else ''):
+        if reason := episode.done_after(view):
             received = max([view.stamp, *view.received.values()])
             yield received, 'done', view.stamp, done_to_msg(view.stamp, reason)
         yield from _of_goal(view.goal, size)
 
 
-def _of_goal(goal: RecordedGoal | None, size: float) -> Iterator[tuple[int, str, int, Any]]:
-    if goal is not None:
+def _of_goal(asked: RecordedGoal | None, size: float) -> Iterator[tuple[int, str, int, Any]]:
+    for goal in () if asked is None else (asked, *asked.instead):
         messages = goal_to_msgs(goal.stamp, goal.azimuth, goal.candidates, goal.scores, size)
         yield from _at(messages, goal.stamp, dict.fromkeys(messages, goal.received))
 

@@ -1,7 +1,7 @@
 """The network and the planner that a run was made with, found again by what its bag says."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 import math
 from pathlib import Path
 from typing import Any
@@ -10,11 +10,14 @@ from active_recon.bags.parameters import node_parameters
 from active_recon.bags.run import RecordedRun
 from active_recon.errors import WeightsError
 from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
+from active_recon.motion import MotionLimits
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
 
 _OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
-_OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw')
+_OF_LIMITS = tuple(field.name for field in fields(MotionLimits))
+_OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw', 'motion_weight',
+               *_OF_LIMITS)
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,12 @@ class Settings:
 
     def load_planner(self) -> Planner | None:
         """Return None where nothing tells which policy chose; raise as the reconstructor does."""
-        return None if self.planner is None else Planner.load(**self.planner)
+        if self.planner is None:
+            return None
+        limits = MotionLimits(**{name: self.planner[name] for name in _OF_LIMITS
+                                 if name in self.planner})
+        return Planner.load(limits=limits, **{
+            name: value for name, value in self.planner.items() if name not in _OF_LIMITS})
 
 
 def recorded_settings(run: RecordedRun, weights: Path | None = None, instead: bool = False,

@@ -15,6 +15,9 @@ _STOPPED = {
                                 'allowed.'),
     'entropy_settled': ('settled', 'It stopped by itself: the last two views changed almost '
                                    'nothing, so another was not worth taking.'),
+    'no_reachable_azimuth': ('nowhere to go', 'It stopped because the camera did not get to any '
+                                              'azimuth that was left.'),
+    'stopped': ('stopped', 'It stopped because it was asked to.'),
     '': ('cut off', 'It never said that it was done: the recording ends, or a new episode '
                     'begins, in the middle.'),
 }
