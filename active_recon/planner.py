@@ -110,17 +110,18 @@ class Planner:
         if self._taken:
             self._aim(self._taken[-1])
         elif other._wanted is not None:
-            self.first_goal(other._wanted[0])
+            self._aim_first(other._wanted[0])
 
     def first_goal(self, azimuth: float) -> Goal:
-        """Return the goal of the view that no policy chooses: there, or as near as can be."""
+        """
+        Return the goal of the view that no policy chooses: there, or as near as can be.
+
+        Raises ViewError where the azimuth is not finite, or none is left that was not given up.
+        """
         if not math.isfinite(azimuth):
             raise ViewError(f'expected a finite azimuth, got {azimuth}', 'azimuth')
-        away = azimuth_difference(self._candidates, azimuth)
-        self._wanted = wrap_azimuth(azimuth), -np.abs(away).astype(np.float32)
-        self._goal = self._best(azimuth)
-        assert self._goal is not None, 'limits leave an azimuth, and none has failed yet'
-        return self._goal
+        self._aim_first(azimuth)
+        return self.plan()
 
     def add_view(self, latent: NDArray[np.float32], azimuth: float, entropy: float) -> Decision:
         """
@@ -182,6 +183,12 @@ class Planner:
         """Let the policy choose after a view."""
         self._choice, self._state = self._policy.choose(
             latent[None], np.array([taken]) - self._yaw, self._state)
+
+    def _aim_first(self, azimuth: float) -> None:
+        """Make the best of an azimuth that no policy chose."""
+        away = azimuth_difference(self._candidates, azimuth)
+        self._wanted = wrap_azimuth(azimuth), -np.abs(away).astype(np.float32)
+        self._goal = self._best(azimuth)
 
     def _aim(self, azimuth: float) -> None:
         """Make the best of the policy's choice for a camera that is at an azimuth."""

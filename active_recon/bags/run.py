@@ -38,6 +38,11 @@ class RecordedGoal:
     received: int
     instead: Sequence['RecordedGoal'] = ()
 
+    @property
+    def followed(self) -> 'RecordedGoal':
+        """The goal that was not given up."""
+        return (self, *self.instead)[-1]
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedView:

@@ -49,7 +49,8 @@ class Timing:
 def timings(episode: RecordedEpisode) -> list[Timing]:
     """Return the timing of each view."""
     asked = [episode.first_goal, *(view.goal for view in episode.views)]
-    return [_timing(view, goal) for view, goal in zip(episode.views, asked, strict=False)]
+    return [_timing(view, goal and goal.followed)
+            for view, goal in zip(episode.views, asked, strict=False)]
 
 
 def two_clocks(view: RecordedView) -> bool:

@@ -34,7 +34,8 @@ class Subject:
     @property
     def goals(self) -> list[RecordedGoal | None]:
         """The goal that asked for each view."""
-        return [self.episode.first_goal, *(view.goal for view in self.views[:-1])]
+        decided = [self.episode.first_goal, *(view.goal for view in self.views[:-1])]
+        return [goal and goal.followed for goal in decided]
 
     @property
     def threshold(self) -> float:

@@ -32,10 +32,12 @@ def _episode_states(episode: RecordedEpisode) -> Iterator[LoopState]:
         observer.take_view(
             TakenView(view.stamp, view.camera, thumbnail(view.image), view.entropy), grid,
             None if view.occupied is None else own_threshold(view.occupied))
+        end = view.stamp
         if view.goal is not None:
-            _set_goal(observer, view.goal, 1.0 if grid is None else grid.size)
-        elif view is episode.views[-1]:
-            observer.set_done(view.stamp, episode.done)
+            _set_goal(observer, view.goal.followed, 1.0 if grid is None else grid.size)
+            end = view.goal.followed.stamp + 1
+        if view is episode.views[-1]:
+            observer.set_done(end, episode.done)
         yield observer.state
 
 
