@@ -13,8 +13,9 @@ from active_recon.nodes.qos import HEARD, LATCHED
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import run_node
 from active_recon.nodes.settings.viewer import ViewerSettings
+from active_recon.viewer.courtesy import Courtesy
 from active_recon.viewer.link import link_words, TopicLink
-from active_recon.viewer.page import Page, UPDATES_PER_S
+from active_recon.viewer.page import Page
 from active_recon.viewer.state import Observer, own_threshold, Scores, TakenView, thumbnail
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
@@ -36,6 +37,8 @@ BUTTONS = {'next_object': ('Next object', 'Show the camera the next object, as a
            'start_episode': ('New episode', 'Forget the object and begin again.')}
 _ROLES = {'image': 'camera/image_raw', 'view': 'view', 'occupancy': 'occupancy',
           'goal': 'next_view'}
+_ANSWERS = (_ROLES['goal'], 'done')
+_LOOK_EVERY_S = 1 / 60
 _TELL_EVERY_S = 0.5
 _IMAGES_KEPT = 64
 
@@ -53,6 +56,8 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self._images: dict[int, NDArray[np.uint8]] = {}
         self._intrinsics = CANONICAL_INTRINSICS
         self._heard_at: dict[str, float] = {}
+        self._courtesy = Courtesy()
+        self._unread: list[tuple[Callable[[Any], None], Any]] = []
         self._diagnostics = Diagnostics(self)
         self._page = Page('active_recon, live', self._size, settings.port)
         self._askable: dict[str, Client] = {}
@@ -70,7 +75,7 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self._hear(Header, 'done', self._on_done, LATCHED)
         self._hear(Header, 'episode', self._on_episode, LATCHED)
         self._tell()
-        self.create_timer(1 / UPDATES_PER_S, self._draw)
+        self.create_timer(_LOOK_EVERY_S, self._look)
         self.create_timer(_TELL_EVERY_S, self._tell)
         if self._page.port_taken:
             self.get_logger().warning(f'port {settings.port} is taken, so the page is at another')
@@ -79,10 +84,13 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
 
     def _hear(self, kind: type, topic: str, callback: Callable[[Any], None], qos: Any) -> None:
         def heard(msg: Any) -> None:
-            self._heard_at[topic] = time.monotonic()
+            now = self._heard_at[topic] = time.monotonic()
+            if topic == _ROLES['image']:
+                self._courtesy.image(now)
+            elif topic in _ANSWERS:
+                self._courtesy.answer()
             self._diagnostics.count(topic)
-            with self._diagnostics.refusing():
-                callback(msg)
+            self._unread.append((callback, msg))
 
         self.create_subscription(kind, topic, heard, qos)
 
@@ -133,6 +141,16 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         episode = episode_from_msg(msg)
         self._observer.begin_episode(episode.id, episode.begin)
 
+    def _look(self) -> None:
+        """Read and draw what was heard, unless an image is on its way through the loop."""
+        if not self._courtesy.has_turn(time.monotonic()):
+            return
+        unread, self._unread = self._unread, []
+        for callback, msg in unread:
+            with self._diagnostics.refusing():
+                callback(msg)
+        self._draw()
+
     def _draw(self) -> None:
         for label in self._page.clicks():
             self._askable[label].call_async(Trigger.Request()).add_done_callback(
@@ -161,7 +179,9 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
 
 def main(args: list[str] | None = None) -> None:
     """Run the viewer until it is asked to stop."""
-    os.nice(10)  # where cores are short, who watches gives way to the loop
+    # Where cores are short, who watches gives way to the loop: less of them, and never at once
+    os.nice(10)
+    os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     run_node(ViewerNode, args)
 
 

@@ -21,8 +21,11 @@ _BAR_COLOR: Color = (176, 186, 204)
 _FLOOR = -0.5  # the grid's lowest side
 _BAR_RADIUS = 1.15  # outside of the cube, inside the cameras
 _BAR_HEIGHT = 0.3
+_BAR_WIDTH = 0.06
 _FRUSTUM = 0.22
 _BOX: Any = trimesh.creation.box()
+_COLORS: NDArray[np.uint8] = np.asarray(cv2.applyColorMap(
+    np.arange(256, dtype=np.uint8), cv2.COLORMAP_VIRIDIS), np.uint8).reshape(-1, 3)[:, ::-1]
 _GAP = 0.93  # of a cell: the seams let the single voxels be told apart
 
 
@@ -35,7 +38,9 @@ class Scene:
         self._shown = LoopState()
         self._threshold = math.nan
         self._views: list[Any] = []
-        self._now: Any = None
+        # What changes is changed where it stands: to make a thing anew costs several times that
+        self._known: dict[str, Any] = {}
+        self._cell_side = math.nan
         scene.configure_environment_map('studio', environment_intensity=0.1)
         scene.add_cylinder('/turntable', 0.78, 0.02, (226, 229, 236), radial_segments=64,
                            position=(0, 0, _FLOOR - 0.015), cast_shadow=False)
@@ -63,8 +68,11 @@ class Scene:
             self._remove('/occupancy')
             return
         assert grid is not None
-        self._boxes('/occupancy', cells[:, :3], _GAP * grid.cell_size / grid.size,
-                    certainty_colors(cells[:, 3]))
+        side = _GAP * grid.cell_size / grid.size
+        if side != self._cell_side:  # another network's
+            self._cell_side = side
+            self._remove('/occupancy')
+        self._boxes('/occupancy', side, cells[:, :3], certainty_colors(cells[:, 3]))
 
     def _draw_scores(self, scores: Scores | None) -> None:
         if scores is None:
@@ -76,8 +84,8 @@ class Scene:
             _FLOOR + heights / 2])
         colors = np.full((len(heights), 3), _BAR_COLOR, np.uint8)
         colors[np.argmax(scores.scores)] = _NEXT_COLOR
-        self._boxes('/scores', centers, np.column_stack([
-            np.full_like(heights, 0.06), np.full_like(heights, 0.06), heights]), colors)
+        self._boxes('/scores', _BAR_WIDTH, centers, colors,
+                    np.column_stack([np.ones((len(heights), 2)), heights / _BAR_WIDTH]))
 
     def _draw_views(self, before: tuple[TakenView, ...], views: tuple[TakenView, ...]) -> None:
         kept = before == views[:len(before)]
@@ -88,28 +96,35 @@ class Scene:
         first = len(before) if kept else 0
         for number, view in enumerate(views[first:], first + 1):
             name, color = f'/views/{number}', view_color(number)
-            again = sum(_together(view, earlier) for earlier in views[:number - 1])
+            again = _together(view, views[:number - 1])
             self._views.append(self._frustum(name, view.camera, color, view.image))
             self._label(f'{name}/label', f'{number} · {math.degrees(view.camera.azimuth):.0f}°',
                         again)
 
     def _draw_goal(self, goal: Camera | None) -> None:
         if goal is None:
+            self._remove('/goal/label')
             self._remove('/goal')
             return
-        self._frustum('/goal', goal, _NEXT_COLOR, None)
-        self._label('/goal/label', f'next · {math.degrees(goal.azimuth):.0f}°')
+        words = f'next · {math.degrees(goal.azimuth):.0f}°'
+        if '/goal' in self._known:
+            self._place(self._known['/goal'], goal)
+            self._known['/goal/label'].text = words
+            return
+        self._known['/goal'] = self._frustum('/goal', goal, _NEXT_COLOR, None)
+        self._known['/goal/label'] = self._label('/goal/label', words)
 
     def _draw_camera(self, camera: Camera | None, picture: NDArray[np.uint8] | None) -> None:
         if camera is None:
             return
-        if self._now is None:
-            self._now = self._frustum('/camera', camera, _NOW_COLOR, picture, 0.8 * _FRUSTUM)
+        if '/camera' not in self._known:
+            self._known['/camera'] = self._frustum(
+                '/camera', camera, _NOW_COLOR, picture, 0.8 * _FRUSTUM)
             return
-        self._now.position = camera.position / self._size
-        self._now.wxyz = SO3.from_matrix(camera.pose[:3, :3]).wxyz
-        if picture is not None and picture is not self._now.image:
-            self._now.image = picture
+        known = self._known['/camera']
+        self._place(known, camera)
+        if picture is not None and picture is not known.image:
+            known.image = picture
 
     def _frustum(self, name: str, camera: Camera, color: Color,
                  image: NDArray[np.uint8] | None, scale: float = _FRUSTUM) -> Any:
@@ -119,28 +134,44 @@ class Scene:
             color=color, image=image, thickness=0.012, cast_shadow=False,
             wxyz=SO3.from_matrix(camera.pose[:3, :3]).wxyz, position=camera.position / self._size)
 
-    def _label(self, name: str, words: str, others: int = 0) -> None:
+    def _place(self, frustum: Any, camera: Camera) -> None:
+        frustum.position = camera.position / self._size
+        frustum.wxyz = SO3.from_matrix(camera.pose[:3, :3]).wxyz
+
+    def _label(self, name: str, words: str, others: int = 0) -> Any:
         # Above the camera, and above others' labels there: y is down in its optical frame
-        self._scene.add_label(
+        return self._scene.add_label(
             name, words, position=(0, -0.62 * _FRUSTUM - 0.1 * others, _FRUSTUM),
             anchor='bottom-center', font_screen_scale=0.9)
 
-    def _boxes(self, name: str, centers: NDArray[np.floating], sides: Any,
-               colors: NDArray[np.uint8]) -> None:
-        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(centers), 1))
-        scales = np.broadcast_to(np.asarray(sides, np.float32), (len(centers), 3))
-        self._scene.add_batched_meshes_simple(
-            name, _BOX.vertices, _BOX.faces, upright, centers, batched_scales=scales,
-            batched_colors=colors, flat_shading=True, lod='off', cast_shadow=False,
-            receive_shadow=False)
+    def _boxes(self, name: str, side: float, centers: NDArray[np.floating],
+               colors: NDArray[np.uint8], scales: NDArray[np.floating] | None = None) -> None:
+        """Show cubes of a side that stays, (N, 3) times as long by `scales`."""
+        upright = np.tile(np.array([1, 0, 0, 0], np.float32), (len(centers), 1))
+        known = self._known.get(name)
+        if known is None:
+            self._known[name] = self._scene.add_batched_meshes_simple(
+                name, side * _BOX.vertices, _BOX.faces, upright, centers, batched_scales=scales,
+                batched_colors=colors, flat_shading=True, lod='off', cast_shadow=False,
+                receive_shadow=False)
+            return
+        if len(known.batched_wxyzs) != len(upright):
+            known.batched_wxyzs = upright
+        known.batched_positions = centers
+        known.batched_colors = colors
+        if scales is not None:
+            known.batched_scales = scales
 
     def _remove(self, name: str) -> None:
-        self._scene.remove_by_name(name)  # which is no error where there is none
+        known = self._known.pop(name, None)
+        if known is not None:
+            known.remove()
 
 
-def _together(view: TakenView, other: TakenView) -> bool:
-    apart = azimuth_difference(view.camera.azimuth, other.camera.azimuth)
-    return bool(abs(apart) < math.radians(7))
+def _together(view: TakenView, others: tuple[TakenView, ...]) -> int:
+    """Return how many of the others stand where a view does."""
+    apart = azimuth_difference([other.camera.azimuth for other in others], view.camera.azimuth)
+    return int((np.abs(apart) < math.radians(7)).sum())
 
 
 def shown_cells(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
@@ -156,8 +187,7 @@ def shown_cells(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
 
 def certainty_colors(occupancy: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return colours, (N, 3) RGB, from light (0, hardly occupied) to dark (1, certainly so)."""
-    shades = np.rint(235 - 195 * occupancy).astype(np.uint8)
-    return np.asarray(cv2.applyColorMap(shades, cv2.COLORMAP_VIRIDIS).reshape(-1, 3)[:, ::-1])
+    return _COLORS[np.rint(235 - 195 * occupancy).astype(np.uint8)]
 
 
 def relative_scores(scores: NDArray[np.floating]) -> NDArray[np.float64]:
