@@ -3,17 +3,19 @@
 import struct
 import tracemalloc
 
+from active_recon.bags import packing
 from active_recon.bags.reading import read_run
 from active_recon.cli.main import main
 from active_recon.errors import DataError
 from foreign_recordings import images, joints
 from loop_bags import BEGIN, LoopRun, type_name, write_bag
 from mcap.opcode import Opcode
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 import pytest
 from rclpy.serialization import serialize_message
-from recorded_messages import definition
-from rosbags.rosbag2 import StoragePlugin
+from recorded_messages import definition, IMAGE, STORE
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from test_reading import copied, same
 import zstandard
 
@@ -29,7 +31,7 @@ def mcap(path, definitions=definition, compression=CompressionType.NONE, chunked
          messages=RUN.messages):
     """Write an MCAP file of the run by hand."""
     with path.open('wb') as file:
-        writer = Writer(file, use_chunking=chunked, compression=compression)
+        writer = McapWriter(file, use_chunking=chunked, compression=compression)
         writer.start('ros2', 'a test')
         channels = {}
         for time, topic, msg in messages:
@@ -115,6 +117,45 @@ def test_a_chunk_that_unpacks_to_gigabytes_takes_none(tmp_path, claim):
     assert peak(tmp_path / 'bag.mcap', 'expected (a chunk|chunks)') < 2.5 * 2**27
 
 
+def bomb(size):
+    """Return so many zeros as a few bytes of zstd."""
+    packer = zstandard.ZstdCompressor().compressobj()
+    return b''.join(packer.compress(bytes(1 << 20)) for _ in range(size >> 20)) + packer.flush()
+
+
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+def test_a_packed_message_that_unpacks_to_much_more_takes_no_memory(tmp_path, monkeypatch,
+                                                                   storage):
+    monkeypatch.setattr(packing, 'MOST_BYTES', 1 << 22)
+    rosbag2 = Writer(tmp_path / 'run', version=9, storage_plugin=storage)
+    rosbag2.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    with rosbag2:
+        connection = rosbag2.add_connection('/camera/image_raw', IMAGE, typestore=STORE)
+        rosbag2.write(connection, BEGIN, bytes(1 << 26))
+    assert peak(tmp_path / 'run', 'expected messages of at most .* that unpacks to more') < 2**24
+
+
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+def test_a_packed_file_that_unpacks_to_gigabytes_fills_no_disk(bag, tmp_path, monkeypatch,
+                                                               storage):
+    monkeypatch.setattr(packing, 'MOST_BYTES', 1 << 24)
+    copy = copied(bag, tmp_path / 'copy', storage, CompressionMode.FILE)
+    (packed,) = copy.glob('*.zstd')
+    packed.write_bytes(bomb(1 << 28))
+    assert peak(copy, 'expected a file that unpacks to at most') < 2**24
+
+
+@pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+def test_what_is_told_to_be_packed_and_is_not_is_refused(bag, tmp_path, storage, mode):
+    copy = copied(bag, tmp_path / 'copy', storage)
+    description = copy / 'metadata.yaml'
+    description.write_text(description.read_text().replace(
+        "compression_mode: ''", f'compression_mode: {mode.name}'))
+    assert mode.name in description.read_text()
+    refusal(copy, 'packed by zstd, got other bytes')
+
+
 @pytest.mark.parametrize('compression', list(CompressionType))
 def test_chunks_are_read_however_they_are_packed(bag, tmp_path, compression):
     path = mcap(tmp_path / 'bag.mcap', compression=compression, chunked=True)
@@ -131,7 +172,7 @@ def test_a_definition_that_is_not_ros_own_is_refused(tmp_path):
 def test_bytes_of_another_type_than_the_schemas_are_refused(tmp_path):
     lying = tmp_path / 'bag.mcap'
     with lying.open('wb') as file:
-        writer = Writer(file)
+        writer = McapWriter(file)
         writer.start('ros2', 'a test')
         for topic, name in (('/camera/image_raw', 'sensor_msgs/msg/Image'),
                             ('/camera/pose', 'geometry_msgs/msg/PoseStamped')):
@@ -178,7 +219,8 @@ def test_a_view_whose_image_was_lost_is_named(tmp_path):
     ('a: &a [x, x]\nb: [*a, *a]', 'expected YAML, got: an alias'),
     ('rosbag2_bagfile_information: {storage_identifier: mcap, relative_file_paths: [x.mcap]}',
      'it is missing'),
-    ('rosbag2_bagfile_information: {storage_identifier: sqlite4, version: 5}', 'expected a bag')])
+    ('rosbag2_bagfile_information: {storage_identifier: sqlite4, relative_file_paths: []}',
+     'expected a storage of mcap or sqlite3')])
 def test_a_folder_whose_description_is_none_is_refused(tmp_path, text, match):
     (tmp_path / 'run').mkdir()
     (tmp_path / 'run' / 'metadata.yaml').write_text(text)

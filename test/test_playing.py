@@ -3,6 +3,7 @@
 from active_recon.bags.metadata import Topic
 from active_recon.bags.playing import played_topics
 from active_recon.errors import ConfigError, DataError
+from mcap.opcode import Opcode
 import pytest
 from recorded_messages import (
     announced,
@@ -13,8 +14,19 @@ from recorded_messages import (
     image,
     LATCHED,
     SENSOR,
+    STORE,
     time_of,
 )
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import StoragePlugin, Writer
+from test_bad_bags import first_record
 
 
 @pytest.fixture
@@ -51,6 +63,26 @@ def test_a_topic_that_the_bag_has_not_is_refused_with_those_it_has(bag):
 def test_what_is_no_whole_bag_is_refused(bag, tmp_path):
     with pytest.raises(DataError, match='there is nothing'):
         played_topics(tmp_path / 'nowhere', 1.0)
-    (bag.folder / 'metadata.yaml').unlink()
+    bag.path.write_bytes(bag.path.read_bytes()[:-100])
     with pytest.raises(DataError, match='active-recon bag repair'):
         played_topics(bag.folder, 1.0)
+
+
+def test_a_bag_that_is_damaged_inside_a_chunk_is_refused_before_anything_is_played(bag):
+    content = bytearray(bag.path.read_bytes())
+    content[first_record(content, Opcode.CHUNK) + 100] ^= 1
+    bag.path.write_bytes(content)
+    for damaged in (bag.folder, bag.path):
+        with pytest.raises(DataError, match='bag repair. keeps the others'):
+            played_topics(damaged, 1.0)
+
+
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+def test_bags_of_others_are_played_with_their_qos_too(tmp_path, storage):
+    profile = Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL,
+                  QosTime(0, 0), QosTime(0, 0), QosLiveliness.AUTOMATIC, QosTime(0, 0), False)
+    with Writer(tmp_path / 'run', version=9, storage_plugin=storage) as writer:
+        connection = writer.add_connection(
+            '/episode', HEADER, typestore=STORE, offered_qos_profiles=[profile])
+        writer.write(connection, time_of(0), cdr(header(0)))
+    assert played_topics(tmp_path / 'run', 1.0) == [Topic('/episode', HEADER, (LATCHED,))]

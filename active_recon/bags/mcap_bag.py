@@ -10,33 +10,36 @@ from active_recon.bags.metadata import (
     Contents,
     parameters_node,
     PROVENANCE,
+    qos_from_yaml,
+    Topic,
     yaml_mapping,
 )
+from active_recon.bags.packing import StoredFiles
 from active_recon.bags.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import DataError
 from active_recon.reporting import Advance, Reporting, silent
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
 
 class McapBag:
     """MCAP files that follow each other in the recording of that path."""
 
-    def __init__(self, path: Path, files: list[Path]) -> None:
+    def __init__(self, path: Path, files: StoredFiles) -> None:
         self._path = path
         self._files = files
 
     def summary(self, reporting: Reporting = silent) -> BagSummary:
         """Read all of the files and say what is in them."""
-        size = sum(path.stat().st_size for path in self._files)
+        size = sum(path.stat().st_size for path in self._files.paths)
         with reporting('checking the bag', size) as advance:
             return self._summary(advance)
 
     def _summary(self, advance: Advance) -> BagSummary:
-        types: dict[str, str] = {}
+        topics: dict[str, Topic] = {}
         contents = Contents()
         provenance: dict[str, str] = {}
         parameters: dict[str, Mapping[str, Any]] = {}
-        for record in self._records(types, advance):
+        for record in self._records(topics, advance):
             if isinstance(record, RawMessage):
                 contents.add(record.topic, record.received)
             elif isinstance(record, Metadata) and record.name == PROVENANCE:
@@ -44,7 +47,7 @@ class McapBag:
             elif isinstance(record, Attachment) and (node := parameters_node(record.name)):
                 parameters[node] = yaml_mapping(
                     record.data, f'{self._path}: {record.name}')
-        return bag_summary(types, contents, provenance, parameters)
+        return bag_summary(topics.values(), contents, provenance, parameters)
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """Yield the messages of the topics, file after file, each in its order."""
@@ -53,28 +56,39 @@ class McapBag:
             if isinstance(record, RawMessage) and record.topic in wanted:
                 yield record
 
-    def _records(self, types: dict[str, str], advance: Advance
+    def _records(self, topics: dict[str, Topic], advance: Advance
                  ) -> Iterator[RawMessage | Metadata | Attachment]:
-        """Yield what the files hold; `types` gathers the topics and their types."""
-        for path in self._files:
-            schemas: dict[int, Schema] = {}
-            channels: dict[int, tuple[str, str]] = {}
-            for record in mcap_records(path, advance):
-                if isinstance(record, Schema):
-                    schemas[record.id] = record
-                    if record.encoding == 'ros2msg':
-                        require_standard(record.name, record.data, path)
-                elif isinstance(record, Channel):
-                    channels[record.id] = record.topic, _type_name(record, schemas)
-                    types[record.topic] = channels[record.id][1]
-                elif isinstance(record, Message):
-                    if record.channel_id not in channels:
-                        raise DataError(f'{path}: expected messages of announced channels, got '
-                                        f'one of channel {record.channel_id}', 'damaged')
-                    yield RawMessage(*channels[record.channel_id], record.data, record.log_time,
-                                     record.publish_time or record.log_time)
-                elif isinstance(record, Metadata | Attachment):
-                    yield record
+        """Yield what the files hold; `topics` gathers those that they announce."""
+        with self._files.opened() as files:
+            for name, path in zip(self._files.paths, files, strict=True):
+                yield from self._file_records(mcap_records(path, advance, name), name, topics)
+
+    def _file_records(self, records: Iterator[McapRecord], name: Path, topics: dict[str, Topic]
+                      ) -> Iterator[RawMessage | Metadata | Attachment]:
+        schemas: dict[int, Schema] = {}
+        channels: dict[int, Topic] = {}
+        for record in records:
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+                if record.encoding == 'ros2msg':
+                    require_standard(record.name, record.data, name)
+            elif isinstance(record, Channel):
+                channels[record.id] = topics[record.topic] = Topic(
+                    record.topic, _type_name(record, schemas),
+                    qos_from_yaml(record.metadata.get('offered_qos_profiles', '')))
+            elif isinstance(record, Message):
+                if record.channel_id not in channels:
+                    raise DataError(f'{name}: expected messages of announced channels, got '
+                                    f'one of channel {record.channel_id}', 'damaged')
+                topic = channels[record.channel_id]
+                try:
+                    data = self._files.message(record.data)
+                except DataError as error:
+                    raise DataError(f'{name}: {error}', error.kind) from error
+                yield RawMessage(topic.name, topic.type_name, data, record.log_time,
+                                 record.publish_time or record.log_time)
+            elif isinstance(record, Metadata | Attachment):
+                yield record
 
 
 def _type_name(channel: Channel, schemas: Mapping[int, Schema]) -> str:

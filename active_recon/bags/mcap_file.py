@@ -28,23 +28,24 @@ _READ: dict[Opcode, _Reader] = {
     Opcode.ATTACHMENT: Attachment.read}
 
 
-def mcap_records(path: Path, advance: Advance) -> Iterator[McapRecord]:
+def mcap_records(path: Path, advance: Advance, name: Path | None = None) -> Iterator[McapRecord]:
     """
     Yield the schemas, channels, messages, metadata and attachments of a file, in its order.
 
-    The index is not used, so that it cannot mislead. `advance` is told the bytes.
-    Raises DataError where the file is no whole
+    The index is not used, so that it cannot mislead. `advance` is told the bytes. `name` is what
+    a person knows the file by, where it is another. Raises DataError where the file is no whole
     MCAP file or a chunk is not what its checksum says.
     """
+    name = name or path
     try:
         with path.open('rb') as file:
             yield from _file_records(file, path.stat().st_size, advance)
     except DataError as error:
-        raise DataError(f'{path}: {error}', error.kind) from error
+        raise DataError(f'{name}: {error}', error.kind) from error
     except OSError as error:
-        raise DataError(f'{path}: cannot be read: {error.strerror}') from error
+        raise DataError(f'{name}: cannot be read: {error.strerror}') from error
     except Exception as error:  # the decoders raise whatever damaged bytes lead them to
-        raise DataError(f'{path}: expected a whole MCAP file, got records that cannot be '
+        raise DataError(f'{name}: expected a whole MCAP file, got records that cannot be '
                         f'understood ({str(error) or type(error).__name__}); `active-recon bag '
                         'repair` keeps the others', 'damaged') from error
 

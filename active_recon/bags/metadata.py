@@ -1,7 +1,7 @@
 """rosbag2's description of a bag: what it holds, and the QoS its topics were offered with."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,10 @@ import yaml
 VERSION = 9  # of the description, as Jazzy writes it
 RELIABILITIES = ('reliable', 'best_effort')
 DURABILITIES = ('volatile', 'transient_local')
+_RELIABILITY: Mapping[object, str] = {
+    **{word: word for word in RELIABILITIES}, 1: 'reliable', 2: 'best_effort'}
+_DURABILITY: Mapping[object, str] = {
+    **{word: word for word in DURABILITIES}, 1: 'transient_local', 2: 'volatile'}
 PROVENANCE = 'active_recon'
 """The name of the MCAP metadata record that says what made a bag; the last one of a file holds."""
 
@@ -139,15 +143,19 @@ class _NoAliases(yaml.SafeLoader):
 
 
 def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
-    """Return the profiles that the channel of a topic carries; what is unknown is left out."""
+    """
+    Return the profiles that the channel of a topic carries; what is unknown is left out.
+
+    Before Jazzy their words were numbers, those of the middleware.
+    """
     try:
-        offered = yaml.safe_load(text) or []
-        return tuple(QosProfile(profile['reliability'], profile['durability'])
-                     for profile in offered
-                     if profile['reliability'] in RELIABILITIES
-                     and profile['durability'] in DURABILITIES)
-    except (yaml.YAMLError, TypeError, KeyError):
+        offered = yaml.load(text, _NoAliases) or []
+        named = [(_RELIABILITY.get(profile['reliability']), _DURABILITY.get(profile['durability']))
+                 for profile in offered]
+    except (yaml.YAMLError, TypeError, KeyError, ValueError, RecursionError):
         return ()
+    return tuple(QosProfile(reliability, durability) for reliability, durability in named
+                 if reliability and durability)
 
 
 def _span(contents: Contents) -> dict[str, Any]:

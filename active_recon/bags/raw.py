@@ -1,10 +1,10 @@
 """What every bag is read as: raw messages, and a summary of them."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from active_recon.bags.metadata import Contents
+from active_recon.bags.metadata import Contents, Topic
 from active_recon.bags.run import TopicSummary
 from active_recon.reporting import Reporting, silent
 
@@ -31,11 +31,12 @@ class BagSummary:
     parameters: Mapping[str, Mapping[str, Any]]
 
 
-def bag_summary(types: Mapping[str, str], contents: Contents, provenance: Mapping[str, str],
+def bag_summary(topics: Iterable[Topic], contents: Contents, provenance: Mapping[str, str],
                 parameters: Mapping[str, Mapping[str, Any]]) -> BagSummary:
-    """Return the summary of what was counted; `types` by topic."""
-    topics = [TopicSummary(name, types[name], contents.counts[name]) for name in sorted(types)]
-    return BagSummary(topics, contents.begin, contents.end, provenance, parameters)
+    """Return the summary of what was counted."""
+    counted = [TopicSummary(topic.name, topic.type_name, contents.counts[topic.name], topic.qos)
+               for topic in sorted(topics, key=lambda topic: topic.name)]
+    return BagSummary(counted, contents.begin, contents.end, provenance, parameters)
 
 
 class Bag(Protocol):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from active_recon.bags.metadata import QosProfile
 from active_recon.cameras import Camera
 from active_recon.voxels import VoxelGrid
 import numpy as np
@@ -13,11 +14,16 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class TopicSummary:
-    """A topic of a bag: its full name, its type as in 'std_msgs/msg/Header', its messages."""
+    """
+    A topic of a bag: its full name, its type as in 'std_msgs/msg/Header', its messages.
+
+    `qos` are the profiles that its publishers offered, as far as the bag tells.
+    """
 
     name: str
     type_name: str
     count: int
+    qos: tuple[QosProfile, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

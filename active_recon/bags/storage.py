@@ -5,10 +5,13 @@ from pathlib import Path
 from active_recon.bags.files import mcap_files
 from active_recon.bags.mcap_bag import McapBag
 from active_recon.bags.metadata import yaml_mapping
+from active_recon.bags.packing import PACKINGS, StoredFiles
 from active_recon.bags.raw import Bag
 from active_recon.bags.rosbag2 import OtherBag
 from active_recon.errors import DataError
 from mcap.writer import MCAP0_MAGIC
+
+_STORAGES = ('mcap', 'sqlite3')
 
 
 def open_bag(path: Path) -> Bag:
@@ -16,17 +19,16 @@ def open_bag(path: Path) -> Bag:
     if not path.exists():
         raise DataError(f'{path}: expected a bag, but there is nothing')
     if not path.is_dir():
-        return McapBag(path, [path]) if _is_mcap(path) else OtherBag(path)
-    files = mcap_files(path)
+        alone = StoredFiles([path])
+        return McapBag(path, alone) if _is_mcap(path) else OtherBag(path, alone)
     if (path / 'metadata.yaml').exists():
-        named = _named_files(path)
-        if named is None:
-            return OtherBag(path)
-        files = named
+        storage, named = _described(path)
+        return McapBag(path, named) if storage == 'mcap' else OtherBag(path, named)
+    files = mcap_files(path)
     if not files:
         raise DataError(f'{path}: expected a folder with a bag, got neither a metadata.yaml nor '
                         'an MCAP file')
-    return McapBag(path, files)
+    return McapBag(path, StoredFiles(files))
 
 
 def _is_mcap(path: Path) -> bool:
@@ -37,13 +39,13 @@ def _is_mcap(path: Path) -> bool:
         raise DataError(f'{path}: cannot be read: {error.strerror}') from error
 
 
-def _named_files(folder: Path) -> list[Path] | None:
-    """Return the MCAP files that metadata.yaml names; None where rosbag2 stored otherwise."""
+def _described(folder: Path) -> tuple[str, StoredFiles]:
+    """Return the storage that metadata.yaml tells, and the files that it names."""
     path = folder / 'metadata.yaml'
     try:
         information = yaml_mapping(path.read_bytes(), str(path))['rosbag2_bagfile_information']
-        if information['storage_identifier'] != 'mcap' or information.get('compression_mode'):
-            return None
+        storage = str(information['storage_identifier'])
+        packed = str(information.get('compression_mode') or '').lower().replace('none', '')
         files = [folder / Path(str(name)).name for name in information['relative_file_paths']]
     except OSError as error:
         raise DataError(f'{path}: cannot be read: {error.strerror}') from error
@@ -53,4 +55,7 @@ def _named_files(folder: Path) -> list[Path] | None:
     for file in files:
         if not file.is_file():
             raise DataError(f'{file}: expected the file that {path.name} names, but it is missing')
-    return files
+    if storage not in _STORAGES or packed not in PACKINGS:
+        raise DataError(f"{path}: expected a storage of {' or '.join(_STORAGES)}, packed by file, "
+                        f'by message or not at all, got {storage!r} and {packed!r}')
+    return storage, StoredFiles(files, packed)

@@ -5,6 +5,7 @@ from pathlib import Path
 import sys
 from typing import Annotated
 
+from active_recon.cli.progress import bag_progress
 import typer
 
 
@@ -27,7 +28,7 @@ def play(
     """
     from active_recon.bags.playing import played_topics
 
-    played_topics(bag, rate, topics)
+    played_topics(bag, rate, topics, bag_progress(bag))
     # The node takes this process's place, and so hears its Ctrl-C
     os.execv(sys.executable, [
         sys.executable, '-m', 'active_recon.nodes.player', '--ros-args', '-p', f'bag:="{bag}"',

@@ -121,3 +121,16 @@ def test_a_bag_that_was_cut_off_is_refused_with_the_cure(play, bag, tmp_path):
     assert play(tmp_path / 'run').wait(60) == 2
     (line,) = (tmp_path / 'said').read_text().splitlines()
     assert 'active-recon bag repair' in line
+
+
+def test_a_bag_that_is_damaged_inside_is_refused_and_not_played_in_part(
+        bench, play, bag, tmp_path):
+    path = tmp_path / 'run.mcap'
+    content = bytearray((bag / f'{bag.name}_0.mcap').read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
+    assert play(path).wait(60) == 2
+    (line,) = (tmp_path / 'said').read_text().splitlines()
+    assert line.startswith(f'active-recon: {path}: expected')
+    assert not poses
