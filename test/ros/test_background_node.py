@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
+from test_life_cycle import Supervisor
 
 pytestmark = pytest.mark.ros
 CAMERA = orbit_camera(0.5)
@@ -90,7 +91,8 @@ def test_what_a_mask_calls_background_becomes_white_and_a_bad_mask_refuses_its_i
                                atol=1e-5)
 
 
-def test_an_image_of_the_empty_scene_is_asked_for_taken_and_kept_over_episodes(bench, start_node):
+def test_an_image_of_the_empty_scene_is_asked_for_kept_over_episodes_and_forgotten_on_cleanup(
+        bench, start_node):
     node = start(start_node, background='reference')
     room = Room(bench)
     room.until(refused(bench, 'no_reference'), SHOWN)
@@ -110,6 +112,16 @@ def test_an_image_of_the_empty_scene_is_asked_for_taken_and_kept_over_episodes(b
     room.until(refused(bench, 'no_object'), EMPTY)
     other = orbit_camera(0.5, intrinsics=CANONICAL_INTRINSICS.resized(64, 64))
     room.until(refused(bench, 'reference'), EMPTY[:64, :64], camera=other)
+
+    supervisor = Supervisor(bench, 'reconstructor')
+    for transition in ('deactivate', 'activate'):
+        assert supervisor.set(transition)
+    np.testing.assert_array_equal(Room(bench).take(SHOWN), expected)
+    before = refused(bench, 'no_reference')()
+    for transition in ('deactivate', 'cleanup', 'configure', 'activate'):
+        assert supervisor.set(transition)
+    room = Room(bench)
+    room.until(lambda: refused(bench, 'no_reference')() > before, SHOWN)
 
 
 def test_what_is_of_the_background_s_color_becomes_white(bench, start_node):
