@@ -41,6 +41,7 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
         self._bag: BagWriter | None = None
         self._offered: dict[str, tuple[QosProfile, ...]] = {}
         self._heard: dict[str, Subscription] = {}
+        self._recorded_nodes: set[str] = set()
         self._asked = AskedParameters(self, self._on_parameters)
         self.create_service(Trigger, 'start', self._on_start)
         self.create_service(Trigger, 'stop', self._on_stop)
@@ -85,17 +86,24 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
 
     def _watch(self) -> None:
         """Listen to the publishers that have appeared, as each offers its messages."""
-        nodes = set()
-        for name in self._topics if self._bag is not None else ():
+        if self._bag is None:
+            self._asked.ask(())
+            return
+        for name in self._topics:
             publishers = self.get_publishers_info_by_topic(name)
             offered = tuple(sorted(map(offered_profile, publishers), key=str))
             if publishers and self._offered.get(name) != offered:
                 self._offered[name] = offered
                 self._listen(name, publishers[0].topic_type, offered)
             if name != DIAGNOSTICS:  # which whole robots publish
-                nodes |= {f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}'
-                          for publisher in publishers}
-        self._asked.ask(nodes)
+                self._recorded_nodes |= {
+                    _full_name(publisher.node_name, publisher.node_namespace)
+                    for publisher in publishers}
+        around = {_full_name(name, namespace)
+                  for name, namespace in self.get_node_names_and_namespaces()}
+        own = self.get_fully_qualified_name()
+        self._asked.ask(name for name in around - {own} if name in self._recorded_nodes or (
+            name.rpartition('/')[0] == own.rpartition('/')[0] and not _is_hidden(name)))
 
     def _listen(self, name: str, type_name: str, offered: tuple[QosProfile, ...]) -> None:
         assert self._bag is not None
@@ -126,7 +134,8 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
     def _on_parameters(self, node: str, parameters: dict[str, object]) -> None:
         if self._bag is None:
             return
-        made_it = {name: str(parameters[name]) for name in MADE_IT if name in parameters}
+        made_it = {name: str(parameters[name]) for name in MADE_IT if name in parameters
+                   and node in self._recorded_nodes}
         try:
             self._bag.attach_parameters(node, parameters)
             if made_it:
@@ -181,6 +190,15 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
         except RecordingError as error:
             self._fail(error)
         super().destroy_node()
+
+
+def _full_name(name: str, namespace: str) -> str:
+    return f'{namespace.rstrip("/")}/{name}'
+
+
+def _is_hidden(full_name: str) -> bool:
+    """Return whether ROS hides a node, as those of its command line that come and go."""
+    return full_name.rpartition('/')[2].startswith('_')
 
 
 def main(args: list[str] | None = None) -> None:

@@ -14,6 +14,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 import numpy as np
 import pytest
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
@@ -224,11 +225,27 @@ def test_a_killed_recorder_has_told_what_made_the_bag(bench, start_node, box, tm
     recorder.stop(signal.SIGKILL)
     record, parameters = provenance_of(path)
     assert (record['object'], record['policy'], record['seed']) == ('box.ply', 'random', '12')
-    assert parameters.keys() == {
+    assert parameters.keys() >= {
         f'parameters/{node}.yaml' for node in ('recorder', 'turntable_camera', 'view_planner')}
     assert parameters['parameters/recorder.yaml']['max_bag_size_mb'] == 7
     assert parameters['parameters/view_planner.yaml']['max_views'] == 5
     assert math.isnan(parameters['parameters/view_planner.yaml']['start_azimuth'])
+
+
+def test_the_parameters_of_nodes_that_publish_nothing_are_kept_too(bench, start_node, tmp_path):
+    bench.node.declare_parameter('seed', 99)  # of something else: it did not make the bag
+    elsewhere = Node('elsewhere', namespace='/other_robot', context=bench.node.context)
+    try:
+        start_node('recorder', output_dir=tmp_path / 'bags')
+        (path,) = (tmp_path / 'bags').glob('*/*.mcap')
+        name = f'parameters/{bench.node.get_name()}.yaml'
+        bench.until(lambda: name in provenance_of(path)[1], 'the parameters of a bystander')
+        record, parameters = provenance_of(path)
+        assert parameters[name]['seed'] == 99
+        assert 'seed' not in record
+        assert not [found for found in parameters if 'elsewhere' in found]
+    finally:
+        elsewhere.destroy_node()
 
 
 def test_a_node_that_comes_back_is_asked_again(bench, start_node, tmp_path):
