@@ -4,6 +4,8 @@ from collections import deque
 from collections.abc import Iterator
 from statistics import median
 
+import numpy as np
+
 STREAMS = ('images', 'camera_info', 'poses')
 SILENT_S = 0.5
 """A stream is silent after this time without a message, or after three of its periods."""
@@ -11,8 +13,9 @@ LATE_S = 0.15
 """An image is late that comes so long after the camera info or the pose of its stamp."""
 WINDOW_S = 1.5
 """What is missing or late is counted over this time."""
-_PERIODS = 10
-_SHORTEST_PERIOD_S = 0.002
+_STAMPS = 21
+_REGULAR, _NO_LONGER = 0.85, 0.6
+"""This share of periods is near the median: of what becomes a stream, of what still is one."""
 _AT_LEAST, _SHARE = 2, 0.1
 
 
@@ -29,17 +32,20 @@ class StreamWatch:
 
     def clear(self) -> None:
         """Begin anew, as if nothing had come yet."""
-        self._arrivals: dict[str, deque[float]] = {
-            stream: deque(maxlen=_PERIODS + 1) for stream in STREAMS}
+        self._arrived: dict[str, float] = {}
+        self._stamps: dict[str, deque[int]] = {
+            stream: deque(maxlen=_STAMPS) for stream in STREAMS}
         self._periods: dict[str, float] = {}
         self._moments: dict[int, dict[str, float]] = {}
 
     def heard(self, stream: str, stamp: int, now: float) -> None:
         """Note a message of one of STREAMS, whether or not it can be used."""
         self._moments.setdefault(stamp, {}).setdefault(stream, now)
-        arrivals = self._arrivals[stream]
-        arrivals.append(now)
-        if len(arrivals) > _PERIODS:
+        self._arrived[stream] = now
+        stamps = self._stamps[stream]
+        if not stamps or stamp > stamps[-1]:
+            stamps.append(stamp)
+        if len(stamps) == _STAMPS:
             self._note_period(stream)
 
     def found(self, now: float) -> dict[str, str]:
@@ -49,17 +55,16 @@ class StreamWatch:
 
     def _note_period(self, stream: str) -> None:
         """Keep the period of a stream that comes regularly; one that no longer does has none."""
-        arrivals = list(self._arrivals[stream])
-        periods = [b - a for a, b in zip(arrivals, arrivals[1:], strict=False)]
-        typical = median(periods)
-        regular = sum(typical / 3 <= period <= 3 * typical for period in periods)
-        if typical >= _SHORTEST_PERIOD_S and regular >= 0.8 * len(periods):
+        periods = np.diff(self._stamps[stream]) / 1e9
+        typical = float(np.median(periods))
+        regular = float(np.mean((periods >= typical / 3) & (periods <= 3 * typical)))
+        if regular >= (_NO_LONGER if stream in self._periods else _REGULAR):
             self._periods[stream] = typical
         else:
             self._periods.pop(stream, None)
 
     def _silent(self, now: float) -> dict[str, str]:
-        since = {stream: now - self._arrivals[stream][-1] for stream in self._periods}
+        since = {stream: now - self._arrived[stream] for stream in self._periods}
         silent = {stream: time for stream, time in since.items()
                   if time > max(SILENT_S, 3 * self._periods[stream])}
         if len(silent) == len(STREAMS):

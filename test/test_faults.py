@@ -1,6 +1,7 @@
 """What the simulated camera sends of each shot, under each fault."""
 
 from collections import Counter
+from pathlib import Path
 
 from active_recon.cameras import azimuth_difference, orbit_camera
 from active_recon.errors import ConfigError
@@ -160,3 +161,9 @@ def test_a_fault_that_cannot_be_is_refused_with_the_reason(entries, said):
 def test_faults_are_read_and_empty_entries_passed_by():
     assert read_faults(['drop_images:0.3', '', 'pose_noise:1e-2']) == {
         'drop_images': 0.3, 'pose_noise': 0.01}
+
+
+def test_the_readme_has_a_row_for_each_fault_and_for_no_other():
+    readme = (Path(__file__).parents[1] / 'README.md').read_text()
+    table = readme.split('| fault |')[1].split('\n\n')[0]
+    assert [row.split('`')[1] for row in table.splitlines()[2:]] == list(FAULTS)

@@ -15,6 +15,7 @@ from active_recon.cameras import (
     orbit_camera,
 )
 from active_recon.errors import ConfigError, DataError, MessageError
+from active_recon.nodes.camera_watch import CameraWatch
 from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.parameters import Commit, Parameters, tell
 from active_recon.nodes.pose_sources import check_pose_source, hear_poses
@@ -60,6 +61,8 @@ class ReconstructorNode(ManagedNode):
         self._joiner = ViewJoiner(settings.max_pose_gap, masks=self._background.how == 'mask')
         self._gate = ViewGate(
             settings.take_views, settings.goal_tolerance, settings.min_view_separation)
+        self._watch = CameraWatch(
+            self._diagnostics, settings.goal_tolerance, settings.stall_timeout)
         self._object_frame = settings.object_frame
         self._reconstruction: Reconstruction | None = None
         self._view_pub = self.create_publisher(PoseStamped, 'view', LATCHED)
@@ -85,6 +88,8 @@ class ReconstructorNode(ManagedNode):
             self, self._settings.now, self._object_frame, self._on_pose, self._diagnostics)
         self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
         self.create_timer(0.1, self._take_in)  # what has waited in vain is refused
+        self.create_timer(0.1, self._watch.tell)
+        self.on_undo(self._watch.forget)
 
     def _load(self, settings: ReconstructorSettings) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
@@ -117,6 +122,7 @@ class ReconstructorNode(ManagedNode):
             self._gate.take_views = settings.take_views
             self._gate.goal_tolerance = settings.goal_tolerance
             self._gate.min_view_separation = settings.min_view_separation
+            self._watch.change(settings.goal_tolerance, settings.stall_timeout)
 
         return commit
 
@@ -135,6 +141,7 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.count('images')
         with self._diagnostics.refusing():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
+            self._watch.heard('images', stamp)
             self._capture.image_came(stamp, partial(image_from_msg, msg))
             if stamp < self._episode.begin:
                 raise MessageError(
@@ -147,8 +154,9 @@ class ReconstructorNode(ManagedNode):
 
     def _on_camera_info(self, msg: CameraInfo) -> None:
         with self._diagnostics.refusing():
-            self._joiner.add_intrinsics(
-                nanoseconds_from_stamp(msg.header.stamp), intrinsics_from_msg(msg))
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            self._watch.heard('camera_info', stamp)
+            self._joiner.add_intrinsics(stamp, intrinsics_from_msg(msg))
         self._take_in()
 
     def _on_mask(self, msg: Image) -> None:
@@ -158,8 +166,11 @@ class ReconstructorNode(ManagedNode):
     def _on_pose(self, msg: PoseStamped) -> None:
         self._diagnostics.count('poses')
         with self._diagnostics.refusing():
-            self._joiner.add_pose(nanoseconds_from_stamp(msg.header.stamp),
-                                  pose_from_msg(msg, self._object_frame))
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            self._watch.heard('poses', stamp)
+            pose = pose_from_msg(msg, self._object_frame)
+            self._watch.stands(Camera(pose), stamp, self._gate.open_goal)
+            self._joiner.add_pose(stamp, pose)
         self._take_in()
 
     def _on_goal(self, msg: PoseStamped) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import DataError
+from active_recon.faults import CameraFaults, read_faults, Sent, Shot
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import Commit, Parameters, ReadOnlySaysWhy, tell
 from active_recon.nodes.qos import HEARD, STREAM
@@ -17,6 +18,7 @@ from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs
 from msg_tools.goals import azimuth_goal_from_msg
 from msg_tools.images import image_to_msg
+from msg_tools.stamps import stamp_from_nanoseconds
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.task import Future
 from sensor_msgs.msg import CameraInfo, Image, JointState
@@ -35,8 +37,8 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
         self._settings = Parameters(self, TurntableCameraSettings)
         self._settings.on_change(self._change)
         settings = self._settings.now
-        self._turntable = Turntable(
-            settings.start_azimuth, settings.speed, settings.time_scale)
+        self._turntable = _at_start(settings)
+        self._faults = CameraFaults(read_faults(settings.faults), settings.faults_seed)
         self._objects = _objects(settings)
         self._index = 0
         first = self._objects[0]()
@@ -56,8 +58,11 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
 
     def _change(self, settings: TurntableCameraSettings) -> Commit:
         """Return what puts settings into effect that changed while the node runs."""
+        faults = read_faults(settings.faults)
+
         def commit() -> None:
-            self._turntable.set_speed(settings.speed, settings.time_scale, self._now_s())
+            self._turntable.set_speed(settings.speed, settings.time_scale, self._motor_s())
+            self._faults.change(faults)
             self._timer.timer_period_ns = round(1e9 / settings.rate)
             self._timer.reset()
 
@@ -66,22 +71,42 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
     def _now_s(self) -> float:
         return self.get_clock().now().nanoseconds / 1e9
 
+    def _motor_s(self) -> float:
+        return self._faults.motor_time(self._now_s())
+
     def _show(self) -> None:
         if self._shown is None:
             return
-        now = self.get_clock().now()
-        image, camera = self._shown.seen_from(self._turntable.azimuth_at(now.nanoseconds / 1e9))
-        header = Header(stamp=now.to_msg(), frame_id=self._settings.now.camera_frame)
-        info, pose = camera_to_msgs(camera, header, self._settings.now.object_frame)
+        now = self.get_clock().now().nanoseconds
+        if not self._faults.is_there(now / 1e9):
+            self._turntable = _at_start(self._settings.now)
+            return
+        image, camera = self._shown.seen_from(
+            self._turntable.azimuth_at(self._faults.motor_time(now / 1e9)))
         # The image comes last: whoever hears it has what belongs to it.
-        self._pose_pub.publish(pose)
-        self._info_pub.publish(info)
-        self._image_pub.publish(image_to_msg(image, header))
-        self._diagnostics.count('images')
+        for sent in self._faults.sent(Shot(now, image, camera), now / 1e9):
+            self._send(sent)
+
+    def _send(self, sent: Sent) -> None:
+        settings, shot = self._settings.now, sent.shot
+        header = Header(stamp=stamp_from_nanoseconds(shot.stamp), frame_id=settings.camera_frame)
+        if sent.part == 'image':
+            msg = image_to_msg(shot.image, header)
+            del msg.data[round(sent.kept * len(msg.data)):]
+            self._image_pub.publish(msg)
+            self._diagnostics.count('images')
+            return
+        info, pose = camera_to_msgs(shot.camera, header, settings.object_frame)
+        if sent.part == 'pose':
+            self._pose_pub.publish(pose)
+        else:
+            self._info_pub.publish(info)
 
     def _on_goal(self, msg: JointState) -> None:
+        if not self._faults.is_there(self._now_s()):
+            return
         with self._diagnostics.refusing():
-            self._turntable.turn_to(azimuth_goal_from_msg(msg), self._now_s())
+            self._turntable.turn_to(azimuth_goal_from_msg(msg), self._motor_s())
             self._diagnostics.count('goals')
 
     async def _on_next_object(self, _request: Trigger.Request,
@@ -116,6 +141,10 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
         answer = await answered
         self.destroy_timer(late)
         return answer is not None and answer.success
+
+
+def _at_start(settings: TurntableCameraSettings) -> Turntable:
+    return Turntable(settings.start_azimuth, settings.speed, settings.time_scale)
 
 
 def _objects(settings: TurntableCameraSettings) -> list[partial[ShownObject]]:

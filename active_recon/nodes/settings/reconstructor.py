@@ -35,6 +35,9 @@ class ReconstructorSettings(BackgroundSettings, CameraPoseSettings, FrontSetting
     max_pose_gap: float = parameter(
         0.1, 's from an image to a pose that is interpolated', low=0.0, high=10.0,
         changeable=True)
+    stall_timeout: float = parameter(
+        1.0, 's for which a camera may stand away from its goal before the motion is called '
+        'stalled', low=0.1, high=3600.0, changeable=True)
     output_dir: str = parameter('.', 'where meshes are saved')
     mesh_format: str = parameter(
         'ply', 'the format of saved meshes', choices=MESH_FORMATS, changeable=True)

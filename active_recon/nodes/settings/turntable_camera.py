@@ -25,6 +25,10 @@ class TurntableCameraSettings(CubeSettings):
         1.0, 'how much faster than the clock it turns', low=0.001, high=1000.0, changeable=True)
     rate: float = parameter(10.0, 'of the stream, Hz', low=0.1, high=1000.0, changeable=True)
     camera_frame: str = parameter('camera_optical_frame', 'the frame of the images')
+    faults: tuple[str, ...] = parameter(
+        (), 'what goes wrong, each as NAME:AMOUNT, such as drop_images:0.3', changeable=True)
+    faults_seed: int = parameter(
+        0, 'of what goes wrong by chance', low=0, high=2**32 - 1)
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
