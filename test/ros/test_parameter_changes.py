@@ -1,0 +1,131 @@
+"""Parameters that change while a node runs, by the services that `ros2 param` calls."""
+
+import math
+
+from active_recon.cameras import Camera
+from active_recon.nodes.parameters import NEW_START
+from conftest import FakeCamera, LATCHED
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import pose_from_msg
+from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
+import pytest
+from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from test_planner_node import FakeReconstructor, latent  # noqa: F401
+
+pytestmark = pytest.mark.ros
+
+
+def messages(values):
+    return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+
+
+def change(bench, node, **values):
+    """Set each parameter by itself; return the results by name."""
+    request = SetParameters.Request(parameters=messages(values))
+    answer = bench.ask(SetParameters, f'{node}/set_parameters', request)
+    return dict(zip(values, answer.results, strict=True))
+
+
+def change_together(bench, node, **values):
+    request = SetParametersAtomically.Request(parameters=messages(values))
+    return bench.ask(
+        SetParametersAtomically, f'{node}/set_parameters_atomically', request).result
+
+
+def test_a_threshold_counts_from_the_next_view_and_what_is_refused_changes_nothing(
+        start_node, bench):
+    start_node('reconstructor', take_views='all', threshold=0.01)
+    camera = FakeCamera(bench)
+    camera.show()
+    cells = camera.occupancy[-1].width
+    assert cells > 0
+    results = change(bench, 'reconstructor', threshold=1.5, weights='other.safetensors',
+                     take_views='some', mesh_format='stl')
+    assert {name: each.successful for name, each in results.items()} == {
+        'threshold': False, 'weights': False, 'take_views': False, 'mesh_format': True}
+    assert 'expected a number from 0.01 to 0.99, or nan, got 1.5' in results['threshold'].reason
+    assert NEW_START in results['weights'].reason
+    assert 'expected one of auto' in results['take_views'].reason
+    assert not change_together(
+        bench, 'reconstructor', threshold=0.99, max_pose_gap=-1.0).successful
+    camera.show()
+    assert camera.occupancy[-1].width > cells / 4  # the same image again: about as much is known
+    assert change_together(bench, 'reconstructor', threshold=0.99, max_pose_gap=1).successful
+    camera.show()
+    assert camera.occupancy[-1].width < cells / 4
+
+
+def test_views_are_taken_by_the_rule_that_was_set_last(start_node, bench):
+    start_node('reconstructor', take_views='at_goal')
+    camera = FakeCamera(bench)
+
+    def is_unused():
+        camera.send(*camera.messages())
+        return bench.counts('reconstructor').get('images_unused')
+
+    bench.until(is_unused, 'an image that is not used')
+    assert not camera.occupancy
+    assert change(bench, 'reconstructor', take_views='all')['take_views'].successful
+    camera.show()
+
+
+def test_a_policy_that_is_changed_goes_on_from_what_the_episode_has_seen(
+        start_node, bench, latent):  # noqa: F811
+    start_node('view_planner', policy='uniform', max_views=8, start_azimuth=0.0,
+               entropy_tolerance=0.0)
+    fake = FakeReconstructor(bench)
+    fake.begin('only')
+    fake.wait_goal(0)
+    second = view_goal_from_msg(fake.wait_goal(fake.show(latent, 0.0)))
+    assert second == pytest.approx(math.tau / 8)
+    assert change(bench, 'view_planner', policy='farthest')['policy'].successful
+    third = view_goal_from_msg(fake.wait_goal(fake.show(latent, second)))
+    assert third == pytest.approx(math.pi + math.tau / 16, abs=0.14)
+    assert change(bench, 'view_planner', max_views=3)['max_views'].successful
+    fake.show(latent, third)
+    bench.until(lambda: fake.done[-1].frame_id == 'max_views', 'the end after three views')
+
+
+def test_a_policy_whose_weights_are_missing_is_refused_and_the_last_one_stays(
+        start_node, bench, latent, tmp_path):  # noqa: F811
+    start_node('view_planner', policy='farthest', start_azimuth=0.0,
+               weights=tmp_path / 'none.safetensors')
+    fake = FakeReconstructor(bench)
+    fake.begin('only')
+    fake.wait_goal(0)
+    request = SetParameters.Request(parameters=messages({'policy': 'attention'}))
+    result, = bench.ask(SetParameters, 'view_planner/set_parameters', request).results
+    assert not result.successful
+    assert 'no such file' in result.reason
+    goal = fake.wait_goal(fake.show(latent, 0.0))
+    assert view_goal_from_msg(goal) == pytest.approx(math.pi, abs=0.14)
+
+
+def test_the_services_describe_what_may_change(start_node, bench):
+    start_node('view_planner', policy='farthest')
+    names = ['policy', 'max_views', 'entropy_tolerance', 'weights']
+    policy, views, tolerance, weights = bench.ask(
+        DescribeParameters, 'view_planner/describe_parameters',
+        DescribeParameters.Request(names=names)).descriptors
+    assert not policy.read_only and 'one of attention' in policy.additional_constraints
+    assert views.integer_range[0].to_value == 1000
+    assert tolerance.floating_point_range[0].to_value == pytest.approx(0.99)
+    assert weights.read_only and NEW_START in weights.additional_constraints
+
+
+def test_a_turntable_turns_and_streams_as_fast_as_was_set_last(start_node, bench, box):
+    start_node('turntable_camera', mesh=box, rate=0.1, speed=0.001)  # no goal is reached so
+    poses = bench.hear(PoseStamped, 'camera/pose')
+    goals = bench.advertise(JointState, 'next_azimuth', LATCHED)
+    result = change_together(bench, 'turntable_camera', rate=50, speed=100)
+    assert result.successful, result.reason
+
+    def there():
+        goals.publish(azimuth_goal_to_msg(2.0, Header()))
+        azimuth = Camera(pose_from_msg(poses[-1])).azimuth if poses else 0.0
+        return len(poses) > 10 and abs(azimuth - 2.0) < 0.2
+
+    bench.until(there, 'a stream of poses, and the goal')
