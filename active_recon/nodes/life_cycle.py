@@ -7,6 +7,7 @@ import traceback
 from typing import Any
 
 from active_recon.errors import ActiveReconError
+from active_recon.nodes.clock import ClockWatch
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import ReadOnlySaysWhy
 from active_recon.nodes.qos_warnings import QosWarnings
@@ -45,6 +46,10 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         """Begin to hear and to work."""
         raise NotImplementedError
 
+    def clock_went_back(self, how: str) -> None:
+        """Begin anew while active; `how` says in words what the clock did."""
+        raise NotImplementedError
+
     def on_undo(self, undo: Callable[[], Any]) -> None:
         """Let the opposite of the transition that is being made call `undo`."""
         assert self._being_made is not None
@@ -62,7 +67,7 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Configure, or hold nothing."""
         self._before = frozenset(vars(self))
-        result = self._transit(self.configure, self._configured)
+        result = self._transit('configure', self.configure, self._configured)
         self.is_configured = result == TransitionCallbackReturn.SUCCESS
         if not self.is_configured:
             self._free()
@@ -71,7 +76,7 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Activate, or hear nothing."""
-        result = self._transit(self.activate, self._activated)
+        result = self._transit('activate', self._activate, self._activated)
         self.is_active = result == TransitionCallbackReturn.SUCCESS
         if self.is_active:
             self.get_logger().info('ready')
@@ -103,16 +108,22 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         """Free everything; the node can be configured again."""
         return self.on_cleanup(state)
 
-    def _transit(self, make: Callable[[], None], undo: ExitStack) -> TransitionCallbackReturn:
+    def _activate(self) -> None:
+        self.clock_watch = ClockWatch(self, self.clock_went_back)
+        self.on_undo(self.clock_watch.close)
+        self.activate()
+
+    def _transit(self, name: str, make: Callable[[], None],
+                 undo: ExitStack) -> TransitionCallbackReturn:
         self._being_made, self._failure = undo, None
         try:
             make()
         except ActiveReconError as error:
-            self._tell_failure(error, f'{make.__name__} failed: {one_line(error)}')
+            self._tell_failure(error, f'{name} failed: {one_line(error)}')
             undo.close()
             return TransitionCallbackReturn.FAILURE
         except Exception as error:  # rclpy would pass over it in silence
-            self._tell_failure(error, f'{make.__name__} failed: {traceback.format_exc()}')
+            self._tell_failure(error, f'{name} failed: {traceback.format_exc()}')
             undo.close()
             return TransitionCallbackReturn.ERROR
         finally:

@@ -16,6 +16,7 @@ from active_recon.cameras import (
 )
 from active_recon.errors import ConfigError, DataError, MessageError
 from active_recon.nodes.camera_watch import CameraWatch
+from active_recon.nodes.clock import STEADY
 from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.parameters import Commit, Parameters, tell
 from active_recon.nodes.pose_sources import check_pose_source, hear_poses
@@ -87,8 +88,9 @@ class ReconstructorNode(ManagedNode):
         self._poses = hear_poses(
             self, self._settings.now, self._object_frame, self._on_pose, self._diagnostics)
         self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
-        self.create_timer(0.1, self._take_in)  # what has waited in vain is refused
-        self.create_timer(0.1, self._watch.tell)
+        # What has waited in vain is refused
+        self.create_timer(0.1, self._take_in, clock=STEADY)
+        self.create_timer(0.1, self._watch.tell, clock=STEADY)
         self.on_undo(self._watch.forget)
 
     def _load(self, settings: ReconstructorSettings) -> Reconstructor:
@@ -137,13 +139,19 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.tell('Views of the episode', '0')
         self._episode_pub.publish(episode_to_msg(self._episode))
 
+    def clock_went_back(self, how: str) -> None:
+        """Begin an episode: what was seen bears stamps that are yet to come."""
+        self._begin_episode()
+        self._diagnostics.count('clock_jumps')
+        self.get_logger().warning(f'{how}: the episode {self._episode.id} begins')
+
     def _on_image(self, msg: Image) -> None:
         self._diagnostics.count('images')
         with self._diagnostics.refusing():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             self._watch.heard('images', stamp)
             self._capture.image_came(stamp, partial(image_from_msg, msg))
-            if stamp < self._episode.begin:
+            if stamp < self._episode.begin or self.clock_watch.is_ahead(stamp):
                 raise MessageError(
                     'expected an image of this episode, which began at '
                     f'{self._episode.begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
@@ -176,7 +184,7 @@ class ReconstructorNode(ManagedNode):
     def _on_goal(self, msg: PoseStamped) -> None:
         with self._diagnostics.refusing():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
-            if stamp >= self._episode.begin:
+            if stamp >= self._episode.begin and not self.clock_watch.is_ahead(stamp):
                 self._gate.set_goal(view_goal_from_msg(msg, self._object_frame), stamp)
 
     def _take_in(self) -> None:

@@ -2,10 +2,12 @@
 
 import math
 from pathlib import Path
+import time
 from typing import Any
 
 from active_recon.cameras import Camera, CANONICAL_DISTANCE
 from active_recon.errors import ActiveReconError
+from active_recon.nodes.clock import AHEAD_S, STEADY
 from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.parameters import Commit, Parameters
 from active_recon.nodes.qos import HEARD, LATCHED
@@ -72,8 +74,8 @@ class ViewPlannerNode(ManagedNode):
         self.create_subscription(PoseStamped, 'view', self._on_view, LATCHED)
         self.create_subscription(PointCloud2, 'probabilities', self._on_probabilities, LATCHED)
         self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
-        self.create_timer(0.1, self._ask_first)
-        self.create_timer(REPEAT_S, self._repeat)
+        self.create_timer(0.1, self._ask_first, clock=STEADY)
+        self.create_timer(REPEAT_S, self._repeat, clock=STEADY)
 
     def _load(self, settings: ViewPlannerSettings) -> Policy:
         if settings.policy == 'attention':  # only this one needs torch, and the time to load it
@@ -119,13 +121,26 @@ class ViewPlannerNode(ManagedNode):
                 return
             self._forget()
             self._episode = episode
-            self._heard_at = self.get_clock().now().nanoseconds
+            self._heard_at = time.monotonic()
             self._diagnostics.count('episodes')
             self._diagnostics.tell('Episode', episode.id)
             self._tell_done(episode.begin, '')
             if self._early is not None:
                 self._decide(*self._early, episode)
                 self._early = None
+
+    def clock_went_back(self, how: str) -> None:
+        """Wait for the episode of the new time, unless it came before the new time was heard."""
+        now = self.get_clock().now().nanoseconds
+        self._begun_at = min(self._begun_at, now)
+        self._last_goal_stamp = 0
+        self._diagnostics.count('clock_jumps')
+        self.get_logger().warning(f'{how}: a new episode is awaited')
+        if self._episode is not None and self._episode.begin > now + AHEAD_S * 1e9:
+            self._episode = None
+            self._forget()
+        elif self._asked is not None:
+            self._ask(self._planner.plan())  # under a stamp of the new time
 
     def _on_camera(self, msg: PoseStamped) -> None:
         with self._diagnostics.refusing():
@@ -139,8 +154,7 @@ class ViewPlannerNode(ManagedNode):
         if self._episode is None or self._started:
             return
         older = self._episode.begin < self._begun_at
-        waited = self.get_clock().now().nanoseconds - self._heard_at
-        if older and waited < FIND_VIEWS_S * 1e9:
+        if older and time.monotonic() - self._heard_at < FIND_VIEWS_S:
             return
         start = self._settings.now.start_azimuth
         azimuth = self._camera_azimuth if math.isnan(start) else start
@@ -163,6 +177,8 @@ class ViewPlannerNode(ManagedNode):
     def _join(self, name: str, header: Header, part: Any) -> None:
         """Decide once all parts of a view are there, and its episode is known."""
         stamp = nanoseconds_from_stamp(header.stamp)
+        if self.clock_watch.is_ahead(stamp):
+            return
         parts = self._joiner.add(name, stamp, part)
         if parts is None:
             return

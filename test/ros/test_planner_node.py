@@ -40,12 +40,13 @@ class FakeReconstructor:
         self.goals = bench.hear(PoseStamped, 'next_view', LATCHED)
         self.done = bench.hear(Header, 'done', LATCHED)
 
-    def begin(self, name):
-        self.publishers['episode'].publish(episode_to_msg(Episode(name, self.bench.now())))
+    def begin(self, name, stamp=None):
+        begin = self.bench.now() if stamp is None else stamp
+        self.publishers['episode'].publish(episode_to_msg(Episode(name, begin)))
 
-    def show(self, latent, azimuth):
-        """Publish a view's three parts; return their stamp."""
-        stamp = self.bench.now()
+    def show(self, latent, azimuth, stamp=None):
+        """Publish a view's three parts, of now if no stamp is given; return their stamp."""
+        stamp = self.bench.now() if stamp is None else stamp
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
         self.publishers['probabilities'].publish(voxel_grid_to_msg(GRID, FLOOR, header))
         self.publishers['latent'].publish(latent_to_msg(latent, header))

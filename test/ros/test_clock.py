@@ -1,0 +1,126 @@
+"""Nodes on a clock of a simulation: they follow it, and begin an episode where it goes back."""
+
+import itertools
+import math
+
+from conftest import FakeCamera, LATCHED
+from msg_tools.goals import view_goal_from_msg
+from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
+import pytest
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
+from test_parameter_changes import change
+from test_planner_node import FakeReconstructor, latent  # noqa: F401
+
+pytestmark = pytest.mark.ros
+S = 1_000_000_000
+
+
+class FakeClock:
+    """The time of a simulation, in the bench's hand; it is told until it is heard."""
+
+    def __init__(self, bench):
+        self._bench = bench
+        self._publisher = bench.advertise(Clock, '/clock')
+        self.now = 0
+
+    def tell(self, seconds):
+        self.now = round(seconds * S)
+        self._publisher.publish(Clock(clock=stamp_from_nanoseconds(self.now)))
+
+    def until(self, condition, what, seconds):
+        """Tell a time until the condition holds."""
+        def told():
+            self.tell(seconds)
+            return condition()
+        return self._bench.until(told, what)
+
+
+def begin_of(episode):
+    return nanoseconds_from_stamp(episode.stamp)
+
+
+def test_a_reconstructor_begins_an_episode_where_its_clock_goes_back(start_node, bench):
+    node = start_node('reconstructor', take_views='all', use_sim_time=True)
+    clock = FakeClock(bench)
+    episodes = bench.hear(Header, 'episode', LATCHED)
+    bench.until(lambda: episodes, 'the first episode')
+    camera = FakeCamera(bench)
+
+    sent = itertools.count()
+
+    def taken(second):
+        camera.send(*camera.messages(second * S + next(sent)))  # best effort may lose one
+        return any(second * S <= nanoseconds_from_stamp(msg.header.stamp) < (second + 1) * S
+                   for msg in camera.occupancy)
+
+    clock.until(lambda: taken(100), 'a view', 100.0)
+    clock.tell(99.95)
+    clock.until(lambda: taken(160), 'a view after a jump ahead', 160.0)
+    assert len(episodes) == 1
+    clock.until(lambda: len(episodes) == 2, 'a second episode', 50.0)
+    assert begin_of(episodes[1]) == 50 * S
+    bench.until(lambda: taken(161) or bench.counts('reconstructor').get('refused/last_episode'),
+                'the refusal of what was on its way since before the jump')
+    assert not taken(161)
+    clock.until(lambda: taken(50), 'a view of the second episode', 50.0)
+    assert len(episodes) == 2
+    said, = node.log('the clock went back by 110.000 s: ')
+    assert episodes[1].frame_id in said
+    assert bench.counts('reconstructor')['clock_jumps'] == 1
+
+
+def test_a_node_that_changes_to_the_clock_of_a_simulation_begins_an_episode(start_node, bench):
+    start_node('reconstructor')
+    episodes = bench.hear(Header, 'episode', LATCHED)
+    bench.until(lambda: episodes, 'the first episode')
+    assert change(bench, 'reconstructor', use_sim_time=True)['use_sim_time'].successful
+    bench.until(lambda: len(episodes) == 2, 'an episode of the simulation')
+    assert begin_of(episodes[1]) < begin_of(episodes[0])
+
+
+@pytest.fixture
+def planner(start_node, bench):
+    """Return a planner's clock at 110 s, and its reconstructor in an episode of 100 s."""
+    start_node('view_planner', policy='farthest', start_azimuth=1.0, use_sim_time=True)
+    clock, fake = FakeClock(bench), FakeReconstructor(bench)
+    fake.begin('of before', 100 * S)
+    clock.until(lambda: within(fake.goals, 110, 111), 'the first goal', 110.0)
+    return clock, fake
+
+
+def within(goals, low, high):
+    """Return the goals whose stamps lie between two times in seconds."""
+    return [msg for msg in goals if low * S <= nanoseconds_from_stamp(msg.header.stamp) < high * S]
+
+
+def wait_second(bench, fake, latent):  # noqa: F811
+    """Take the first view, just after 50 s, and wait for the goal after it."""
+    fake.show(latent, 1.0, 50 * S + S // 10)
+    bench.until(lambda: any(
+        view_goal_from_msg(msg) == pytest.approx(1.0 + math.pi, abs=0.14)
+        for msg in within(fake.goals, 50, 51)), 'the second goal')
+
+
+def test_a_planner_waits_for_the_episode_of_the_new_time(bench, planner, latent):  # noqa: F811
+    clock, fake = planner
+    clock.until(lambda: bench.counts('view_planner').get('clock_jumps') == 1, 'the jump', 50.0)
+    fake.goals.clear()
+    fake.show(latent, 1.0, 111 * S)  # on its way since before the jump
+    fake.begin('of now', 50 * S)
+    first = clock.until(lambda: within(fake.goals, 50, 51), 'the first goal again', 50.0)[-1]
+    assert view_goal_from_msg(first) == pytest.approx(1.0)
+    wait_second(bench, fake, latent)
+    assert bench.counts('view_planner')['clock_jumps'] == 1
+
+
+def test_a_planner_keeps_an_episode_that_came_before_it_heard_the_new_time(
+        bench, planner, latent):  # noqa: F811
+    clock, fake = planner
+    fake.goals.clear()
+    fake.begin('of now', 50 * S)
+    bench.until(lambda: bench.counts('view_planner').get('episodes') == 2, 'the new episode')
+    first = clock.until(lambda: within(fake.goals, 50, 51), 'its first goal', 50.0)[-1]
+    assert view_goal_from_msg(first) == pytest.approx(1.0)
+    wait_second(bench, fake, latent)
+    assert bench.counts('view_planner')['episodes'] == 2
