@@ -62,6 +62,8 @@ def test_the_parameters_are_those_of_the_camera_beside_the_table(written):
     goals = nodes['/**/view_planner']['ros__parameters']
     assert goals['distance'] == pytest.approx(camera.distance, abs=1e-4)
     assert goals['elevation'] == pytest.approx(camera.elevation, abs=1e-4)
+    assert nodes['/**/turntable_driver']['ros__parameters'] == {
+        'camera_azimuth_at_zero': 0.0, 'turntable_direction': -1}
 
 
 def test_every_image_and_its_error_is_told(written, folder):

@@ -79,16 +79,19 @@ def calibrate_turntable(images: BoardImages, placement: Placement,
         'camera_position': _rounded(pose[:3, 3]),
         'camera_orientation': _rounded(quaternion_of(pose))}
     remarks = [*look.remarks, *of_elevation(camera)]
+    driver: dict[str, Any] = {'camera_azimuth_at_zero': round(placement.azimuth_at_zero, 6)}
     if found.direction is None:
         remarks.append(DIRECTION_UNKNOWN)
     else:
-        reconstructor['turntable_direction'] = found.direction
+        for node in (reconstructor, driver):
+            node['turntable_direction'] = found.direction
     planner = {'object_size': placement.object_size, 'elevation': round(camera.elevation, 5),
                'distance': round(camera.distance, 5)}
     object_from_board = pose @ found.camera_from_table @ found.table_from_board
     board_from_object = np.asarray(np.linalg.inv(object_from_board), np.float64)
     return _calibration(found.images, look.lens, board_from_object, placement, remarks,
-                        {'reconstructor': reconstructor, 'view_planner': planner}, {})
+                        {'reconstructor': reconstructor, 'view_planner': planner,
+                         'turntable_driver': driver}, {})
 
 
 def calibrate_arm(images: BoardImages, placement: Placement,

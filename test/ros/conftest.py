@@ -1,6 +1,6 @@
 """Real nodes as processes, on a private domain of this machine, and a bench that talks to them."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import fcntl
 import os
 from pathlib import Path
@@ -40,9 +40,11 @@ _PIXELS = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
 class NodeProcess:
     """A node in a process of its own, its log in a file."""
 
-    def __init__(self, name: str, parameters: dict[str, Any], folder: Path) -> None:
+    def __init__(self, name: str, parameters: dict[str, Any], folder: Path,
+                 program: Sequence[str] = ()) -> None:
         arguments = [f'{key}:={value}' for key, value in parameters.items()]
-        command = [sys.executable, '-m', f'active_recon.nodes.{name}', '--ros-args']
+        program = program or ('-m', f'active_recon.nodes.{name}')
+        command = [sys.executable, *program, '--ros-args']
         for argument in arguments:
             command += ['-p', argument]
         folder.mkdir(parents=True, exist_ok=True)
@@ -252,8 +254,9 @@ class FakeCamera:
 def _started(folder: Path) -> Iterator[Callable[..., NodeProcess]]:
     processes: list[NodeProcess] = []
 
-    def start(name: str, ready: bool = True, **parameters: Any) -> NodeProcess:
-        process = NodeProcess(name, parameters, folder / str(len(processes)))
+    def start(name: str, ready: bool = True, program: Sequence[str] = (), **parameters: Any
+              ) -> NodeProcess:
+        process = NodeProcess(name, parameters, folder / str(len(processes)), program)
         processes.append(process)
         if ready:
             process.wait_ready()
