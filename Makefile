@@ -20,7 +20,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full bench soak chromium lint clean
+.PHONY: help venv demo golden test test-full bench soak policies chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -63,6 +63,9 @@ bench: .venv/installed  ## the figures of the README's table, measured here
 soak: .venv/installed  ## an hour of the loop, for docs/soak.md; ARGS='--minutes 5' for less
 	@echo '== soaking'
 	@$(BIN)/python -m benchmarks.soak $(ARGS)
+
+policies: .venv/installed  ## security/policies.xml anew, from the live graph
+	@$(BIN)/python security/generate.py
 
 lint: .venv/installed  ## ruff and mypy
 	@echo '== checking the style and the types'

@@ -61,13 +61,21 @@ class NodeProcesses:
                              'PYTHONUNBUFFERED': '1', 'RCUTILS_COLORIZED_OUTPUT': '0'}
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, node: str, parameters: Mapping[str, object]) -> None:
-        """Start `active_recon.nodes.<node>` with parameters."""
+    def start(self, node: str, parameters: Mapping[str, object], namespace: str = '') -> None:
+        """
+        Start `active_recon.nodes.<node>` with parameters.
+
+        In a namespace, for example '/cell_1', it is known here as 'cell_1.<node>'.
+        """
         settings = [word for name, value in parameters.items()
                     for word in ('-p', f'{name}:={_as_yaml(value)}')]
-        with self._log(node).open('wb') as log:
+        known_as = node
+        if namespace:
+            settings += ['-r', f'__ns:={namespace}']
+            known_as = f'{namespace.strip("/").replace("/", ".")}.{node}'
+        with self._log(known_as).open('wb') as log:
             # A session of its own keeps the terminal's Ctrl-C from it: the demo stops the nodes.
-            self._running[node] = subprocess.Popen(
+            self._running[known_as] = subprocess.Popen(
                 [sys.executable, '-m', f'active_recon.nodes.{node}', '--ros-args', *settings],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
                 env=self._environment, start_new_session=True)

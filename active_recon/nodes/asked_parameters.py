@@ -1,17 +1,38 @@
 """The parameters of other nodes, asked for as the nodes appear."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 import time
 
 from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import GetParameters, GetParameterTypes, ListParameters
+from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 
 ASK_AGAIN_S = 2.0
 """A request may go to a node that has just ended; after that time it is sent again."""
+
+
+@dataclass(frozen=True)
+class _Clients:
+    """What reads the parameters of one node; rclpy's own client could set them as well."""
+
+    names: Client
+    types: Client
+    values: Client
+
+    @classmethod
+    def of(cls, node: Node, name: str) -> '_Clients':
+        return cls(node.create_client(ListParameters, f'{name}/list_parameters'),
+                   node.create_client(GetParameterTypes, f'{name}/get_parameter_types'),
+                   node.create_client(GetParameters, f'{name}/get_parameters'))
+
+    @property
+    def are_ready(self) -> bool:
+        return all(each.service_is_ready() for each in (self.names, self.types, self.values))
 
 
 class AskedParameters:
@@ -25,7 +46,7 @@ class AskedParameters:
     def __init__(self, node: Node, on_known: Callable[[str, dict[str, object]], None]) -> None:
         self._node = node
         self._on_known = on_known
-        self._clients: dict[str, AsyncParameterClient] = {}
+        self._clients: dict[str, _Clients] = {}
         self._asked_at: dict[str, float] = {}
         self._known: set[str] = set()
 
@@ -42,17 +63,20 @@ class AskedParameters:
             now = time.monotonic()
             if now - self._asked_at.get(name, -ASK_AGAIN_S) < ASK_AGAIN_S:
                 continue
-            client = self._clients.setdefault(name, AsyncParameterClient(self._node, name))
-            if client.services_are_ready():
+            if name not in self._clients:
+                self._clients[name] = _Clients.of(self._node, name)
+            clients = self._clients[name]
+            if clients.are_ready:
                 self._asked_at[name] = now
-                client.list_parameters(callback=partial(self._ask_types, name))
+                clients.names.call_async(ListParameters.Request()).add_done_callback(
+                    partial(self._ask_types, name))
 
     def _ask_types(self, name: str, listed: Future) -> None:
         answer = listed.result()
         if answer is not None and name in self._asked_at:
             names = list(answer.result.names)
-            self._clients[name].get_parameter_types(
-                names, callback=partial(self._ask_values, name, names))
+            self._clients[name].types.call_async(GetParameterTypes.Request(
+                names=names)).add_done_callback(partial(self._ask_values, name, names))
 
     def _ask_values(self, name: str, names: list[str], typed: Future) -> None:
         """Ask for those that have a value: one without keeps a node from telling any."""
@@ -61,7 +85,8 @@ class AskedParameters:
             return
         known = [each for each, kind in zip(names, answer.types, strict=True)
                  if kind != ParameterType.PARAMETER_NOT_SET]
-        self._clients[name].get_parameters(known, callback=partial(self._take, name, known))
+        self._clients[name].values.call_async(GetParameters.Request(
+            names=known)).add_done_callback(partial(self._take, name, known))
 
     def _take(self, name: str, names: list[str], got: Future) -> None:
         answer = got.result()

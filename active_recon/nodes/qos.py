@@ -15,6 +15,14 @@ HEARD = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Best effort, which hears reliable and best-effort publishers alike."""
 HEARD_OFTEN = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 """The same for poses, of which a fast tracker sends many while the network runs."""
+_UNKNOWN_NODE = '_NODE_NAME_UNKNOWN_'  # an endpoint may be discovered before its node's name
+
+
+def endpoint_node(endpoint: TopicEndpointInfo) -> str | None:
+    """Return the full name of the node that has the endpoint; None while it is not known."""
+    if endpoint.node_name == _UNKNOWN_NODE:
+        return None
+    return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
 
 
 def offered_profile(publisher: TopicEndpointInfo) -> QosProfile:

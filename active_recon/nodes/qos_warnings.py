@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.qos import profile_words
+from active_recon.nodes.qos import endpoint_node, profile_words
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -21,7 +21,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 LOOK_EVERY_S = 0.5
 FOUND_WITHIN_S = 5.0
 """The middleware may tell of a mismatch before it tells with whom."""
-_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+_UNKNOWN = 'a node without a name'
 
 
 class QosWarnings(Node):
@@ -93,7 +93,7 @@ def _fits(kind: type, own: QoSProfile, other: QoSProfile) -> bool:
 
 
 def _told(kind: type, own: QoSProfile, other: TopicEndpointInfo) -> str:
-    node = f'{other.node_namespace.rstrip("/")}/{other.node_name}'
+    node = endpoint_node(other) or _UNKNOWN
     asks, serves = profile_words(other.qos_profile), profile_words(own)
     if kind is Publisher:
         return (f'expected who listens to ask for no more than this node offers ({serves}), but '

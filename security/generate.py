@@ -1,0 +1,115 @@
+"""
+Write the SROS2 policies of the nodes as they really are, or check those that stand here.
+
+    python security/generate.py             # writes security/policies.xml
+    python security/generate.py --check     # exit code 1, and the differences, where it is not so
+
+Every node is started, with each parameter that changes what it talks to, on a domain of its own.
+"""
+
+import argparse
+from collections.abc import Iterator
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+import time
+
+from active_recon.cameras import orbit_camera
+from active_recon.demo.processes import NodeProcesses, private_environment
+from active_recon.nodes.graph_access import (
+    Access,
+    differences,
+    joined,
+    live_access,
+    read_policies,
+    write_policies,
+)
+from active_recon.nodes.loop_watch import joined_domain
+from msg_tools.cameras import pose_to_msg
+from msg_tools.stamps import stamp_from_nanoseconds
+from rclpy.node import Node, NodeNameNonExistentError
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+
+POLICIES = Path(__file__).with_name('policies.xml')
+LOOP = '/policies_0'
+OBSERVER = 'policies'
+MESH = Path(__file__).parents[1] / 'active_recon' / 'objects' / 'chair.glb'
+SETTLED_S = 5.0
+"""What is new for so long comes no more."""
+BUDGET_S = 90.0
+_POLL_S = 0.25
+
+
+def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
+    """Return by namespace the nodes to start and their parameters; the first is a whole loop."""
+    pose = pose_to_msg(orbit_camera(0.0).pose, Header()).pose
+    position, turn = pose.position, pose.orientation
+    return {
+        LOOP: {'recorder': {'output_dir': folder}, 'turntable_camera': {'mesh': MESH},
+               'reconstructor': {'output_dir': folder}, 'view_planner': {}, 'viewer': {'port': 0}},
+        '/policies_1': {'reconstructor': {
+            'output_dir': folder, 'background': 'mask', 'pose_source': 'turntable_joint',
+            'camera_position': [position.x, position.y, position.z],
+            'camera_orientation': [turn.x, turn.y, turn.z, turn.w]}}}
+
+
+def live_accesses() -> Iterator[dict[str, Access]]:
+    """Start all and yield what is known by now of each node, again and again, for BUDGET_S."""
+    environment = private_environment()
+    os.environ.update(environment)  # for the observer in this process
+    with (TemporaryDirectory() as folder, joined_domain(OBSERVER) as (observer, _),
+          NodeProcesses(Path(folder), environment) as nodes):
+        clock = observer.create_publisher(Clock, '/clock', 10)
+        observer.create_publisher(Image, f'{LOOP}/camera/mask', 10)  # so that it is recorded
+        for namespace, parameters in starts(Path(folder)).items():
+            for name, values in parameters.items():
+                nodes.start(name, {'use_sim_time': True, **values}, namespace)
+        seen: dict[str, list[Access]] = {}
+        deadline = time.monotonic() + BUDGET_S
+        while time.monotonic() < deadline:
+            nodes.check()
+            clock.publish(Clock(clock=stamp_from_nanoseconds(time.time_ns())))
+            for namespace, parameters in starts(Path(folder)).items():
+                for name in parameters:
+                    seen.setdefault(name, []).extend(_access(observer, name, namespace))
+            known = {name: joined(each) for name, each in seen.items()}
+            seen = {name: [access] for name, access in known.items()}
+            yield known
+            time.sleep(_POLL_S)
+
+
+def _access(observer: Node, name: str, namespace: str) -> Iterator[Access]:
+    try:
+        access = live_access(observer, name, namespace)
+        yield {kind: frozenset(each for each in names if not each.startswith(f'/{OBSERVER}/'))
+               for kind, names in access.items()}
+    except NodeNameNonExistentError:  # it is still starting
+        return
+
+
+def main() -> None:
+    """Write, or check."""
+    parser = argparse.ArgumentParser(description='The SROS2 policies of the nodes.')
+    parser.add_argument('--check', action='store_true', help='compare, and write nothing')
+    parser.add_argument('--namespace', default='/', help="the loop's, for which they are written")
+    parser.add_argument('--file', type=Path, default=POLICIES)
+    options = parser.parse_args()
+    wanted = read_policies(options.file) if options.check else None
+    settled_since, last = time.monotonic(), {}
+    for live in live_accesses():
+        if live != last:
+            settled_since, last = time.monotonic(), live
+        enough = live == wanted if options.check else any(map(any, last.values()))
+        if enough and time.monotonic() - settled_since > SETTLED_S:
+            break
+    if wanted is None:
+        write_policies(options.file, last, options.namespace)
+    elif told := differences(wanted, last):
+        print('\n'.join(told))  # noqa: T201
+        raise SystemExit(1)
+
+
+if __name__ == '__main__':
+    main()
