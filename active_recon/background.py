@@ -88,7 +88,8 @@ def on_white(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.ui
     if not mask.any():
         raise ViewError('expected a mask with an object, got one that is all background',
                         'no_object')
-    return np.asarray(np.where(mask[..., None], image, np.uint8(255)), np.uint8)
+    white = np.full_like(image, 255)
+    return np.asarray(cv2.copyTo(image, mask.view(np.uint8), white), np.uint8)
 
 
 def off_reference(image: NDArray[np.uint8], reference: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -102,9 +103,8 @@ def off_reference(image: NDArray[np.uint8], reference: NDArray[np.uint8]) -> NDA
         raise ViewError(f"expected an image of the reference's size, {_size(reference)}, got "
                         f'{_size(image)}; empty the scene and call capture_background again',
                         'reference')
-    apart = _lab(_smoothed(_searched(image))) - _lab(_smoothed(_searched(reference)))
-    apart[..., 0] *= _SHADOW_DISCOUNT
-    return _object(np.linalg.norm(apart, axis=2), _STANDS_OUT, image, 'the empty scene; where '
+    apart = _apart(_smoothed(_searched(image)), _smoothed(_searched(reference)), _SHADOW_DISCOUNT)
+    return _object(apart, _STANDS_OUT, image, 'the empty scene; where '
                    'camera or light have changed, empty it and call capture_background again')
 
 
@@ -123,8 +123,8 @@ def off_color(image: NDArray[np.uint8], color: Sequence[int],
     pixels = _smoothed(_searched(image))
     key = np.asarray(color, np.float32)
     brightness = np.clip(pixels.astype(np.float32) @ (key / (key @ key)), *_SHADES)
-    shade = np.rint(np.minimum(brightness[..., None] * key, 255)).astype(np.uint8)
-    apart = np.linalg.norm(_lab(pixels) - _lab(shade), axis=2)
+    shade = cv2.merge([cv2.convertScaleAbs(brightness, alpha=float(value)) for value in key])
+    apart = _apart(pixels, np.asarray(shade, np.uint8))
     return _object(apart, tolerance, image, f'the color {list(color)}; see the parameters '
                    'background_color and background_tolerance')
 
@@ -141,10 +141,14 @@ def _smoothed(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.6), np.uint8)
 
 
-def _lab(image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return L* in [0, 100], a* and b*."""
-    scaled = image.astype(np.float32) / np.float32(255)
-    return np.asarray(cv2.cvtColor(scaled, cv2.COLOR_RGB2Lab), np.float32)
+def _apart(a: NDArray[np.uint8], b: NDArray[np.uint8], of_lightness: float = 1.0
+           ) -> NDArray[np.float32]:
+    """Return the distance of two images' colours, (H, W), in units of L*a*b*."""
+    lab = (cv2.cvtColor(image, cv2.COLOR_RGB2Lab) for image in (a, b))
+    lightness, green_red, blue_yellow = (
+        plane.astype(np.float32) for plane in cv2.split(cv2.absdiff(*lab)))
+    lightness *= of_lightness * 100 / 255  # of bytes, OpenCV's L* goes to 255
+    return np.asarray(cv2.magnitude(cv2.magnitude(green_red, blue_yellow), lightness), np.float32)
 
 
 def _object(apart: NDArray[np.float32], threshold: float, image: NDArray[np.uint8],
