@@ -136,7 +136,8 @@ class Camera:
             lens = self.intrinsics
             return bent * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[:, 2]
         image = optical @ self.intrinsics.matrix.T
-        return image[:, :2] / image[:, 2:], optical[:, 2]
+        with np.errstate(divide='ignore', invalid='ignore'):
+            return image[:, :2] / image[:, 2:], optical[:, 2]
 
     def ray_directions(self, samples: int = 1) -> NDArray[np.float64]:
         """

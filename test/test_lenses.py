@@ -4,6 +4,7 @@ import math
 
 from active_recon.errors import ViewError
 from active_recon.lenses import Distortion
+import cv2
 import numpy as np
 import pytest
 
@@ -12,6 +13,8 @@ LENSES = {
     'pincushion': Distortion('plumb_bob', (0.2, 0.1, 0.0, 0.0)),
     'rational': Distortion('rational_polynomial',
                            (0.5, -0.2, 1e-4, -2e-4, -0.01, 0.8, -0.1, -0.05)),
+    'thin prism': Distortion('rational_polynomial', (
+        -0.2, 0.1, 0.001, -0.002, 0.01, 0.05, 0.01, 0.002, 0.003, -0.001, 0.002, 0.001)),
     'fisheye': Distortion('equidistant', (0.05, -0.02, 0.01, -0.004)),
 }
 EACH = pytest.mark.parametrize('lens', LENSES.values(), ids=LENSES)
@@ -19,6 +22,18 @@ EACH = pytest.mark.parametrize('lens', LENSES.values(), ids=LENSES)
 
 def points(reach=0.6, count=500):
     return np.random.default_rng(0).uniform(-reach, reach, (count, 2))
+
+
+@EACH
+def test_a_lens_bends_as_opencv_s_own_does(lens):
+    pinhole, coefficients = np.eye(3), np.array(lens.coefficients)
+    if lens.model == 'equidistant':
+        expected = cv2.fisheye.distortPoints(points()[:, None], pinhole, coefficients)
+    else:
+        rays = np.column_stack([points(), np.ones(len(points()))])
+        expected = cv2.projectPoints(
+            rays[:, None], np.zeros(3), np.zeros(3), pinhole, coefficients)[0]
+    np.testing.assert_allclose(lens.bend(points()), expected.reshape(-1, 2), atol=1e-12)
 
 
 @EACH
@@ -39,9 +54,9 @@ def test_a_lens_without_coefficients_is_a_pinhole_or_counts_angles():
     np.testing.assert_allclose(angles, [[1.2, 0.0]])
 
 
-@EACH
-def test_the_further_out_a_point_is_the_further_out_the_lens_shows_it(lens):
-    radii = np.linspace(0, 50, 20_001)
+@pytest.mark.parametrize('name', ['barrel', 'pincushion', 'rational', 'fisheye'])
+def test_the_further_out_a_point_is_the_further_out_the_lens_shows_it(name):
+    radii, lens = np.linspace(0, 50, 20_001), LENSES[name]
     for angle in np.linspace(0, math.tau, 7):
         line = radii[:, None] * [math.cos(angle), math.sin(angle)]
         shown = np.linalg.norm(lens.bend(line), axis=1)
