@@ -5,7 +5,7 @@ from pathlib import Path
 
 from active_recon.cameras import azimuth_difference, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.turntable_pose import FixedCamera
-from conftest import STREAM
+from conftest import BUDGET_S, STREAM
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import intrinsics_to_msg, pose_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, azimuth_goal_to_msg, view_goal_from_msg
@@ -113,7 +113,7 @@ def test_the_loop_goes_round_with_the_driver_and_a_camera_that_only_streams(
 
     stream = bench.node.create_timer(0.1, show)
     end = bench.until(lambda: next((msg for msg in done if msg.frame_id), None),
-                      'the end of the episode')
+                      'the end of the episode', 2 * BUDGET_S)
     bench.node.destroy_timer(stream)
     assert end.frame_id == 'max_views'
     bench.until(lambda: len(views) == VIEWS, 'the last view')
