@@ -148,7 +148,7 @@ class Planner:
             return Decision(None, 'max_views')
         if self._settled():
             return Decision(None, 'entropy_settled')
-        return self._goal_or_none()
+        return self.next_goal()
 
     def give_up(self, azimuth: float, camera: float | None = None) -> Decision:
         """
@@ -163,7 +163,7 @@ class Planner:
         if camera is None:
             camera = self._taken[-1] if self._taken else azimuth
         self._goal = self._best(camera)
-        return self._goal_or_none()
+        return self.next_goal()
 
     def stop(self) -> Decision:
         """End the episode for a reason from outside; `plan` still tells where next."""
@@ -178,6 +178,10 @@ class Planner:
                 if self._wanted else
                 'expected a view before a plan; this episode has none yet', 'plan')
         return self._goal
+
+    def next_goal(self) -> Decision:
+        """Return the goal after the views so far, or that none can be reached."""
+        return Decision(self._goal, '' if self._goal else 'no_reachable_azimuth')
 
     def _choose(self, latent: NDArray[np.float32], taken: list[float]) -> None:
         """Let the policy choose after a view."""
@@ -196,9 +200,6 @@ class Planner:
         self._wanted = (wrap_azimuth(float(self._choice.azimuth[0]) + self._yaw),
                         self._at_candidates(self._choice.scores[0]))
         self._goal = self._best(azimuth)
-
-    def _goal_or_none(self) -> Decision:
-        return Decision(self._goal, '' if self._goal else 'no_reachable_azimuth')
 
     def _best(self, azimuth: float) -> Goal | None:
         """Return the best goal for a camera that is at an azimuth; None where none is left."""

@@ -17,6 +17,10 @@ class StampJoiner:
         """Forget what is not complete."""
         self._parts.clear()
 
+    def forget_before(self, stamp: int) -> None:
+        """Forget what is stamped earlier."""
+        self._parts = {each: parts for each, parts in self._parts.items() if each >= stamp}
+
     def add(self, name: str, stamp: int, part: Any) -> dict[str, Any] | None:
         """Take in one part; return all parts of its stamp if it was the last one missing."""
         parts = self._parts.setdefault(stamp, {})

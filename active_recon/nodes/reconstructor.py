@@ -61,7 +61,8 @@ class ReconstructorNode(ManagedNode):
         self._reconstructor = self._load(settings)
         self._joiner = ViewJoiner(settings.max_pose_gap, masks=self._background.how == 'mask')
         self._gate = ViewGate(
-            settings.take_views, settings.goal_tolerance, settings.min_view_separation)
+            settings.take_views, settings.goal_tolerance, settings.min_view_separation,
+            settings.settle_time)
         self._watch = CameraWatch(
             self._diagnostics, settings.goal_tolerance, settings.stall_timeout)
         self._object_frame = settings.object_frame
@@ -125,6 +126,7 @@ class ReconstructorNode(ManagedNode):
             self._gate.goal_tolerance = settings.goal_tolerance
             self._gate.min_view_separation = settings.min_view_separation
             self._watch.change(settings.goal_tolerance, settings.stall_timeout)
+            self._gate.settle_time = settings.settle_time
 
         return commit
 

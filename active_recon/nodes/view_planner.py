@@ -8,32 +8,31 @@ from typing import Any
 from active_recon.cameras import Camera, CANONICAL_DISTANCE
 from active_recon.errors import ActiveReconError
 from active_recon.nodes.clock import AHEAD_S, STEADY
+from active_recon.nodes.goal_publisher import GoalPublisher
 from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.parameters import Commit, Parameters
 from active_recon.nodes.qos import HEARD, LATCHED
 from active_recon.nodes.run import one_line
 from active_recon.nodes.settings.view_planner import ViewPlannerSettings
-from active_recon.planner import Goal, Planner
+from active_recon.planner import Decision, Goal, Planner
 from active_recon.policies import load_policy, Policy
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
-from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
-from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
+from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
-from sensor_msgs.msg import Image, JointState, PointCloud2
+from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 FIND_VIEWS_S = 0.5
-"""An episode older than this node may have views already: for so long they may come first."""
+"""An episode older than this node may have views already: so long after their publishers were
+found they may come first."""
 REPEAT_S = 1.0
-"""A goal whose view has not come is sent again, with its stamp: it may not have been heard."""
-
-
+"""So often a goal whose view has not come is sent again."""
 MADE_OF = {'random': ('seed',), 'uniform': ('max_views',)}
 """The parameters that a policy is made of, and that may change while the node runs."""
 
@@ -50,32 +49,34 @@ class ViewPlannerNode(ManagedNode):
         """Load the policy, and offer its goals."""
         settings = self._settings.now
         self._frame = settings.object_frame
-        self._distance = (CANONICAL_DISTANCE * settings.object_size
-                          if math.isnan(settings.distance) else settings.distance)
         self._policy = self._load(settings)
         self._planner = self._planner_of(settings, self._policy)
         self._joiner = StampJoiner(('latent', 'view', 'probabilities'))
-        self._last_goal_stamp = 0
-        self._next_view_pub = self.create_publisher(PoseStamped, 'next_view', LATCHED)
-        self._next_azimuth_pub = self.create_publisher(JointState, 'next_azimuth', LATCHED)
-        self._scores_pub = self.create_publisher(PointCloud2, 'azimuth_scores', LATCHED)
+        self._goals = GoalPublisher(
+            self, self._frame, settings.elevation,
+            CANONICAL_DISTANCE * settings.object_size if math.isnan(settings.distance)
+            else settings.distance)
         self._done_pub = self.create_publisher(Header, 'done', LATCHED)
         self._diagnostics.measure('views', 'goals')
         self.create_service(Trigger, 'plan', self._on_plan)
+        self.create_service(Trigger, 'stop', self._on_stop)
 
     def activate(self) -> None:
         """Hear the reconstructor, and go on from what is latched."""
         self._episode: Episode | None = None
-        self._early: tuple[int, dict[str, Any]] | None = None
+        self._last: tuple[int, dict[str, Any]] | None = None
         self._begun_at = self.get_clock().now().nanoseconds
+        self._matched_at: float | None = None
         self._forget()
         self.create_subscription(PoseStamped, 'camera/pose', self._on_camera, HEARD)
-        self.create_subscription(Image, 'latent', self._on_latent, LATCHED)
-        self.create_subscription(PoseStamped, 'view', self._on_view, LATCHED)
-        self.create_subscription(PointCloud2, 'probabilities', self._on_probabilities, LATCHED)
+        self._of_views = [self.create_subscription(kind, topic, on_msg, LATCHED)
+                          for kind, topic, on_msg in (
+            (Image, 'latent', self._on_latent), (PoseStamped, 'view', self._on_view),
+            (PointCloud2, 'probabilities', self._on_probabilities))]
         self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
         self.create_timer(0.1, self._ask_first, clock=STEADY)
-        self.create_timer(REPEAT_S, self._repeat, clock=STEADY)
+        self.create_timer(0.1, self._give_up_late, clock=STEADY)
+        self.create_timer(REPEAT_S, self._goals.repeat, clock=STEADY)
 
     def _load(self, settings: ViewPlannerSettings) -> Policy:
         if settings.policy == 'attention':  # only this one needs torch, and the time to load it
@@ -87,7 +88,8 @@ class ViewPlannerNode(ManagedNode):
 
     def _planner_of(self, settings: ViewPlannerSettings, policy: Policy) -> Planner:
         return Planner(
-            policy, settings.max_views, settings.entropy_tolerance, settings.object_yaw)
+            policy, settings.max_views, settings.entropy_tolerance, settings.object_yaw,
+            settings.limits(), settings.motion_weight)
 
     def _change(self, settings: ViewPlannerSettings) -> Commit | None:
         """Return what puts settings into effect that changed while the node runs."""
@@ -102,15 +104,17 @@ class ViewPlannerNode(ManagedNode):
 
         def commit() -> None:
             self._policy, self._planner = policy, planner
+            asked = self._goals.azimuth if self.is_active else None
+            if asked is not None and not settings.limits().allows(asked):
+                self._follow(planner.next_goal(), self.get_clock().now().nanoseconds)
 
         return commit
 
     def _forget(self) -> None:
         """Begin with no camera, no goal and no view."""
         self._planner.reset()
-        self._joiner.clear()
+        self._goals.close()
         self._camera_azimuth = math.nan
-        self._asked: tuple[PoseStamped, JointState] | None = None
         self._started = False
         self._done = False
 
@@ -119,27 +123,30 @@ class ViewPlannerNode(ManagedNode):
             episode = episode_from_msg(msg)
             if self._episode is not None and episode.id == self._episode.id:
                 return
+            if self._episode is not None and episode.begin < self._episode.begin:
+                self._joiner.clear()  # time went back: what is stamped later is of before
+                self._last = None
             self._forget()
+            self._joiner.forget_before(episode.begin)
             self._episode = episode
-            self._heard_at = time.monotonic()
             self._diagnostics.count('episodes')
             self._diagnostics.tell('Episode', episode.id)
             self._tell_done(episode.begin, '')
-            if self._early is not None:
-                self._decide(*self._early, episode)
-                self._early = None
+            if self._last is not None:  # its view may be heard before an episode is
+                self._decide(*self._last, episode)
 
     def clock_went_back(self, how: str) -> None:
         """Wait for the episode of the new time, unless it came before the new time was heard."""
         now = self.get_clock().now().nanoseconds
         self._begun_at = min(self._begun_at, now)
-        self._last_goal_stamp = 0
+        self._goals.forget_stamps()
         self._diagnostics.count('clock_jumps')
         self.get_logger().warning(f'{how}: a new episode is awaited')
         if self._episode is not None and self._episode.begin > now + AHEAD_S * 1e9:
-            self._episode = None
+            self._episode = self._last = None
+            self._joiner.clear()
             self._forget()
-        elif self._asked is not None:
+        elif self._goals.azimuth is not None:
             self._ask(self._planner.plan())  # under a stamp of the new time
 
     def _on_camera(self, msg: PoseStamped) -> None:
@@ -153,13 +160,20 @@ class ViewPlannerNode(ManagedNode):
         """Ask for the first view, once, where the camera or the parameter says."""
         if self._episode is None or self._started:
             return
-        older = self._episode.begin < self._begun_at
-        if older and time.monotonic() - self._heard_at < FIND_VIEWS_S:
+        if self._episode.begin < self._begun_at and not self._has_heard_latched():
             return
         start = self._settings.now.start_azimuth
         azimuth = self._camera_azimuth if math.isnan(start) else start
         if not math.isnan(azimuth):
             self._ask(self._planner.first_goal(azimuth))
+
+    def _has_heard_latched(self) -> bool:
+        """Whether a view that was there before this node would have been heard by now."""
+        if not all(heard.get_publisher_count() for heard in self._of_views):
+            return False
+        now = time.monotonic()
+        self._matched_at = now if self._matched_at is None else self._matched_at
+        return now - self._matched_at >= FIND_VIEWS_S
 
     def _on_latent(self, msg: Image) -> None:
         with self._diagnostics.refusing():
@@ -179,25 +193,33 @@ class ViewPlannerNode(ManagedNode):
         stamp = nanoseconds_from_stamp(header.stamp)
         if self.clock_watch.is_ahead(stamp):
             return
+        if self._episode is not None and stamp < self._episode.begin:
+            self._diagnostics.count('dropped/last_episode')
+            return
         parts = self._joiner.add(name, stamp, part)
         if parts is None:
             return
-        if self._episode is None:  # a latched view may be heard before its latched episode
-            self._early = stamp, parts
-        else:
+        self._last = stamp, parts
+        if self._episode is not None:
             self._decide(stamp, parts, self._episode)
 
     def _decide(self, stamp: int, parts: dict[str, Any], episode: Episode) -> None:
-        if stamp < episode.begin:
+        if stamp < episode.begin:  # heard before any episode was
             return
         decision = self._planner.add_view(parts['latent'], parts['view'], parts['probabilities'])
         self._started = True
         self._diagnostics.count('views')
+        self._follow(decision, stamp)
+        if decision.goal is not None:
+            self._diagnostics.took_since(stamp)
+
+    def _follow(self, decision: Decision, stamp: int) -> None:
+        """Ask for the goal, or say that the episode is done, at a stamp in nanoseconds."""
         if decision.goal is not None:
             self._ask(decision.goal)
-            self._diagnostics.took_since(stamp)
             return
-        self._asked = None
+        self._goals.close()
+        self._started = True
         self._done = True
         self._tell_done(stamp, decision.reason)
         self.get_logger().info(f'done: {decision.reason}')
@@ -208,25 +230,23 @@ class ViewPlannerNode(ManagedNode):
         self._diagnostics.tell('Done', reason or 'not yet')
 
     def _ask(self, goal: Goal) -> None:
-        """Publish a goal under a stamp of its own, its identity."""
-        now = self.get_clock().now().nanoseconds
-        # A paused clock would give two goals one identity
-        self._last_goal_stamp = max(now, self._last_goal_stamp + 1)
-        header = Header(stamp=stamp_from_nanoseconds(self._last_goal_stamp), frame_id=self._frame)
-        self._asked = (
-            view_goal_to_msg(goal.azimuth, self._settings.now.elevation, self._distance, header),
-            azimuth_goal_to_msg(goal.azimuth, header))
+        self._goals.ask(goal)
         self._started = True
         self._diagnostics.count('goals')
-        self._scores_pub.publish(scores_to_msg(
-            goal.candidates, goal.scores, self._settings.now.elevation, self._distance, header))
-        self._repeat()
 
-    def _repeat(self) -> None:
-        if self._asked is not None:
-            next_view, next_azimuth = self._asked
-            self._next_view_pub.publish(next_view)
-            self._next_azimuth_pub.publish(next_azimuth)
+    def _give_up_late(self) -> None:
+        """Ask for the next best goal where one has been open for too long."""
+        timeout, failed = self._settings.now.goal_timeout, self._goals.azimuth
+        if timeout == 0 or failed is None or not self._goals.waited > timeout:
+            return
+        camera = None if math.isnan(self._camera_azimuth) else self._camera_azimuth
+        decision = self._planner.give_up(failed, camera)
+        instead = ('nothing that can be reached is left' if decision.goal is None else
+                   f'the next best is {math.degrees(decision.goal.azimuth):.1f} degrees')
+        self._diagnostics.warn('goal_timeout', (
+            f'expected a view from {math.degrees(failed):.1f} degrees within {timeout:g} s, got '
+            f'none: left out for this episode, {instead}'))
+        self._follow(decision, self.get_clock().now().nanoseconds)
 
     def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Ask for the goal after the views so far under a new stamp; answer with its azimuth."""
@@ -241,6 +261,17 @@ class ViewPlannerNode(ManagedNode):
         self._ask(goal)
         response.success = True
         response.message = f'{goal.azimuth:.6f}'
+        return response
+
+    def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """End the episode; the next one goes on as usual."""
+        if not self.is_active or self._episode is None:
+            response.message = 'expected an episode to stop; there is none'
+            return response
+        response.success = True
+        response.message = 'already done' if self._done else 'stopped'
+        if not self._done:
+            self._follow(self._planner.stop(), self.get_clock().now().nanoseconds)
         return response
 
 

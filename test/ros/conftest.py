@@ -13,12 +13,15 @@ import time
 from typing import Any, IO
 
 from active_recon.cameras import CANONICAL_ELEVATION, orbit_camera
+from active_recon.voxels import VoxelGrid
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import camera_to_msgs
+from msg_tools.cameras import camera_to_msgs, pose_to_msg
 from msg_tools.diagnostics import diagnostics_from_msg, NodeStatus
-from msg_tools.images import image_to_msg
+from msg_tools.episodes import Episode, episode_to_msg
+from msg_tools.images import image_to_msg, latent_to_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
+from msg_tools.voxels import FLOOR, voxel_grid_to_msg
 import numpy as np
 import pytest
 import rclpy
@@ -34,6 +37,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM = QoSProfile(depth=100)
 BUDGET_S = 30.0  # for what takes a second on an idle machine
 SEND_AGAIN_S = 5.0
+_GRID = VoxelGrid(np.random.default_rng(0).random((32, 32, 32), np.float32))
 _PIXELS = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
 
 
@@ -249,6 +253,50 @@ class FakeCamera:
             if found := self._bench.within(SEND_AGAIN_S, heard):
                 return found[-1]
         raise AssertionError('no occupancy after a good view')
+
+
+class FakeReconstructor:
+    """A reconstructor in the bench's hand; it begins to publish when it is made."""
+
+    TOPICS = {'episode': Header, 'latent': Image, 'view': PoseStamped,
+              'probabilities': PointCloud2}
+
+    def __init__(self, bench: Bench, topics: Sequence[str] = tuple(TOPICS),
+                 heard: bool = True) -> None:
+        self.bench = bench
+        self.goals = bench.hear(PoseStamped, 'next_view', LATCHED)
+        self.done = bench.hear(Header, 'done', LATCHED)
+        self._publishers: dict[str, Any] = {}
+        for topic in topics:
+            self.publish_on(topic, heard)
+
+    def publish_on(self, topic: str, heard: bool = True) -> None:
+        """Offer a topic; `heard` waits for a listener."""
+        make = self.bench.advertise if heard else self.bench.node.create_publisher
+        self._publishers[topic] = make(self.TOPICS[topic], topic, LATCHED)
+
+    def begin(self, name: str, stamp: int | None = None) -> None:
+        """Begin an episode, now if no stamp in nanoseconds is given."""
+        begin = self.bench.now() if stamp is None else stamp
+        self._publishers['episode'].publish(episode_to_msg(Episode(name, begin)))
+
+    def show(self, latent: np.ndarray, azimuth: float, stamp: int | None = None,
+             parts: Sequence[str] = ('probabilities', 'latent', 'view')) -> int:
+        """Publish a view's parts; return their stamp."""
+        stamp = self.bench.now() if stamp is None else stamp
+        header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
+        messages = {'probabilities': voxel_grid_to_msg(_GRID, FLOOR, header),
+                    'latent': latent_to_msg(latent, header),
+                    'view': pose_to_msg(orbit_camera(azimuth).pose, header)}
+        for part in parts:
+            self._publishers[part].publish(messages[part])
+        return stamp
+
+    def wait_goal(self, after: int) -> PoseStamped:
+        """Wait for the goal that was asked for after a time in nanoseconds."""
+        return self.bench.until(
+            lambda: next((msg for msg in reversed(self.goals)
+                          if nanoseconds_from_stamp(msg.header.stamp) > after), None), 'a goal')
 
 
 def _started(folder: Path) -> Iterator[Callable[..., NodeProcess]]:

@@ -3,14 +3,14 @@
 import itertools
 import math
 
-from conftest import FakeCamera, LATCHED
+from conftest import FakeCamera, FakeReconstructor, LATCHED
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 import pytest
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from test_parameter_changes import change
-from test_planner_node import FakeReconstructor, latent  # noqa: F401
+from test_planner_node import latent  # noqa: F401
 
 pytestmark = pytest.mark.ros
 S = 1_000_000_000

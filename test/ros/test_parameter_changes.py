@@ -4,7 +4,7 @@ import math
 
 from active_recon.cameras import Camera
 from active_recon.nodes.parameters import NEW_START
-from conftest import FakeCamera, LATCHED
+from conftest import FakeCamera, FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
@@ -13,7 +13,7 @@ from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersA
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
-from test_planner_node import FakeReconstructor, latent  # noqa: F401
+from test_planner_node import latent  # noqa: F401
 
 pytestmark = pytest.mark.ros
 

@@ -3,61 +3,22 @@
 import math
 import signal
 
-from active_recon.cameras import azimuth_difference, orbit_camera
+from active_recon.cameras import azimuth_difference
 from active_recon.models.weights import load_weights
-from active_recon.voxels import VoxelGrid
-from conftest import LATCHED
-from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import pose_to_msg
-from msg_tools.episodes import Episode, episode_to_msg
+from conftest import FakeReconstructor, LATCHED
 from msg_tools.goals import scores_from_msg, view_goal_from_msg
-from msg_tools.images import latent_to_msg
-from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
-from msg_tools.voxels import FLOOR, voxel_grid_to_msg
+from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
-from sensor_msgs.msg import Image, JointState, PointCloud2
-from std_msgs.msg import Header
+from sensor_msgs.msg import JointState, PointCloud2
 
 pytestmark = pytest.mark.ros
-GRID = VoxelGrid(np.random.default_rng(0).random((32, 32, 32), np.float32))
 
 
 @pytest.fixture(scope='module')
 def latent():
     config = load_weights().config
     return np.zeros((config.latent_channels * 4, 4, 4), np.float32)
-
-
-class FakeReconstructor:
-    """A reconstructor in the bench's hand."""
-
-    def __init__(self, bench):
-        self.bench = bench
-        self.publishers = {topic: bench.advertise(kind, topic, LATCHED) for kind, topic in (
-            (Header, 'episode'), (Image, 'latent'), (PoseStamped, 'view'),
-            (PointCloud2, 'probabilities'))}
-        self.goals = bench.hear(PoseStamped, 'next_view', LATCHED)
-        self.done = bench.hear(Header, 'done', LATCHED)
-
-    def begin(self, name, stamp=None):
-        begin = self.bench.now() if stamp is None else stamp
-        self.publishers['episode'].publish(episode_to_msg(Episode(name, begin)))
-
-    def show(self, latent, azimuth, stamp=None):
-        """Publish a view's three parts, of now if no stamp is given; return their stamp."""
-        stamp = self.bench.now() if stamp is None else stamp
-        header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
-        self.publishers['probabilities'].publish(voxel_grid_to_msg(GRID, FLOOR, header))
-        self.publishers['latent'].publish(latent_to_msg(latent, header))
-        self.publishers['view'].publish(pose_to_msg(orbit_camera(azimuth).pose, header))
-        return stamp
-
-    def wait_goal(self, after):
-        """Wait for the goal that was asked for after a time in nanoseconds."""
-        return self.bench.until(
-            lambda: next((msg for msg in reversed(self.goals)
-                          if nanoseconds_from_stamp(msg.header.stamp) > after), None), 'a goal')
 
 
 def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent):
@@ -112,3 +73,17 @@ def test_a_planner_that_comes_late_goes_on_from_the_latched_view(start_node, ben
     start_node('view_planner', policy='farthest', start_azimuth=1.0)
     assert view_goal_from_msg(fake.wait_goal(after)) == pytest.approx(1.0 + math.pi, abs=0.14)
     assert all(view_goal_from_msg(msg) != pytest.approx(1.0) for msg in fake.goals)
+
+
+def test_a_planner_that_comes_late_waits_until_it_could_hear_every_part_of_a_view(
+        start_node, bench, latent):
+    fake = FakeReconstructor(bench, ('episode', 'latent', 'view'), heard=False)
+    fake.begin('before')
+    stamp = fake.show(latent, 1.0, parts=('latent', 'view'))
+    start_node('view_planner', policy='farthest', start_azimuth=1.0)
+    bench.until(lambda: bench.counts('view_planner').get('episodes'), 'the episode')
+    assert not bench.within(1.5, lambda: fake.goals)
+    fake.publish_on('probabilities', heard=False)
+    fake.show(latent, 1.0, stamp, parts=('probabilities',))
+    goal = view_goal_from_msg(fake.wait_goal(stamp))
+    assert abs(azimuth_difference(goal, 1.0)) == pytest.approx(math.pi, abs=0.14)

@@ -12,6 +12,7 @@ from active_recon.nodes.settings.shared import (
     ManagedSettings,
     NetworkSettings,
 )
+from active_recon.stillness import STILL_TIME
 from active_recon.view_gate import GOAL_TOLERANCE, TAKE_VIEWS
 from active_recon.voxels import MESH_FORMATS
 
@@ -32,6 +33,9 @@ class ReconstructorSettings(BackgroundSettings, CameraPoseSettings, FrontSetting
         changeable=True)
     min_view_separation: float = parameter(
         0.2, 'rad between views while there are no goals', low=0.0, high=math.pi, changeable=True)
+    settle_time: float = parameter(
+        STILL_TIME, 's that the camera stands still before an image may be a view', low=0.0,
+        high=60.0, changeable=True)
     max_pose_gap: float = parameter(
         0.1, 's from an image to a pose that is interpolated', low=0.0, high=10.0,
         changeable=True)
