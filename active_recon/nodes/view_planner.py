@@ -59,7 +59,7 @@ class ViewPlannerNode(ManagedNode):
         self._done_pub = self.create_publisher(Header, 'done', LATCHED)
         self._diagnostics.measure('views', 'goals')
         self.create_service(Trigger, 'plan', self._on_plan)
-        self.create_service(Trigger, 'stop', self._on_stop)
+        self.create_service(Trigger, 'stop_episode', self._on_stop)
 
     def activate(self) -> None:
         """Hear the reconstructor, and go on from what is latched."""

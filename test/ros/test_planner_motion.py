@@ -101,11 +101,11 @@ def test_a_weight_of_motion_draws_the_goals_near(fake):
 
 def test_a_stopped_episode_asks_for_nothing_more_and_the_next_one_does(fake, node):
     asked = fake.bench.now()
-    answer = fake.bench.call('stop')
+    answer = fake.bench.call('stop_episode')
     assert (answer.success, answer.message) == (True, 'stopped')
     assert wait_end(fake, 'stopped') > asked
     assert node.log('done: stopped')
-    assert fake.bench.call('stop').message == 'already done'
+    assert fake.bench.call('stop_episode').message == 'already done'
     late = fake.show(LATENT, START)
     fake.bench.until(lambda: nanoseconds_from_stamp(fake.done[-1].stamp) == late,
                      'the end after a late view')
