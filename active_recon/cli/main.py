@@ -14,6 +14,7 @@ from active_recon.cli.replay import replay
 from active_recon.cli.report import report
 from active_recon.cli.sheet import sheet
 from active_recon.cli.train import train
+from active_recon.cli.up import up
 from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
 import typer
@@ -21,7 +22,7 @@ import typer
 app = typer.Typer(
     help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, calibrate, view, report, replay, play, record_sweep, render, train,
+for command in (demo, up, calibrate, view, report, replay, play, record_sweep, render, train,
                 evaluate, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')

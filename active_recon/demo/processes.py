@@ -1,7 +1,7 @@
-"""The four nodes as processes of their own, on a private domain of this machine."""
+"""Nodes as processes of their own, started and stopped together."""
 
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
 import os
 from pathlib import Path
 import random
@@ -52,32 +52,39 @@ class NodeProcesses:
     """
     Starts nodes by their module's name, tells which has died, and stops them, the last first.
 
-    A node's output goes to a log in `log_folder`. `environment` is added to this process's own.
+    A node's output goes to a log in `log_folder`, or, without one, to where this process's own
+    goes. `environment` is added to this process's.
     """
 
-    def __init__(self, log_folder: Path, environment: Mapping[str, str]) -> None:
+    def __init__(self, log_folder: Path | None = None,
+                 environment: Mapping[str, str] | None = None) -> None:
         self._logs = log_folder
-        self._environment = {**os.environ, **environment, 'ROS_LOG_DIR': str(log_folder),
-                             'PYTHONUNBUFFERED': '1', 'RCUTILS_COLORIZED_OUTPUT': '0'}
+        self._environment = {**os.environ, **(environment or {}), 'PYTHONUNBUFFERED': '1'}
+        if log_folder is not None:
+            self._environment |= {
+                'ROS_LOG_DIR': str(log_folder), 'RCUTILS_COLORIZED_OUTPUT': '0'}
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, node: str, parameters: Mapping[str, object], namespace: str = '') -> None:
+    def start(self, node: str, parameters: Mapping[str, object], namespace: str = '',
+              arguments: Sequence[str] = ()) -> None:
         """
-        Start `active_recon.nodes.<node>` with parameters.
+        Start `active_recon.nodes.<node>` with parameters and further arguments of ROS.
 
         In a namespace, for example '/cell_1', it is known here as 'cell_1.<node>'.
         """
-        settings = [word for name, value in parameters.items()
-                    for word in ('-p', f'{name}:={_as_yaml(value)}')]
+        settings = [*arguments, *(word for name, value in parameters.items()
+                                  for word in ('-p', f'{name}:={_as_yaml(value)}'))]
         known_as = node
         if namespace:
             settings += ['-r', f'__ns:={namespace}']
             known_as = f'{namespace.strip("/").replace("/", ".")}.{node}'
-        with self._log(known_as).open('wb') as log:
-            # A session of its own keeps the terminal's Ctrl-C from it: the demo stops the nodes.
+        with ExitStack() as opened:
+            log = self._log(known_as)
+            output = None if log is None else opened.enter_context(log.open('wb'))
+            # A session of its own keeps the terminal's Ctrl-C from it: we stop the nodes.
             self._running[known_as] = subprocess.Popen(
                 [sys.executable, '-m', f'active_recon.nodes.{node}', '--ros-args', *settings],
-                stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL, stdout=output, stderr=output and subprocess.STDOUT,
                 env=self._environment, start_new_session=True)
 
     def pid(self, node: str) -> int:
@@ -88,10 +95,14 @@ class NodeProcesses:
         """Raise NodeError, with the last lines of its log, where a node has ended."""
         for node, process in self._running.items():
             code = process.poll()
-            if code is not None:
-                lines = self._log(node).read_text(errors='replace').splitlines()[-_LAST_LINES:]
-                said = '\n  '.join(lines) or '(it said nothing)'
-                raise NodeError(f'{node} ended with code {code}. It said last:\n  {said}')
+            if code is None:
+                continue
+            log = self._log(node)
+            if log is None:
+                raise NodeError(f'{node} ended with code {code}')
+            lines = log.read_text(errors='replace').splitlines()[-_LAST_LINES:]
+            said = '\n  '.join(lines) or '(it said nothing)'
+            raise NodeError(f'{node} ended with code {code}. It said last:\n  {said}')
 
     def stop(self) -> None:
         """Ask the nodes to end, the last started first, and wait; kill what does not."""
@@ -106,8 +117,8 @@ class NodeProcesses:
                 alive[-1].wait(_ASK_AGAIN_S)
         self._running.clear()
 
-    def _log(self, node: str) -> Path:
-        return self._logs / f'{node}.txt'
+    def _log(self, node: str) -> Path | None:
+        return self._logs and self._logs / f'{node}.txt'
 
     def __enter__(self) -> 'NodeProcesses':
         """Stop the nodes where the block ends, however it ends."""

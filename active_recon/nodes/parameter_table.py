@@ -6,17 +6,8 @@ import sys
 
 from active_recon.errors import DataError
 from active_recon.nodes.parameters import Declared, declared, number_words
-from active_recon.nodes.settings.player import PlayerSettings
-from active_recon.nodes.settings.reconstructor import ReconstructorSettings
-from active_recon.nodes.settings.recorder import RecorderSettings
-from active_recon.nodes.settings.turntable_camera import TurntableCameraSettings
-from active_recon.nodes.settings.view_planner import ViewPlannerSettings
-from active_recon.nodes.settings.viewer import ViewerSettings
+from active_recon.nodes.settings.every_node import SETTINGS
 
-SETTINGS: dict[str, type] = {
-    'reconstructor': ReconstructorSettings, 'view_planner': ViewPlannerSettings,
-    'turntable_camera': TurntableCameraSettings, 'recorder': RecorderSettings,
-    'viewer': ViewerSettings, 'player': PlayerSettings}
 BEGIN, END = '<!-- parameters: begin -->\n', '<!-- parameters: end -->\n'
 _SHOWN = 3  # elements of a list
 

@@ -12,6 +12,7 @@ from active_recon.nodes.qos import HEARD, STREAM
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
 from active_recon.nodes.settings.turntable_camera import TurntableCameraSettings
+from active_recon.objects import find_object
 from active_recon.shown_object import rendered_object, ShownObject, stored_object
 from active_recon.turntable import Turntable
 from geometry_msgs.msg import PoseStamped
@@ -151,7 +152,7 @@ def _objects(settings: TurntableCameraSettings) -> list[partial[ShownObject]]:
     """Return what makes each object, for only one of them is held at a time."""
     size, background = settings.object_size, settings.background
     if settings.mesh:
-        return [partial(rendered_object, Path(settings.mesh), size, background,
+        return [partial(rendered_object, find_object(settings.mesh), size, background,
                         settings.up or None, settings.front or None)]
     folders = list_objects(Path(settings.dataset))
     if not folders:

@@ -44,7 +44,8 @@ def known_truth(run: RecordedRun) -> NDArray[np.bool_] | None:
     """Return the true cells where the camera says that it showed an object that ships."""
     camera = node_parameters(run, 'turntable_camera')
     mesh = Path(str(camera.get('mesh', '')))
-    ships = mesh.parts[-3:-1] == ('active_recon', 'objects') and mesh.stem in shipped_objects()
+    ships = mesh.stem in shipped_objects() and (
+        mesh.parts == (mesh.stem,) or mesh.parts[-3:-1] == ('active_recon', 'objects'))
     if not ships or camera.get('up') or camera.get('front'):
         return None
     return read_truth(find_object(mesh.stem), run)

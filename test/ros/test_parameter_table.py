@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from active_recon.errors import DataError
-from active_recon.nodes.parameter_table import BEGIN, END, parameter_table, SETTINGS, with_table
+from active_recon.nodes.parameter_table import BEGIN, END, parameter_table, with_table
 from active_recon.nodes.parameters import declared
+from active_recon.nodes.settings.every_node import SETTINGS
 import pytest
 
 README = Path(__file__).parents[2] / 'README.md'

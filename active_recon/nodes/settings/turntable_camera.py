@@ -12,7 +12,7 @@ from active_recon.nodes.settings.shared import CubeSettings
 class TurntableCameraSettings(CubeSettings):
     """What the simulated turntable is told; ConfigError where its object is not clear."""
 
-    mesh: str = parameter('', 'a mesh file to show')
+    mesh: str = parameter('', 'what to show: the name of a model that ships, or a mesh file')
     dataset: str = parameter('', 'a folder of rendered objects to show, instead of a mesh')
     up: str = parameter('', "the mesh file's axis that is up; empty for its format's")
     front: str = parameter('', "the mesh file's axis of the front; empty for its format's")

@@ -1,0 +1,40 @@
+"""The whole loop on a simulated turntable, recorded; `ros2 launch ... --show-args`."""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+SHARE = FindPackageShare('active_recon')
+ARGUMENTS = {
+    'namespace': ('', 'the namespace of the nodes and of all their topics'),
+    'params_file': (PathJoinSubstitution([SHARE, 'config', 'demo.yaml']), "the nodes' parameters"),
+    'use_sim_time': ('false', 'whether the time is that of /clock'),
+    'autostart': ('true', 'whether reconstructor and view planner activate themselves'),
+    'log_level': ('info', 'debug, info, warn, error or fatal'),
+}
+
+
+def generate_launch_description():
+    value = {name: LaunchConfiguration(name) for name in ARGUMENTS}
+    shared = {
+        'package': 'active_recon',
+        'namespace': value['namespace'],
+        'parameters': [value['params_file'], {
+            'use_sim_time': ParameterValue(value['use_sim_time'], value_type=bool)}],
+        'arguments': ['--ros-args', '--log-level', value['log_level']],
+        'output': 'screen',
+    }
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=default, description=description)
+          for name, (default, description) in ARGUMENTS.items()),
+        Node(executable='recorder', name='recorder', **shared),
+        Node(executable='turntable_camera', name='turntable_camera', **shared),
+        IncludeLaunchDescription(
+            PythonLaunchDescriptionSource(
+                PathJoinSubstitution([SHARE, 'launch', 'reconstruction.launch.py'])),
+            launch_arguments=value.items()),
+    ])

@@ -1,0 +1,66 @@
+"""Parameters files: those that ship, and what is refused before any node starts."""
+
+from pathlib import Path
+import re
+
+from active_recon.errors import ConfigError
+from active_recon.nodes.params_file import read_params_file
+import pytest
+
+CONFIG = Path(__file__).parents[2] / 'config'
+SHIPPED = sorted(CONFIG.glob('*.yaml'))
+
+
+@pytest.mark.parametrize('path', SHIPPED, ids=lambda path: path.stem)
+def test_a_file_that_ships_gives_parameters_that_its_nodes_have(path):
+    assert {'reconstructor', 'view_planner'} <= read_params_file(path).keys()
+
+
+@pytest.mark.parametrize('path', SHIPPED, ids=lambda path: path.stem)
+def test_a_file_that_ships_explains_each_of_its_lines(path):
+    lines = [line for line in path.read_text().splitlines()
+             if line.strip() and not re.match(r'#|/\*\*/\w+:$|  ros__parameters:$', line)]
+    assert lines
+    assert all(re.search(r' # \S', line) for line in lines)
+
+
+@pytest.mark.parametrize('path', SHIPPED, ids=lambda path: path.stem)
+def test_the_nodes_of_a_file_that_ships_agree_on_the_object(path):
+    given = read_params_file(path).values()
+    for name in ('object_size', 'object_frame', 'object_yaw', 'use_sim_time'):
+        assert len({values[name] for values in given if name in values}) <= 1, name
+
+
+def test_what_is_given_to_all_is_given_to_each_unless_it_has_its_own(tmp_path):
+    path = tmp_path / 'some.yaml'
+    path.write_text('/**: {ros__parameters: {object_size: 2, mesh: chair}}\n'
+                    '/cell/recorder: {ros__parameters: {use_sim_time: true}}\n'
+                    'view_planner: {ros__parameters: {object_size: 3}}\n')
+    given = read_params_file(path)
+    assert list(given) == ['recorder', 'view_planner']
+    assert given['view_planner']['object_size'] == 3
+    assert given['recorder']['object_size'] == 2
+
+
+@pytest.mark.parametrize(('text', 'said'), [
+    ('', 'expected names with values, got None'),
+    ('- a', 'expected names with values'),
+    ('{', 'expected a ROS parameters file in YAML'),
+    ('/**: {ros__parameters: {a: 1}}', 'expected a node among reconstructor.*, got none'),
+    ('grasper: {ros__parameters: {a: 1}}', 'expected nodes among reconstructor.*, got grasper'),
+    ('recorder: {topics: [a]}', 'recorder: expected ros__parameters and nothing else, got topics'),
+    ('recorder: {}', 'recorder: expected ros__parameters and nothing else, got nothing'),
+    ('recorder: {ros__parameters: 1}', 'recorder: expected names with values, got 1'),
+    ('recorder: {ros__parameters: {output: a}}', 'among output_dir, .*, got output'),
+    ('recorder: {ros__parameters: {max_bag_size_mb: 0}}',
+     'recorder: parameter max_bag_size_mb: expected an integer from 1 to 1000000, got 0')])
+def test_a_file_that_cannot_be_used_is_refused_with_its_name(tmp_path, text, said):
+    path = tmp_path / 'some.yaml'
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=f'^{path}: .*{said}'):
+        read_params_file(path)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match='No such file'):
+        read_params_file(tmp_path / 'none.yaml')

@@ -1,0 +1,79 @@
+"""`active-recon up`: the nodes of a file start together, and end together."""
+
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+from conftest import BUDGET_S, ROOT
+import pytest
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def up(ros_domain, tmp_path):
+    """Start the command on a parameters file of this text; its output is in `up.log`."""
+    started = []
+
+    def start(text, *options):
+        file = tmp_path / 'nodes.yaml'
+        file.write_text(text)
+        with (tmp_path / 'up.log').open('wb') as log:
+            started.append(subprocess.Popen(
+                [sys.executable, '-m', 'active_recon.cli.main', 'up', '--params', str(file),
+                 *options], cwd=tmp_path, stdout=log, stderr=subprocess.STDOUT,
+                env={**os.environ, 'PYTHONPATH': str(ROOT)}))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def node_pids(folder):
+    """Return the processes of nodes that were started with a file in this folder."""
+    pids = []
+    for each in Path('/proc').glob('[0-9]*'):
+        try:
+            command = (each / 'cmdline').read_text()
+        except OSError:  # it has just ended
+            continue
+        if str(folder) in command and 'active_recon.nodes.' in command:
+            pids.append(int(each.name))
+    return pids
+
+
+TWO = ('/**/view_planner: {ros__parameters: {policy: farthest}}\n'
+       '/**/recorder: {ros__parameters: {record_at_start: false}}\n')
+
+
+def test_the_nodes_of_a_file_run_in_a_namespace_until_ctrl_c(up, bench, tmp_path):
+    process = up(TWO, '--namespace', 'cell', '--remap', 'next_view:=wanted')
+    bench.until(lambda: {'/cell/view_planner', '/cell/recorder'} <= set(
+        bench.node.get_fully_qualified_node_names()), 'the nodes')
+    bench.until(lambda: bench.node.count_publishers('/cell/wanted'), 'the remapped topic')
+    process.send_signal(signal.SIGINT)
+    assert process.wait(BUDGET_S) == 0
+    assert not node_pids(tmp_path)
+    said = (tmp_path / 'up.log').read_text()
+    assert 'starting view_planner, recorder' in said
+    assert 'the nodes are stopped' in said
+    assert 'Traceback' not in said
+
+
+def test_where_one_node_ends_the_others_are_stopped_and_the_command_fails(up, bench, tmp_path):
+    process = up(TWO)
+    bench.until(lambda: len(node_pids(tmp_path)) == 2, 'the nodes')
+    bench.until(lambda: '/view_planner' in bench.node.get_fully_qualified_node_names(), 'one')
+    os.kill(node_pids(tmp_path)[0], signal.SIGKILL)
+    assert process.wait(BUDGET_S) == 2
+    assert not node_pids(tmp_path)
+    assert 'ended with code -9' in (tmp_path / 'up.log').read_text()
+
+
+def test_a_file_that_cannot_be_used_starts_nothing(up, tmp_path):
+    assert up('recorder: {ros__parameters: {output: bags}}').wait(BUDGET_S) == 2
+    assert 'expected parameters among output_dir' in (tmp_path / 'up.log').read_text()
