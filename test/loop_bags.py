@@ -14,7 +14,7 @@ from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import FLOOR, voxel_grid_to_msg
 import numpy as np
 from rclpy.serialization import serialize_message
-from recorded_messages import definition
+from recorded_messages import definition, LATCHED, SENSOR
 from std_msgs.msg import Float64, Header
 
 BEGIN = 1_700_000_000_000_000_000
@@ -103,7 +103,8 @@ def write_bag(folder, messages, max_bytes=None, parameters=None, one_by_one=Fals
         if parameters:
             bag.attach_parameters('/reconstructor', parameters)
         for time, topic, msg in messages:
-            bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
+            bag.add_topic(topic, type_name(msg), definition(type_name(msg)),
+                          (SENSOR if topic.startswith('/camera/') else LATCHED,))
             bag.write(topic, serialize_message(msg), time + DELAY, time)
             if max_bytes or one_by_one:
                 bag.flush()  # a file may end wherever a chunk does

@@ -1,6 +1,8 @@
 """Bags: what is written is what readers that we did not write read."""
 
 from active_recon.bags import writer
+from active_recon.bags.files import mcap_files
+from active_recon.bags.storage import open_bag
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import RecordingError
 from mcap.reader import make_reader
@@ -16,6 +18,7 @@ from recorded_messages import (
     header,
     IMAGE,
     image,
+    small_disk,
     time_of,
 )
 from rosbags.highlevel import AnyReader
@@ -209,6 +212,41 @@ def test_a_bag_of_many_chunks_is_split_so_that_their_index_stays_small(tmp_path,
             bag.write('/episode', cdr(header(number)), time_of(number), time_of(number))
             bag.flush()
             bag.flush()
-    with Reader(bag.folder) as reader:
-        assert reader.message_count == 12
     assert len(list(bag.folder.glob('*.mcap'))) == 3
+    assert open_bag(bag.folder).summary().topics[0].count == 12
+
+
+def test_each_file_of_a_split_bag_begins_with_what_is_latched_and_counts_once(tmp_path):
+    with announced(tmp_path / 'run', max_bytes=50_000) as bag:
+        bag.write('/episode', cdr(header(0)), time_of(0), time_of(0))
+        for number in range(1, 21):
+            bag.write('/camera/image_raw', cdr(image(number, 64)), time_of(number), 0)
+            if number == 10:
+                bag.write('/episode', cdr(header(10)), time_of(10), time_of(10))
+            bag.flush()
+    files = mcap_files(bag.folder)
+    assert len(files) > 3
+    for file in files:
+        first = next(open_bag(file).messages({'/episode'}))
+        shown = next(open_bag(file).messages({'/camera/image_raw'}))
+        episode = 10 if shown.received > time_of(10) else 0
+        assert (first.data, first.published) == (cdr(header(episode)), time_of(episode))
+        begin = open_bag(file).summary().begin
+        assert first.received == begin
+        assert not errors_in(file)
+    read = list(open_bag(bag.folder).messages({'/episode', '/camera/image_raw'}))
+    assert [message.data for message in read if message.topic == '/episode'] == [
+        cdr(header(0)), cdr(header(10))]
+    assert len(read) == 22 == bag.message_count
+
+
+def test_a_disk_that_is_full_where_a_file_is_split_leaves_the_files_before(tmp_path):
+    bag = announced(tmp_path / 'run', max_bytes=20_000)
+    bag.write('/episode', cdr(header(0)), time_of(0), time_of(0))
+    bag.write('/camera/image_raw', cdr(image(1, 90)), time_of(1), 0)
+    bag.flush()
+    with small_disk(3_000), pytest.raises(RecordingError, match='ends after 2 messages, 1 were'):
+        bag.write('/camera/image_raw', cdr(image(2, 90)), time_of(2), 0)
+    assert [file.name for file in mcap_files(bag.folder)] == ['run_0.mcap']
+    with Reader(bag.folder) as reader:
+        assert reader.message_count == 2

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 
-from active_recon.bags.comparison import SAME_BITS, WITHIN_TOLERANCE
+from active_recon.bags.comparison import NOTHING_RECORDED, SAME_BITS, WITHIN_TOLERANCE
 from active_recon.bags.reading import read_run
 from active_recon.bags.replay import computing_with, replay, replay_hash
 from active_recon.bags.run_writing import write_run
@@ -160,8 +160,12 @@ def test_a_replay_under_others_is_a_bag_that_replays_to_the_same_bits(
     planner = settings.load_planner()
     assert (planner is not None) == knows_policy
     with computing_with(1):
-        assert verify(again, settings.load_reconstructor(),
-                      planner).comparison.verdict == SAME_BITS
+        verified = verify(again, settings.load_reconstructor(), planner).comparison
+        for quantity, deviation in verified.deviations.items():
+            # Goals that were kept are those of the machine that made the golden run
+            kept = options[0] == '--threshold' and quantity in ('goal', 'scores')
+            expected = {SAME_BITS, WITHIN_TOLERANCE} if kept else {SAME_BITS}
+            assert deviation.verdict in expected | {NOTHING_RECORDED}, quantity
     code, said = command(monkeypatch, capsys, 'replay', copied, *options)
     assert (code, 'nothing is overwritten' in said) == (2, True)
 

@@ -1,12 +1,16 @@
 """Reading bags: what was recorded is what is read, in whatever form it was stored."""
 
 
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 import sqlite3
 
+from active_recon.bags.comparison import compare, NOTHING_RECORDED
+from active_recon.bags.files import mcap_files
 from active_recon.bags.reading import read_run
+from active_recon.bags.replay import ReplayedEpisode, ReplayedView
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import DataError
+from active_recon.reconstructor import Reconstruction
 from active_recon.voxels import VoxelGrid
 from loop_bags import BEGIN, DELAY, header, LENS, LoopRun, STILL, type_name, write_bag
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
@@ -136,6 +140,36 @@ def test_a_bare_file_a_split_bag_and_one_without_metadata_read_alike(loop, bag, 
     assert same(read_run(split), whole)
     (split / 'metadata.yaml').unlink()
     assert same(read_run(split), whole)
+
+
+def test_a_file_of_a_split_bag_is_read_alone_from_its_first_own_view_on(loop, bag, tmp_path):
+    split = write_bag(tmp_path / 'split', loop.messages, max_bytes=20_000)
+    whole = {view.stamp: view for view in only(read_run(bag)).views}
+    found = []
+    for file in mcap_files(split):
+        with suppress(DataError):  # one that has no view of its own
+            episode = only(read_run(file))
+            assert (episode.id, episode.begin) == ('first', BEGIN)
+            assert episode.begun_before == (episode.views[0].stamp != loop.stamps[0])
+            found += [view.stamp for view in episode.views]
+            for view in episode.views:
+                assert np.array_equal(view.image, whole[view.stamp].image)
+    assert found == sorted(set(found)) and len(found) > 1
+    assert not only(read_run(split)).begun_before
+
+
+def test_an_episode_that_began_before_the_recording_is_not_compared(loop, tmp_path):
+    second = loop.stamps[1] - 2 * 10**8
+    late = [entry for entry in loop.messages
+            if entry[0] > second or entry[1] in ('/episode', '/view', '/latent')]
+    run = read_run(write_bag(tmp_path / 'run', late))
+    assert only(run).begun_before
+    assert [view.stamp for view in only(run).views] == loop.stamps[1:]
+    replayed = [ReplayedEpisode(only(run), None, [
+        ReplayedView(view, Reconstruction(VoxelGrid(np.zeros((32,) * 3, np.float32)),
+                                          view.latent), None)
+        for view in only(run).views])]
+    assert compare(replayed, 0.5).verdict == NOTHING_RECORDED
 
 
 def copied(bag, folder, storage, packed=None):

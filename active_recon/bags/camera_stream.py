@@ -49,6 +49,7 @@ class CameraStream:
         self._unstamped = False
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
+        self._first_image = math.inf
         self.received: dict[str, dict[int, int]] = {
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
@@ -62,6 +63,12 @@ class CameraStream:
         with self._reporting('reading the images', self._camera.image.count) as advance:
             yield from self._joined(wanted, advance)
 
+    def begins_after(self, stamp: int) -> bool:
+        """Return whether an image of that stamp, or what tells of its camera, came too early."""
+        firsts = [entries[0][0] for entries in (self._poses, self._lenses)
+                  if entries and not self._unstamped]
+        return stamp < max(self._first_image, *firsts)
+
     def _joined(self, wanted: Callable[[int], bool], advance: Advance
                 ) -> Iterator[View | MessageError]:
         joiner = ViewJoiner(self._topics.max_pose_gap)
@@ -70,6 +77,7 @@ class CameraStream:
             advance(1, '')
             msg = read_message(message)
             stamp = nanoseconds_from_stamp(msg.header.stamp)
+            self._first_image = min(self._first_image, stamp)
             if not wanted(stamp):
                 continue
             self.received[IMAGE_ROLE].setdefault(stamp, message.received)

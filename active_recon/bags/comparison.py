@@ -65,10 +65,13 @@ def compare(episodes: Sequence[ReplayedEpisode], threshold: float) -> Comparison
     """
     Compare all that was recorded of each view with what the replay made of it.
 
-    `threshold` is that above which the replay calls a cell occupied.
+    `threshold` is that above which the replay calls a cell occupied. An episode that had begun
+    before the recording is left out: the network had seen more of it than the bag has.
     """
     comparison = Comparison()
     for episode in episodes:
+        if episode.recorded.begun_before:
+            continue
         for view in episode.views:
             done = episode.recorded.done_after(view.recorded)
             for name, same, apart in _deviations(view, done, threshold):

@@ -1,6 +1,6 @@
 """A recording in MCAP, of one file or of several that follow each other."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ from active_recon.bags.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import DataError
 from active_recon.reporting import Advance, Reporting, silent
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+
+_Record = RawMessage | Metadata | Attachment
 
 
 class McapBag:
@@ -57,14 +59,15 @@ class McapBag:
                 yield record
 
     def _records(self, topics: dict[str, Topic], advance: Advance
-                 ) -> Iterator[RawMessage | Metadata | Attachment]:
+                 ) -> Iterator[_Record]:
         """Yield what the files hold; `topics` gathers those that they announce."""
         with self._files.opened() as files:
-            for name, path in zip(self._files.paths, files, strict=True):
-                yield from self._file_records(mcap_records(path, advance, name), name, topics)
+            yield from new_in_bag(
+                self._file_records(mcap_records(path, advance, name), name, topics)
+                for name, path in zip(self._files.paths, files, strict=True))
 
     def _file_records(self, records: Iterator[McapRecord], name: Path, topics: dict[str, Topic]
-                      ) -> Iterator[RawMessage | Metadata | Attachment]:
+                      ) -> Iterator[_Record]:
         schemas: dict[int, Schema] = {}
         channels: dict[int, Topic] = {}
         for record in records:
@@ -89,6 +92,23 @@ class McapBag:
                                  record.publish_time or record.log_time)
             elif isinstance(record, Metadata | Attachment):
                 yield record
+
+
+def new_in_bag(files: Iterable[Iterator[_Record]]) -> Iterator[_Record]:
+    """
+    Yield the records of files that follow each other without what a file repeats of those before.
+
+    That is the last message of a topic, once more with its bytes and its time of publication.
+    """
+    last: dict[str, tuple[int, bytes]] = {}
+    for number, records in enumerate(files):
+        for record in records:
+            if isinstance(record, RawMessage):
+                said = record.published, record.data
+                if number and last.get(record.topic) == said:
+                    continue
+                last[record.topic] = said
+            yield record
 
 
 def _type_name(channel: Channel, schemas: Mapping[int, Schema]) -> str:

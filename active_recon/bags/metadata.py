@@ -37,6 +37,12 @@ class Topic:
     type_name: str
     qos: tuple[QosProfile, ...] = ()
 
+    @property
+    def latched(self) -> bool:
+        """Whether who comes late is told the last message."""
+        return bool(self.qos) and all(
+            profile.durability == 'transient_local' for profile in self.qos)
+
 
 @dataclass
 class Contents:

@@ -20,17 +20,22 @@ def recorded_episodes(stream: CameraStream, record: LoopRecord) -> list[Recorded
     """
     Return the episodes that the loop recorded, each with its views in the order it took them.
 
-    What was recorded before any episode began is one without an id. Raises DataError where the
-    image of a view is missing or its camera is.
+    What was recorded before any episode began is one without an id. Views from before the
+    recording, of which a latched message tells, are left out. Raises DataError where the image of
+    another view is missing or its camera is.
     """
-    views = _taken_views(stream, sorted(record.parts['view']))
+    stamps = sorted(record.parts['view'])
+    views = _taken_views(stream, stamps)
+    before = set(stamps) - {view.stamp for view in views}
     begun: list[Episode] = sorted(record.parts['episode'].values(), key=lambda each: each.begin)
     if views and (not begun or views[0].stamp < begun[0].begin):
         begun.insert(0, Episode('', views[0].stamp))
     ends = [episode.begin for episode in begun[1:]] + [math.inf]
-    return [_episode(episode, [view for view in views if episode.begin <= view.stamp < end],
-                     end, stream, record)
-            for episode, end in zip(begun, ends, strict=True)]
+    return [replace(
+        _episode(episode, [view for view in views if episode.begin <= view.stamp < end],
+                 end, stream, record),
+        begun_before=any(episode.begin <= stamp < end for stamp in before))
+        for episode, end in zip(begun, ends, strict=True)]
 
 
 def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, dict[str, int]]:
@@ -72,11 +77,11 @@ def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
         else:
             refusal = refusal or str(view)
     for number, stamp in enumerate(stamps, 1):
-        if stamp not in found:
+        if stamp not in found and not (found and stream.begins_after(stamp)):
             raise DataError(f'expected the image and the camera of view {number} '
                             f'({stamp / 1e9:.3f} s), but they are missing: '
                             f'{refusal or "the image was not recorded"}', 'no_image')
-    return [found[stamp] for stamp in stamps]
+    return [found[stamp] for stamp in stamps if stamp in found]
 
 
 def _episode(episode: Episode, views: Sequence[View], end: float, stream: CameraStream,

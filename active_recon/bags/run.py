@@ -80,13 +80,18 @@ class RecordedView:
 
 @dataclass(frozen=True, eq=False)
 class RecordedEpisode:
-    """One object's views; `begin` in nanoseconds, `done` the reason for the end, '' if none."""
+    """
+    One object's views; `begin` in nanoseconds, `done` the reason for the end, '' if none.
+
+    `begun_before`: there were views before the recording, whose images it does not have.
+    """
 
     id: str
     begin: int
     first_goal: RecordedGoal | None
     views: Sequence[RecordedView]
     done: str
+    begun_before: bool = False
 
     def done_after(self, view: RecordedView) -> str:
         """Return the reason where it was that view that ended the episode, else ''."""

@@ -36,7 +36,9 @@ class BagWriter:
     Records messages into a folder: `<folder's name>_0.mcap`, `_1.mcap`, ..., `metadata.yaml`.
 
     The folder is made where it is missing; a folder that already holds a bag is refused, nothing
-    is ever overwritten. A new file is begun when the last has reached `max_bytes`, or MOST_CHUNKS.
+    is ever overwritten. A new file is begun when the last has reached `max_bytes`, or MOST_CHUNKS;
+    it repeats the last message of each latched topic, as it was published, so that it can be read
+    alone (`new_in_bag` tells them from new ones).
     Messages reach the disk in chunks, by `flush` or when a chunk is full. Where the disk is full
     (or fails) the call that noticed raises RecordingError, the unwritten chunk is dropped, and
     the bag is closed: it stays a readable one up to its last chunk.
@@ -50,6 +52,9 @@ class BagWriter:
         self._provenance: dict[str, str] = {}
         self._parameters: dict[str, bytes] = {}
         self._done: list[tuple[str, Contents]] = []
+        self._latched: dict[str, tuple[bytes, int, int]] = {}
+        self._repeated = 0
+        self._repeated_bytes = 0
         self._closed = False
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -102,10 +107,12 @@ class BagWriter:
         self._counts[topic] += 1
         try:
             if self._file_is_full():
-                self._split()
+                self._split(receive_time)
             if not self._file.has(topic):
                 self._file.add_topic(*self._topics[topic])
             self._file.write(topic, data, receive_time, publish_time, self._counts[topic])
+            if self._topics[topic][0].latched:
+                self._latched[topic] = data, publish_time, self._counts[topic]
         except OSError as error:
             self._abandon(error)
 
@@ -174,13 +181,29 @@ class BagWriter:
 
     def _file_is_full(self) -> bool:
         return self._file.chunks >= MOST_CHUNKS or (
-            self._max_bytes is not None and self._file.size >= self._max_bytes)
+            self._max_bytes is not None
+            and self._file.size - self._repeated_bytes >= self._max_bytes)
 
-    def _split(self) -> None:
+    def _split(self, time: int) -> None:
         self._file.finish()
         following = self._begin_file(len(self._done) + 1)
+        begun = following.size
+        try:
+            self._repeat_latched(following, time)
+        except OSError:
+            following.abandon()
+            following.path.unlink()
+            raise
         self._done.append((self.path.name, self._file.contents))
         self._file = following
+        self._repeated += len(self._latched)
+        self._repeated_bytes = following.size - begun
+
+    def _repeat_latched(self, file: BagFile, time: int) -> None:
+        for topic, (data, publish_time, sequence) in self._latched.items():
+            file.add_topic(*self._topics[topic])
+            file.write(topic, data, time, publish_time, sequence)
+        file.flush()
 
     def _require_open(self) -> None:
         if self._closed:
@@ -189,7 +212,7 @@ class BagWriter:
     def _abandon(self, error: OSError) -> None:
         """End the bag after its last whole chunk, and say why."""
         self._closed = True
-        kept = total(contents for _, contents in self._files()).counts.total()
+        kept = total(contents for _, contents in self._files()).counts.total() - self._repeated
         lost = self.message_count - kept
         message = (f'{self.path}: the disk took no more ({error.strerror}); the bag ends after '
                    f'{kept} messages, {lost} were lost')

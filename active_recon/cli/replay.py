@@ -102,6 +102,9 @@ def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
             f'{found.same} of {found.compared} the same, at most {found.largest:.2g} apart '
             f'(tolerance {found.tolerance:g})')
         typer.echo(f'  {name:<14}{found.compared:>4} compared  {found.verdict:<17} {gap}'.rstrip())
+    for number, episode in enumerate(run.episodes, 1):
+        if episode.begun_before:
+            typer.echo(f'episode {number} had begun before the recording: it is not compared')
     if not verified.knows_policy:
         typer.echo('the bag does not tell which policy chose: goals and stop are not compared')
     typer.echo(f'hash {verified.hash}')

@@ -45,8 +45,8 @@ class Finding:
 def findings(subject: Subject) -> list[Finding]:
     """Return what the run earned, the warnings first."""
     found = [Finding(level, text) for level, text in (
-        *_stop(subject), *_counted(subject), *_off_goal(subject), *_off_elevation(subject),
-        *_estimate(subject))]
+        *_beginning(subject), *_stop(subject), *_counted(subject), *_off_goal(subject),
+        *_off_elevation(subject), *_estimate(subject))]
     return sorted(found, key=lambda finding: finding.level != 'warning')
 
 
@@ -54,6 +54,12 @@ def stopped(reason: str) -> str:
     """Return in a word or two why an episode stopped, by the planner's reason."""
     word, _ = _STOPPED.get(reason, (reason, ''))
     return word
+
+
+def _beginning(subject: Subject) -> Iterator[tuple[str, str]]:
+    if subject.episode.begun_before:
+        yield 'warning', ('The recording begins in the middle of the episode: there were views '
+                          'before the first one here.')
 
 
 def _stop(subject: Subject) -> Iterator[tuple[str, str]]:
