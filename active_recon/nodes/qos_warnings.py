@@ -1,6 +1,6 @@
 """A node that warns of whoever is on its topics, but with a QoS profile that lets nothing pass."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from functools import partial
 import math
 import time
@@ -35,26 +35,25 @@ class QosWarnings(Node):
     _diagnostics: Diagnostics
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        self._noticed: dict[tuple[str, type], float] = {}
+        self._noticed: dict[str, float] = {}
         self._looking: Timer | None = None
         super().__init__(*args, **options)
 
     def create_publisher(self, msg_type: Any, topic: str, *args: Any, **options: Any) -> Publisher:
         """Create a publisher, as rclpy does, whose mismatches are noticed."""
-        events = PublisherEventCallbacks(incompatible_qos=partial(self._notice, topic, Publisher))
+        events = PublisherEventCallbacks(incompatible_qos=partial(self._notice, topic))
         return super().create_publisher(
             msg_type, topic, *args, **{'event_callbacks': events, **options})
 
     def create_subscription(self, msg_type: Any, topic: str, callback: Callable[[Any], None],
                             *args: Any, **options: Any) -> Subscription:
         """Create a subscription, as rclpy does, whose mismatches are noticed."""
-        events = SubscriptionEventCallbacks(
-            incompatible_qos=partial(self._notice, topic, Subscription))
+        events = SubscriptionEventCallbacks(incompatible_qos=partial(self._notice, topic))
         return super().create_subscription(
             msg_type, topic, callback, *args, **{'event_callbacks': events, **options})
 
-    def _notice(self, topic: str, kind: type, _event: object) -> None:
-        self._noticed[self.resolve_topic_name(topic), kind] = time.monotonic()
+    def _notice(self, topic: str, _event: object) -> None:
+        self._noticed[self.resolve_topic_name(topic)] = time.monotonic()
         self._look()
         if self._looking is None:
             self._looking = self.create_timer(
@@ -62,41 +61,39 @@ class QosWarnings(Node):
 
     def _look(self) -> None:
         """Tell which endpoints do not fit now, and forget the topics on which all do."""
-        for (topic, kind), noticed_at in list(self._noticed.items()):
-            trouble = f'qos/{topic.removeprefix(self.get_namespace()).lstrip("/")}'
-            mismatches = '; '.join(self._mismatches(topic, kind))
+        for topic, noticed_at in list(self._noticed.items()):
+            inside = self.get_namespace().rstrip('/') + '/'
+            trouble = f'qos/{topic.removeprefix(inside).lstrip("/")}'
+            mismatches = '; '.join(self._mismatches(topic))
             late = time.monotonic() - noticed_at > FOUND_WITHIN_S
             if mismatches and (late or _UNKNOWN not in mismatches):
                 self._diagnostics.begin_trouble(trouble, f'{topic}: {mismatches}')
-                self._noticed[topic, kind] = -math.inf
+                self._noticed[topic] = -math.inf
             elif late:
                 self._diagnostics.end_trouble(trouble)
-                del self._noticed[topic, kind]
+                del self._noticed[topic]
         if not self._noticed and self._looking is not None:
             self.destroy_timer(self._looking)
             self._looking = None
 
-    def _mismatches(self, topic: str, kind: type) -> list[str]:
-        own: Iterable[Publisher | Subscription]
-        if kind is Publisher:
-            own, others = self.publishers, self.get_subscriptions_info_by_topic(topic)
-        else:
-            own, others = self.subscriptions, self.get_publishers_info_by_topic(topic)
-        profiles = [each.qos_profile for each in own if each.topic_name == topic]
-        return [_told(kind, profile, other) for profile in profiles for other in others
-                if not _fits(kind, profile, other.qos_profile)]
+    def _mismatches(self, topic: str) -> Iterator[str]:
+        for served in (each.qos_profile for each in self.publishers if each.topic_name == topic):
+            for other in self.get_subscriptions_info_by_topic(topic):
+                if not _fit(served, other.qos_profile):
+                    yield ('expected who listens to ask for no more than this node offers '
+                           f'({profile_words(served)}), but {_name_of(other)} asks for '
+                           f'({profile_words(other.qos_profile)}) and hears nothing')
+        for asked in (each.qos_profile for each in self.subscriptions if each.topic_name == topic):
+            for other in self.get_publishers_info_by_topic(topic):
+                if not _fit(other.qos_profile, asked):
+                    yield ('expected who publishes to offer at least what this node asks for '
+                           f'({profile_words(asked)}), but {_name_of(other)} offers '
+                           f'({profile_words(other.qos_profile)}) and is not heard')
 
 
-def _fits(kind: type, own: QoSProfile, other: QoSProfile) -> bool:
-    offered, requested = (own, other) if kind is Publisher else (other, own)
+def _fit(offered: QoSProfile, requested: QoSProfile) -> bool:
     return bool(qos_check_compatible(offered, requested)[0] != QoSCompatibility.ERROR)
 
 
-def _told(kind: type, own: QoSProfile, other: TopicEndpointInfo) -> str:
-    node = endpoint_node(other) or _UNKNOWN
-    asks, serves = profile_words(other.qos_profile), profile_words(own)
-    if kind is Publisher:
-        return (f'expected who listens to ask for no more than this node offers ({serves}), but '
-                f'{node} asks for ({asks}) and hears nothing')
-    return (f'expected who publishes to offer at least what this node asks for ({serves}), but '
-            f'{node} offers ({asks}) and is not heard')
+def _name_of(endpoint: TopicEndpointInfo) -> str:
+    return endpoint_node(endpoint) or _UNKNOWN

@@ -18,6 +18,7 @@ from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
 from active_recon.nodes.settings.recorder import DIAGNOSTICS, RecorderSettings
 from active_recon.output import output_path
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
@@ -25,6 +26,8 @@ MADE_IT = ('weights_sha256', 'config_sha256', 'policy', 'seed', 'object')
 """The parameters of the loop's nodes that say what made the bag."""
 WATCH_EVERY_S = 0.1
 FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second
+# Who offers less than those before is no mistake: it is listened to anew.
+ADAPTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 QUEUE = 1000  # messages that may wait while the disk is slow
 
 
@@ -119,7 +122,8 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
                 return
             self.destroy_subscription(heard)
         self._heard[name] = self.create_subscription(
-            message_class(type_name), name, partial(self._on_message, name), profile, raw=True)
+            message_class(type_name), name, partial(self._on_message, name), profile, raw=True,
+            event_callbacks=ADAPTS)
 
     def _on_message(self, topic: str, data: bytes, info: dict[str, int]) -> None:
         if self._bag is None:
