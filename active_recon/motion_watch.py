@@ -2,6 +2,7 @@
 
 from active_recon.cameras import azimuth_difference, Camera
 from active_recon.stillness import Stillness
+from active_recon.stream_watch import CLOCK_BACK_S
 import numpy as np
 
 _JUMPS, _JUMPS_S = 3, 1.0
@@ -29,7 +30,9 @@ class MotionWatch:
         self._away = 0.0
 
     def heard(self, camera: Camera, stamp: int, goal: float | None) -> None:
-        """Note where the camera is, and the azimuth of its open goal; old poses are passed by."""
+        """Note where the camera is and the azimuth of its open goal; older poses are passed by."""
+        if stamp < self._last - CLOCK_BACK_S * 1e9:
+            self.clear()
         if stamp <= self._last:
             return
         self._last = stamp

@@ -11,6 +11,8 @@ SILENT_S = 0.5
 """A stream is silent after this time without a message, or after three of its periods."""
 LATE_S = 0.15
 """An image is late that comes so long after the camera info or the pose of its stamp."""
+CLOCK_BACK_S = 1.0
+"""A stamp so much older than the last is of a clock that went back, not of a message too late."""
 WINDOW_S = 1.5
 """What is missing or late is counted over this time."""
 _STAMPS = 21
@@ -43,6 +45,8 @@ class StreamWatch:
         self._moments.setdefault(stamp, {}).setdefault(stream, now)
         self._arrived[stream] = now
         stamps = self._stamps[stream]
+        if stamps and stamp < stamps[-1] - CLOCK_BACK_S * 1e9:
+            stamps.clear()
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
         if len(stamps) == _STAMPS:

@@ -87,5 +87,13 @@ def test_poses_that_are_older_than_the_last_are_passed_by():
     motion.run(lambda now: 1.0, 0.5)
     before = motion.now
     for back in range(20):
-        motion.watch.heard(orbit_camera(back % 2), round((before - 5) * 1e9) + back, None)
+        motion.watch.heard(orbit_camera(back % 2), round((before - 0.5) * 1e9) + back, None)
     assert not motion.watch.found()
+
+
+def test_after_the_clock_went_back_the_motion_is_watched_anew():
+    motion = Motion()
+    motion.run(lambda now: 1.0, 3.0, goal=2.0)
+    motion.now -= 60.0
+    assert motion.run(lambda now: 1.0, 2.0, goal=2.0) == {
+        'stalled': pytest.approx(TIMEOUT, abs=0.05)}

@@ -115,6 +115,14 @@ def test_images_a_little_behind_their_poses_are_not_late():
     assert not Streams().run(5.0, late_s=0.07)
 
 
+def test_after_the_clock_went_back_a_stream_is_watched_anew():
+    watch = StreamWatch()
+    for index in range(40):
+        for stream in STREAMS:
+            watch.heard(stream, (1000 if index < 10 else 0) * 10**9 + index * 33 * MS, index / 30)
+    assert watch.found(40 / 30 + 1.0).keys() == {'silent_camera'}
+
+
 def test_after_clear_nothing_is_missed_before_it_has_come_anew():
     streams = Streams()
     streams.run(3.0)

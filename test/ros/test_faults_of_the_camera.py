@@ -6,30 +6,18 @@ images without ROS.
 """
 
 from functools import partial
+import logging
+import time
 
 from active_recon.faults import FAULTS
-from active_recon.reconstructor import Reconstructor
 from active_recon.shown_object import rendered_object
-from conftest import LATCHED
-from geometry_msgs.msg import PoseStamped
-from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.voxels import voxel_grid_to_msg
+from hand_listed_loop import computed, DEGREES, Loop, RECOVERED_S
 import pytest
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
-from sensor_msgs.msg import Image, PointCloud2
-from std_msgs.msg import Header
 import torch
 import trimesh
 
 pytestmark = pytest.mark.ros
-
-# Of the 24 views, 15 degrees apart, those nearest to 0, 18, 36, ... 342 degrees
-DEGREES = [0, 15, 30, 60, 75, 90, 105, 120, 150, 165,
-           180, 195, 210, 240, 255, 270, 285, 300, 330, 345]
-VIEWS = len(DEGREES)
-TOLD_S, RECOVERED_S = 3.0, 6.0
-"""Seconds in which a fault is told and the loop goes on after it: 1 and 2, slow machines apart."""
+LOG = logging.getLogger(__name__)
 
 # What each fault is told as: while the loop goes on, and where nothing gets through at all
 SOME = {'drop_images:0.3': 'warned/missing_images', 'delay_images:0.2': 'warned/late_images',
@@ -72,14 +60,6 @@ def one_thread():
     torch.set_num_threads(threads)
 
 
-def computed(shown, degrees):
-    """Return the occupancy after each of those views, as a message without a stamp."""
-    reconstructor = Reconstructor.load()
-    grids = [reconstructor.add_view(shown.images[at // 15], shown.cameras[at // 15]).grid
-             for at in degrees]
-    return [voxel_grid_to_msg(grid, reconstructor.threshold, Header()) for grid in grids]
-
-
 @pytest.fixture(scope='module')
 def expected(one_thread, shown):
     return computed(shown, DEGREES)
@@ -94,84 +74,7 @@ def start(start_shared_node, mesh, tmp_path_factory):
         'reconstructor': partial(start_shared_node, 'reconstructor', take_views='at_goal',
                                  output_dir=tmp_path_factory.mktemp('meshes')),
         'view_planner': partial(start_shared_node, 'view_planner', policy='uniform',
-                                max_views=VIEWS, entropy_tolerance=0.0, start_azimuth=0.0)}
-
-
-def stamp_of(msg):
-    return nanoseconds_from_stamp(getattr(msg, 'header', msg).stamp)
-
-
-class Loop:
-    """The running loop, what is heard of it, and the faults of its camera."""
-
-    def __init__(self, bench, nodes, shown):
-        self.bench, self.nodes = bench, nodes
-        self._degrees = {image.tobytes(): 15 * index for index, image in enumerate(shown.images)}
-        self._seen = {}
-        bench.node.create_subscription(Image, 'camera/image_raw', self._on_image, 100)
-        self._views = bench.hear(PoseStamped, 'view')
-        self._occupancy = bench.hear(PointCloud2, 'occupancy')
-        self._episodes = bench.hear(Header, 'episode', LATCHED)
-        self._ends = bench.hear(Header, 'done', LATCHED)
-        self._parameters = bench.node.create_client(
-            SetParameters, 'turntable_camera/set_parameters')
-        for topic in ('camera/image_raw', 'view', 'occupancy', 'episode', 'done'):
-            bench.until(lambda topic=topic: bench.node.count_publishers(topic), topic)
-
-    def _on_image(self, msg):
-        degrees = self._degrees.get(bytes(msg.data))
-        if degrees is not None:
-            self._seen[stamp_of(msg)] = degrees
-
-    def set_faults(self, *entries):
-        """Have these faults, and no others, from now on; return whether they were taken."""
-        value = ParameterValue(type=ParameterType.PARAMETER_STRING_ARRAY,
-                               string_array_value=list(entries))
-        self.bench.until(self._parameters.service_is_ready, 'the parameters of the camera')
-        answer = self._parameters.call_async(
-            SetParameters.Request(parameters=[Parameter(name='faults', value=value)]))
-        self.bench.until(answer.done, 'the answer to new faults')
-        return answer.result().results[0]
-
-    def begin(self):
-        """Begin an episode."""
-        answer = self.bench.call('start_episode')
-        assert answer.success
-        self.bench.until(lambda: self._episodes and self._episodes[-1].frame_id == answer.message,
-                         'the new episode')
-
-    def _of_episode(self, heard):
-        return [msg for msg in heard if stamp_of(msg) >= stamp_of(self._episodes[-1])]
-
-    @property
-    def taken(self):
-        """The degrees of the views of this episode, as their images show them."""
-        return [self._seen.get(stamp_of(view)) for view in self._of_episode(self._views)]
-
-    def count(self, key):
-        return self.bench.counts('reconstructor').get(key, 0)
-
-    def wait_views(self, number, budget_s=30.0):
-        self.bench.until(lambda: len(self._of_episode(self._views)) >= number,
-                         f'view {number} of an episode with {self.taken}', budget_s)
-
-    def wait_told(self, key, before):
-        self.bench.until(lambda: self.count(key) > before, f'{key} to be told', TOLD_S)
-
-    def check(self, degrees, expected):
-        """Wait for the end: these views, in this order, and each one's occupancy to the bit."""
-        self.bench.until(lambda: self._of_episode(self._ends)[-1:]
-                         and self._of_episode(self._ends)[-1].frame_id == 'max_views',
-                         f'the end of an episode with {self.taken}')
-        stamps = [stamp_of(view) for view in self._of_episode(self._views)]
-        clouds = {stamp_of(cloud): cloud for cloud in self._of_episode(self._occupancy)}
-        self.bench.until(lambda: set(stamps) <= self._seen.keys(), 'the images of all views')
-        assert self.taken == degrees
-        assert sorted(clouds) == stamps
-        for stamp, cloud in zip(stamps, expected, strict=True):
-            assert clouds[stamp].data == cloud.data
-        assert all(node.running for node in self.nodes.values())
-        assert not [line for node in self.nodes.values() for line in node.log('Traceback|ERROR')]
+                                max_views=len(DEGREES), entropy_tolerance=0.0, start_azimuth=0.0)}
 
 
 @pytest.fixture(scope='module')
@@ -212,13 +115,17 @@ def test_a_fault_is_told_and_when_it_is_over_the_loop_goes_on_with_the_right_vie
 
 def go_through(loop, entry, key):
     """Have a fault until it is told, and for six views if any can be taken; then go on."""
-    before = loop.count(key)
+    before, began = loop.count(key), time.monotonic()
     assert loop.set_faults(entry).successful
     loop.wait_told(key, before)
+    told_s = time.monotonic() - began
     if entry in SOME:
         loop.wait_views(len(loop.taken) + 6)
+    taken, ended = len(loop.taken), time.monotonic()
     assert loop.set_faults().successful
-    loop.wait_views(len(loop.taken) + 1, RECOVERED_S)
+    loop.wait_views(taken + 1, RECOVERED_S)
+    LOG.info('%s: told after %.2f s, the next view %.2f s after its end',
+             entry, told_s, time.monotonic() - ended)
 
 
 @pytest.mark.parametrize('episodes', EPISODES)
@@ -228,6 +135,8 @@ def test_all_faults_together_change_neither_the_views_nor_what_comes_of_them(
     for _ in range(episodes):
         loop.begin()
         loop.check(DEGREES, expected)
+    assert loop.set_faults().successful
+    loop.bench.until(lambda: not loop.bench.state('reconstructor').problem, 'the end of warnings')
 
 
 def test_faults_that_cannot_be_are_refused_with_a_reason_and_the_old_ones_stay(loop):
@@ -236,3 +145,44 @@ def test_faults_that_cannot_be_are_refused_with_a_reason_and_the_old_ones_stay(l
     assert not refused.successful
     assert 'a name of drop_images' in refused.reason
     loop.wait_told('refused/no_camera_info', loop.count('refused/no_camera_info'))
+
+
+@pytest.fixture
+def stopped(loop):
+    """Return the loop in mid-episode, the motor standing away from its goal."""
+    loop.begin()
+    loop.wait_views(4)
+    before = loop.count('warned/stalled')
+    assert loop.set_faults('stall_motor:1').successful
+    loop.wait_told('warned/stalled', before)
+    return loop
+
+
+def test_a_reconstructor_that_is_killed_comes_back_to_a_clean_episode(stopped, start, expected):
+    episode = stopped.episode
+    stopped.kill('reconstructor')
+    stopped.nodes['reconstructor'] = start['reconstructor']()
+    stopped.bench.until(lambda: stopped.episode != episode, 'a new episode')
+    stopped.wait_told('warned/stalled', 0)
+    assert not stopped.taken
+    assert stopped.set_faults().successful
+    stopped.check(DEGREES, expected)
+
+
+def test_a_planner_that_is_killed_comes_back_to_go_on_from_the_last_view(
+        stopped, start, one_thread, shown):
+    taken, goal = list(stopped.taken), stopped.goal
+    stopped.kill('view_planner')
+    stopped.nodes['view_planner'] = start['view_planner']()
+    stopped.bench.until(lambda: stopped.goal != goal, 'a goal of the new planner')
+    assert stopped.set_faults().successful
+    stopped.wait_done()
+    sweep = [(taken[-1] + degrees) % 360 for degrees in DEGREES[1:]]
+    stopped.check(taken + sweep, computed(shown, taken + sweep))
+
+
+def test_a_camera_that_is_killed_comes_back_and_hears_the_open_goal_again(
+        stopped, start, expected):
+    stopped.kill('turntable_camera')
+    stopped.nodes['turntable_camera'] = start['turntable_camera']()
+    stopped.check(DEGREES, expected)
