@@ -48,9 +48,15 @@ class ViewJoiner:
         self._with_masks = masks
         self.clear()
 
-    def clear(self) -> None:
-        """Forget everything, the order of stamps included."""
-        self._last_image = -1
+    def clear(self, earliest: int = 0) -> None:
+        """
+        Forget everything, the order of stamps included.
+
+        What is stamped before `earliest` and still comes is of no use from now on: an image is
+        refused, the rest is left out.
+        """
+        self._earliest = earliest
+        self._last_image = earliest - 1
         self._images: deque[tuple[int, NDArray[np.uint8], float]] = deque()
         self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_WAITING)
         self._masks: deque[tuple[int, Image]] = deque(maxlen=_WAITING)
@@ -69,14 +75,18 @@ class ViewJoiner:
         self._images.append((stamp, image, now))
 
     def add_intrinsics(self, stamp: int, intrinsics: Intrinsics) -> None:
-        self._intrinsics.append((stamp, intrinsics))
+        if stamp >= self._earliest:
+            self._intrinsics.append((stamp, intrinsics))
 
     def add_mask(self, stamp: int, mask: Image) -> None:
         """Take in the mask of the image of that stamp, as it came."""
-        self._masks.append((stamp, mask))
+        if stamp >= self._earliest:
+            self._masks.append((stamp, mask))
 
     def add_pose(self, stamp: int, pose: NDArray[np.float64]) -> None:
         """Take in a pose, (4, 4), object from optical frame."""
+        if stamp < self._earliest:
+            return
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
         del self._poses[:-_KEPT]
 

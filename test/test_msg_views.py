@@ -156,6 +156,34 @@ def test_an_image_comes_once_and_in_order_until_an_episode_begins():
     joiner.add_image(4, IMAGE, 0.0)
 
 
+@pytest.mark.parametrize('late', ['image', 'camera info', 'pose', 'mask'])
+def test_what_is_late_of_the_last_episode_never_gets_into_a_view(late):
+    joiner = ViewJoiner(max_pose_gap=0.1, patience=0.5, masks=True)
+    joiner.add_intrinsics(90 * MS, CANONICAL_INTRINSICS)
+    joiner.add_mask(90 * MS, Image())
+    joiner.add_pose(90 * MS, pose(1.0))
+    joiner.clear(earliest=100 * MS)
+    if late == 'image':
+        with pytest.raises(MessageError, match='expected images in the order of their stamps'):
+            joiner.add_image(90 * MS, IMAGE, 0.0)
+        return
+    joiner.add_image(100 * MS, IMAGE, 0.0)
+    if late != 'camera info':
+        joiner.add_intrinsics(100 * MS, CANONICAL_INTRINSICS)
+    if late != 'mask':
+        joiner.add_mask(100 * MS, Image())
+    if late == 'pose':  # between two of them the image's would be interpolated
+        joiner.add_pose(99 * MS, pose(1.0))
+        joiner.add_pose(101 * MS, pose(1.1))
+        assert only_error(joiner, 1.0).kind == 'no_pose'
+        return
+    joiner.add_pose(100 * MS, pose(1.0))
+    joiner.add_intrinsics(99 * MS, CANONICAL_INTRINSICS)
+    joiner.add_mask(99 * MS, Image())
+    assert only_error(joiner, 1.0).kind == {'camera info': 'no_camera_info',
+                                            'mask': 'no_mask'}[late]
+
+
 def test_a_flood_of_images_without_poses_does_not_pile_up():
     joiner = ViewJoiner(max_pose_gap=0.1)
     refused = 0

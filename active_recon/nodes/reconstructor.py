@@ -133,9 +133,9 @@ class ReconstructorNode(ManagedNode):
     def _begin_episode(self) -> None:
         self._reconstructor.reset()
         self._gate.reset()
-        self._joiner.clear()
         self._reconstruction = None
         self._episode = Episode(uuid.uuid4().hex[:12], self.get_clock().now().nanoseconds)
+        self._joiner.clear(self._episode.begin)
         self._diagnostics.count('episodes')
         self._diagnostics.tell('Episode', self._episode.id)
         self._diagnostics.tell('Views of the episode', '0')

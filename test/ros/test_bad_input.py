@@ -6,6 +6,7 @@ import re
 
 from conftest import FakeCamera
 from geometry_msgs.msg import PoseStamped
+from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
@@ -127,6 +128,26 @@ def test_bad_input_is_said_once_counted_and_survived(
     line, = reconstructor.log('WARN|ERROR|Traceback')[said_before:]
     assert re.search(f'refused: .*{said}', line)
     camera.show()
+
+
+def test_what_is_late_of_the_last_episode_never_reaches_the_new_one(
+        shared_bench, reconstructor, camera):
+    late = shared_bench.now()
+    assert shared_bench.call('start_episode').success
+    refused = shared_bench.counts('reconstructor').get('refused/last_episode', 0)
+    messages = camera.messages(late)
+
+    def was_refused():
+        camera.send(*messages)
+        return shared_bench.counts('reconstructor').get('refused/last_episode', 0) > refused
+
+    shared_bench.until(was_refused, 'the refusal of the late image')
+    taken = camera.show()
+    shared_bench.until(
+        lambda: shared_bench.state('reconstructor').facts.get('Views of the episode') == '1',
+        'one view in the new episode')
+    assert late not in [nanoseconds_from_stamp(msg.header.stamp) for msg in camera.occupancy]
+    assert taken > late
 
 
 @pytest.fixture
