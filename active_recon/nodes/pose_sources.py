@@ -7,6 +7,7 @@ import time
 from typing import Any, Protocol
 
 from active_recon.errors import ConfigError, MessageError
+from active_recon.nodes.clock import STEADY
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.qos import HEARD_OFTEN, STREAM
 from active_recon.nodes.settings.camera_pose import CameraPoseSettings
@@ -111,7 +112,7 @@ class TfPoses:
         self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
         self._buffer = self._tf.Buffer()
         self._listener = self._tf.TransformListener(self._buffer, node)
-        node.create_timer(LOOK_UP_EVERY_S, self._look_up)
+        node.create_timer(LOOK_UP_EVERY_S, self._look_up, clock=STEADY)
 
     def image_came(self, header: Header) -> None:
         """Look the image's pose up, now or when its transform has come."""

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 
+from active_recon.nodes.clock import STEADY
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
@@ -51,7 +50,7 @@ class ReferenceCapture:
         image = self._image = Future()
         late = self._node.create_timer(
             IMAGE_WITHIN_S, lambda: image.done() or image.set_result(None),
-            clock=Clock(clock_type=ClockType.STEADY_TIME))
+            clock=STEADY)
         captured = await image
         self._node.destroy_timer(late)
         self._image = None
