@@ -2,6 +2,7 @@
 
 from active_recon.background import Background, off_color, off_reference, on_white
 from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.canonical import canonical_image
 from active_recon.errors import ConfigError, ViewError
 from active_recon.rendering import composite, Renderer
 from active_recon.shapes import make_shape
@@ -74,6 +75,20 @@ def test_the_background_becomes_white_and_the_object_stays(shown):
     np.testing.assert_array_equal(whitened[mask], image[mask])
     assert (whitened[~mask] == 255).all()
     assert whitened.dtype == np.uint8
+
+
+def test_the_network_sees_a_cleared_view_nearly_as_one_before_white(shown):
+    rng = np.random.default_rng(0)
+    camera = orbit_camera(0.9, intrinsics=CANONICAL_INTRINSICS.resized(SIDE, SIDE))
+    scene = clutter(rng)
+    views = {'reference': (grainy(composite(shown, scene), rng), grainy(scene, rng)),
+             'color': (grainy(composite(shown, uneven(GREEN)), rng), None)}
+    expected = canonical_image(composite(shown, 255), camera).astype(int)
+    for how, (image, reference) in views.items():
+        cleared = Background(how, GREEN).cleared(image, reference=reference)
+        away = [np.abs(canonical_image(one, camera) - expected).mean()
+                for one in (cleared, image)]
+        assert away[0] < 2 < 50 < away[1]
 
 
 def test_holes_through_the_object_show_the_background():
