@@ -12,10 +12,12 @@ from active_recon.bags.writer import BagWriter
 from active_recon.errors import DataError
 from active_recon.reconstructor import Reconstruction
 from active_recon.voxels import VoxelGrid
-from loop_bags import BEGIN, DELAY, header, LENS, LoopRun, STILL, type_name, write_bag
+from loop_bags import BEGIN, DELAY, header, LENS, LoopRun, PERIOD, STILL, type_name, write_bag
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
+from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
 from msg_tools.episodes import done_to_msg
 from msg_tools.images import image_to_msg
+from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import FIELDS
 import numpy as np
 import pytest
@@ -280,3 +282,23 @@ def test_reading_tells_how_far_it_is(loop, bag):
     read_run(bag, reporting=reporting)
     size = sum(path.stat().st_size for path in bag.glob('*.mcap'))
     assert told == {'checking the bag': [size, size], 'reading the images': [3 * STILL, 3 * STILL]}
+
+
+def test_images_that_are_missing_in_the_stream_are_told(tmp_path):
+    loop = LoopRun(azimuths=tuple(np.arange(6.0)))
+    whole = read_run(write_bag(tmp_path / 'whole', loop.messages))
+    assert (whole.gaps.missing, whole.gaps.unheard) == (0, None)
+    lost = [entry for entry in loop.messages if not (
+        entry[1] == '/camera/image_raw' and entry[0] - 3 == loop.stamps[2] - PERIOD)]
+    gaps = read_run(write_bag(tmp_path / 'lost', lost)).gaps
+    assert gaps.missing == 1
+    assert gaps.period_s == pytest.approx(PERIOD / 1e9)
+
+
+def test_images_that_the_loop_did_not_hear_are_told(loop, tmp_path):
+    counted = [(time, '/diagnostics', diagnostics_to_msg(
+        NodeStatus('/reconstructor', {'images': images}), stamp_from_nanoseconds(time)))
+        for time, images in ((loop.begin, 100), (loop.end, 102))]
+    others = [entry for entry in loop.messages if entry[1] != '/diagnostics']
+    run = read_run(write_bag(tmp_path / 'run', [*others, *counted]))
+    assert run.gaps.unheard == STILL * len(loop.stamps) - 2

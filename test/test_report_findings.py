@@ -3,6 +3,7 @@
 from dataclasses import replace
 import math
 
+from active_recon.bags.image_gaps import ImageGaps
 from active_recon.bags.run import RecordedGoal
 from active_recon.cameras import orbit_camera
 from active_recon.report.findings import findings
@@ -36,6 +37,14 @@ def test_late_poses_and_dropped_images_are_told_with_their_number(run):
     [warning] = said(counted(run, refused__no_pose=7))
     assert warning.startswith('7 images were dropped')
     assert 'late poses' in warning
+
+
+def test_images_that_nobody_counted_are_told(run):
+    assert said(replace(run, gaps=ImageGaps(0.1, 0, 0.0, 0))) == []
+    [gap] = said(replace(run, gaps=ImageGaps(0.1, 7, 0.8)))
+    assert 'About 7 images are missing' in gap and 'every 100 ms' in gap and '0.8 s' in gap
+    [unheard] = said(replace(run, gaps=ImageGaps(0.1, unheard=9)))
+    assert unheard.startswith('9 images that were recorded never reached')
 
 
 def test_refusal_of_a_kind_unknown_here_is_told_by_its_name(run):

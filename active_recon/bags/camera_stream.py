@@ -37,7 +37,7 @@ class CameraStream:
     to the images on their receive times.
 
     `received` tells when what bears a stamp was received, by the topic's name in the loop,
-    nanoseconds.
+    nanoseconds; `images` are the stamp and the receive time of each image read, wanted or not.
     """
 
     def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics,
@@ -49,7 +49,7 @@ class CameraStream:
         self._unstamped = False
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
-        self._first_image = math.inf
+        self.images: list[tuple[int, int]] = []
         self.received: dict[str, dict[int, int]] = {
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
@@ -67,7 +67,7 @@ class CameraStream:
         """Return whether an image of that stamp, or what tells of its camera, came too early."""
         firsts = [entries[0][0] for entries in (self._poses, self._lenses)
                   if entries and not self._unstamped]
-        return stamp < max(self._first_image, *firsts)
+        return stamp < max(min(self.images)[0] if self.images else math.inf, *firsts)
 
     def _joined(self, wanted: Callable[[int], bool], advance: Advance
                 ) -> Iterator[View | MessageError]:
@@ -77,7 +77,7 @@ class CameraStream:
             advance(1, '')
             msg = read_message(message)
             stamp = nanoseconds_from_stamp(msg.header.stamp)
-            self._first_image = min(self._first_image, stamp)
+            self.images.append((stamp, message.received))
             if not wanted(stamp):
                 continue
             self.received[IMAGE_ROLE].setdefault(stamp, message.received)

@@ -38,7 +38,8 @@ class LoopRecord:
 
     - parts: what was said, by the topic's name in the loop, then by its stamp in nanoseconds
     - published, received: when it was, the same way; what was published again counts once
-    - counters: the last ones of `/diagnostics`, by node
+    - counters: the last ones of `/diagnostics`, by node; counted: all of them, with the times at
+      which they were received
 
     An entropy bears no stamp and has that of the view that was published next to it.
     `object_size` is the grid's side in metres. Raises DataError on what is not as the loop's
@@ -50,6 +51,7 @@ class LoopRecord:
         self.published: dict[str, dict[int, int]] = {role: {} for role in LOOP}
         self.received: dict[str, dict[int, int]] = {role: {} for role in LOOP}
         self.counters: dict[str, dict[str, int]] = {}
+        self.counted: dict[str, list[tuple[int, dict[str, int]]]] = {}
         self._from_msg: dict[str, Callable[[Any], Any]] = {
             'episode': episode_from_msg,
             'view': lambda msg: pose_from_msg(msg, object_frame),
@@ -102,7 +104,8 @@ class LoopRecord:
         if message.type_name != DIAGNOSTICS:
             return
         for name, status in diagnostics_from_msg(read_message(message)).items():
-            self.counters[name.lstrip('/')] = dict(status.counts)
+            known = self.counters[name.lstrip('/')] = dict(status.counts)
+            self.counted.setdefault(name.lstrip('/'), []).append((message.received, known))
 
 
 def _scores_from_msg(msg: Any) -> tuple[NDArray[np.float64], NDArray[np.float32]]:

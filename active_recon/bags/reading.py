@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from active_recon.bags.camera_stream import CameraStream
+from active_recon.bags.image_gaps import gaps_between, ImageGaps, unheard_images
 from active_recon.bags.loop_record import LoopRecord
 from active_recon.bags.raw import Bag, BagSummary
 from active_recon.bags.recorded_views import gated_views, recorded_episodes
@@ -35,18 +36,18 @@ def run_in(bag: Bag, summary: BagSummary, path: Path, topics: Topics,
            reporting: Reporting) -> RecordedRun:
     """Return the run in an open bag, as `read_run` does."""
     try:
-        episodes, counters = _episodes(bag, summary, topics, reporting)
+        episodes, counters, gaps = _episodes(bag, summary, topics, reporting)
     except ActiveReconError as error:
         told = str(error)
         raise DataError(told if told.startswith(str(path)) else f'{path}: {told}',
                         error.kind) from error
     return RecordedRun(path, episodes, summary.provenance, summary.parameters, counters,
-                       summary.topics, summary.begin, summary.end)
+                       summary.topics, summary.begin, summary.end, gaps)
 
 
 def _episodes(bag: Bag, summary: BagSummary, topics: Topics, reporting: Reporting
-              ) -> tuple[list[RecordedEpisode], Mapping[str, Mapping[str, int]]]:
-    """Return the episodes, and the counters by node."""
+              ) -> tuple[list[RecordedEpisode], Mapping[str, Mapping[str, int]], ImageGaps]:
+    """Return the episodes, the counters by node, and what is missing of the images."""
     namespace = None if topics.azimuth else loop_namespace(summary.topics)
     node = summary.parameters.get(f'{namespace or "/"}reconstructor'.strip('/'), {})
     topics = replace(topics, max_pose_gap=_value(node, 'max_pose_gap', topics.max_pose_gap),
@@ -54,10 +55,14 @@ def _episodes(bag: Bag, summary: BagSummary, topics: Topics, reporting: Reportin
     stream = CameraStream(bag, camera_topics(summary.topics, topics), topics, reporting)
     if namespace is None:
         episode, counters = gated_views(stream, ViewGate())
-        return [episode], {'bag': counters}
+        return [episode], {'bag': counters}, gaps_between([stamp for stamp, _ in stream.images])
     record = LoopRecord(
         bag, namespace, _value(node, 'object_size', 1.0), topics.object_frame)
-    return recorded_episodes(stream, record), record.counters
+    episodes = recorded_episodes(stream, record)
+    gaps = gaps_between([stamp for stamp, _ in stream.images])
+    unheard = unheard_images([received for _, received in stream.images], record.counted.get(
+        f'{namespace}reconstructor'.strip('/'), ()))
+    return episodes, record.counters, replace(gaps, unheard=unheard)
 
 
 def _value(parameters: Mapping[str, Any], name: str, default: Value) -> Value:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from active_recon.bags.image_gaps import ImageGaps
 from active_recon.bags.metadata import QosProfile
 from active_recon.cameras import Camera
 from active_recon.voxels import VoxelGrid
@@ -121,6 +122,7 @@ class RecordedRun:
       have none
     - parameters: by node; counters: the last of `/diagnostics`, by node
     - begin, end: receive times of the first and the last message, nanoseconds
+    - gaps: what of the camera's images is missing
     """
 
     path: Path
@@ -131,3 +133,4 @@ class RecordedRun:
     topics: Sequence[TopicSummary]
     begin: int
     end: int
+    gaps: ImageGaps = ImageGaps()

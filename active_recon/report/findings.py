@@ -45,8 +45,8 @@ class Finding:
 def findings(subject: Subject) -> list[Finding]:
     """Return what the run earned, the warnings first."""
     found = [Finding(level, text) for level, text in (
-        *_beginning(subject), *_stop(subject), *_counted(subject), *_off_goal(subject),
-        *_off_elevation(subject), *_estimate(subject))]
+        *_beginning(subject), *_stop(subject), *_counted(subject), *_missing(subject),
+        *_off_goal(subject), *_off_elevation(subject), *_estimate(subject))]
     return sorted(found, key=lambda finding: finding.level != 'warning')
 
 
@@ -87,6 +87,18 @@ def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
             yield 'note', (f'By the last count of the {name}, {counts["images"]} images came in. '
                            f'{counts["views"]} became views; {counts["images_unused"]} showed the '
                            'camera on its way or waiting, and were left out as they should be.')
+
+
+def _missing(subject: Subject) -> Iterator[tuple[str, str]]:
+    """Yield what nobody counted, since it never came."""
+    gaps = subject.run.gaps
+    if gaps.missing and gaps.period_s:
+        yield 'warning', (f'About {gaps.missing} images are missing: the camera showed one every '
+                          f'{1e3 * gaps.period_s:.0f} ms, but once none for '
+                          f'{gaps.longest_s:.1f} s.')
+    if gaps.unheard:
+        yield 'warning', (f'{gaps.unheard} images that were recorded never reached the '
+                          'reconstructor.')
 
 
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
