@@ -45,10 +45,10 @@ class NodeProcess:
     """A node in a process of its own, its log in a file."""
 
     def __init__(self, name: str, parameters: dict[str, Any], folder: Path,
-                 program: Sequence[str] = ()) -> None:
+                 program: Sequence[str] = (), namespace: str = '') -> None:
         arguments = [f'{key}:={value}' for key, value in parameters.items()]
         program = program or ('-m', f'active_recon.nodes.{name}')
-        command = [sys.executable, *program, '--ros-args']
+        command = [sys.executable, *program, '--ros-args', '-r', f'__ns:=/{namespace}']
         for argument in arguments:
             command += ['-p', argument]
         folder.mkdir(parents=True, exist_ok=True)
@@ -302,9 +302,9 @@ class FakeReconstructor:
 def _started(folder: Path) -> Iterator[Callable[..., NodeProcess]]:
     processes: list[NodeProcess] = []
 
-    def start(name: str, ready: bool = True, program: Sequence[str] = (), **parameters: Any
-              ) -> NodeProcess:
-        process = NodeProcess(name, parameters, folder / str(len(processes)), program)
+    def start(name: str, ready: bool = True, program: Sequence[str] = (), namespace: str = '',
+              **parameters: Any) -> NodeProcess:
+        process = NodeProcess(name, parameters, folder / str(len(processes)), program, namespace)
         processes.append(process)
         if ready:
             process.wait_ready()
