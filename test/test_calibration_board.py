@@ -18,7 +18,7 @@ def test_a_corner_is_found_where_the_lens_shows_it(lens):
     seen = BOARD.detect(render(lens, POSE), 'a.png')
     apart = seen.pixels - project(lens, seen.points, POSE)
     assert len(seen.points) >= 24
-    assert np.linalg.norm(apart, axis=1).max() < 1
+    assert np.quantile(np.linalg.norm(apart, axis=1), 0.9) < 0.5
     assert np.abs(np.median(apart, axis=0)).max() < 0.05  # nothing is shifted by half a pixel
 
 
@@ -71,7 +71,8 @@ def test_a_strip_of_corners_is_not_enough_for_a_pose():
 
 
 @pytest.mark.parametrize(('given', 'said'), [
-    ({'columns': 2}, '3 x 3 squares or more, got 2 x 5'),
+    ({'columns': 2}, '4 x 3 squares or more, got 2 x 5'),
+    ({'columns': 3, 'rows': 3}, '4 x 3 squares or more, got 3 x 3'),
     ({'square': 0.0}, 'markers smaller than the squares'),
     ({'marker': 0.03}, 'markers of 30 mm in squares of 30 mm'),
     ({'square': math.nan}, 'markers smaller than the squares'),

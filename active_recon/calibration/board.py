@@ -17,6 +17,7 @@ DICTIONARIES = tuple(sorted(name.removeprefix('DICT_').lower() for name in dir(c
 PIXELS_PER_MM = 12
 _MARGIN = 0.5  # white around the printed board, in squares
 _FEWEST_CORNERS = 6
+_SIDE = 60  # of a square that the detector is sure to find, pixels
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class Board:
 
     def __post_init__(self) -> None:
         """Refuse what OpenCV would crash on."""
-        if self.columns < 3 or self.rows < 3:
-            raise ConfigError('board: expected 3 x 3 squares or more, got '
+        if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) < 4:
+            raise ConfigError('board: expected 4 x 3 squares or more, got '
                               f'{self.columns} x {self.rows}')
         if not 0 < self.marker < self.square < np.inf:
             raise ConfigError('board: expected markers smaller than the squares, and both above '
@@ -72,6 +73,16 @@ class Board:
         side = round(self.square * 1e3 * pixels_per_mm)
         return np.asarray(self._charuco.generateImage(
             (self.columns * side, self.rows * side)), np.uint8)
+
+    @cached_property
+    def _first_pixel(self) -> NDArray[np.float64]:
+        """Where the detector's (0, 0) is: OpenCV 5 says the first pixel's centre, 4 its corner."""
+        drawn = self.drawn(_SIDE / self.square / 1e3)
+        corners, ids, *_ = cv2.aruco.CharucoDetector(self._charuco).detectBoard(
+            np.pad(drawn, _SIDE, constant_values=255))
+        true = self.corners[np.ravel(ids), :2] / self.square * _SIDE + _SIDE
+        apart = true - np.asarray(corners, np.float64).reshape(-1, 2)
+        return np.asarray(np.round(2 * np.median(apart, axis=0)) / 2)
 
     def printed_size(self) -> tuple[float, float]:
         """Return width and height of the squares as `save` prints them, metres."""
@@ -110,8 +121,7 @@ class Board:
         if self._charuco.checkCharucoCornersCollinear(ids):
             return None
         return Detection(name, self.corners[ids],
-                         # OpenCV counts from the first pixel's centre, we from its corner
-                         np.asarray(corners, np.float64).reshape(-1, 2) + 0.5,
+                         np.asarray(corners, np.float64).reshape(-1, 2) + self._first_pixel,
                          (image.shape[1], image.shape[0]))
 
 
