@@ -37,8 +37,8 @@ LOOP = '/policies_0'
 OBSERVER = 'policies'
 MESH = Path(__file__).parents[1] / 'active_recon' / 'objects' / 'chair.glb'
 SETTLED_S = 5.0
-"""What is new for so long comes no more."""
-BUDGET_S = 90.0
+"""Where nothing is new for so long after all are ready, nothing more comes."""
+BUDGET_S = 150.0
 _POLL_S = 0.25
 
 
@@ -55,8 +55,12 @@ def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
             'camera_orientation': [turn.x, turn.y, turn.z, turn.w]}}}
 
 
-def live_accesses() -> Iterator[dict[str, Access]]:
-    """Start all and yield what is known by now of each node, again and again, for BUDGET_S."""
+def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
+    """
+    Start all and yield, again and again, whether all are ready, and what each node has by now.
+
+    It ends after BUDGET_S.
+    """
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
     with (TemporaryDirectory() as folder, joined_domain(OBSERVER) as (observer, _),
@@ -76,7 +80,8 @@ def live_accesses() -> Iterator[dict[str, Access]]:
                     seen.setdefault(name, []).extend(_access(observer, name, namespace))
             known = {name: joined(each) for name, each in seen.items()}
             seen = {name: [access] for name, access in known.items()}
-            yield known
+            ready = all(']: ready' in log.read_text() for log in Path(folder).glob('*.txt'))
+            yield ready, known
             time.sleep(_POLL_S)
 
 
@@ -98,11 +103,10 @@ def main() -> None:
     options = parser.parse_args()
     wanted = read_policies(options.file) if options.check else None
     settled_since, last = time.monotonic(), {}
-    for live in live_accesses():
-        if live != last:
+    for ready, live in live_accesses():
+        if not ready or live != last:
             settled_since, last = time.monotonic(), live
-        enough = live == wanted if options.check else any(map(any, last.values()))
-        if enough and time.monotonic() - settled_since > SETTLED_S:
+        if time.monotonic() - settled_since > SETTLED_S and wanted in (None, live):
             break
     if wanted is None:
         write_policies(options.file, last, options.namespace)
