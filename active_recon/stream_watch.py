@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from statistics import median
 
 import numpy as np
+from numpy.typing import NDArray
 
 STREAMS = ('images', 'camera_info', 'poses')
 SILENT_S = 0.5
@@ -49,17 +50,17 @@ class StreamWatch:
             stamps.clear()
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
-        if len(stamps) == _STAMPS:
-            self._note_period(stream)
 
     def found(self, now: float) -> dict[str, str]:
         """Return what is wrong now: a short word of each fault, and a sentence."""
         self._forget(now - WINDOW_S)
+        for stream, stamps in self._stamps.items():
+            if len(stamps) == _STAMPS:
+                self._note_period(stream, np.diff(stamps) / 1e9)
         return {**self._silent(now), **dict(self._missing()), **dict(self._late())}
 
-    def _note_period(self, stream: str) -> None:
+    def _note_period(self, stream: str, periods: NDArray[np.float64]) -> None:
         """Keep the period of a stream that comes regularly; one that no longer does has none."""
-        periods = np.diff(self._stamps[stream]) / 1e9
         typical = float(np.median(periods))
         regular = float(np.mean((periods >= typical / 3) & (periods <= 3 * typical)))
         if regular >= (_NO_LONGER if stream in self._periods else _REGULAR):

@@ -74,6 +74,7 @@ def test_what_does_not_come_regularly_is_not_missed(arrivals):
     for now in arrivals:
         for stream in STREAMS:
             watch.heard(stream, round(now * 1e9), now)
+        assert not watch.found(now)
     assert not watch.found(100.0)
 
 
@@ -120,6 +121,7 @@ def test_after_the_clock_went_back_a_stream_is_watched_anew():
     for index in range(40):
         for stream in STREAMS:
             watch.heard(stream, (1000 if index < 10 else 0) * 10**9 + index * 33 * MS, index / 30)
+        assert not watch.found(index / 30)
     assert watch.found(40 / 30 + 1.0).keys() == {'silent_camera'}
 
 
