@@ -2,17 +2,22 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 import gc
 import traceback
 from typing import Any
 
-from active_recon.errors import ActiveReconError
+from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.nodes.clock import ClockWatch
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import ReadOnlySaysWhy
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import one_line, run_node
+from lifecycle_msgs.srv import ChangeState
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+RCLError = rclpy_implementation.RCLError
 
 
 class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
@@ -29,12 +34,14 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
     def __init__(self, name: str) -> None:
         self._configured, self._activated = ExitStack(), ExitStack()
         self._being_made: ExitStack | None = None
-        self._before: frozenset[str] = frozenset()
+        self._before: frozenset[str] | None = None
         self._failure: Exception | None = None
         self._is_starting = False
         self.is_configured = False
         self.is_active = False
         super().__init__(name)
+        self._service_change_state.callback = partial(
+            self._refuse_impossible, self._service_change_state.callback)
         self._diagnostics = Diagnostics(self)
         self._tell_state()
 
@@ -142,10 +149,21 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
 
     def _free(self) -> None:
         self._configured.close()
-        self._diagnostics.forget()
-        for name in vars(self).keys() - self._before:
-            delattr(self, name)
+        if self._before is not None:
+            for name in vars(self).keys() - self._before:
+                delattr(self, name)
+            self._before = None
         gc.collect()
+
+    def _refuse_impossible(self, change: Callable[..., ChangeState.Response],
+                           request: ChangeState.Request,
+                           response: ChangeState.Response) -> ChangeState.Response:
+        """Answer that a transition failed which rclpy, asked by its number, would not survive."""
+        try:
+            return change(request, response)
+        except RCLError as error:
+            self._diagnostics.refuse(ConfigError(one_line(error), 'transition'))
+            return response
 
     def _undone_later(self, made: Any, destroy: Callable[[Any], Any]) -> Any:
         if self._being_made is not None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import DataError
 from active_recon.faults import CameraFaults, read_faults, Sent, Shot
+from active_recon.nodes.clock import ClockWatch
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import Commit, Parameters, ReadOnlySaysWhy, tell
 from active_recon.nodes.qos import HEARD, STREAM
@@ -55,6 +56,7 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
         self.create_service(Trigger, 'next_object', self._on_next_object,
                             callback_group=MutuallyExclusiveCallbackGroup())
         self._timer = self.create_timer(1 / settings.rate, self._show)
+        self._clock_watch = ClockWatch(self, self._clock_went_back)
         self.get_logger().info('ready')
 
     def _change(self, settings: TurntableCameraSettings) -> Commit:
@@ -68,6 +70,10 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
             self._timer.reset()
 
         return commit
+
+    def _clock_went_back(self, how: str) -> None:
+        self._turntable = _at_start(self._settings.now)
+        self.get_logger().warning(f'{how}: the turntable is where it was at start')
 
     def _now_s(self) -> float:
         return self.get_clock().now().nanoseconds / 1e9

@@ -3,11 +3,15 @@
 import itertools
 import math
 
+from active_recon.cameras import Camera
 from conftest import FakeCamera, FakeReconstructor, LATCHED
-from msg_tools.goals import view_goal_from_msg
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import pose_from_msg
+from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 import pytest
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from test_parameter_changes import change
 from test_planner_node import latent  # noqa: F401
@@ -124,3 +128,25 @@ def test_a_planner_keeps_an_episode_that_came_before_it_heard_the_new_time(
     assert view_goal_from_msg(first) == pytest.approx(1.0)
     wait_second(bench, fake, latent)
     assert bench.counts('view_planner')['episodes'] == 2
+
+
+def test_a_turntable_begins_anew_where_its_clock_goes_back(start_node, bench, box):
+    start_node('turntable_camera', mesh=box, start_azimuth=1.0, use_sim_time=True)
+    clock = FakeClock(bench)
+    poses = bench.hear(PoseStamped, 'camera/pose')
+    goals = bench.advertise(JointState, 'next_azimuth', LATCHED)
+
+    def was_at(azimuth, low, high):
+        """Return whether a pose of that time, seconds, is near an azimuth."""
+        return any(abs(Camera(pose_from_msg(msg)).azimuth - azimuth) < 0.14 for msg in poses
+                   if low * S <= nanoseconds_from_stamp(msg.header.stamp) < high * S)
+
+    def let_pass(seconds):
+        """Let the time go on: the stream stands still with the clock."""
+        clock.tell(next(seconds))
+        goals.publish(azimuth_goal_to_msg(2.0, Header()))
+
+    before, after = itertools.count(100, 0.1), itertools.count(50, 0.1)
+    bench.until(lambda: let_pass(before) or was_at(2.0, 100, 1000), 'the goal')
+    bench.until(lambda: let_pass(after) or was_at(1.0, 50, 100), 'the start')
+    bench.until(lambda: let_pass(after) or was_at(2.0, 50, 100), 'the goal again')

@@ -32,11 +32,13 @@ class Supervisor:
         return self._bench.ask(GetState, f'{self._node}/get_state').current_state.label
 
     def set(self, transition):
-        """Return whether the transition succeeded; it is asked for once, for it may take long."""
+        """Return whether the transition of that label or number succeeded."""
         before = self.state()
         self._bench.until(self._client.service_is_ready, 'the service')
-        answer = self._client.call_async(
-            ChangeState.Request(transition=Transition(label=transition)))
+        wanted = (Transition(id=transition) if isinstance(transition, int)
+                  else Transition(label=transition))
+        # Only once: it may take long, and a second request would be refused
+        answer = self._client.call_async(ChangeState.Request(transition=wanted))
         if self._bench.within(BUDGET_S, answer.done):
             return answer.result().success
         return self.state() != before  # the answer was lost
@@ -75,7 +77,7 @@ def test_what_a_transition_makes_its_opposite_destroys(start_node, bench, name):
 
 @pytest.mark.parametrize('transitions', [
     [], ['configure'], ['configure', 'activate'], ['configure', 'activate', 'shutdown'],
-    ['configure', 'cleanup']], ids='-'.join)
+    ['configure', 'cleanup'], ['shutdown'], ['configure', 'cleanup', 'shutdown']], ids='-'.join)
 def test_a_node_that_is_asked_to_stop_ends_cleanly_in_every_state(
         start_node, bench, transitions):
     node = start_node('view_planner', ready=False, autostart=False, policy='farthest')
@@ -100,6 +102,17 @@ def test_weights_that_are_missing_leave_a_node_unconfigured_and_say_why(
     bench.until(lambda: bench.counts(name).get('refused/transition'), 'the diagnostics')
     assert node.running
     assert not supervisor.set('activate')
+
+
+def test_a_transition_that_is_not_possible_now_is_refused_and_survived(start_node, bench):
+    node = start_node('view_planner', policy='farthest')
+    supervisor = Supervisor(bench, 'view_planner')
+    for impossible in ('configure', 'nonsense', Transition.TRANSITION_ACTIVATE, 77):
+        assert not supervisor.set(impossible)
+    assert supervisor.state() == 'active'
+    assert supervisor.set(Transition.TRANSITION_DEACTIVATE)
+    assert supervisor.state() == 'inactive'
+    assert node.log('refused: .*Transition is not registered')
 
 
 def test_a_reconstructor_hears_nothing_while_inactive_and_then_begins_an_episode(
