@@ -59,7 +59,7 @@ class Background:
             return on_white(image, off_color(image, self.color, self.tolerance))
         if self.how == 'mask':
             if mask is None:
-                raise ViewError('expected a mask with the image, got none', 'no_mask')
+                raise ViewError("expected a mask of the image's stamp, got none", 'no_mask')
             return on_white(image, mask)
         if reference is None:
             raise ViewError('expected an image of the empty scene before the first view, got '

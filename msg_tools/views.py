@@ -23,7 +23,7 @@ class View:
     """
     An image, (H, W, 3) uint8 RGB, and the camera that took it, at a stamp in nanoseconds.
 
-    With the mask of its object, still unread, where masks are joined.
+    With the mask of its object, still unread, where masks are joined and one came.
     """
 
     stamp: int
@@ -39,7 +39,8 @@ class ViewJoiner:
     The camera info is that of the image's stamp. The pose is too, or is interpolated between its
     neighbours, each at most `max_pose_gap` seconds away. An image waits for them until they can
     no longer come: a later one is there, or `patience` seconds have passed. With `masks` it waits
-    for the mask of its stamp in the same way. `max_pose_gap` may be changed at any time.
+    in the same way for the mask of its stamp, without which it may still be joined.
+    `max_pose_gap` may be changed at any time.
     """
 
     def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False) -> None:
@@ -96,14 +97,12 @@ class ViewJoiner:
             stamp, image, arrived = self._images[0]
             late = now - arrived > self._patience or len(self._images) > _WAITING
             try:
-                intrinsics = _of_stamp(self._intrinsics, stamp, late, 'camera info',
-                                       'no_camera_info')
+                intrinsics = self._intrinsics_at(stamp, late)
                 pose = self._pose_at(stamp, late) if intrinsics else None
                 if intrinsics is None or pose is None:
                     return
-                mask = (_of_stamp(self._masks, stamp, late, 'a mask', 'no_mask')
-                        if self._with_masks else None)
-                if self._with_masks and mask is None:
+                mask = _of_stamp(self._masks, stamp) if self._with_masks else None
+                if self._with_masks and mask is None and not _is_past(self._masks, stamp, late):
                     return
                 height, width = image.shape[:2]
                 if (intrinsics.height, intrinsics.width) != (height, width):
@@ -122,6 +121,16 @@ class ViewJoiner:
         stamp, _, _ = self._images.popleft()
         while self._masks and self._masks[0][0] <= stamp:
             self._masks.popleft()
+
+    def _intrinsics_at(self, stamp: int, late: bool) -> Intrinsics | None:
+        """Return the camera info of that stamp, None while it may still come."""
+        intrinsics = _of_stamp(self._intrinsics, stamp)
+        if intrinsics is None and _is_past(self._intrinsics, stamp, late):
+            came = (f'the last is of {_seconds(self._intrinsics[-1][0])}' if self._intrinsics
+                    else 'none came')
+            raise MessageError("expected camera info of the image's stamp, "
+                               f'{_seconds(stamp)}, {came}', 'no_camera_info')
+        return intrinsics
 
     def _pose_at(self, stamp: int, late: bool) -> NDArray[np.float64] | None:
         """Return the pose at that stamp, None while it or its later neighbour may still come."""
@@ -154,17 +163,14 @@ def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
     return pose
 
 
-def _of_stamp(parts: Sequence[tuple[int, Part]], stamp: int, late: bool, what: str,
-              kind: str) -> Part | None:
-    """Return the part of that stamp, None while it may still come."""
-    for known, part in reversed(parts):
-        if known == stamp:
-            return part
-    if late or (parts and parts[-1][0] > stamp):
-        came = f'the last is of {_seconds(parts[-1][0])}' if parts else 'none came'
-        raise MessageError(f"expected {what} of the image's stamp, {_seconds(stamp)}, {came}",
-                           kind)
-    return None
+def _of_stamp(parts: Sequence[tuple[int, Part]], stamp: int) -> Part | None:
+    """Return the last part that came of that stamp, None where there is none."""
+    return next((part for known, part in reversed(parts) if known == stamp), None)
+
+
+def _is_past(parts: Sequence[tuple[int, object]], stamp: int, late: bool) -> bool:
+    """Return whether a part of that stamp can come no longer."""
+    return late or bool(parts and parts[-1][0] > stamp)
 
 
 def _seconds(stamp: int) -> str:

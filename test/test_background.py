@@ -182,7 +182,7 @@ def test_an_image_that_is_to_stay_as_it_is_stays_so():
 
 
 @pytest.mark.parametrize(('how', 'kind', 'said'), [
-    ('mask', 'no_mask', 'expected a mask with the image, got none'),
+    ('mask', 'no_mask', "a mask of the image's stamp, got none"),
     ('reference', 'no_reference', 'empty the scene and call capture_background')])
 def test_what_is_needed_to_tell_the_background_is_asked_for(how, kind, said):
     with pytest.raises(ViewError, match=said) as refusal:
