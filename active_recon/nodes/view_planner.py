@@ -2,13 +2,12 @@
 
 import math
 from pathlib import Path
-import time
-from typing import Any
 
 from active_recon.cameras import Camera, CANONICAL_DISTANCE
 from active_recon.errors import ActiveReconError
 from active_recon.nodes.clock import AHEAD_S, STEADY
 from active_recon.nodes.goal_publisher import GoalPublisher
+from active_recon.nodes.heard_views import HeardView, HeardViews
 from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.parameters import Commit, Parameters
 from active_recon.nodes.qos import HEARD, LATCHED
@@ -19,18 +18,11 @@ from active_recon.policies import load_policy, Policy
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
-from msg_tools.images import latent_from_msg
-from msg_tools.joins import StampJoiner
 from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
-from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-FIND_VIEWS_S = 0.5
-"""An episode older than this node may have views already: so long after their publishers were
-found they may come first."""
 REPEAT_S = 1.0
 """So often a goal whose view has not come is sent again."""
 MADE_OF = {'random': ('seed',), 'uniform': ('max_views',)}
@@ -51,7 +43,6 @@ class ViewPlannerNode(ManagedNode):
         self._frame = settings.object_frame
         self._policy = self._load(settings)
         self._planner = self._planner_of(settings, self._policy)
-        self._joiner = StampJoiner(('latent', 'view', 'probabilities'))
         self._goals = GoalPublisher(
             self, self._frame, settings.elevation,
             CANONICAL_DISTANCE * settings.object_size if math.isnan(settings.distance)
@@ -64,15 +55,11 @@ class ViewPlannerNode(ManagedNode):
     def activate(self) -> None:
         """Hear the reconstructor, and go on from what is latched."""
         self._episode: Episode | None = None
-        self._last: tuple[int, dict[str, Any]] | None = None
         self._begun_at = self.get_clock().now().nanoseconds
-        self._matched_at: float | None = None
         self._forget()
         self.create_subscription(PoseStamped, 'camera/pose', self._on_camera, HEARD)
-        self._of_views = [self.create_subscription(kind, topic, on_msg, LATCHED)
-                          for kind, topic, on_msg in (
-            (Image, 'latent', self._on_latent), (PoseStamped, 'view', self._on_view),
-            (PointCloud2, 'probabilities', self._on_probabilities))]
+        self._views = HeardViews(self, self._frame, self._settings.now.object_size,
+                                 self._diagnostics, self._decide)
         self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
         self.create_timer(0.1, self._ask_first, clock=STEADY)
         self.create_timer(0.1, self._give_up_late, clock=STEADY)
@@ -123,17 +110,14 @@ class ViewPlannerNode(ManagedNode):
             episode = episode_from_msg(msg)
             if self._episode is not None and episode.id == self._episode.id:
                 return
-            if self._episode is not None and episode.begin < self._episode.begin:
-                self._joiner.clear()  # time went back: what is stamped later is of before
-                self._last = None
             self._forget()
-            self._joiner.forget_before(episode.begin)
+            self._views.begin(episode.begin)
             self._episode = episode
             self._diagnostics.count('episodes')
             self._diagnostics.tell('Episode', episode.id)
             self._tell_done(episode.begin, '')
-            if self._last is not None:  # its view may be heard before an episode is
-                self._decide(*self._last, episode)
+            if self._views.last is not None:
+                self._decide(self._views.last)
 
     def clock_went_back(self, how: str) -> None:
         """Wait for the episode of the new time, unless it came before the new time was heard."""
@@ -143,8 +127,8 @@ class ViewPlannerNode(ManagedNode):
         self._diagnostics.count('clock_jumps')
         self.get_logger().warning(f'{how}: a new episode is awaited')
         if self._episode is not None and self._episode.begin > now + AHEAD_S * 1e9:
-            self._episode = self._last = None
-            self._joiner.clear()
+            self._episode = None
+            self._views.forget()
             self._forget()
         elif self._goals.azimuth is not None:
             self._ask(self._planner.plan())  # under a stamp of the new time
@@ -160,58 +144,22 @@ class ViewPlannerNode(ManagedNode):
         """Ask for the first view, once, where the camera or the parameter says."""
         if self._episode is None or self._started:
             return
-        if self._episode.begin < self._begun_at and not self._has_heard_latched():
-            return
+        if self._episode.begin < self._begun_at and not self._views.would_be_here():
+            return  # an episode older than this node may have views already
         start = self._settings.now.start_azimuth
         azimuth = self._camera_azimuth if math.isnan(start) else start
         if not math.isnan(azimuth):
             self._ask(self._planner.first_goal(azimuth))
 
-    def _has_heard_latched(self) -> bool:
-        """Whether a view that was there before this node would have been heard by now."""
-        if not all(heard.get_publisher_count() for heard in self._of_views):
-            return False
-        now = time.monotonic()
-        self._matched_at = now if self._matched_at is None else self._matched_at
-        return now - self._matched_at >= FIND_VIEWS_S
-
-    def _on_latent(self, msg: Image) -> None:
-        with self._diagnostics.refusing():
-            self._join('latent', msg.header, latent_from_msg(msg))
-
-    def _on_view(self, msg: PoseStamped) -> None:
-        with self._diagnostics.refusing():
-            self._join('view', msg.header, Camera(pose_from_msg(msg, self._frame)).azimuth)
-
-    def _on_probabilities(self, msg: PointCloud2) -> None:
-        with self._diagnostics.refusing():
-            grid = voxel_grid_from_msg(msg, self._settings.now.object_size)
-            self._join('probabilities', msg.header, grid.entropy())
-
-    def _join(self, name: str, header: Header, part: Any) -> None:
-        """Decide once all parts of a view are there, and its episode is known."""
-        stamp = nanoseconds_from_stamp(header.stamp)
-        if self.clock_watch.is_ahead(stamp):
+    def _decide(self, view: HeardView) -> None:
+        if self._episode is None:
             return
-        if self._episode is not None and stamp < self._episode.begin:
-            self._diagnostics.count('dropped/last_episode')
-            return
-        parts = self._joiner.add(name, stamp, part)
-        if parts is None:
-            return
-        self._last = stamp, parts
-        if self._episode is not None:
-            self._decide(stamp, parts, self._episode)
-
-    def _decide(self, stamp: int, parts: dict[str, Any], episode: Episode) -> None:
-        if stamp < episode.begin:  # heard before any episode was
-            return
-        decision = self._planner.add_view(parts['latent'], parts['view'], parts['probabilities'])
+        decision = self._planner.add_view(view.latent, view.azimuth, view.entropy)
         self._started = True
         self._diagnostics.count('views')
-        self._follow(decision, stamp)
+        self._follow(decision, view.stamp)
         if decision.goal is not None:
-            self._diagnostics.took_since(stamp)
+            self._diagnostics.took_since(view.stamp)
 
     def _follow(self, decision: Decision, stamp: int) -> None:
         """Ask for the goal, or say that the episode is done, at a stamp in nanoseconds."""

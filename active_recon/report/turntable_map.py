@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from active_recon.bags.run import RecordedGoal, RecordedView
-from active_recon.cameras import azimuth_difference
+from active_recon.cameras import azimuth_difference, TURN, VIEW_COUNT
 from active_recon.report.charts import Figure, view_color
 from active_recon.report.images import data_uri
 from active_recon.report.subject import degrees, shown_grid, Subject
@@ -109,7 +109,8 @@ def _decision(goal: RecordedGoal | None) -> list[dict[str, Any]]:
     x: list[float | None] = []
     y: list[float | None] = []
     tips, words = [], []
-    half = 0.4 * 2 * math.pi / len(scores)
+    gaps = np.diff(np.unique(azimuths), append=azimuths.min() + TURN)
+    half = 0.4 * min(TURN / VIEW_COUNT, gaps.min())
     for azimuth, score, share in zip(azimuths.tolist(), scores.tolist(), shares.tolist(),
                                      strict=True):
         inner, outer = _PETAL[0], _PETAL[0] + 0.03 + share * (_PETAL[1] - _PETAL[0])
