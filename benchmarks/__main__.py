@@ -1,8 +1,10 @@
-"""Measure everything, print the README's table, and write it as JSON."""
+"""Measure everything, print the README's table, and write it as JSON; or only the parts named."""
 
+from collections.abc import Callable, Mapping, Sequence
 import json
 from pathlib import Path
 import platform
+import sys
 
 from benchmarks.core import reconstruct_and_plan, rendering
 from benchmarks.figures import Figure, reference_ms
@@ -10,6 +12,13 @@ from benchmarks.loop import demo_figure, reconstructor_figures
 from benchmarks.viewer import watching_figures
 
 RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'benchmarks.json'
+PARTS: Mapping[str, Callable[[], list[Figure]]] = {
+    'view': lambda: [reconstruct_and_plan()],
+    'rendering': lambda: [rendering(1, 400), rendering(2, 100)],
+    'reconstructor': reconstructor_figures,
+    'viewer': watching_figures,
+    'demo': lambda: [demo_figure()],
+}
 
 
 def main() -> None:
@@ -18,12 +27,17 @@ def main() -> None:
     print(f'{platform.machine()}; reference (512 x 512 matrix product): {reference:.2f} ms')  # noqa: T201
     print('| figure | measured | 5 to 95 % | goal | x reference |\n|---|---|---|---|---|')  # noqa: T201
     figures = []
-    for measure in (lambda: [reconstruct_and_plan()], lambda: [rendering(1, 400)],
-                    lambda: [rendering(2, 100)], reconstructor_figures,
-                    watching_figures, lambda: [demo_figure()]):
-        for figure in measure():
+    for part in sys.argv[1:] or PARTS:
+        for figure in PARTS[part]():
             figures.append(figure)
             print(_row(figure, reference), flush=True)  # noqa: T201
+    if not sys.argv[1:]:
+        _keep(figures, reference)
+    missed = [figure.name for figure in figures if not figure.reached]
+    print(f'missed: {", ".join(missed)}' if missed else 'every goal is reached')  # noqa: T201
+
+
+def _keep(figures: Sequence[Figure], reference: float) -> None:
     RESULTS.parent.mkdir(parents=True, exist_ok=True)
     RESULTS.write_text(json.dumps({
         'command': 'make bench', 'reference_ms': reference,
@@ -31,8 +45,6 @@ def main() -> None:
                      'percentile': figure.percentile, 'low_high': figure.spread,
                      'goal': figure.goal, 'reached': figure.reached,
                      'samples': len(figure.samples)} for figure in figures]}, indent=1) + '\n')
-    missed = [figure.name for figure in figures if not figure.reached]
-    print(f'missed: {", ".join(missed)}' if missed else 'every goal is reached')  # noqa: T201
 
 
 def _row(figure: Figure, reference: float) -> str:
