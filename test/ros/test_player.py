@@ -16,6 +16,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM = QoSProfile(depth=1000)
 CAMERA = 'camera/image_raw,camera/camera_info,camera/pose'
 VIEWS = 3
+PLAYED_WITHIN_S = 120.0  # two processes to start, and a bag as long as it took to record
 
 
 def read(bag):
@@ -78,7 +79,7 @@ def test_every_message_is_heard_in_order_at_the_rate(bench, play, bag):
     episodes = bench.hear(Header, 'episode', LATCHED)
     began = time.monotonic()
     process = play(bag, '--rate', '2', '--topics', 'camera/pose,/episode')
-    bench.until(lambda: process.poll() is not None, 'the end of the playing')
+    bench.until(lambda: process.poll() is not None, 'the end of the playing', PLAYED_WITHIN_S)
     assert process.returncode == 0
     assert time.monotonic() - began > seconds / 2
     assert stamps(poses) == stamps(recorded['/camera/pose'])
@@ -88,7 +89,7 @@ def test_every_message_is_heard_in_order_at_the_rate(bench, play, bag):
 def test_latched_topics_are_latched_again(bench, play, bag):
     process = play(bag, '--topics', 'episode,camera/pose', '--rate', '0.5')
     poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
-    bench.until(lambda: poses, 'the first pose, which follows the episode')
+    bench.until(lambda: poses, 'the first pose, which follows the episode', PLAYED_WITHIN_S)
     late = bench.hear(Header, 'episode', LATCHED)
     bench.until(lambda: late, 'the episode, which was said before')
     process.terminate()
@@ -103,7 +104,7 @@ def test_live_nodes_take_the_recorded_camera_for_one(bench, play, start_node, ba
     views = bench.hear(PoseStamped, 'view', LATCHED)
     done = bench.hear(Header, 'done', LATCHED)
     play(bag, '--topics', CAMERA)
-    bench.until(lambda: done and done[-1].frame_id, 'the end of the loop')
+    bench.until(lambda: done and done[-1].frame_id, 'the end of the loop', PLAYED_WITHIN_S)
     assert done[-1].frame_id == 'max_views'
     assert len(views) == VIEWS
     assert set(stamps(views)) <= set(stamps(recorded['/camera/image_raw']))
