@@ -13,8 +13,9 @@ import subprocess
 import sys
 
 import active_recon
-from conftest import BUDGET_S, FakeCamera, ROOT
+from conftest import BUDGET_S, LATCHED, ROOT
 import pytest
+from sensor_msgs.msg import PointCloud2
 
 pytestmark = pytest.mark.ros
 LISTENS = '0A'
@@ -98,7 +99,8 @@ def witnessed(name: str, folder: Path, **parameters) -> Iterator[Path]:
         yield notes
     finally:
         process.terminate()
-        assert process.wait(BUDGET_S) == 0, log.read_text()
+        code = process.wait(BUDGET_S)
+    assert code == 0, log.read_text()
 
 
 def fingerprints(folder):
@@ -119,7 +121,8 @@ def test_files_that_parameters_name_are_only_read_and_all_else_goes_under_output
           witnessed('turntable_camera', run, mesh=mesh) as by_camera,
           witnessed('reconstructor', run, weights=given / '2d3d-attention.safetensors',
                     take_views='all', threshold=0.01, output_dir=out / 'meshes') as by_network):
-        FakeCamera(bench).show()
+        occupancy = bench.hear(PointCloud2, 'occupancy', LATCHED)
+        bench.until(lambda: occupancy, 'a view of what the camera shows', 3 * BUDGET_S)
         mesh_file = Path(bench.call('save_mesh').message)
         bag = Path(bench.call('stop').message)
     assert fingerprints(given) == before
