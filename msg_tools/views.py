@@ -8,13 +8,15 @@ from typing import TypeVar
 
 from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import MessageError
+from msg_tools.camera_images import pixels_from_msg, size_from_msg
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 
 _KEPT = 1024  # poses: five seconds of a fast tracker
-_WAITING = 32  # images
+_WAITING = 32  # images, as long as they are not larger than
+_WAITING_BYTES = 1 << 28  # all together
 Part = TypeVar('Part')
 
 
@@ -30,6 +32,28 @@ class View:
     image: NDArray[np.uint8]
     camera: Camera
     mask: Image | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class UnreadView:
+    """A view whose image is still the message that came, so that nothing is unpacked in vain."""
+
+    stamp: int
+    image: Image | CompressedImage
+    camera: Camera
+    mask: Image | None = None
+
+    def read(self) -> View:
+        """Unpack the image; raises MessageError where it cannot be."""
+        return View(self.stamp, pixels_from_msg(self.image), self.camera, self.mask)
+
+
+@dataclass(frozen=True, eq=False)
+class _WaitingImage:
+    stamp: int
+    msg: Image | CompressedImage
+    size: tuple[int, int]
+    arrived: float
 
 
 class ViewJoiner:
@@ -58,13 +82,19 @@ class ViewJoiner:
         """
         self._earliest = earliest
         self._last_image = earliest - 1
-        self._images: deque[tuple[int, NDArray[np.uint8], float]] = deque()
+        self._images: deque[_WaitingImage] = deque()
         self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_WAITING)
         self._masks: deque[tuple[int, Image]] = deque(maxlen=_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
 
-    def add_image(self, stamp: int, image: NDArray[np.uint8], now: float) -> None:
-        """Raise MessageError on an image that came before, or is older than the last."""
+    def add_image(self, stamp: int, msg: Image | CompressedImage, now: float) -> None:
+        """
+        Take in an image as it came.
+
+        Raises MessageError where `size_from_msg` does, and on an image that came before or is
+        older than the last.
+        """
+        size = size_from_msg(msg)
         if stamp == self._last_image:
             raise MessageError(f'expected each image once, got that of {_seconds(stamp)} again',
                                'duplicate')
@@ -73,7 +103,7 @@ class ViewJoiner:
                 f'expected images in the order of their stamps, got {_seconds(stamp)} after '
                 f'{_seconds(self._last_image)}; a new episode forgets the order', 'out_of_order')
         self._last_image = stamp
-        self._images.append((stamp, image, now))
+        self._images.append(_WaitingImage(stamp, msg, size, now))
 
     def add_intrinsics(self, stamp: int, intrinsics: Intrinsics) -> None:
         if stamp >= self._earliest:
@@ -91,11 +121,12 @@ class ViewJoiner:
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
         del self._poses[:-_KEPT]
 
-    def joined(self, now: float) -> Iterator[View | MessageError]:
+    def joined(self, now: float) -> Iterator[UnreadView | MessageError]:
         """Yield what has been decided since the last call, in the images' order."""
         while self._images:
-            stamp, image, arrived = self._images[0]
-            late = now - arrived > self._patience or len(self._images) > _WAITING
+            image = self._images[0]
+            stamp = image.stamp
+            late = now - image.arrived > self._patience or self._are_too_many()
             try:
                 intrinsics = self._intrinsics_at(stamp, late)
                 pose = self._pose_at(stamp, late) if intrinsics else None
@@ -104,7 +135,7 @@ class ViewJoiner:
                 mask = _of_stamp(self._masks, stamp) if self._with_masks else None
                 if self._with_masks and mask is None and not _is_past(self._masks, stamp, late):
                     return
-                height, width = image.shape[:2]
+                height, width = image.size
                 if (intrinsics.height, intrinsics.width) != (height, width):
                     raise MessageError(
                         f"expected camera info of the image's size, {height} x {width}, "
@@ -114,11 +145,16 @@ class ViewJoiner:
                 yield error
                 continue
             self._drop_first()
-            yield View(stamp, image, Camera(pose, intrinsics), mask)
+            yield UnreadView(stamp, image.msg, Camera(pose, intrinsics), mask)
+
+    def _are_too_many(self) -> bool:
+        return len(self._images) > _WAITING or (
+            len(self._images) > 1
+            and sum(len(image.msg.data) for image in self._images) > _WAITING_BYTES)
 
     def _drop_first(self) -> None:
         """Forget the first image, and the masks that no later one can want: they are large."""
-        stamp, _, _ = self._images.popleft()
+        stamp = self._images.popleft().stamp
         while self._masks and self._masks[0][0] <= stamp:
             self._masks.popleft()
 

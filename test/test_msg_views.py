@@ -1,17 +1,21 @@
 """Image, camera info and pose, joined on stamps."""
 
+from array import array
 from itertools import permutations
 
 from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.errors import MessageError
+from msg_tools.images import image_to_msg
 from msg_tools.joins import StampJoiner
 from msg_tools.views import interpolated, ViewJoiner
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
 MS = 1_000_000
-IMAGE = np.zeros((137, 137, 3), np.uint8)
+PIXELS = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
+IMAGE = image_to_msg(PIXELS, Header())
 
 
 def pose(azimuth):
@@ -192,6 +196,34 @@ def test_a_flood_of_images_without_poses_does_not_pile_up():
         joiner.add_image(stamp, IMAGE, 0.0)
         refused += len(drain(joiner))
     assert refused >= 150
+
+
+def test_large_images_that_wait_hold_no_more_than_so_many_bytes():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    large = Image(encoding='mono8', height=8000, width=10_000, step=10_000,
+                  data=array('B', bytes(80_000_000)))
+    for stamp in range(6):
+        joiner.add_image(stamp, large, 0.0)
+    assert [error.kind for error in drain(joiner)] == ['no_camera_info'] * 3
+
+
+def test_an_image_that_is_none_is_refused_where_it_comes_in_and_leaves_no_trace():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    with pytest.raises(MessageError) as caught:
+        joiner.add_image(5, Image(encoding='yuv9'), 0.0)
+    assert caught.value.kind == 'encoding'
+    joiner.add_image(5, IMAGE, 0.0)
+
+
+def test_an_image_is_unpacked_when_its_view_is_read():
+    joiner = ViewJoiner(max_pose_gap=0.1)
+    joiner.add_image(5, IMAGE, 0.0)
+    joiner.add_intrinsics(5, CANONICAL_INTRINSICS)
+    joiner.add_pose(5, pose(1.0))
+    view, = drain(joiner)
+    assert view.image is IMAGE
+    np.testing.assert_array_equal(view.read().image, PIXELS)
+    assert view.read().camera is view.camera
 
 
 def test_parts_of_a_stamp_are_complete_with_the_last_one():

@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -16,11 +17,11 @@ from active_recon.bags.topics import CameraTopics, Topics
 from active_recon.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.errors import DataError, MessageError
 from active_recon.reporting import Advance, Reporting, silent
-from msg_tools.camera_images import pixels_from_msg
+from msg_tools.camera_images import size_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
 from msg_tools.goals import joint_position_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.views import View, ViewJoiner
+from msg_tools.views import UnreadView, ViewJoiner
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,7 +54,7 @@ class CameraStream:
         self.received: dict[str, dict[int, int]] = {
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
-    def views(self, wanted: Callable[[int], bool]) -> Iterator[View | MessageError]:
+    def views(self, wanted: Callable[[int], bool]) -> Iterator[UnreadView | MessageError]:
         """
         Yield the images whose stamps are wanted, with their cameras, or why they are refused.
 
@@ -70,7 +71,7 @@ class CameraStream:
         return stamp < max(min(self.images)[0] if self.images else math.inf, *firsts)
 
     def _joined(self, wanted: Callable[[int], bool], advance: Advance
-                ) -> Iterator[View | MessageError]:
+                ) -> Iterator[UnreadView | MessageError]:
         joiner = ViewJoiner(self._topics.max_pose_gap)
         fed = 0
         for message in self._bag.messages({self._camera.image.name}):
@@ -86,9 +87,8 @@ class CameraStream:
                 joiner.add_pose(*self._poses[fed])
                 fed += 1
             try:
-                image = pixels_from_msg(msg)
-                joiner.add_intrinsics(time, self._lens(time, *image.shape[:2]))
-                joiner.add_image(time, image, now=0)
+                joiner.add_intrinsics(time, self._lens(time, *size_from_msg(msg)))
+                joiner.add_image(time, msg, now=0)
             except MessageError as error:
                 if error.kind == 'out_of_order':
                     raise DataError(f'{message.topic}: the times run backwards: {error}',
@@ -96,7 +96,7 @@ class CameraStream:
                 yield error
                 continue
             for view in joiner.joined(now=math.inf):  # what may come has come
-                yield View(stamp, view.image, view.camera) if isinstance(view, View) else view
+                yield replace(view, stamp=stamp) if isinstance(view, UnreadView) else view
 
     def _read_cameras(self) -> Iterator[MessageError]:
         """Read the poses and lenses, in the order of their stamps; yield what is refused."""

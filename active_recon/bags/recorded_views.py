@@ -10,7 +10,7 @@ from typing import Any
 from active_recon.bags.camera_stream import CameraStream
 from active_recon.bags.loop_record import LoopRecord
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedView
-from active_recon.errors import DataError
+from active_recon.errors import DataError, MessageError
 from active_recon.view_gate import ViewGate
 from msg_tools.episodes import Episode
 from msg_tools.views import View
@@ -48,16 +48,20 @@ def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, 
     counters: Counter[str] = Counter()
     refusal = ''
     for view in stream.views(wanted=lambda stamp: True):
-        if not isinstance(view, View):
-            refusal = refusal or str(view)
-            counters[f'refused/{view.kind}'] += 1
+        try:
+            if isinstance(view, MessageError):
+                raise view
+            if not gate.wants(view.camera, view.stamp):
+                counters['images'] += 1
+                counters['images_unused'] += 1
+                continue
+            views.append(_view(view.read(), None, stream, None))
+        except MessageError as error:
+            refusal = refusal or str(error)
+            counters[f'refused/{error.kind}'] += 1
             continue
         counters['images'] += 1
-        if not gate.wants(view.camera, view.stamp):
-            counters['images_unused'] += 1
-            continue
         gate.took(view.camera)
-        views.append(_view(view, None, stream, None))
     if not counters['images']:
         raise DataError(f'expected images with an azimuth each, got none: '
                         f'{refusal or "there is no image"}', 'no_views')
@@ -72,10 +76,12 @@ def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
     found = {}
     refusal = ''
     for view in stream.views(wanted=frozenset(stamps).__contains__):
-        if isinstance(view, View):
-            found[view.stamp] = view
-        else:
-            refusal = refusal or str(view)
+        try:
+            if isinstance(view, MessageError):
+                raise view
+            found[view.stamp] = view.read()
+        except MessageError as error:
+            refusal = refusal or str(error)
     for number, stamp in enumerate(stamps, 1):
         if stamp not in found and not (found and stream.begins_after(stamp)):
             raise DataError(f'expected the image and the camera of view {number} '

@@ -15,6 +15,8 @@ from active_recon.cameras import (
     orbit_camera,
 )
 from active_recon.errors import ConfigError, DataError, MessageError
+from active_recon.nodes.after_hearing import AfterHearing
+from active_recon.nodes.camera_images import CameraImages
 from active_recon.nodes.camera_watch import CameraWatch
 from active_recon.nodes.clock import STEADY
 from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
@@ -29,15 +31,16 @@ from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import ViewGate
 from active_recon.voxels import write_mesh
 from geometry_msgs.msg import PoseStamped
+from msg_tools.camera_images import pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg, pose_to_msg
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
-from msg_tools.images import image_from_msg, image_to_msg, latent_to_msg, mask_from_msg
+from msg_tools.images import image_to_msg, latent_to_msg, mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
-from msg_tools.views import View, ViewJoiner
+from msg_tools.views import UnreadView, ViewJoiner
 from msg_tools.voxels import FLOOR, voxel_grid_to_msg
 import numpy as np
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Float64, Header
 from std_srvs.srv import Trigger
 import torch
@@ -82,7 +85,9 @@ class ReconstructorNode(ManagedNode):
     def activate(self) -> None:
         """Begin an episode, and hear the camera."""
         self._begin_episode()
-        self.create_subscription(Image, 'camera/image_raw', self._on_image, HEARD)
+        self._later = AfterHearing(self, self._fold_waiting)
+        self.on_undo(self._later.close)
+        CameraImages(self, self._diagnostics, self._on_image)
         self.create_subscription(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
         if self._background.how == 'mask':
             self.create_subscription(Image, 'camera/mask', self._on_mask, HEARD)
@@ -131,6 +136,7 @@ class ReconstructorNode(ManagedNode):
         return commit
 
     def _begin_episode(self) -> None:
+        self._waiting: UnreadView | None = None
         self._reconstructor.reset()
         self._gate.reset()
         self._reconstruction = None
@@ -147,31 +153,31 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.count('clock_jumps')
         self.get_logger().warning(f'{how}: the episode {self._episode.id} begins')
 
-    def _on_image(self, msg: Image) -> None:
+    def _on_image(self, msg: Image | CompressedImage) -> None:
         self._diagnostics.count('images')
         with self._diagnostics.refusing():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             self._watch.heard('images', stamp)
-            self._capture.image_came(stamp, partial(image_from_msg, msg))
+            self._capture.image_came(stamp, partial(pixels_from_msg, msg))
             if stamp < self._episode.begin or self.clock_watch.is_ahead(stamp):
                 raise MessageError(
                     'expected an image of this episode, which began at '
                     f'{self._episode.begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
                     'recording, play its clock and set use_sim_time', 'last_episode')
-            self._joiner.add_image(stamp, image_from_msg(msg), time.monotonic())
+            self._joiner.add_image(stamp, msg, time.monotonic())
             self._poses.image_came(msg.header)
-        self._take_in()
+        self._heard()
 
     def _on_camera_info(self, msg: CameraInfo) -> None:
         with self._diagnostics.refusing():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             self._watch.heard('camera_info', stamp)
             self._joiner.add_intrinsics(stamp, intrinsics_from_msg(msg))
-        self._take_in()
+        self._heard()
 
     def _on_mask(self, msg: Image) -> None:
         self._joiner.add_mask(nanoseconds_from_stamp(msg.header.stamp), msg)
-        self._take_in()
+        self._heard()
 
     def _on_pose(self, msg: PoseStamped) -> None:
         self._diagnostics.count('poses')
@@ -181,16 +187,22 @@ class ReconstructorNode(ManagedNode):
             pose = pose_from_msg(msg, self._object_frame)
             self._watch.stands(Camera(pose), stamp, self._gate.open_goal)
             self._joiner.add_pose(stamp, pose)
-        self._take_in()
+        self._heard()
 
     def _on_goal(self, msg: PoseStamped) -> None:
         with self._diagnostics.refusing():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             if stamp >= self._episode.begin and not self.clock_watch.is_ahead(stamp):
+                self._fold_waiting()  # it was taken for the goal before
                 self._gate.set_goal(view_goal_from_msg(msg, self._object_frame), stamp)
 
+    def _heard(self) -> None:
+        """Take in what came of the camera."""
+        self._later.heard()
+        self._take_in()
+
     def _take_in(self) -> None:
-        """Fold in what is joined by now and is to be a view."""
+        """Look through what is joined by now for what is to be a view: the newest is folded in."""
         for view in self._joiner.joined(time.monotonic()):
             if isinstance(view, MessageError):
                 self._diagnostics.refuse(view)
@@ -198,10 +210,19 @@ class ReconstructorNode(ManagedNode):
                                       self.count_publishers('next_view') > 0):
                 self._diagnostics.count('images_unused')
             else:
-                with self._diagnostics.refusing():
-                    self._fold(view)
+                if self._waiting is not None:
+                    self._diagnostics.count('dropped/overtaken')
+                self._waiting = view
+                self._later.ask()
 
-    def _fold(self, view: View) -> None:
+    def _fold_waiting(self) -> None:
+        view, self._waiting = self._waiting, None
+        if view is not None:
+            with self._diagnostics.refusing():
+                self._fold(view)
+
+    def _fold(self, unread: UnreadView) -> None:
+        view = unread.read()
         mask = None if view.mask is None else mask_from_msg(view.mask)
         image = self._background.cleared(view.image, mask, self._capture.reference)
         reconstruction = self._reconstructor.add_view(image, view.camera)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from active_recon.nodes.parameters import parameter
 
 DIAGNOSTICS = '/diagnostics'
-TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'view',
-          'view_image', 'occupancy', 'probabilities', 'latent', 'entropy', 'episode', 'next_view',
-          'next_azimuth', 'azimuth_scores', 'done', DIAGNOSTICS)
+TOPICS = ('camera/image_raw', 'camera/image_raw/compressed', 'camera/camera_info', 'camera/pose',
+          'camera/mask', 'view', 'view_image', 'occupancy', 'probabilities', 'latent', 'entropy',
+          'episode', 'next_view', 'next_azimuth', 'azimuth_scores', 'done', DIAGNOSTICS)
 
 
 @dataclass(frozen=True)
