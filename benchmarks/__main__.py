@@ -6,9 +6,11 @@ from pathlib import Path
 import platform
 import sys
 
+from benchmarks.converters import converter_figures
 from benchmarks.core import reconstruct_and_plan, rendering
 from benchmarks.figures import Figure, reference_ms
 from benchmarks.loop import demo_figure, reconstructor_figures
+from benchmarks.stream import stream_figures
 from benchmarks.viewer import watching_figures
 
 RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'benchmarks.json'
@@ -17,6 +19,8 @@ PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'rendering': lambda: [rendering(1, 400), rendering(2, 100)],
     'reconstructor': reconstructor_figures,
     'viewer': watching_figures,
+    'converters': converter_figures,
+    'stream': stream_figures,
     'demo': lambda: [demo_figure()],
 }
 

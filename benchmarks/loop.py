@@ -29,7 +29,7 @@ def reconstructor_figures() -> list[Figure]:
     memory_mb: list[float] = []
     latency_ms: list[float] = []
     for _ in range(_READY_STARTS):
-        with _reconstructor() as (seconds, process):
+        with reconstructor_process() as (seconds, process):
             ready.append(seconds)
             if len(ready) == _READY_STARTS:
                 latency_ms = _latencies_ms()
@@ -54,7 +54,7 @@ def demo_figure() -> Figure:
 
 
 @contextmanager
-def _reconstructor() -> Iterator[tuple[float, int]]:
+def reconstructor_process() -> Iterator[tuple[float, int]]:
     """Start a reconstructor that takes every image; yield the seconds it took, and its pid."""
     environment = private_environment()
     os.environ.update(environment)
