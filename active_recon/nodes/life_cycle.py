@@ -149,6 +149,7 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
 
     def _free(self) -> None:
         self._configured.close()
+        self._diagnostics.forget()
         if self._before is not None:
             for name in vars(self).keys() - self._before:
                 delattr(self, name)
