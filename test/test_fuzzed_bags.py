@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 from recorded_messages import definition
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 from test_reading import copied
 
 SECONDS_EACH = 10
@@ -100,12 +100,15 @@ def rewritten(path, messages, rng):
 
 @pytest.fixture(scope='module')
 def whole(tmp_path_factory):
-    """Return bags of each recording: a folder, a bare file, a database."""
+    """Return bags of each recording: a folder, a bare file, a database, and one of each packed."""
     folder = tmp_path_factory.mktemp('whole')
     bags = [write_bag(folder / f'run{number}', sorted(messages, key=lambda entry: entry[0]))
             for number, messages in enumerate(RECORDINGS)]
     return [*bags, *(bag / f'{bag.name}_0.mcap' for bag in bags),
-            *(copied(bag, folder / f'{bag.name}_sqlite', StoragePlugin.SQLITE3) for bag in bags)]
+            *(copied(bag, folder / f'{bag.name}_sqlite', StoragePlugin.SQLITE3) for bag in bags),
+            *(copied(bags[0], folder / f'packed_{storage.name}_{mode.name}', storage, mode)
+              for storage in StoragePlugin
+              for mode in (CompressionMode.FILE, CompressionMode.MESSAGE))]
 
 
 def mutated(path, whole, rng):
