@@ -20,19 +20,14 @@ ARGUMENTS = {
 
 def generate_launch_description():
     value = {name: LaunchConfiguration(name) for name in ARGUMENTS}
-    shared = {
-        'package': 'active_recon',
-        'namespace': value['namespace'],
-        'parameters': [value['params_file'], {
-            'use_sim_time': ParameterValue(value['use_sim_time'], value_type=bool)}],
-        'arguments': ['--ros-args', '--log-level', value['log_level']],
-        'output': 'screen',
-    }
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),
-        Node(executable='recorder', name='recorder', **shared),
-        Node(executable='turntable_camera', name='turntable_camera', **shared),
+        Node(package='active_recon', executable='turntable_camera', name='turntable_camera',
+             namespace=value['namespace'], output='screen',
+             parameters=[value['params_file'], {
+                 'use_sim_time': ParameterValue(value['use_sim_time'], value_type=bool)}],
+             arguments=['--ros-args', '--log-level', value['log_level']]),
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(
                 PathJoinSubstitution([SHARE, 'launch', 'reconstruction.launch.py'])),

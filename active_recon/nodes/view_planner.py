@@ -198,6 +198,9 @@ class ViewPlannerNode(ManagedNode):
 
     def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Ask for the goal after the views so far under a new stamp; answer with its azimuth."""
+        if not self.is_active:
+            response.message = 'expected an active node to plan; this one is inactive'
+            return response
         try:
             goal = self._planner.plan()
         except ActiveReconError as error:

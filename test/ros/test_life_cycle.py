@@ -104,7 +104,7 @@ def test_weights_that_are_missing_leave_a_node_unconfigured_and_say_why(
     assert not supervisor.set('activate')
 
 
-def test_a_transition_that_is_not_possible_now_is_refused_and_survived(start_node, bench):
+def test_what_is_not_possible_in_a_state_is_refused_and_survived(start_node, bench):
     node = start_node('view_planner', policy='farthest')
     supervisor = Supervisor(bench, 'view_planner')
     for impossible in ('configure', 'nonsense', Transition.TRANSITION_ACTIVATE, 77):
@@ -112,6 +112,8 @@ def test_a_transition_that_is_not_possible_now_is_refused_and_survived(start_nod
     assert supervisor.state() == 'active'
     assert supervisor.set(Transition.TRANSITION_DEACTIVATE)
     assert supervisor.state() == 'inactive'
+    refused = bench.ask(Trigger, 'plan')
+    assert not refused.success and 'inactive' in refused.message
     assert node.log('refused: .*Transition is not registered')
 
 
