@@ -14,7 +14,7 @@ LATE_S = 0.15
 """An image is late that comes so long after the camera info or the pose of its stamp."""
 CLOCK_BACK_S = 1.0
 """A stamp so much older than the last is of a clock that went back, not of a message too late."""
-WINDOW_S = 1.5
+WINDOW_S = 1.0
 """What is missing or late is counted over this time."""
 _STAMPS = 21
 _REGULAR, _NO_LONGER = 0.85, 0.6

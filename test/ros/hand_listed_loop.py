@@ -7,8 +7,8 @@ from conftest import LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_to_msg
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 
@@ -44,8 +44,9 @@ class Loop:
         self._episodes = bench.hear(Header, 'episode', LATCHED)
         self._ends = bench.hear(Header, 'done', LATCHED)
         self._goals = bench.hear(PoseStamped, 'next_view', LATCHED)
-        self._parameters = bench.node.create_client(
-            SetParameters, 'turntable_camera/set_parameters')
+        self._clients = {
+            name: bench.node.create_client(SetParameters, f'{name}/set_parameters')
+            for name in nodes}
         for topic in ('camera/image_raw', 'view', 'occupancy', 'episode', 'done', 'next_view'):
             bench.until(lambda topic=topic: bench.node.count_publishers(topic), topic)
 
@@ -70,12 +71,16 @@ class Loop:
 
     def set_faults(self, *entries):
         """Have these faults, and no others, from now on; return whether they were taken."""
-        value = ParameterValue(type=ParameterType.PARAMETER_STRING_ARRAY,
-                               string_array_value=list(entries))
-        self.bench.until(self._parameters.service_is_ready, 'the parameters of the camera')
-        answer = self._parameters.call_async(
-            SetParameters.Request(parameters=[Parameter(name='faults', value=value)]))
-        self.bench.until(answer.done, 'the answer to new faults')
+        return self.set('turntable_camera', Parameter(
+            'faults', Parameter.Type.STRING_ARRAY, list(entries)))
+
+    def set(self, node, parameter):
+        """Change a parameter of a node; return whether it was changed, and why not."""
+        client = self._clients[node]
+        request = SetParameters.Request(parameters=[parameter.to_parameter_msg()])
+        self.bench.until(client.service_is_ready, f'the parameters of {node}')
+        answer = client.call_async(request)
+        self.bench.until(answer.done, f'the answer to {parameter.name}')
         return answer.result().results[0]
 
     def begin(self):
