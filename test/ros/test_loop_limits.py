@@ -1,0 +1,50 @@
+"""The loop under limits of motion, over real DDS, and its bag, which replays under the same."""
+
+from active_recon.bags.comparison import SAME_BITS, WITHIN_TOLERANCE
+from active_recon.bags.reading import read_run
+from active_recon.bags.replay import computing_with
+from active_recon.bags.settings import recorded_settings
+from active_recon.bags.verification import verify
+from active_recon.errors import DataError
+from active_recon.motion import MotionLimits
+from conftest import LATCHED
+import pytest
+from std_msgs.msg import Header
+
+pytestmark = pytest.mark.ros
+LIMITS = {'azimuth_range': [-1.0, 2.0], 'forbidden_sectors': [0.4, 0.9]}
+
+
+def test_a_loop_keeps_to_its_limits_and_its_bag_replays_under_them(
+        start_node, bench, box, tmp_path):
+    recorder = start_node('recorder', output_dir=tmp_path / 'bags')
+    done = bench.hear(Header, 'done', LATCHED)
+    start_node('turntable_camera', mesh=box, start_azimuth=3.3, time_scale=20.0, rate=20.0)
+    start_node('reconstructor', take_views='at_goal', settle_time=0.2)
+    start_node('view_planner', policy='random', max_views=4, entropy_tolerance=0.0,
+               motion_weight=0.5, **LIMITS)
+    bench.until(lambda: done and done[-1].frame_id == 'max_views', 'the end of the loop')
+    (folder,) = (tmp_path / 'bags').iterdir()
+
+    def is_told():
+        try:
+            run = read_run(folder)
+        except DataError:  # the last record is on its way to the disk
+            return False
+        told = {node.strip('/') for node in run.parameters}
+        return {'reconstructor', 'view_planner'} <= told and run.episodes[-1].done
+
+    bench.until(is_told, 'the parameters and the views in the bag')
+    recorder.stop()
+    run = read_run(folder)
+    episode = run.episodes[-1]
+    goals = [episode.first_goal, *(view.goal for view in episode.views if view.goal)]
+    assert len(goals) == 4
+    limits = MotionLimits(**LIMITS)
+    assert all(limits.allows(goal.azimuth) for goal in goals)
+    settings = recorded_settings(run)
+    assert settings.planner.items() >= {**LIMITS, 'motion_weight': 0.5}.items()
+    with computing_with(settings.threads):
+        found = verify(run, settings.load_reconstructor(), settings.load_planner())
+    assert found.comparison.verdict in (SAME_BITS, WITHIN_TOLERANCE)
+    assert found.comparison.deviations['goal'].compared == 3
