@@ -25,15 +25,17 @@ from active_recon.nodes.graph_access import (
     write_policies,
 )
 from active_recon.nodes.loop_watch import joined_domain
+from active_recon.nodes.settings.recorder import TOPICS
 from msg_tools.cameras import pose_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from rclpy.node import Node, NodeNameNonExistentError
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 POLICIES = Path(__file__).with_name('policies.xml')
 LOOP = '/policies_0'
+RECORDED = '/policies_2'
+"""Here somebody publishes each topic that is recorded; a recorder hears no others."""
 OBSERVER = 'policies'
 MESH = Path(__file__).parents[1] / 'active_recon' / 'objects' / 'chair.glb'
 SETTLED_S = 5.0
@@ -52,7 +54,8 @@ def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
         '/policies_1': {'reconstructor': {
             'output_dir': folder, 'background': 'mask', 'pose_source': 'turntable_joint',
             'camera_position': [position.x, position.y, position.z],
-            'camera_orientation': [turn.x, turn.y, turn.z, turn.w]}}}
+            'camera_orientation': [turn.x, turn.y, turn.z, turn.w]}},
+        RECORDED: {'recorder': {'output_dir': folder}}}
 
 
 def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
@@ -66,7 +69,9 @@ def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
     with (TemporaryDirectory() as folder, joined_domain(OBSERVER) as (observer, _),
           NodeProcesses(Path(folder), environment) as nodes):
         clock = observer.create_publisher(Clock, '/clock', 10)
-        observer.create_publisher(Image, f'{LOOP}/camera/mask', 10)  # so that it is recorded
+        for topic in TOPICS:
+            if not topic.startswith('/'):
+                observer.create_publisher(Header, f'{RECORDED}/{topic}', 10)
         for namespace, parameters in starts(Path(folder)).items():
             for name, values in parameters.items():
                 nodes.start(name, {'use_sim_time': True, **values}, namespace)
