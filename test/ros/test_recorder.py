@@ -276,7 +276,7 @@ def noise(size):
 
 
 @pytest.mark.parametrize(('parameters', 'said'), [
-    ({'topics': '7'}, 'parameter topics: expected a list of names, got 7'),
+    ({'topics': '7'}, 'parameter topics: expected a list, each a string, got 7'),
     ({'output_dir': '/proc/bags'}, 'expected to begin a new bag in /proc/bags'),
 ])
 def test_what_cannot_be_recorded_is_refused_at_start(start_node, parameters, said):
