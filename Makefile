@@ -15,7 +15,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet
 SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell find \
-	active_recon msg_tools resource scripts launch config rviz \
+	active_recon msg_tools resource scripts launch config rviz security \
 	-type f -not -path '*/__pycache__/*' 2>/dev/null)
 
 .DEFAULT_GOAL := help

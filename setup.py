@@ -36,6 +36,7 @@ setup(
         (f'lib/{NAME}', [f'scripts/{name}' for name in EXECUTABLES]),
         *((f'share/{NAME}/{folder}', files) for folder in ('launch', 'config', 'rviz')
           if (files := sorted(glob(f'{folder}/*')))),
+        (f'share/{NAME}/security', ['security/README.md', 'security/policies.xml']),
     ],
     entry_points={'console_scripts': [
         f'{name} = {module}:main' for name, module in EXECUTABLES.items()]},
