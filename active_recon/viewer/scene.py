@@ -147,11 +147,13 @@ class Scene:
     def _boxes(self, name: str, side: float, centers: NDArray[np.floating],
                colors: NDArray[np.uint8], scales: NDArray[np.floating] | None = None) -> None:
         """Show cubes of a side that stays, (N, 3) times as long by `scales`."""
+        # Scales go to the browser with as many bits as they have, and it reads 32
+        lengths = None if scales is None else np.asarray(scales, np.float32)
         upright = np.tile(np.array([1, 0, 0, 0], np.float32), (len(centers), 1))
         known = self._known.get(name)
         if known is None:
             self._known[name] = self._scene.add_batched_meshes_simple(
-                name, side * _BOX.vertices, _BOX.faces, upright, centers, batched_scales=scales,
+                name, side * _BOX.vertices, _BOX.faces, upright, centers, batched_scales=lengths,
                 batched_colors=colors, flat_shading=True, lod='off', cast_shadow=False,
                 receive_shadow=False)
             return
@@ -159,8 +161,8 @@ class Scene:
             known.batched_wxyzs = upright
         known.batched_positions = centers
         known.batched_colors = colors
-        if scales is not None:
-            known.batched_scales = scales
+        if lengths is not None:
+            known.batched_scales = lengths
 
     def _remove(self, name: str) -> None:
         known = self._known.pop(name, None)

@@ -1,0 +1,47 @@
+"""What viser is given to show: the bars are as high as the scores, however often they change."""
+
+from types import SimpleNamespace
+
+from active_recon.cameras import AZIMUTHS
+from active_recon.viewer.scene import relative_scores, Scene
+from active_recon.viewer.state import LoopState, Scores
+import numpy as np
+import pytest
+
+
+class Shown:
+    """Stands for viser's scene: keeps what was added by its name."""
+
+    def __init__(self):
+        self.boxes = {}
+
+    def add_batched_meshes_simple(self, name, vertices, faces, wxyzs, positions, **others):
+        self.boxes[name] = SimpleNamespace(
+            vertices=vertices, batched_wxyzs=wxyzs, batched_positions=positions, **others)
+        return self.boxes[name]
+
+    def __getattr__(self, name):
+        return lambda *args, **kwargs: SimpleNamespace()
+
+
+@pytest.fixture
+def shown():
+    return Shown()
+
+
+def heights(bars):
+    """Return how high the browser shows the bars: it reads scales as 32 bits each."""
+    scales = np.frombuffer(bars.batched_scales.tobytes(), np.float32).reshape(-1, 3)
+    assert len(scales) == len(bars.batched_positions)
+    return np.ptp(bars.vertices[:, 2]) * scales[:, 2]
+
+
+def test_bars_are_as_high_as_the_scores_say_at_first_and_when_they_change(shown):
+    scene = Scene(shown, 1.0)
+    for scores in (np.arange(24.0), np.arange(24.0)[::-1] ** 2):
+        scene.draw(LoopState(scores=Scores(AZIMUTHS, scores)), 0.5)
+        bars = shown.boxes['/scores']
+        found = heights(bars)
+        np.testing.assert_allclose(found, 0.3 * relative_scores(scores), rtol=1e-5)
+        # They stand on the floor
+        np.testing.assert_allclose(bars.batched_positions[:, 2] - found / 2, -0.5, atol=1e-6)
