@@ -25,7 +25,7 @@ _PAIRS = 6  # and one run to warm up
 _VIEWS = 75  # of a run; all of them together are one episode, of at most 1000
 _RATE = 30.0  # updates a second that are to reach the page
 _VIEW_RATE = 36.0  # views a second, each of which changes all that the page shows
-_BUDGET_S = 30.0
+_BUDGET_S = 120.0
 _AGAIN_S = 2.0
 
 
