@@ -4,9 +4,9 @@ import math
 import re
 
 from active_recon.calibration.arm import fit_arm
-from active_recon.calibration.board import detect_all
+from active_recon.calibration.board import detect_all, Detection
 from active_recon.calibration.fit import overall_error, rigid
-from active_recon.calibration.lens import write_lens
+from active_recon.calibration.lens import project, write_lens
 from active_recon.calibration.placement import Placement
 from active_recon.cameras import orbit_camera
 from active_recon.cli.main import app
@@ -75,6 +75,18 @@ def test_it_is_found_through_a_bent_lens_and_noise():
     found = fit_arm(seen_from(VIEWS, WIDE, noise=4.0), WIDE, mounts_of(VIEWS))
     assert_same(found.mount_from_camera, MOUNT_FROM_CAMERA)
     assert_same(found.base_from_board, BASE_FROM_BOARD)
+
+
+def test_an_arm_that_is_not_quite_where_it_says_is_forgiven():
+    rng = np.random.default_rng(5)
+    views = [orbit_camera(rng.uniform(-3, 3), rng.uniform(0.6, 1.4), 0.45).pose
+             @ rigid(np.array([0, 0, rng.normal(0, 0.3)]), np.zeros(3)) for _ in range(12)]
+    mounts = mounts_of(views) @ np.stack([
+        rigid(rng.normal(0, math.radians(0.1), 3), rng.normal(0, 0.0005, 3)) for _ in views])
+    seen = [Detection(str(index), BOARD.corners, project(
+        LENS, BOARD.corners, np.linalg.inv(BOARD_FROM_OBJECT @ view)), (640, 480))
+        for index, view in enumerate(views)]
+    assert_same(fit_arm(seen, LENS, mounts).mount_from_camera, MOUNT_FROM_CAMERA, 3e-3, 0.4)
 
 
 def test_the_order_of_the_images_does_not_matter(seen, found):

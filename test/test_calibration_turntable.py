@@ -7,6 +7,7 @@ from active_recon.calibration.board import detect_all, Detection
 from active_recon.calibration.fit import overall_error
 from active_recon.calibration.lens import estimate_lens, project, read_lens, write_lens
 from active_recon.calibration.placement import Placement
+from active_recon.calibration.remarks import of_angles
 from active_recon.calibration.turntable import fit_turntable
 from active_recon.cameras import azimuth_difference, Camera
 from active_recon.errors import ConfigError, DataError
@@ -107,8 +108,8 @@ def test_a_point_of_the_turned_object_is_seen_where_the_parameters_say(found):
     """The board itself, carried into the object frame, must be where each image shows it."""
     pose = Placement(SIZE).on_table(found)
     board_at_zero = pose @ found.camera_from_table @ found.table_from_board
-    for angle, image in zip(ANGLES, found.images, strict=True):
-        camera = FixedCamera(pose, found.direction).pose_at(angle)
+    for turned, image in zip(found.turned, found.images, strict=True):
+        camera = FixedCamera(pose, found.direction).pose_at(found.direction * turned)
         pixels = project(LENS, image.seen.points, np.linalg.inv(camera) @ board_at_zero)
         np.testing.assert_allclose(pixels, image.fitted, atol=1e-6)
 
@@ -140,6 +141,17 @@ def test_an_image_that_contradicts_its_angle_is_named(seen):
     with pytest.raises(DataError, match=r'3.png: expected the table at 160.0 degrees') as refusal:
         fit_turntable(seen, LENS, told)
     assert refusal.value.kind == 'angles'
+
+
+def test_a_table_with_play_is_found_as_well_and_its_play_is_told(seen, found):
+    play = np.radians([0.0, 1.5, -1.0, 0.5, -2.0, 1.0, 0.0])  # on average none
+    other = fit_turntable(seen, LENS, ANGLES + play)
+    np.testing.assert_allclose(Placement(SIZE).on_table(other), Placement(SIZE).on_table(found),
+                               atol=1e-6)
+    np.testing.assert_allclose(other.off, found.off - play, atol=math.radians(0.05))
+    assert of_angles(found) == []
+    remark, = of_angles(other)
+    assert 'up to 2.0 degrees off what the images show (4.png)' in remark
 
 
 def test_half_turns_alone_do_not_tell_the_direction(seen):

@@ -5,7 +5,13 @@ from dataclasses import dataclass
 import math
 
 from active_recon.calibration.board import Detection
-from active_recon.calibration.fit import fit, ImageFit, parameters_of, rigid
+from active_recon.calibration.fit import (
+    fit,
+    fitted_images,
+    ImageFit,
+    parameters_of,
+    rigid,
+)
 from active_recon.calibration.lens import board_pose
 from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
@@ -16,6 +22,7 @@ from scipy.spatial.transform import Rotation
 FEWEST_IMAGES = 5
 _LEAST_TURN = math.radians(10)
 _SCALE_TOLERANCE = 0.05
+_LIKELY_OFF = np.repeat([math.radians(0.1), 0.0005], 3)  # of an arm's pose, rad and metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +51,22 @@ def fit_arm(seen: Sequence[Detection], lens: Intrinsics, mounts: NDArray[np.floa
 
     def board_poses(parameters: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         camera = rigid(parameters[:3], parameters[3:6])
-        board = rigid(parameters[6:9], parameters[9:])
-        return [np.linalg.inv(mount @ camera) @ board for mount in mounts]
+        board = rigid(parameters[6:9], parameters[9:12])
+        off = parameters[12:].reshape(-1, 6)
+        return [np.linalg.inv(mount @ rigid(one[:3], one[3:]) @ camera) @ board
+                for mount, one in zip(mounts, off, strict=True)]
 
-    found, images = fit(seen, lens, board_poses, start)
-    return ArmFit(rigid(found[:3], found[3:6]), rigid(found[6:9], found[9:]), images)
+    # An arm is not quite where it says. Left out, its error would be taken for the camera's: a
+    # camera that is turned and moved about the board sees nearly the same.
+    count = len(seen)
+    exact = np.zeros(6 * count)
+    own = np.kron(np.eye(count, dtype=bool), np.ones((1, 6), bool))
+    depends = np.block([[np.ones((count, 12), bool), own],
+                        [np.zeros((6 * count, 12), bool), np.eye(6 * count, dtype=bool)]])
+    found = fit(seen, lens, board_poses, np.append(start, exact),
+                lambda parameters: parameters[12:] / np.tile(_LIKELY_OFF, count), depends)[:12]
+    return ArmFit(rigid(found[:3], found[3:6]), rigid(found[6:9], found[9:]),
+                  fitted_images(seen, lens, board_poses(np.append(found, exact))))
 
 
 def _hand_eye(mounts: NDArray[np.float64], boards: NDArray[np.float64]) -> NDArray[np.float64]:

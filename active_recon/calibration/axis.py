@@ -64,20 +64,31 @@ def _center(poses: NDArray[np.float64], up: NDArray[np.float64], turned: NDArray
     return np.asarray(center + up * (up @ (corner.mean(0) - center)))
 
 
-def direction_of(turned: NDArray[np.float64], angles: NDArray[np.float64],
-                 names: Sequence[str]) -> int:
+@dataclass(frozen=True, eq=False)
+class Told:
     """
-    Return +1 where the table's angles grow counter-clockwise seen from above, else -1.
+    How the angles that a table tells belong to those that the images show.
 
-    - turned: as the images show it, counter-clockwise, radians, (N,)
-    - angles: as the table tells it, radians, (N,)
+    What is shown is `direction` times what is told plus `offset`, radians, and `off`, (N,).
+    `direction` is +1 where the told angle grows counter-clockwise seen from above, else -1.
+    """
 
-    Raises DataError where that cannot be told, or where an image contradicts its angle.
+    direction: int
+    offset: float
+    off: NDArray[np.float64]
+
+
+def compare_angles(turned: NDArray[np.float64], angles: NDArray[np.float64],
+                   names: Sequence[str]) -> Told:
+    """
+    Compare how far a table turned, counter-clockwise, with its own angles, both radians, (N,).
+
+    Raises DataError where they do not tell the direction, or an image contradicts its angle.
     """
     agreement = {direction: abs(np.exp(1j * (turned - direction * angles)).mean())
                  for direction in (1, -1)}
     direction = max(agreement, key=lambda one: agreement[one])
-    offset = np.angle(np.exp(1j * (turned - direction * angles)).mean())
+    offset = float(np.angle(np.exp(1j * (turned - direction * angles)).mean()))
     off = np.asarray(azimuth_difference(turned - direction * angles, offset))
     worst = int(np.argmax(np.abs(off)))
     if abs(off[worst]) > _ANGLE_TOLERANCE:
@@ -89,7 +100,7 @@ def direction_of(turned: NDArray[np.float64], angles: NDArray[np.float64],
     if agreement[direction] - agreement[-direction] < 0.01:
         raise DataError('expected angles that tell which way the table turns; half turns alone '
                         'do not', 'direction')
-    return direction
+    return Told(direction, offset, off)
 
 
 def _angle_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

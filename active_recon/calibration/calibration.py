@@ -16,6 +16,7 @@ from active_recon.calibration.placement import Placement
 from active_recon.calibration.remarks import (
     DIRECTION_UNKNOWN,
     LENS_HALF_KNOWN,
+    of_angles,
     of_cube,
     of_elevation,
     of_errors,
@@ -78,7 +79,7 @@ def calibrate_turntable(images: BoardImages, placement: Placement,
         'object_size': placement.object_size, 'pose_source': 'turntable_joint',
         'camera_position': _rounded(pose[:3, 3]),
         'camera_orientation': _rounded(quaternion_of(pose))}
-    remarks = [*look.remarks, *of_elevation(camera)]
+    remarks = [*look.remarks, *of_elevation(camera), *of_angles(found)]
     driver: dict[str, Any] = {'camera_azimuth_at_zero': round(placement.azimuth_at_zero, 6)}
     if found.direction is None:
         remarks.append(DIRECTION_UNKNOWN)

@@ -10,9 +10,10 @@ from active_recon.errors import DataError
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.sparse import csr_matrix
 from scipy.spatial.transform import Rotation
 
-_LARGEST_ERROR = 5.0  # pixels
+_LARGEST_ERROR = 1 / 128  # of the image's width
 _OUTLIER = 1.0  # pixels
 _BEHIND = 1e4  # pixels, for what a step too far has put behind the camera
 
@@ -44,30 +45,50 @@ def overall_error(images: Sequence[ImageFit]) -> float:
     return root_mean_square(np.concatenate([one.fitted - one.seen.pixels for one in images]))
 
 
-def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses, start: NDArray[np.float64]
-        ) -> tuple[NDArray[np.float64], list[ImageFit]]:
+def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses,
+        start: NDArray[np.float64],
+        expected: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda _: np.zeros(0),
+        depends: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
     """
-    Find the parameters, (P,), under which the corners fall where they are seen.
+    Return the parameters, (P,), under which the corners fall where they are seen.
 
-    A corner that lies far off counts less than its square. Raises DataError where even the best
-    parameters leave several pixels.
+    `expected` says, in units of what is likely, how far parameters are from what was expected of
+    them. `depends` says of each image, and then of each such expectation, which parameters it
+    depends on, (N + M, P); None: on all. A corner that lies far off counts less than its square.
     """
     def apart(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
         off = [(project(lens, one.points, pose) - one.pixels).ravel()
                for one, pose in zip(seen, poses(parameters), strict=True)]
-        return np.nan_to_num(np.concatenate(off), nan=_BEHIND)
+        together = np.concatenate([*off, expected(parameters)])
+        return np.asarray(np.nan_to_num(together, nan=_BEHIND))
 
-    found = least_squares(apart, start, x_scale='jac', loss='soft_l1', f_scale=_OUTLIER).x
+    sparsity = None
+    if depends is not None:
+        counts = [2 * len(one.points) for one in seen]
+        sparsity = csr_matrix(np.repeat(
+            depends, [*counts, *[1] * (len(depends) - len(seen))], axis=0).astype(int))
+    return np.asarray(least_squares(apart, start, x_scale='jac', loss='soft_l1', f_scale=_OUTLIER,
+                                    jac_sparsity=sparsity).x)
+
+
+def fitted_images(seen: Sequence[Detection], lens: Intrinsics,
+                  poses: Sequence[NDArray[np.float64]]) -> list[ImageFit]:
+    """
+    Return the images with the board where it was fitted, camera from board (4, 4) of each.
+
+    Raises DataError where that is far from where it is seen.
+    """
     images = [ImageFit(one, project(lens, one.points, pose), pose)
-              for one, pose in zip(seen, poses(found), strict=True)]
-    if (error := overall_error(images)) > _LARGEST_ERROR:
+              for one, pose in zip(seen, poses, strict=True)]
+    largest = lens.width * _LARGEST_ERROR
+    if not (error := overall_error(images)) <= largest:
         worst = max(images, key=lambda one: one.error)
         raise DataError(
-            f'expected the board to be where the motion says, within {_LARGEST_ERROR:g} pixels, '
-            f'got {error:.1f} (worst: {worst.error:.1f} in {worst.seen.name}); are the squares, '
-            'the angles or poses and the camera info those of these images, and did neither '
-            'the camera nor the board slip?', 'reprojection')
-    return found, images
+            f'expected the board to be where the motion says, within {largest:.0f} pixels, got '
+            f'{error:.1f} (worst: {worst.error:.1f} in {worst.seen.name}); are the squares, '
+            'the poses and the camera info those of these images, and did neither the camera nor '
+            'the board slip?', 'reprojection')
+    return images
 
 
 def rigid(turn: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.float64]:

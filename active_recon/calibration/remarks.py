@@ -6,11 +6,13 @@ import math
 from active_recon.calibration.fit import ImageFit, overall_error
 from active_recon.calibration.lens import project
 from active_recon.calibration.placement import cube_corners
+from active_recon.calibration.turntable import TurntableFit
 from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE, Intrinsics
 import numpy as np
 from numpy.typing import NDArray
 
-_GOOD_ERROR = 1.0  # pixels
+_GOOD_ERROR = 1 / 640  # of the image's width
+_EXACT_ANGLE = math.radians(1)
 _MUCH_WORSE = 3.0  # than the overall error
 
 LENS_HALF_KNOWN = (
@@ -26,6 +28,15 @@ def of_missing(names: Sequence[str]) -> list[str]:
     return [f'The board is not seen in {", ".join(names)}.'] if names else []
 
 
+def of_angles(found: TurntableFit) -> list[str]:
+    """Return what to say of angles that are not quite where the images show the table."""
+    if found.off is None or (worst := float(np.abs(found.off).max())) <= _EXACT_ANGLE:
+        return []
+    name = found.images[int(np.argmax(np.abs(found.off)))].seen.name
+    return [f'The angles that were told are up to {math.degrees(worst):.1f} degrees off what the '
+            f'images show ({name}): does the table slip, or have play?']
+
+
 def of_elevation(camera: Camera) -> list[str]:
     """Return what to say of a camera that the networks never saw."""
     if abs(camera.elevation - CANONICAL_ELEVATION) <= ELEVATION_TOLERANCE:
@@ -36,10 +47,10 @@ def of_elevation(camera: Camera) -> list[str]:
 
 def of_errors(images: Sequence[ImageFit]) -> list[str]:
     """Return what to say of a large error, and of images far worse than the others."""
-    error = overall_error(images)
-    remarks = [] if error <= _GOOD_ERROR else [
-        f'An error of {error:.1f} pixels is much: below {_GOOD_ERROR:g} is usual. Is the board '
-        'flat, and are the images sharp?']
+    error, good = overall_error(images), images[0].seen.size[0] * _GOOD_ERROR
+    remarks = [] if error <= good else [
+        f'An error of {error:.1f} pixels is much: below {good:.1f} is usual. Is the board flat, '
+        'are the images sharp, and the motion exact?']
     worse = [one.seen.name for one in images if one.error > _MUCH_WORSE * error]
     return remarks + ([f'Much worse than the others: {", ".join(worse)}.'] if worse else [])
 

@@ -3,15 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from active_recon.calibration.axis import direction_of, find_axis
+from active_recon.calibration.axis import compare_angles, find_axis
 from active_recon.calibration.board import Detection
-from active_recon.calibration.fit import fit, ImageFit, parameters_of, rigid
+from active_recon.calibration.fit import fit, fitted_images, ImageFit, parameters_of, rigid
 from active_recon.calibration.lens import board_pose
 from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 FEWEST_IMAGES = 3
 _FACE_UP = np.diag([1.0, -1.0, -1.0, 1.0])  # a board on the plate, whose z points down
@@ -28,12 +27,14 @@ class TurntableFit:
       (N,)
     - direction: +1 where the table's own angle grows counter-clockwise, -1 where clockwise, None
       where no angles were told; angle 0 then is that of the first image
+    - off: how far each told angle is off, radians, (N,), None where none were told
     """
 
     camera_from_table: NDArray[np.float64]
     table_from_board: NDArray[np.float64]
     turned: NDArray[np.float64]
     direction: int | None
+    off: NDArray[np.float64] | None
     images: list[ImageFit]
 
     @property
@@ -46,49 +47,47 @@ class TurntableFit:
 def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
                   angles: NDArray[np.float64] | None = None) -> TurntableFit:
     """
-    Find a turntable's axis in the camera's frame.
+    Find a turntable's axis in the camera's frame, and how far the table turned in each image.
 
-    `angles`: of the table in each image, radians, (N,), None where they are not known: they are
-    then found too. The order of the images does not matter, except that without angles the first
-    is at 0. Raises DataError where the images are too few or contradict what was told.
+    `angles`: as the table tells them, radians, (N,), None where they are not known. They say
+    where its angle 0 is and which way it grows; a table's play does no harm. The order of the
+    images does not matter, except that without angles the first is at 0. Raises DataError where
+    the images are too few or contradict what was told.
     """
     if len(seen) < FEWEST_IMAGES:
         raise DataError(f'expected {FEWEST_IMAGES} images of the turning board or more, got '
                         f'{len(seen)}', 'too_few_images')
     poses = np.stack([board_pose(lens, one) for one in seen])
     axis = find_axis(poses)
-    if angles is None:
-        direction, turned = None, axis.turned
-    else:
-        direction = direction_of(axis.turned, angles, [one.name for one in seen])
-        turned = direction * angles
-    camera_from_table = _table_frame(axis.up, axis.center, poses[0], turned[0])
-    table_from_board = np.linalg.inv(camera_from_table @ _about_z(turned[0])) @ poses[0]
-    tilt = parameters_of(table_from_board @ _FACE_UP)[:2]
-    start = np.concatenate([parameters_of(camera_from_table), tilt, table_from_board[:2, 3],
-                            [] if angles is not None else turned[1:]])
+    table = _table_frame(axis.up, axis.center, poses[0])
+    board = np.linalg.inv(table) @ poses[0]
+    tilt = parameters_of(board @ _FACE_UP)[:2]
+    start = np.concatenate([parameters_of(table), tilt, board[:2, 3], axis.turned[1:]])
 
     def parts(parameters: NDArray[np.float64]
               ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         # The board's corner is at z 0 and its edge along x: the axis itself fixes neither
         board = rigid(np.append(parameters[6:8], 0), np.append(parameters[8:10], 0)) @ _FACE_UP
-        found = turned if angles is not None else np.append(0, parameters[10:])
-        return rigid(parameters[:3], parameters[3:6]), board, found
+        return rigid(parameters[:3], parameters[3:6]), board, np.append(0, parameters[10:])
 
     def board_poses(parameters: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        table, board, found = parts(parameters)
-        return [table @ _about_z(angle) @ board for angle in found]
+        table, board, turned = parts(parameters)
+        return [table @ _about_z(angle) @ board for angle in turned]
 
-    parameters, images = fit(seen, lens, board_poses, start)
-    table, board, found = parts(parameters)
-    return TurntableFit(table, board, found, direction, images)
+    found = fit(seen, lens, board_poses, start)
+    images = fitted_images(seen, lens, board_poses(found))
+    table, board, turned = parts(found)
+    if angles is None:
+        return TurntableFit(table, board, turned, None, None, images)
+    told = compare_angles(turned, angles, [one.name for one in seen])
+    return TurntableFit(table @ _about_z(told.offset), board, turned - told.offset,
+                        told.direction, told.off, images)
 
 
 def _table_frame(up: NDArray[np.float64], center: NDArray[np.float64],
-                 board: NDArray[np.float64], turned: float) -> NDArray[np.float64]:
-    """Return camera from table at angle 0, x along the board's edge as it lies at that angle."""
-    edge = Rotation.from_rotvec(-turned * up).apply(board[:3, 0])
-    edge -= up * (up @ edge)
+                 board: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return camera from table, whose x runs along the board's edge."""
+    edge = board[:3, 0] - up * (up @ board[:3, 0])
     edge /= np.linalg.norm(edge)
     frame = np.eye(4)
     frame[:3, :3] = np.stack([edge, np.cross(up, edge), up], axis=1)
