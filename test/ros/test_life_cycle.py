@@ -75,14 +75,16 @@ def test_what_a_transition_makes_its_opposite_destroys(start_node, bench, name):
     assert not node.log('Traceback|ERROR|FATAL')
 
 
-@pytest.mark.parametrize('transitions', [
-    [], ['configure'], ['configure', 'activate', 'shutdown'], ['shutdown'],
-    ['configure', 'cleanup', 'shutdown']], ids='-'.join)
+@pytest.mark.parametrize(('transitions', 'state'), [
+    ([], 'unconfigured'), (['configure'], 'inactive'),
+    (['configure', 'activate', 'shutdown'], 'finalized'), (['shutdown'], 'finalized'),
+    (['configure', 'cleanup', 'shutdown'], 'finalized')])
 def test_a_node_that_is_asked_to_stop_ends_cleanly_in_every_state(
-        start_node, bench, transitions):
+        start_node, bench, transitions, state):
     node = start_node('view_planner', ready=False, autostart=False, policy='farthest')
     supervisor = Supervisor(bench, 'view_planner')
     assert all(supervisor.set(each) for each in transitions)
+    assert supervisor.state() == state
     assert node.stop(signal.SIGTERM) == 0
     assert not node.log('Traceback|ERROR|FATAL')
 
