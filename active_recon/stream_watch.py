@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator
+import math
 from statistics import median
 
 import numpy as np
@@ -16,10 +17,15 @@ CLOCK_BACK_S = 1.0
 """A stamp so much older than the last is of a clock that went back, not of a message too late."""
 WINDOW_S = 1.0
 """What is missing or late is counted over this time."""
+_KEPT_S = 3.0
+_LONGEST_LOOK_S = 0.2
 _STAMPS = 21
 _REGULAR, _NO_LONGER = 0.85, 0.6
 """This share of periods is near the median: of what becomes a stream, of what still is one."""
 _AT_LEAST, _SHARE = 2, 0.1
+
+_NAMES = {'images': 'images', 'camera_info': 'camera infos', 'poses': 'poses'}
+_Moments = dict[int, dict[str, float]]  # by stamp, when each stream's message came
 
 
 class StreamWatch:
@@ -35,16 +41,17 @@ class StreamWatch:
 
     def clear(self) -> None:
         """Begin anew, as if nothing had come yet."""
-        self._arrived: dict[str, float] = {}
+        self._quiet: dict[str, float] = {}
+        self._looked = math.inf
         self._stamps: dict[str, deque[int]] = {
             stream: deque(maxlen=_STAMPS) for stream in STREAMS}
         self._periods: dict[str, float] = {}
-        self._moments: dict[int, dict[str, float]] = {}
+        self._moments: _Moments = {}
 
     def heard(self, stream: str, stamp: int, now: float) -> None:
         """Note a message of one of STREAMS, whether or not it can be used."""
         self._moments.setdefault(stamp, {}).setdefault(stream, now)
-        self._arrived[stream] = now
+        self._quiet[stream] = 0.0
         stamps = self._stamps[stream]
         if stamps and stamp < stamps[-1] - CLOCK_BACK_S * 1e9:
             stamps.clear()
@@ -52,12 +59,17 @@ class StreamWatch:
             stamps.append(stamp)
 
     def found(self, now: float) -> dict[str, str]:
-        """Return what is wrong now: a short word of each fault, and a sentence."""
-        self._forget(now - WINDOW_S)
+        """
+        Return what is wrong now: a short word of each fault, and a sentence.
+
+        To be called several times a second: silence is counted from one call to the next.
+        """
+        self._moments = self._since(now - _KEPT_S)
         for stream, stamps in self._stamps.items():
             if len(stamps) == _STAMPS:
                 self._note_period(stream, np.diff(stamps) / 1e9)
-        return {**self._silent(now), **dict(self._missing()), **dict(self._late())}
+        recent = self._since(now - WINDOW_S)
+        return {**self._silent(now), **dict(_missing(recent)), **dict(_late(recent))}
 
     def _note_period(self, stream: str, periods: NDArray[np.float64]) -> None:
         """Keep the period of a stream that comes regularly; one that no longer does has none."""
@@ -69,9 +81,13 @@ class StreamWatch:
             self._periods.pop(stream, None)
 
     def _silent(self, now: float) -> dict[str, str]:
-        since = {stream: now - self._arrived[stream] for stream in self._periods}
-        silent = {stream: time for stream, time in since.items()
-                  if time > max(SILENT_S, 3 * self._periods[stream])}
+        # Whoever was held up between two looks may have messages that it has not read yet
+        step = min(max(now - self._looked, 0.0), _LONGEST_LOOK_S)
+        self._looked = now
+        for stream in self._quiet:
+            self._quiet[stream] += step
+        silent = {stream: self._quiet[stream] for stream, period in self._periods.items()
+                  if self._quiet[stream] > max(SILENT_S, 3 * period)}
         if len(silent) == len(STREAMS):
             return {'silent_camera': (
                 'expected images, camera info and poses of a camera that streamed so far, nothing '
@@ -81,35 +97,35 @@ class StreamWatch:
             f'for {time:.1f} s; is what sends them still running?')
             for stream, time in silent.items()}
 
-    def _missing(self) -> Iterator[tuple[str, str]]:
-        stamps = {stream: {stamp for stamp, came in self._moments.items() if stream in came}
-                  for stream in STREAMS}
-        of_camera = stamps['images'] | stamps['camera_info']
-        expected = {'images': stamps['camera_info']}
-        # A tracker's poses have stamps of their own, and then none belongs to an image
-        if 2 * len(stamps['poses'] & of_camera) >= len(stamps['poses']):
-            expected['poses'] = of_camera
-        for stream, awaited in expected.items():
-            last = max(stamps[stream], default=0)  # later ones may be on their way
-            due = {stamp for stamp in awaited if stamp < last}
-            lost = len(due - stamps[stream])
-            if lost >= max(_AT_LEAST, _SHARE * len(due)):
-                yield f'missing_{stream}', (
-                    f'expected {_NAMES[stream]} of the same stamps as the rest that the camera '
-                    f'sends, {lost} of the last {len(due)} did not come; is the network too slow?')
-
-    def _late(self) -> Iterator[tuple[str, str]]:
-        behind = [came['images'] - min(came.values())
-                  for came in self._moments.values() if 'images' in came and len(came) > 1]
-        late = [time for time in behind if time > LATE_S]
-        if len(late) >= max(_AT_LEAST, _SHARE * len(behind)):
-            yield 'late_images', (
-                f'expected images soon after what else has their stamp, {len(late)} of the last '
-                f'{len(behind)} came {median(late):.2f} s later; views are taken that much later')
-
-    def _forget(self, before: float) -> None:
-        self._moments = {stamp: came for stamp, came in self._moments.items()
-                         if max(came.values()) >= before}
+    def _since(self, begin: float) -> _Moments:
+        """Return the moments of which something came since then."""
+        return {stamp: came for stamp, came in self._moments.items()
+                if max(came.values()) >= begin}
 
 
-_NAMES = {'images': 'images', 'camera_info': 'camera infos', 'poses': 'poses'}
+def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
+    stamps = {stream: {stamp for stamp, came in moments.items() if stream in came}
+              for stream in STREAMS}
+    of_camera = stamps['images'] | stamps['camera_info']
+    expected = {'images': stamps['camera_info']}
+    # A tracker's poses have stamps of their own, and then none belongs to an image
+    if 2 * len(stamps['poses'] & of_camera) >= len(stamps['poses']):
+        expected['poses'] = of_camera
+    for stream, awaited in expected.items():
+        last = max(stamps[stream], default=0)  # later ones may be on their way
+        due = {stamp for stamp in awaited if stamp < last}
+        lost = len(due - stamps[stream])
+        if lost >= max(_AT_LEAST, _SHARE * len(due)):
+            yield f'missing_{stream}', (
+                f'expected {_NAMES[stream]} of the same stamps as the rest that the camera '
+                f'sends, {lost} of the last {len(due)} did not come; is the network too slow?')
+
+
+def _late(moments: _Moments) -> Iterator[tuple[str, str]]:
+    behind = [came['images'] - min(came.values())
+              for came in moments.values() if 'images' in came and len(came) > 1]
+    late = [time for time in behind if time > LATE_S]
+    if len(late) >= max(_AT_LEAST, _SHARE * len(behind)):
+        yield 'late_images', (
+            f'expected images soon after what else has their stamp, {len(late)} of the last '
+            f'{len(behind)} came {median(late):.2f} s later; views are taken that much later')

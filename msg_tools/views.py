@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from sensor_msgs.msg import CompressedImage, Image
 
 _KEPT = 1024  # poses: five seconds of a fast tracker
+_KEPT_INFOS = 256  # those of a fast camera while its images are late
 _WAITING = 32  # images, as long as they are not larger than
 _WAITING_BYTES = 1 << 28  # all together
 Part = TypeVar('Part')
@@ -83,7 +84,7 @@ class ViewJoiner:
         self._earliest = earliest
         self._last_image = earliest - 1
         self._images: deque[_WaitingImage] = deque()
-        self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_WAITING)
+        self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_KEPT_INFOS)
         self._masks: deque[tuple[int, Image]] = deque(maxlen=_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
 
