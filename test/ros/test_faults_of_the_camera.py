@@ -151,7 +151,7 @@ def test_faults_that_cannot_be_are_refused_with_a_reason_and_the_old_ones_stay(l
 @pytest.fixture
 def flooded(loop):
     """Return the loop with more images than views can be made of, and all of them wanted."""
-    assert loop.set('turntable_camera', Parameter('rate', value=200.0)).successful
+    assert loop.set('turntable_camera', Parameter('rate', value=100.0)).successful
     assert loop.set('reconstructor', Parameter('take_views', value='all')).successful
     yield loop
     assert loop.set('turntable_camera', Parameter('rate', value=RATE)).successful
