@@ -6,7 +6,6 @@ from contextlib import contextmanager
 import time
 
 from active_recon.nodes.loop_watch import joined_domain, LoopWatch
-from active_recon.nodes.qos import LATCHED
 from diagnostic_msgs.msg import DiagnosticArray
 from msg_tools.diagnostics import diagnostics_from_msg
 from msg_tools.episodes import done_from_msg, Episode, episode_from_msg
@@ -14,9 +13,12 @@ from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
+# On a busy machine two views may wait here at once, and none shall take the other's place.
+_ALL = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _FAULTS = ('refused/', 'warned/', 'dropped/')
 
 
@@ -39,9 +41,9 @@ class SoakWatch(LoopWatch):
         self._latencies: list[float] = []
         self._at_first: dict[str, Counter[str]] = {}
         self._counted: dict[str, Counter[str]] = {}
-        node.create_subscription(PointCloud2, 'occupancy', self._on_occupancy, LATCHED)
-        node.create_subscription(Header, 'episode', self._on_episode, LATCHED)
-        node.create_subscription(Header, 'done', self._on_done, LATCHED)
+        node.create_subscription(PointCloud2, 'occupancy', self._on_occupancy, _ALL)
+        node.create_subscription(Header, 'episode', self._on_episode, _ALL)
+        node.create_subscription(Header, 'done', self._on_done, _ALL)
         node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
 
     @property
