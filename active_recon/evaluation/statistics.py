@@ -77,7 +77,8 @@ def gap_closed(values: Values, random: Values, oracle: Values, rounds: int = _RO
         return None
     floor, top, own = (resampled_means(each, rounds, seed) for each in (random, oracle, values))
     share = (values.mean() - random.mean()) / (oracle.mean() - random.mean())
-    return _interval(share, (own - floor) / (top - floor))
+    ahead = top > floor  # the few rounds where it is not have no gap to take a share of
+    return _interval(share, (own - floor)[ahead] / (top - floor)[ahead])
 
 
 def headroom_sentence(headroom: Interval) -> str:

@@ -1,5 +1,6 @@
 """The parameters of other nodes, asked for as the nodes appear."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
@@ -49,11 +50,14 @@ class AskedParameters:
         self._clients: dict[str, _Clients] = {}
         self._asked_at: dict[str, float] = {}
         self._known: set[str] = set()
+        self._forgotten: Counter[str] = Counter()
 
-    def forget(self) -> None:
-        """Ask every node anew."""
-        self._known.clear()
-        self._asked_at.clear()
+    def forget(self, name: str | None = None) -> None:
+        """Ask a node anew, or every node."""
+        for each in set(self._clients) if name is None else {name}:
+            self._known.discard(each)
+            self._asked_at.pop(each, None)
+            self._forgotten[each] += 1  # an answer that is on its way tells what was
 
     def ask(self, names: Iterable[str]) -> None:
         """Ask those of the nodes that are there now and not yet known; called again and again."""
@@ -69,31 +73,37 @@ class AskedParameters:
             if clients.are_ready:
                 self._asked_at[name] = now
                 clients.names.call_async(ListParameters.Request()).add_done_callback(
-                    partial(self._ask_types, name))
+                    partial(self._ask_types, name, self._forgotten[name]))
 
-    def _ask_types(self, name: str, listed: Future) -> None:
+    def _ask_types(self, name: str, forgotten: int, listed: Future) -> None:
         answer = listed.result()
-        if answer is not None and name in self._asked_at:
+        if answer is not None and self._is_awaited(name, forgotten):
             names = list(answer.result.names)
             self._clients[name].types.call_async(GetParameterTypes.Request(
-                names=names)).add_done_callback(partial(self._ask_values, name, names))
+                names=names)).add_done_callback(partial(self._ask_values, name, forgotten, names))
 
-    def _ask_values(self, name: str, names: list[str], typed: Future) -> None:
+    def _ask_values(self, name: str, forgotten: int, names: list[str], typed: Future) -> None:
         """Ask for those that have a value: one without keeps a node from telling any."""
         answer = typed.result()
-        if answer is None or len(answer.types) != len(names) or name not in self._asked_at:
+        if answer is None or len(answer.types) != len(names) or not self._is_awaited(
+                name, forgotten):
             return
         known = [each for each, kind in zip(names, answer.types, strict=True)
                  if kind != ParameterType.PARAMETER_NOT_SET]
         self._clients[name].values.call_async(GetParameters.Request(
-            names=known)).add_done_callback(partial(self._take, name, known))
+            names=known)).add_done_callback(partial(self._take, name, forgotten, known))
 
-    def _take(self, name: str, names: list[str], got: Future) -> None:
+    def _take(self, name: str, forgotten: int, names: list[str], got: Future) -> None:
         answer = got.result()
         if answer is None or len(answer.values) != len(names):
             return
-        if self._asked_at.pop(name, None) is None:
+        if not self._is_awaited(name, forgotten):
             return
+        del self._asked_at[name]
         self._known.add(name)
         self._on_known(name, dict(zip(
             names, map(parameter_value_to_python, answer.values), strict=True)))
+
+    def _is_awaited(self, name: str, forgotten: int) -> bool:
+        """Return whether an answer to what was asked after so many times of forgetting counts."""
+        return name in self._asked_at and self._forgotten[name] == forgotten

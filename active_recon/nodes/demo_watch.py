@@ -100,5 +100,5 @@ class DemoWatch(LoopWatch):
 @contextmanager
 def watching(truth: NDArray[np.bool_]) -> Iterator[DemoWatch]:
     """Join the domain that the environment names, (X, Y, Z) the object's true voxels."""
-    with joined_domain('demo') as (node, executor):
+    with joined_domain('_demo') as (node, executor):
         yield DemoWatch(node, executor, truth)

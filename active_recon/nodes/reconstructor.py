@@ -87,13 +87,14 @@ class ReconstructorNode(ManagedNode):
         self._begin_episode()
         self._later = AfterHearing(self, self._fold_waiting)
         self.on_undo(self._later.close)
-        CameraImages(self, self._diagnostics, self._on_image)
         self.create_subscription(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
         if self._background.how == 'mask':
             self.create_subscription(Image, 'camera/mask', self._on_mask, HEARD)
         self._poses = hear_poses(
             self, self._settings.now, self._object_frame, self._on_pose, self._diagnostics)
         self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
+        # Last: whoever is found by an image has been found by what belongs to it
+        CameraImages(self, self._diagnostics, self._on_image)
         # What has waited in vain is refused
         self.create_timer(0.1, self._take_in, clock=STEADY)
         self.create_timer(0.1, self._watch.tell, clock=STEADY)

@@ -99,14 +99,19 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
                 self._offered[name] = offered
                 self._listen(name, publishers[0].topic_type, offered)
             if name != DIAGNOSTICS:  # which whole robots publish
-                self._recorded_nodes |= {
-                    _full_name(publisher.node_name, publisher.node_namespace)
-                    for publisher in publishers}
+                self._record_nodes({_full_name(publisher.node_name, publisher.node_namespace)
+                                    for publisher in publishers})
         around = {_full_name(name, namespace)
                   for name, namespace in self.get_node_names_and_namespaces()}
         own = self.get_fully_qualified_name()
         self._asked.ask(name for name in around - {own} if name in self._recorded_nodes or (
             name.rpartition('/')[0] == own.rpartition('/')[0] and not _is_hidden(name)))
+
+    def _record_nodes(self, names: set[str]) -> None:
+        """Ask who has begun to publish once more: when it was configured it had more to tell."""
+        for name in names - self._recorded_nodes:
+            self._asked.forget(name)
+        self._recorded_nodes |= names
 
     def _listen(self, name: str, type_name: str, offered: tuple[QosProfile, ...]) -> None:
         assert self._bag is not None
