@@ -47,8 +47,9 @@ def stream(bench, publisher, seconds):
     pytest.param(seed, marks=[pytest.mark.slow] * (seed >= IN_EVERY_RUN))
     for seed in range(KILLS)])
 def test_what_came_a_second_before_a_kill_is_on_the_disk(bench, start_node, tmp_path, seed):
-    recorder = start_node('recorder', output_dir=tmp_path / 'bags', topics="['view']")
-    publisher = bench.advertise(PoseStamped, 'view', STREAM)
+    topic = f'view_{seed}'  # one that was killed before is thought to listen for a while
+    recorder = start_node('recorder', output_dir=tmp_path / 'bags', topics=f"['{topic}']")
+    publisher = bench.advertise(PoseStamped, topic, STREAM)
     sent = stream(bench, publisher, 0.5 + 2 * random.Random(seed).random())
     killed = time.monotonic()
     recorder.stop(signal.SIGKILL)
