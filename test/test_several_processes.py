@@ -51,4 +51,4 @@ def test_two_processes_give_the_loss_curve_of_one_within_noise(dataset, tmp_path
     together = np.stack([curve(f'two-{seed}', 2, seed) for seed in range(4)])
     error = np.sqrt((alone.var(axis=0, ddof=1) + together.var(axis=0, ddof=1)) / 4)
     assert (np.abs(alone.mean(axis=0) - together.mean(axis=0)) < 4 * error).all()
-    assert together.mean(axis=0)[-1] < 0.8 * together.mean(axis=0)[0]
+    assert (together[:, -1] < together[:, 0]).all()  # and it is a curve that falls
