@@ -27,6 +27,8 @@ PARTS: Mapping[str, Callable[[], list[Figure]]] = {
 
 def main() -> None:
     """Print a row for each figure as it comes."""
+    if unknown := [part for part in sys.argv[1:] if part not in PARTS]:
+        sys.exit(f'expected parts out of {", ".join(PARTS)}, got {", ".join(unknown)}')
     reference = reference_ms()
     print(f'{platform.machine()}; reference (512 x 512 matrix product): {reference:.2f} ms')  # noqa: T201
     print('| figure | measured | 5 to 95 % | goal | x reference |\n|---|---|---|---|---|')  # noqa: T201
