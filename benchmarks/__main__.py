@@ -6,6 +6,7 @@ from pathlib import Path
 import platform
 import sys
 
+from benchmarks.bags import replay_figure, report_figure
 from benchmarks.converters import converter_figures
 from benchmarks.core import reconstruct_and_plan, rendering
 from benchmarks.figures import Figure, reference_ms
@@ -21,6 +22,7 @@ PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'viewer': watching_figures,
     'converters': converter_figures,
     'stream': stream_figures,
+    'bags': lambda: [replay_figure(), report_figure()],
     'demo': lambda: [demo_figure()],
 }
 

@@ -10,7 +10,6 @@ import os
 from pathlib import Path
 import subprocess
 import sys
-import time
 
 from active_recon.bags.run import TopicSummary
 from active_recon.errors import ConfigError, DataError
@@ -59,11 +58,8 @@ def drawn_in(page):
     return json.loads(gzip.decompress(b64decode(packed)))
 
 
-def test_page_of_five_views_is_small_and_quickly_made(run):
-    began = time.monotonic()
-    page = page_of(run)
-    assert time.monotonic() - began < 5
-    assert len(page.encode()) < 6e6
+def test_page_of_five_views_is_small(run):
+    assert len(page_of(run).encode()) < 6e6
 
 
 def test_nothing_is_fetched(run):
