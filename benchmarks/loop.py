@@ -72,54 +72,46 @@ def reconstructor_process() -> Iterator[tuple[float, int]]:
 
 def _latencies_ms() -> list[float]:
     """Publish views one by one as a camera would; return how long each occupancy took."""
+    from active_recon.nodes.loop_watch import joined_domain
     from active_recon.nodes.qos import LATCHED
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import intrinsics_to_msg, pose_to_msg
     from msg_tools.images import image_to_msg
-    import rclpy
-    from rclpy.context import Context
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
     from sensor_msgs.msg import CameraInfo, Image, PointCloud2
     from std_msgs.msg import Header
 
-    context = Context()
-    rclpy.init(args=[], context=context)
-    node = Node('benchmark', context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    arrived: list[float] = []
-    node.create_subscription(
-        PointCloud2, 'occupancy', lambda _: arrived.append(time.perf_counter()), LATCHED)
-    publishers = [node.create_publisher(kind, topic, 10) for kind, topic in (
-        (CameraInfo, 'camera/camera_info'), (PoseStamped, 'camera/pose'),
-        (Image, 'camera/image_raw'))]
-    renderer = Renderer(load_mesh(OBJECTS / 'chair.glb'))
-    cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
-    images = [composite(renderer.render(camera), 255) for camera in cameras]
+    with joined_domain('benchmark') as (node, executor):
+        arrived: list[float] = []
+        node.create_subscription(
+            PointCloud2, 'occupancy', lambda _: arrived.append(time.perf_counter()), LATCHED)
+        publishers = [node.create_publisher(kind, topic, 10) for kind, topic in (
+            (CameraInfo, 'camera/camera_info'), (PoseStamped, 'camera/pose'),
+            (Image, 'camera/image_raw'))]
+        renderer = Renderer(load_mesh(OBJECTS / 'chair.glb'))
+        cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+        images = [composite(renderer.render(camera), 255) for camera in cameras]
 
-    def spin_until(condition: object, what: str) -> None:
-        deadline = time.monotonic() + _BUDGET_S
-        while not condition():  # type: ignore[operator]
-            if time.monotonic() > deadline:
-                raise TimeoutError(f'waited {_BUDGET_S} s in vain for {what}')
-            executor.spin_once(timeout_sec=0.05)
+        def spin_until(condition: object, what: str) -> None:
+            deadline = time.monotonic() + _BUDGET_S
+            while not condition():  # type: ignore[operator]
+                if time.monotonic() > deadline:
+                    raise TimeoutError(f'waited {_BUDGET_S} s in vain for {what}')
+                executor.spin_once(timeout_sec=0.05)
 
-    spin_until(lambda: all(p.get_subscription_count() for p in publishers), 'the reconstructor')
-    spin_until(lambda: node.count_publishers('occupancy') > 0, 'its publishers')
-    latencies = []
-    for turn in range(_VIEWS):
-        index = turn % len(cameras)
-        header = Header(stamp=node.get_clock().now().to_msg(), frame_id='object')
-        known = len(arrived)
-        messages = (intrinsics_to_msg(cameras[index].intrinsics, header),
-                    pose_to_msg(cameras[index].pose, header), image_to_msg(images[index], header))
-        start = time.perf_counter()
-        for publisher, message in zip(publishers, messages, strict=True):
-            publisher.publish(message)
-        spin_until(lambda known=known: len(arrived) > known, f'occupancy {turn}')
-        latencies.append(1e3 * (arrived[-1] - start))
-    executor.shutdown()
-    node.destroy_node()
-    rclpy.try_shutdown(context=context)
-    return latencies
+        spin_until(lambda: all(p.get_subscription_count() for p in publishers),
+                   'the reconstructor')
+        spin_until(lambda: node.count_publishers('occupancy') > 0, 'its publishers')
+        latencies = []
+        for turn in range(_VIEWS):
+            index = turn % len(cameras)
+            header = Header(stamp=node.get_clock().now().to_msg(), frame_id='object')
+            known = len(arrived)
+            messages = (intrinsics_to_msg(cameras[index].intrinsics, header),
+                        pose_to_msg(cameras[index].pose, header),
+                        image_to_msg(images[index], header))
+            start = time.perf_counter()
+            for publisher, message in zip(publishers, messages, strict=True):
+                publisher.publish(message)
+            spin_until(lambda known=known: len(arrived) > known, f'occupancy {turn}')
+            latencies.append(1e3 * (arrived[-1] - start))
+        return latencies

@@ -38,62 +38,52 @@ def stream_figures() -> list[Figure]:
 @contextmanager
 def _camera() -> Iterator[Callable[[str, tuple[int, int], int], list[float]]]:
     """Yield what sends images at a rate and returns the seconds to each occupancy, 0: none."""
+    from active_recon.nodes.loop_watch import joined_domain
     from active_recon.nodes.qos import LATCHED
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import camera_to_msgs
     from msg_tools.images import image_to_msg
     from msg_tools.stamps import nanoseconds_from_stamp
-    import rclpy
-    from rclpy.context import Context
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
     from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
     from std_msgs.msg import Header
 
-    context = Context()
-    rclpy.init(args=[], context=context)
-    node = Node('benchmark', context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    arrived: dict[int, float] = {}
-    node.create_subscription(
-        PointCloud2, 'occupancy', lambda msg: arrived.setdefault(
-            nanoseconds_from_stamp(msg.header.stamp), time.perf_counter()), LATCHED)
-    publishers = {kind: node.create_publisher(kind, f'camera/{topic}', 10) for kind, topic in (
-        (CameraInfo, 'camera_info'), (PoseStamped, 'pose'), (Image, 'image_raw'),
-        (CompressedImage, 'image_raw/compressed'))}
+    with joined_domain('benchmark') as (node, executor):
+        arrived: dict[int, float] = {}
+        node.create_subscription(
+            PointCloud2, 'occupancy', lambda msg: arrived.setdefault(
+                nanoseconds_from_stamp(msg.header.stamp), time.perf_counter()), LATCHED)
+        publishers = {kind: node.create_publisher(kind, f'camera/{topic}', 10) for kind, topic in (
+            (CameraInfo, 'camera_info'), (PoseStamped, 'pose'), (Image, 'image_raw'),
+            (CompressedImage, 'image_raw/compressed'))}
 
-    def spin(until: float) -> None:
-        while (left := until - time.perf_counter()) > 0:
-            executor.spin_once(timeout_sec=left)
+        def spin(until: float) -> None:
+            while (left := until - time.perf_counter()) > 0:
+                executor.spin_once(timeout_sec=left)
 
-    def send(form: str, size: tuple[int, int], count: int) -> list[float]:
-        views = _views(size)
-        messages = [_packed(CompressedImage, image) if form == 'jpeg'
-                    else image_to_msg(image, Header()) for image, _ in views]
-        sent: dict[int, float] = {}
-        spin(time.perf_counter() + 2)  # the other form must have been silent for a while
-        for turn in range(count):
-            msg, (_, camera) = messages[turn % len(views)], views[turn % len(views)]
-            msg.header = Header(stamp=node.get_clock().now().to_msg(), frame_id='camera')
-            start = time.perf_counter()
-            sent[nanoseconds_from_stamp(msg.header.stamp)] = start
-            for part in (*camera_to_msgs(camera, msg.header), msg):
-                publishers[type(part)].publish(part)
-            spin(start + _PERIOD_S)
-        spin(time.perf_counter() + 1)
-        return [arrived[stamp] - start if stamp in arrived else 0.0
-                for stamp, start in sent.items()]
+        def send(form: str, size: tuple[int, int], count: int) -> list[float]:
+            views = _views(size)
+            messages = [_packed(CompressedImage, image) if form == 'jpeg'
+                        else image_to_msg(image, Header()) for image, _ in views]
+            sent: dict[int, float] = {}
+            spin(time.perf_counter() + 2)  # the other form must have been silent for a while
+            for turn in range(count):
+                msg, (_, camera) = messages[turn % len(views)], views[turn % len(views)]
+                msg.header = Header(stamp=node.get_clock().now().to_msg(), frame_id='camera')
+                start = time.perf_counter()
+                sent[nanoseconds_from_stamp(msg.header.stamp)] = start
+                for part in (*camera_to_msgs(camera, msg.header), msg):
+                    publishers[type(part)].publish(part)
+                spin(start + _PERIOD_S)
+            spin(time.perf_counter() + 1)
+            return [arrived[stamp] - start if stamp in arrived else 0.0
+                    for stamp, start in sent.items()]
 
-    deadline = time.perf_counter() + _BUDGET_S
-    while not all(each.get_subscription_count() for each in publishers.values()):
-        if time.perf_counter() > deadline:
-            raise TimeoutError(f'waited {_BUDGET_S} s in vain for the reconstructor')
-        executor.spin_once(timeout_sec=0.05)
-    yield send
-    executor.shutdown()
-    node.destroy_node()
-    rclpy.try_shutdown(context=context)
+        deadline = time.perf_counter() + _BUDGET_S
+        while not all(each.get_subscription_count() for each in publishers.values()):
+            if time.perf_counter() > deadline:
+                raise TimeoutError(f'waited {_BUDGET_S} s in vain for the reconstructor')
+            executor.spin_once(timeout_sec=0.05)
+        yield send
 
 
 def _views(size: tuple[int, int]) -> Sequence[tuple[Any, Any]]:

@@ -101,64 +101,52 @@ def _read_page(port: int, heard: 'Synchronized[int]') -> None:
 @contextmanager
 def _camera() -> Iterator[Callable[[], float]]:
     """Join the loop as its camera; yield what shows it views and returns the ms to a goal."""
+    from active_recon.nodes.loop_watch import joined_domain
     from active_recon.nodes.qos import LATCHED
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import camera_to_msgs
     from msg_tools.images import image_to_msg
-    import rclpy
-    from rclpy.context import Context
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
     from sensor_msgs.msg import CameraInfo, Image
     from std_msgs.msg import Header
 
-    context = Context()
-    rclpy.init(args=[], context=context)
-    node = Node('benchmark', context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    goals: dict[int, float] = {}
-    node.create_subscription(PoseStamped, 'next_view', lambda msg: goals.setdefault(
-        msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec, time.perf_counter()), LATCHED)
-    info_pub, pose_pub, image_pub = (node.create_publisher(kind, f'camera/{topic}', 10)
-                                     for kind, topic in ((CameraInfo, 'camera_info'),
-                                                         (PoseStamped, 'pose'),
-                                                         (Image, 'image_raw')))
-    renderer = Renderer(load_mesh(OBJECTS / 'chair.glb'))
-    cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
-    images = [composite(renderer.render(camera), 255) for camera in cameras]
+    with joined_domain('benchmark') as (node, executor):
+        goals: dict[int, float] = {}
+        node.create_subscription(PoseStamped, 'next_view', lambda msg: goals.setdefault(
+            msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec, time.perf_counter()), LATCHED)
+        info_pub, pose_pub, image_pub = (node.create_publisher(kind, f'camera/{topic}', 10)
+                                         for kind, topic in ((CameraInfo, 'camera_info'),
+                                                             (PoseStamped, 'pose'),
+                                                             (Image, 'image_raw')))
+        renderer = Renderer(load_mesh(OBJECTS / 'chair.glb'))
+        cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+        images = [composite(renderer.render(camera), 255) for camera in cameras]
 
-    def spin(condition: Callable[[], bool], budget_s: float) -> bool:
-        deadline = time.monotonic() + budget_s
-        while not condition() and time.monotonic() < deadline:
-            executor.spin_once(timeout_sec=0.001)
-        return condition()
+        def spin(condition: Callable[[], bool], budget_s: float) -> bool:
+            deadline = time.monotonic() + budget_s
+            while not condition() and time.monotonic() < deadline:
+                executor.spin_once(timeout_sec=0.001)
+            return condition()
 
-    def show(index: int) -> float:
-        """Show a view, again if it gets lost (the camera is heard best effort); return the ms."""
-        for _ in range(round(_BUDGET_S / _AGAIN_S)):
-            header = Header(stamp=node.get_clock().now().to_msg(), frame_id='camera')
-            info, pose = camera_to_msgs(cameras[index], header)
-            image, known = image_to_msg(images[index], header), len(goals)
-            start = time.perf_counter()
-            for publisher, message in ((info_pub, info), (pose_pub, pose), (image_pub, image)):
-                publisher.publish(message)
-            if spin(lambda known=known: len(goals) > known, _AGAIN_S):  # type: ignore[misc]
-                return 1e3 * (max(goals.values()) - start)
-        raise TimeoutError(f'showed a view for {_BUDGET_S} s, but no goal came')
+        def show(index: int) -> float:
+            """Show a view, again if it gets lost (it is heard best effort); return the ms."""
+            for _ in range(round(_BUDGET_S / _AGAIN_S)):
+                header = Header(stamp=node.get_clock().now().to_msg(), frame_id='camera')
+                info, pose = camera_to_msgs(cameras[index], header)
+                image, known = image_to_msg(images[index], header), len(goals)
+                start = time.perf_counter()
+                for publisher, message in ((info_pub, info), (pose_pub, pose), (image_pub, image)):
+                    publisher.publish(message)
+                if spin(lambda known=known: len(goals) > known, _AGAIN_S):  # type: ignore[misc]
+                    return 1e3 * (max(goals.values()) - start)
+            raise TimeoutError(f'showed a view for {_BUDGET_S} s, but no goal came')
 
-    def goal_ms() -> float:
-        spent = []
-        due = time.perf_counter()
-        for turn in range(_VIEWS):
-            spent.append(show(turn % len(cameras)))
-            due = max(due + 1 / _VIEW_RATE, time.perf_counter())
-            spin(lambda due=due: time.perf_counter() >= due, 1.0)  # type: ignore[misc]
-        return float(np.median(spent))
+        def goal_ms() -> float:
+            spent = []
+            due = time.perf_counter()
+            for turn in range(_VIEWS):
+                spent.append(show(turn % len(cameras)))
+                due = max(due + 1 / _VIEW_RATE, time.perf_counter())
+                spin(lambda due=due: time.perf_counter() >= due, 1.0)  # type: ignore[misc]
+            return float(np.median(spent))
 
-    try:
         yield goal_ms
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown(context=context)
