@@ -9,6 +9,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Reliable, and the last one is kept for whoever comes late."""
+LATCHED_HEARD_LATE = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Hears the latched, and who takes what came only now and then misses none of it."""
 STREAM = QoSProfile(depth=5)
 """Reliable; who listens best effort is served as well."""
 HEARD = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -9,11 +9,11 @@ from typing import Any
 from active_recon.cameras import Camera, CANONICAL_INTRINSICS
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
-from active_recon.nodes.qos import HEARD, LATCHED
+from active_recon.nodes.polled import Polled, taken
+from active_recon.nodes.qos import HEARD, LATCHED_HEARD_LATE
 from active_recon.nodes.qos_warnings import QosWarnings
 from active_recon.nodes.run import run_node
 from active_recon.nodes.settings.viewer import ViewerSettings
-from active_recon.viewer.courtesy import Courtesy
 from active_recon.viewer.link import link_words, TopicLink
 from active_recon.viewer.page import Page
 from active_recon.viewer.state import Observer, own_threshold, Scores, TakenView, thumbnail
@@ -28,6 +28,7 @@ from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.client import Client
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
@@ -37,8 +38,7 @@ BUTTONS = {'next_object': ('Next object', 'Show the camera the next object, as a
            'start_episode': ('New episode', 'Forget the object and begin again.')}
 _ROLES = {'image': 'camera/image_raw', 'view': 'view', 'occupancy': 'occupancy',
           'goal': 'next_view'}
-_ANSWERS = (_ROLES['goal'], 'done')
-_LOOK_EVERY_S = 1 / 60
+_FOLLOW_EVERY_S = 1 / 36
 _TELL_EVERY_S = 0.5
 _IMAGES_KEPT = 64
 
@@ -56,8 +56,8 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self._images: dict[int, NDArray[np.uint8]] = {}
         self._intrinsics = CANONICAL_INTRINSICS
         self._heard_at: dict[str, float] = {}
-        self._courtesy = Courtesy()
-        self._unread: list[tuple[Callable[[Any], None], Any]] = []
+        self._polled = Polled()
+        self._heard: dict[str, tuple[Callable[[Any], None], Subscription]] = {}
         self._diagnostics = Diagnostics(self)
         self._page = Page('active_recon, live', self._size, settings.port)
         self._askable: dict[str, Client] = {}
@@ -67,15 +67,15 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self._hear(Image, _ROLES['image'], self._on_image, HEARD)
         self._hear(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
         self._hear(PoseStamped, 'camera/pose', self._on_camera, HEARD)
-        self._hear(PoseStamped, _ROLES['view'], self._on_view, LATCHED)
-        self._hear(PointCloud2, _ROLES['occupancy'], self._on_occupancy, LATCHED)
-        self._hear(PointCloud2, 'probabilities', self._on_probabilities, LATCHED)
-        self._hear(PoseStamped, _ROLES['goal'], self._on_goal, LATCHED)
-        self._hear(PointCloud2, 'azimuth_scores', self._on_scores, LATCHED)
-        self._hear(Header, 'done', self._on_done, LATCHED)
-        self._hear(Header, 'episode', self._on_episode, LATCHED)
+        self._hear(PoseStamped, _ROLES['view'], self._on_view, LATCHED_HEARD_LATE)
+        self._hear(PointCloud2, _ROLES['occupancy'], self._on_occupancy, LATCHED_HEARD_LATE)
+        self._hear(PointCloud2, 'probabilities', self._on_probabilities, LATCHED_HEARD_LATE)
+        self._hear(PoseStamped, _ROLES['goal'], self._on_goal, LATCHED_HEARD_LATE)
+        self._hear(PointCloud2, 'azimuth_scores', self._on_scores, LATCHED_HEARD_LATE)
+        self._hear(Header, 'done', self._on_done, LATCHED_HEARD_LATE)
+        self._hear(Header, 'episode', self._on_episode, LATCHED_HEARD_LATE)
         self._tell()
-        self.create_timer(_LOOK_EVERY_S, self._look)
+        self.create_timer(_FOLLOW_EVERY_S, self._follow)
         self.create_timer(_TELL_EVERY_S, self._tell)
         if self._page.port_taken:
             self.get_logger().warning(f'port {settings.port} is taken, so the page is at another')
@@ -83,16 +83,8 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self.get_logger().info('ready')
 
     def _hear(self, kind: type, topic: str, callback: Callable[[Any], None], qos: Any) -> None:
-        def heard(msg: Any) -> None:
-            now = self._heard_at[topic] = time.monotonic()
-            if topic == _ROLES['image']:
-                self._courtesy.image(now)
-            elif topic in _ANSWERS:
-                self._courtesy.answer()
-            self._diagnostics.count(topic)
-            self._unread.append((callback, msg))
-
-        self.create_subscription(kind, topic, heard, qos)
+        self._heard[topic] = callback, self.create_subscription(
+            kind, topic, callback, qos, callback_group=self._polled)
 
     def _on_image(self, msg: Image) -> None:
         picture = thumbnail(image_from_msg(msg))
@@ -141,14 +133,14 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         episode = episode_from_msg(msg)
         self._observer.begin_episode(episode.id, episode.begin)
 
-    def _look(self) -> None:
-        """Read and draw what was heard, unless an image is on its way through the loop."""
-        if not self._courtesy.has_turn(time.monotonic()):
-            return
-        unread, self._unread = self._unread, []
-        for callback, msg in unread:
-            with self._diagnostics.refusing():
-                callback(msg)
+    def _follow(self) -> None:
+        """Read and draw what came since the last time."""
+        for topic, (callback, subscription) in self._heard.items():
+            for msg in taken(subscription):
+                self._heard_at[topic] = time.monotonic()
+                self._diagnostics.count(topic)
+                with self._diagnostics.refusing():
+                    callback(msg)
         self._draw()
 
     def _draw(self) -> None:

@@ -1,0 +1,23 @@
+"""A polled subscription keeps what comes until its node takes it, and wakes nobody."""
+
+from active_recon.nodes.polled import Polled, taken
+from active_recon.nodes.qos import LATCHED, LATCHED_HEARD_LATE
+import pytest
+from std_msgs.msg import Header
+
+pytestmark = pytest.mark.ros
+
+
+def test_messages_are_taken_once_in_their_order_and_no_callback_hears_them(bench):
+    called = []
+    polled = bench.node.create_subscription(
+        Header, 'words', called.append, LATCHED_HEARD_LATE, callback_group=Polled())
+    publisher = bench.node.create_publisher(Header, 'words', LATCHED)
+    woken = bench.hear(Header, 'words', LATCHED_HEARD_LATE)
+    bench.until(lambda: publisher.get_subscription_count() == 2, 'both to be found')
+    for word in 'abc':
+        publisher.publish(Header(frame_id=word))
+    bench.until(lambda: len(woken) == 3, 'the messages')
+    assert not called
+    assert [message.frame_id for message in taken(polled)] == ['a', 'b', 'c']
+    assert not list(taken(polled))
