@@ -33,7 +33,7 @@ def paper(
         help='Folder of DATA that all systems learn from (may be given several times); default: '
              'train.')] = None,
     samples: Annotated[int, typer.Option(
-        min=1, help='Views that each system sees in training.')] = 150_000,
+        min=1, help='Views that each system sees in training.')] = 75_000,
     starts: Annotated[int, typer.Option(
         min=1, max=24, help='First views of each object; 24 are all.')] = 4,
     policy_starts: Annotated[int, typer.Option(

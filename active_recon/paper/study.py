@@ -14,7 +14,7 @@ from active_recon.models.weights import find_weights
 from active_recon.reporting import Reporting, silent
 from active_recon.voxels import RESOLUTION
 
-SAMPLES = 150_000
+SAMPLES = 75_000
 REAL = {'real_val': 'real models, `val`', 'real_cc0': 'real models that ship (CC0)',
         'real_unseen': 'real models of unseen categories'}
 """Folders of real models, rendered, which are measured where they are present."""

@@ -45,7 +45,7 @@ class System:
         return FINE_RESOLUTION if self.size.endswith('64') else RESOLUTION
 
 
-TWO_STAGE = System(MODEL, '2D-3D-attention, two-stage', MODEL, policy=True)
+TWO_STAGE = System('two-stage', '2D-3D-attention, two-stage', MODEL, policy=True)
 DICE = System('2d3d-dice', '2D-3D, squared error and Dice', MODEL,
               loss=LossConfig(volume_loss='mse+dice'))
 JOINT = System('joint', '2D-3D-attention, joint', MODEL, joint=True)
