@@ -23,10 +23,10 @@ def make_study(folder: Path, dataset: Path, tiny: NetworkConfig) -> Study:
     (data / 'generators.sha256').write_text('ab' * 32 + '\n')
     for seed, system in enumerate(systems.SYSTEMS):
         untrained(models / system.name, tiny, seed, octree=system.model == 'ogn')
-    for seed, name in enumerate(('2d3d-attention', 'joint')):
+    for seed, name in enumerate(('two-stage', 'joint')):
         untrained(models / 'table1' / name, tiny, 20 + seed)
     study = Study(data, models, folder / 'results',
-                  str(models / '2d3d-attention' / 'weights.safetensors'), samples=72, starts=2,
+                  str(models / 'two-stage' / 'weights.safetensors'), samples=72, starts=2,
                   threads=1, policy_seeds=1, policy_starts=2, views=3)
     root = table2.objects(study)['val'].root.parent
     for seed, pair in enumerate(table2.published.TABLE2):

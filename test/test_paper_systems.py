@@ -57,7 +57,7 @@ def test_what_is_fitted_in_one_go_sees_no_views():
 
 def test_a_missing_system_is_trained_and_then_found(study, small_batches):
     [path] = have_systems(study, [TWO_STAGE]).values()
-    assert path == study.models / '2d3d-attention' / 'weights.safetensors'
+    assert path == study.models / 'two-stage' / 'weights.safetensors'
     bundle, card = load_weights(path), json.loads(path.with_suffix('.json').read_text())
     assert bundle.attention is not None
     assert card['views_seen'] == 9
@@ -106,3 +106,8 @@ def test_a_system_of_64_cells_needs_a_truth_as_fine(study):
 def test_a_study_without_its_weights_says_how_to_get_some(tmp_path):
     with pytest.raises(WeightsError, match='--model'):
         _ = Study(model=str(tmp_path / 'none.safetensors')).weights
+
+
+def test_what_is_fitted_in_one_go_is_fitted_where_others_are_trained(study):
+    [path] = have_systems(study, [systems.SHAPE_BASIS]).values()
+    assert float(load_weights(path).reconstruction.state_dict()['means'].std()) > 0

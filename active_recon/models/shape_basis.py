@@ -137,6 +137,7 @@ def _log_odds(mean: Tensor, modes: Tensor, coefficients: Tensor) -> Tensor:
     return _SLOPE * (mean + deformed)
 
 
+@torch.no_grad()
 def fit_shapes(model: ShapeBasis, voxels: Tensor, categories: NDArray[np.str_]) -> None:
     """
     Fit the shapes to voxels (N, 32, 32, 32), bool, of categories (N,), in place.
