@@ -4,7 +4,7 @@ import json
 
 from active_recon.errors import WeightsError
 from active_recon.models import weights as weights_module
-from active_recon.models.weights import load_weights
+from active_recon.models.weights import FOLDER, load_weights
 from active_recon.paper import systems
 from active_recon.paper.study import Study
 from active_recon.paper.systems import (
@@ -108,6 +108,16 @@ def test_a_study_without_its_weights_says_how_to_get_some(tmp_path):
         _ = Study(model=str(tmp_path / 'none.safetensors')).weights
 
 
-def test_what_is_fitted_in_one_go_is_fitted_where_others_are_trained(study):
+def test_what_is_fitted_in_one_go_is_fitted_where_others_are_trained(
+        study, monkeypatch, tmp_path):
+    monkeypatch.setattr(weights_module, 'FOLDER', tmp_path)  # in which nothing ships
     [path] = have_systems(study, [systems.SHAPE_BASIS]).values()
+    assert path.is_relative_to(study.models)
     assert float(load_weights(path).reconstruction.state_dict()['means'].std()) > 0
+
+
+@pytest.mark.parametrize('system', [each for each in SYSTEMS if each.name != 'ogn-64'],
+                         ids=lambda system: system.name)
+def test_what_ships_is_taken_under_the_usual_settings(system, tmp_path):
+    assert find_system(Study(models=tmp_path), system) == FOLDER / f'{system.name}.safetensors'
+    assert (FOLDER / f'{system.name}.safetensors').stat().st_size < 10e6

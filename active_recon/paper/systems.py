@@ -70,7 +70,8 @@ def find_system(study: Study, system: System) -> Path | None:
     """
     Return a system's weights: those in the study's folder, else those that ship.
 
-    Those that ship are taken only where they saw about as many views as the study gives.
+    Those that ship are taken only where they saw about as many views as the study gives, or
+    where the system sees none, being fitted in one go.
     """
     own = study.models / system.name / 'weights.safetensors'
     if own.is_file():
@@ -79,7 +80,9 @@ def find_system(study: Study, system: System) -> Path | None:
         shipped = find_weights(system.name)
     except WeightsError:
         return None
-    seen = views_seen(read_card(shipped)) if shipped.is_file() else None
+    if network_entry(system.model).fit:
+        return shipped
+    seen = views_seen(read_card(shipped))
     return shipped if seen and abs(seen / study.samples - 1) < 0.1 else None
 
 
