@@ -1,5 +1,6 @@
 """Life-cycle nodes: what a transition makes is destroyed by its opposite."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
@@ -20,7 +21,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 RCLError = rclpy_implementation.RCLError
 
 
-class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
+class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode, ABC):
     """
     A node that is unconfigured, inactive, active or finalized.
 
@@ -45,17 +46,17 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode):
         self._diagnostics = Diagnostics(self)
         self._tell_state()
 
+    @abstractmethod
     def configure(self) -> None:
         """Load, and offer topics and services."""
-        raise NotImplementedError
 
+    @abstractmethod
     def activate(self) -> None:
         """Begin to hear and to work."""
-        raise NotImplementedError
 
+    @abstractmethod
     def clock_went_back(self, how: str) -> None:
         """Begin anew while active; `how` says in words what the clock did."""
-        raise NotImplementedError
 
     def on_undo(self, undo: Callable[[], Any]) -> None:
         """Let the opposite of the transition that is being made call `undo`."""

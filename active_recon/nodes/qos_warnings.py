@@ -16,7 +16,6 @@ from rclpy.qos import qos_check_compatible, QoSCompatibility, QoSProfile
 from rclpy.subscription import Subscription
 
 LOOK_EVERY_S = 0.4
-_LOOKS = 2  # that agree, since an endpoint is found before its node, and lost after it
 _UNKNOWN = 'a node without a name'
 
 
@@ -35,7 +34,7 @@ class QosWarnings(Node):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self._seen_unfit: defaultdict[str, int] = defaultdict(int)
+        self._unfit: set[str] = set()
         self.create_timer(LOOK_EVERY_S, self._look_at_endpoints,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -53,19 +52,20 @@ class QosWarnings(Node):
 
     def _look_at_endpoints(self) -> None:
         """Tell which endpoints do not fit now, and forget the topics on which all do."""
-        inside = self.get_namespace().rstrip('/') + '/'
         found: defaultdict[str, list[str]] = defaultdict(list)
         for topic, mismatch in self._mismatches():
             found[topic].append(mismatch)
-        for topic in {*found, *self._seen_unfit}:
-            trouble = f'qos/{topic.removeprefix(inside).lstrip("/")}'
-            if topic not in found:
-                del self._seen_unfit[topic]
-                self._diagnostics.end_trouble(trouble)
-                continue
-            self._seen_unfit[topic] += 1
-            if self._seen_unfit[topic] >= _LOOKS:
-                self._diagnostics.begin_trouble(trouble, f'{topic}: {"; ".join(found[topic])}')
+        # Two looks must agree: an endpoint is found before its node, and lost after it
+        for topic in found.keys() & self._unfit:
+            self._diagnostics.begin_trouble(
+                self._trouble(topic), f'{topic}: {"; ".join(found[topic])}')
+        for topic in self._unfit - found.keys():
+            self._diagnostics.end_trouble(self._trouble(topic))
+        self._unfit = set(found)
+
+    def _trouble(self, topic: str) -> str:
+        inside = self.get_namespace().rstrip('/') + '/'
+        return f'qos/{topic.removeprefix(inside).lstrip("/")}'
 
     def _mismatches(self) -> Iterator[tuple[str, str]]:
         """Yield topics and what does not fit there, in words."""

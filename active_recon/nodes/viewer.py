@@ -57,7 +57,7 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self._intrinsics = CANONICAL_INTRINSICS
         self._heard_at: dict[str, float] = {}
         self._polled = Polled()
-        self._heard: dict[str, tuple[Callable[[Any], None], Subscription]] = {}
+        self._heard: dict[str, Subscription] = {}
         self._diagnostics = Diagnostics(self)
         self._page = Page('active_recon, live', self._size, settings.port)
         self._askable: dict[str, Client] = {}
@@ -83,7 +83,7 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self.get_logger().info('ready')
 
     def _hear(self, kind: type, topic: str, callback: Callable[[Any], None], qos: Any) -> None:
-        self._heard[topic] = callback, self.create_subscription(
+        self._heard[topic] = self.create_subscription(
             kind, topic, callback, qos, callback_group=self._polled)
 
     def _on_image(self, msg: Image) -> None:
@@ -135,12 +135,12 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
 
     def _follow(self) -> None:
         """Read and draw what came since the last time."""
-        for topic, (callback, subscription) in self._heard.items():
+        for topic, subscription in self._heard.items():
             for msg in taken(subscription):
                 self._heard_at[topic] = time.monotonic()
                 self._diagnostics.count(topic)
                 with self._diagnostics.refusing():
-                    callback(msg)
+                    subscription.callback(msg)
         self._draw()
 
     def _draw(self) -> None:
