@@ -1,6 +1,7 @@
 """Frozen configurations: what is written beside the weights, and nothing a layer ever sees."""
 
 from dataclasses import asdict, dataclass, fields
+import math
 from typing import Any, Self
 
 from active_recon.errors import ConfigError
@@ -31,7 +32,11 @@ class Config:
 
 @dataclass(frozen=True)
 class NetworkConfig(Config):
-    """Sizes of the 2D-3D-attention network; the paper states none of them."""
+    """
+    Sizes of the 2D-3D-attention network; the paper states none of them.
+
+    `view_separation`, radians, is how far its goals stay from every view taken; the paper's is 0.
+    """
 
     stem_channels: int = 32
     block_channels: tuple[int, int, int] = (48, 96, 128)
@@ -41,13 +46,17 @@ class NetworkConfig(Config):
     volume_channels: int = 64
     decoder_channels: tuple[int, int] = (64, 24)
     glimpse_channels: int = 128
+    view_separation: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse sizes that make no network."""
-        sizes = [size for value in self.to_dict().values()
+        sizes = [size for name, value in self.to_dict().items() if name.endswith('channels')
                  for size in (value if isinstance(value, tuple) else (value,))]
         if min(sizes) < 1:
             raise ConfigError(f'NetworkConfig: expected channels of 1 or more, got {min(sizes)}')
+        if not 0 <= self.view_separation <= math.pi:
+            raise ConfigError('NetworkConfig: expected a view_separation from 0 to pi, got '
+                              f'{self.view_separation}')
 
 
 @dataclass(frozen=True)
@@ -71,15 +80,24 @@ class LossConfig(Config):
 
 @dataclass(frozen=True)
 class RewardConfig(Config):
-    """The three-part reward of section 3.3; tau in radians. `paper_distance` is its 1 / d^2."""
+    """
+    The three-part reward of section 3.3; tau in radians. `paper_distance` is its 1 / d^2.
+
+    So many `episodes_alike` begin with the same object and view, and what a choice earned is
+    judged by what the others did; the paper's is 1, which judges by the baseline alone.
+    """
 
     distance_weight: float = 0.02
     distance_tau: float = 0.5235987755982988
     paper_distance: bool = False
     policy_sigma: float = 0.35
+    episodes_alike: int = 1
 
     def __post_init__(self) -> None:
         """Refuse widths that divide by 0."""
         if not (self.distance_tau > 0 and self.policy_sigma > 0 and self.distance_weight >= 0):
             raise ConfigError('RewardConfig: expected tau and sigma above 0 and a weight of 0 or '
                               f'more, got {self.to_dict()}')
+        if self.episodes_alike < 1:
+            raise ConfigError('RewardConfig: expected episodes_alike of 1 or more, got '
+                              f'{self.episodes_alike}')

@@ -37,7 +37,8 @@ def refusal(monkeypatch, capsys, *arguments):
 
 def training(dataset, out, *more):
     return ('train', dataset, '--validation', dataset, '--out', out, '--steps', 2,
-            '--policy-steps', 2, '--batch-size', 2, '--policy-batch-size', 2, '--threads', 1,
+            '--policy-steps', 2, '--batch-size', 2, '--policy-batch-size', 2,
+            '--episodes-alike', 2, '--threads', 1,
             *more)
 
 

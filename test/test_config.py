@@ -34,7 +34,8 @@ def test_unknown_keys_are_named_beside_the_known_ones():
     (LossConfig, {'volume_weight': -0.1}), (LossConfig, {'volume_loss': 'mae'}),
     (LossConfig, {'volume_weight': 0.0, 'silhouette_weight': 0.0}),
     (RewardConfig, {'distance_tau': 0.0}), (RewardConfig, {'policy_sigma': -1.0}),
-    (RewardConfig, {'distance_weight': -1.0}),
+    (RewardConfig, {'distance_weight': -1.0}), (RewardConfig, {'episodes_alike': 0}),
+    (NetworkConfig, {'view_separation': -0.1}), (NetworkConfig, {'view_separation': 3.2}),
     (TrainingConfig, {'steps': 0}), (TrainingConfig, {'steps': 1, 'learning_rate': 0.0}),
     (TrainingConfig, {'steps': 1, 'batch_size': 0}),
 ])

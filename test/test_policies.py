@@ -7,7 +7,7 @@ from active_recon.errors import ConfigError, ViewError, WeightsError
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.policies import load_policy, POLICIES
 from active_recon.policies.attention import AttentionPolicy
-from active_recon.policies.base import distance_to_taken
+from active_recon.policies.base import distance_to_taken, kept_apart
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 import numpy as np
 import pytest
@@ -127,6 +127,61 @@ def test_attention_scores_an_azimuth_by_its_log_density(attention, latent):
     choice, _ = AttentionPolicy(attention, sigma=0.5).choose(latent, np.zeros((3, 1)))
     away = azimuth_difference(AZIMUTHS, choice.azimuth[:, None])
     np.testing.assert_allclose(choice.scores, -(away / 0.5) ** 2 / 2, atol=1e-4)
+
+
+def apart(azimuths, others):
+    """Return how far each azimuth (B,) is from the nearest of others (B, t)."""
+    return np.abs(azimuth_difference(others, azimuths[:, None])).min(axis=1)
+
+
+@pytest.fixture
+def draws():
+    rng = np.random.default_rng(4)
+    return rng.uniform(0, math.tau, 500), rng.uniform(0, math.tau, (500, 3))
+
+
+def test_what_is_far_enough_is_left_where_it_is_wanted(draws):
+    wanted, taken = draws
+    np.testing.assert_array_equal(kept_apart(wanted, taken, 0.0), wanted)
+    far_enough = apart(wanted, taken) >= 0.5
+    assert 0 < far_enough.sum() < len(wanted)
+    np.testing.assert_array_equal(kept_apart(wanted, taken, 0.5)[far_enough], wanted[far_enough])
+
+
+def test_what_is_too_near_gives_way_to_the_nearest_that_is_not(draws):
+    wanted, taken = draws
+    kept = kept_apart(wanted, taken, 0.5)
+    assert (apart(kept, taken) > 0.5 - 2e-3).all()
+    moved = kept != wanted
+    enough = np.where(distance_to_taken(taken) > 0.502, AZIMUTHS, np.nan)
+    nearest = np.nanmin(np.abs(azimuth_difference(enough, wanted[:, None])), axis=1)
+    assert (np.abs(azimuth_difference(kept, wanted))[moved] <= nearest[moved] + 1e-9).all()
+
+
+def test_where_nothing_is_far_enough_the_farthest_is_taken():
+    taken = np.delete(AZIMUTHS, [6, 7, 8])[None]
+    np.testing.assert_array_equal(kept_apart(np.array([0.1]), taken, 1.0), AZIMUTHS[[7]])
+
+
+def kept_policy(attention, separation):
+    attention.view_separation = separation
+    return AttentionPolicy(attention)
+
+
+def test_attention_that_keeps_apart_takes_every_view_once_before_any_twice(attention, latent):
+    taken = episode(kept_policy(attention, math.radians(45)), 0.0, 25, latent)
+    assert (apart(taken[1:8], np.tile(taken[:1], (7, 1))) > math.radians(45) - 2e-3).all()
+    assert sorted(nearest_view(azimuth) for azimuth in taken[:24]) == list(range(24))
+
+
+def test_what_is_too_near_to_a_view_is_worth_less_than_all_else(attention, latent):
+    taken = np.array([[0.0, 1.0], [AZIMUTHS[5], AZIMUTHS[20]], [6.2, 3.3]])
+    choice, _ = kept_policy(attention, 0.7).choose(latent, taken)
+    near = distance_to_taken(taken) < 0.699
+    for scores, here in zip(choice.scores, near, strict=True):
+        assert scores[here].max() < scores[~here].min()
+    np.testing.assert_array_equal(choice.scores.argmax(axis=1),
+                                  [nearest_view(azimuth) for azimuth in choice.azimuth])
 
 
 @pytest.mark.parametrize('shape', [(1, 3, 4, 4), (1, 8, 5, 4), (1, 8, 4)])

@@ -7,6 +7,7 @@ from active_recon.config import RewardConfig
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
+from active_recon.evaluation.rollouts import nearest_views
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import Folded, ReconstructionNetwork
 from active_recon.training import policy_gradient
@@ -14,6 +15,7 @@ from active_recon.training.loop import make_fabric, Run, TrainingConfig, Trainin
 from active_recon.training.policy_gradient import (
     azimuth_entropy,
     distance_reward,
+    draw_episodes,
     Episode,
     policy_losses,
     returns_to_go,
@@ -89,6 +91,64 @@ def test_the_objective_sums_over_the_steps_and_averages_over_the_episodes():
     baseline = torch.full((2, 2), -1.0)
     losses = policy_losses(an_episode(logs, baseline, rewards))
     assert losses['loss'].item() == pytest.approx((1 + 2 + 3 + 4) / 2 + 1)  # and the baseline's
+
+
+def gradient(rewards, alike):
+    """Return the gradient of the objective by log pi, (T - 1, B), with a baseline of 0.5."""
+    logs = torch.zeros_like(rewards, requires_grad=True)
+    episode = an_episode(logs, torch.full_like(rewards, 0.5), rewards)
+    policy_losses(episode, alike)['loss'].backward()
+    return logs.grad
+
+
+def test_what_all_episodes_alike_earn_teaches_nothing():
+    rewards = torch.rand(3, 8, generator=torch.Generator().manual_seed(0))
+    harder = rewards - torch.tensor([1.0, 7.0]).repeat_interleave(4)
+    assert_close(gradient(harder, 4), gradient(rewards, 4))
+    assert (gradient(harder, 1) - gradient(rewards, 1)).abs().min() > 0.1
+
+
+def test_an_episode_is_judged_by_the_mean_of_the_others_alike():
+    # Minus the advantage over six episodes: 1 - (2 + 6) / 2 and so on
+    assert_close(gradient(torch.tensor([[1.0, 2.0, 6.0, 5.0, 5.0, 5.0]]), 3) * 6,
+                 torch.tensor([[3.0, 1.5, -4.5, 0.0, 0.0, 0.0]]))
+
+
+def test_so_many_episodes_begin_alike_as_they_are_told_to(views):
+    objects, starts, _ = draw_episodes(views, 12, [5], 3).arguments
+    for part in (objects, starts):
+        groups = part.reshape(4, 3)
+        assert (groups == groups[:, :1]).all()
+        assert len(groups[:, 0].unique()) > 1
+    with pytest.raises(ConfigError, match='expected a divisor of the 12 episodes.*got 5'):
+        draw_episodes(views, 12, [5], 5)
+
+
+def nearest_of_each(network, attention, views, monkeypatch):
+    """Return how near any two views of an episode came, over several episodes."""
+    went = []
+
+    def spy(azimuths, goals):
+        went.append(nearest_views(azimuths, goals))
+        return went[-1]
+
+    monkeypatch.setattr(policy_gradient, 'nearest_views', spy)
+    nearest = []
+    for seed in range(5):
+        went[:] = [torch.tensor([2, 9, 23])]
+        some_episodes(network, attention, views, seed=seed)
+        taken = views.azimuths[[0, 3, 5]].gather(1, torch.stack(went, dim=1)).double().numpy()
+        gaps = np.abs(azimuth_difference(taken[:, :, None], taken[:, None, :]))
+        nearest += np.where(np.eye(4, dtype=bool), np.inf, gaps).min(axis=(1, 2)).tolist()
+    return nearest
+
+
+def test_episodes_keep_their_views_as_far_apart_as_the_policy_says(
+        network, attention, views, monkeypatch):
+    assert min(nearest_of_each(network, attention, views, monkeypatch)) < 0.5
+    attention.view_separation = 1.0
+    kept = nearest_of_each(network, attention, views, monkeypatch)
+    assert min(kept) > 1.0 - math.radians(7.6)  # the nearest rendered view is taken
 
 
 def some_episodes(network, attention, views, length=4, seed=0, rewards=None):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+import math
 from pathlib import Path
 import sys
 from typing import Annotated, TYPE_CHECKING
@@ -39,11 +40,17 @@ def train(
         help='The same, but the reconstruction is trained further.')] = None,
     steps: Annotated[int, typer.Option(min=1, help='Steps of the reconstruction.')] = 12000,
     policy_steps: Annotated[int, typer.Option(
-        min=0, help='Steps of the view policy; 0 leaves it out.')] = 800,
+        min=0, help='Steps of the view policy; 0 leaves it out.')] = 200,
     batch_size: Annotated[int, typer.Option(min=1, help='Objects in a batch.')] = 32,
-    policy_batch_size: Annotated[int, typer.Option(min=2, help='Episodes in a batch.')] = 48,
+    policy_batch_size: Annotated[int, typer.Option(min=2, help='Episodes in a batch.')] = 96,
     learning_rate: Annotated[float, typer.Option(help='At its peak; then half a cosine.')] = 1e-3,
-    policy_learning_rate: Annotated[float, typer.Option(help='The same, of the policy.')] = 5e-4,
+    policy_learning_rate: Annotated[float, typer.Option(help='The same, of the policy.')] = 1e-3,
+    episodes_alike: Annotated[int | None, typer.Option(
+        min=1, help='Episodes of a batch that begin alike, so that what a choice earned is judged '
+                    'by what the others did. Default: 6; 1, as in the paper, if joint.')] = None,
+    view_separation_deg: Annotated[float | None, typer.Option(
+        min=0, max=180, help='Degrees that goals stay from the views taken. Default: 60; 0, as in '
+                             'the paper, if joint.')] = None,
     max_views: Annotated[int, typer.Option(
         min=1, max=24, help='Longest sequence of views that is learned from.')] = 5,
     short_share: Annotated[float, typer.Option(
@@ -74,7 +81,7 @@ def train(
     together (--scheme joint). A training that was cut off goes on with --resume. The weights and
     their card land in OUT/weights.safetensors.
     """
-    from active_recon.config import LossConfig
+    from active_recon.config import LossConfig, RewardConfig
     from active_recon.models.registry import network_entry
     from active_recon.models.weights import find_weights, save_weights
     from active_recon.shapes import generators_hash
@@ -101,11 +108,16 @@ def train(
     second = TrainingConfig(
         max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed, bf16,
         varied=False, warm_up=20, checkpoint_every=50, validate_every=250)
-    with_policy = entry.attentive and scheme == 'two-stage' and policy_steps > 0
+    joint = scheme == 'joint'
+    if episodes_alike is None:
+        episodes_alike = 1 if joint else 6
+    if view_separation_deg is None:
+        view_separation_deg = 0 if joint else 60
+    with_policy = entry.attentive and not joint and policy_steps > 0
     plan = Plan(model, size, loss, first, second if with_policy else None,
-                joint=scheme == 'joint',
+                RewardConfig(episodes_alike=episodes_alike), joint,
                 begun=_begun(find_weights(begun)) if begun else None,
-                frozen=begin_with is None)
+                frozen=begin_with is None, view_separation=math.radians(view_separation_deg))
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
     fabric = make_fabric(bf16, devices, nodes)

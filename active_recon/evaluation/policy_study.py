@@ -61,8 +61,9 @@ def contenders(names: Sequence[str], attentions: Sequence[AttentionModel] = (), 
                     raise WeightsError('attention: expected weights with a view policy in them, '
                                        'as `active-recon train --model 2d3d-attention` makes; '
                                        'there is none')
-                made += [Contender(name, f'attention-{state_hash(model)[:16]}',
-                                   partial(_attentive, model)) for model in attentions]
+                made += [Contender(
+                    name, f'attention-{state_hash(model)[:16]}-{model.view_separation:.4f}',
+                    partial(_attentive, model)) for model in attentions]
             case 'oracle':
                 made.append(Contender(name, name, None))
             case _:

@@ -25,10 +25,14 @@ class AttentionModel(nn.Module):
 
     The glimpse is g_t = A_t * ReLU(W [sin l_t, cos l_t]), broadcast over the grid: a product with
     the bare angle would erase A_t at azimuth 0. The mean azimuth is the angle of a vector of two.
+    Whoever follows it keeps `view_separation`, radians, from every view taken: the model was
+    trained so.
     """
 
-    def __init__(self, latent_channels: int, hidden_channels: int) -> None:
+    def __init__(self, latent_channels: int, hidden_channels: int,
+                 view_separation: float = 0.0) -> None:
         super().__init__()
+        self.view_separation = view_separation
         channels = latent_channels * LATENT_GRID
         self.where = nn.Linear(2, channels)
         self.memory = nn.LSTMCell(channels * LATENT_GRID ** 2, hidden_channels)
@@ -38,7 +42,7 @@ class AttentionModel(nn.Module):
     @classmethod
     def from_config(cls, config: NetworkConfig) -> 'AttentionModel':
         """Build the model of a configuration, with fresh weights."""
-        return cls(config.latent_channels, config.glimpse_channels)
+        return cls(config.latent_channels, config.glimpse_channels, config.view_separation)
 
     def forward(self, latent: Tensor, azimuth: Tensor, state: tuple[Tensor, Tensor] | None = None,
                 ) -> tuple[Attention, tuple[Tensor, Tensor]]:

@@ -68,12 +68,13 @@ def make(study: Study) -> Result:
     """Run all policies from the same starts."""
     bundle = load_weights(study.weights, study.device)
     trial = Trial(bundle.reconstruction, bundle.threshold, study.read(study.objects('test')),
-                  study.policy_starts, study.views, study.seed, cache=study.models / 'measured')
+                  study.policy_starts, study.views, study.seed, bfloat16=True,
+                  cache=study.models / 'measured')
     attentions = [load_weights(path, study.device).attention for path in weights(study)]
     found = policy_study(trial, [model for model in attentions if model is not None],
                          study.policy_seeds, SUBSET_OBJECTS, study.progress)
     text = (
-        f'All policies on one frozen network, from {study.policy_starts} first views of each of '
+        f'All policies on one frozen network, in bfloat16, from {study.policy_starts} first views of each of '
         f'{found["objects"]} parametric test objects. Attention was trained under '
         f'{len(attentions)} seeds, random drawn under {study.policy_seeds}. The greedy oracle '
         'sees the truth and takes, one step ahead, the view after which the IoU is highest: no '

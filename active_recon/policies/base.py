@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN
 import numpy as np
 from numpy.typing import NDArray
+
+ROUNDING = 1e-3  # rad, of the azimuths that were rendered
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +31,22 @@ class Policy(Protocol):
         - state: what the last call handed back; None before the first
         """
         ...
+
+
+def kept_apart(wanted: NDArray[np.float64], taken: NDArray[np.float64],
+               separation: float) -> NDArray[np.float64]:
+    """
+    Return azimuths (B,) at least `separation` from all taken (B, t), and near those wanted (B,).
+
+    Those wanted, where they are far enough; else the nearest of the 24 that is; where none is, the
+    farthest from what was taken. All in radians.
+    """
+    far_enough = np.abs(azimuth_difference(taken, wanted[:, None])).min(axis=1) >= separation
+    away = np.abs(azimuth_difference(AZIMUTHS[None], wanted[:, None]))
+    gaps = distance_to_taken(taken)
+    # All that are too near come after all that are not, which are at most half a turn away
+    rank = np.where(gaps > separation - ROUNDING, -away, gaps - TURN)
+    return np.where(far_enough, wanted, AZIMUTHS[rank.argmax(axis=1)])
 
 
 def distance_to_taken(taken: NDArray[np.float64]) -> NDArray[np.float64]:

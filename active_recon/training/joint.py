@@ -59,7 +59,7 @@ class JointLearner(nn.Module):
         losses = self.reconstruction.losses(
             episode.features[rng.integers(self._length)],
             self._views.voxels[objects].float().to(device), seen_from)
-        chosen = policy_losses(episode)
+        chosen = policy_losses(episode, self._rewards.episodes_alike)
         return losses | chosen | {'loss': losses['loss'] + chosen['loss']}
 
 
@@ -82,7 +82,8 @@ def train_jointly(
     settings = {'training': config.to_dict(), 'loss': loss.to_dict(), 'reward': rewards.to_dict()}
 
     def draw(step: int) -> Draw:
-        return draw_episodes(views, size, [config.seed, 2, step, run.fabric.global_rank])
+        return draw_episodes(views, size, [config.seed, 2, step, run.fabric.global_rank],
+                             rewards.episodes_alike)
 
     train_steps(
         run, JointLearner(network, attention, views, loss, rewards, config.max_views,

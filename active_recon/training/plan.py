@@ -32,7 +32,8 @@ class Plan:
 
     `policy` None leaves the view policy out; `joint` trains both together, as `reconstruction`
     says. `begun` are weights whose reconstruction network is taken, as it is if `frozen`, else to
-    be trained further.
+    be trained further. `view_separation`, radians, is how far the policy's goals are to stay from
+    the views taken; None is what `begun` says, else 0.
     """
 
     model: str
@@ -44,6 +45,7 @@ class Plan:
     joint: bool = False
     begun: Bundle | None = None
     frozen: bool = True
+    view_separation: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained together."""
@@ -59,7 +61,10 @@ class Plan:
     @property
     def config(self) -> Config:
         """Return the sizes of the network."""
-        return self.begun.config if self.begun else network_config(self.model, self.size)
+        config = self.begun.config if self.begun else network_config(self.model, self.size)
+        if self.view_separation is None or not isinstance(config, NetworkConfig):
+            return config
+        return replace(config, view_separation=self.view_separation)
 
 
 def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,

@@ -7,10 +7,12 @@ import math
 from active_recon.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.config import RewardConfig
 from active_recon.datasets.views import ViewSet
+from active_recon.errors import ConfigError
 from active_recon.evaluation.rollouts import nearest_views
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import state_hash
+from active_recon.policies.base import kept_apart
 from active_recon.silhouettes import frustum, project_all
 from active_recon.training.loop import (
     Draw,
@@ -79,10 +81,11 @@ def run_episodes(
     """
     Run an episode for each object (B,), sampling every azimuth from the policy.
 
-    The nearest rendered view is taken, and log pi is that of the sample before. The first view
-    was not chosen and earns nothing. r_2D compares silhouettes from two random cameras. The
-    network's gradients are kept where it has any; the policy's do not reach into it. `show` makes
-    images (B, 3, 64, 64) of objects and views (B,); by default they stand on white.
+    The sample is kept as far from the views taken as the policy says, the nearest rendered view is
+    taken, and log pi is that of the sample before both. The first view was not chosen and earns
+    nothing. r_2D compares silhouettes from two random cameras. The network's gradients are kept
+    where it has any; the policy's do not reach into it. `show` makes images (B, 3, 64, 64) of
+    objects and views (B,); by default they stand on white.
     """
     device = next(attention.parameters()).device
     show = show or views.white
@@ -119,7 +122,9 @@ def run_episodes(
         steps['log'].append(-((sample - mean) / config.policy_sigma).square() / 2)
         steps['baseline'].append(proposal.baseline)
         steps['azimuth'].append(mean.detach())
-        chosen = nearest_views(azimuths.numpy(), sample.double().cpu().numpy())
+        goal = kept_apart(sample.double().cpu().numpy(), taken.double().numpy(),
+                          attention.view_separation)
+        chosen = nearest_views(azimuths.numpy(), goal)
         steps['distance'].append(distance_reward(azimuths[rows, chosen], taken, config))
     volumes, silhouettes = (torch.stack(part) for part in zip(*quality, strict=True))
     return Episode(
@@ -128,17 +133,25 @@ def run_episodes(
         torch.stack(steps['azimuth']), features)
 
 
-def policy_losses(episode: Episode) -> dict[str, Tensor]:
+def policy_losses(episode: Episode, alike: int = 1) -> dict[str, Tensor]:
     """
     Return J(theta) of section 3.3 and the baseline's squared error, summed as `loss`; and a log.
 
     J sums -log pi (R_t - b_t) over the steps, R_t the reward to go: a choice answers for what
-    follows it. The log: the return of an episode and its three parts, the baseline of the first
-    choice, and how widely the proposals of the batch are spread: the entropy of their histogram
-    over 24 azimuths, nats (a policy that always goes one way has 0, one that goes anywhere 3.18).
+    follows it. Where so many episodes after one another are `alike` at their start, the mean of
+    the others' R_t - b_t is taken off (Kool et al. 2019, "Buy 4 REINFORCE samples, get a baseline
+    for free"): how hard an object is then no longer hides what a choice was worth.
+
+    The log: the return of an episode and its three parts, the baseline of the first choice, and
+    how widely the proposals of the batch are spread: the entropy of their histogram over 24
+    azimuths, nats (a policy that always goes one way has 0, one that goes anywhere 3.18).
     """
     returns = returns_to_go(episode.reward.detach())
     advantage = returns - episode.baseline.detach()
+    if alike > 1:
+        groups = advantage.reshape(len(advantage), -1, alike)
+        others = (groups.sum(dim=2, keepdim=True) - groups) / (alike - 1)
+        advantage = (groups - others).flatten(1)
     objective = -(episode.log_probability * advantage).sum(0).mean()
     error = (returns - episode.baseline).square().mean()
     return {
@@ -173,14 +186,22 @@ class PolicyLearner(nn.Module):
         """Run an episode of each object (B,) from the view it starts at (B,)."""
         return policy_losses(run_episodes(
             self.network, self.attention, self._views, objects.cpu(), starts.cpu(), self._length,
-            self._threshold, self._rewards, rng))
+            self._threshold, self._rewards, rng), self._rewards.episodes_alike)
 
 
-def draw_episodes(views: ViewSet, size: int, key: list[int]) -> Draw:
-    """Return what episodes start from: objects and views (size,), and the generator after."""
+def draw_episodes(views: ViewSet, size: int, key: list[int], alike: int = 1) -> Draw:
+    """
+    Return what episodes start from: objects and views (size,), and the generator after.
+
+    So many after one another are alike. Raises ConfigError where that does not divide the size.
+    """
+    if size % alike:
+        raise ConfigError(f'episodes_alike: expected a divisor of the {size} episodes that a '
+                          f'process runs at once, got {alike}')
     rng = np.random.default_rng(key)
-    objects = torch.from_numpy(rng.integers(len(views), size=size))
-    starts = torch.from_numpy(rng.integers(views.images.shape[1], size=size))
+    objects = torch.from_numpy(rng.integers(len(views), size=size // alike).repeat(alike))
+    starts = torch.from_numpy(
+        rng.integers(views.images.shape[1], size=size // alike).repeat(alike))
     return Draw((objects, starts, rng), objects)
 
 
@@ -196,5 +217,6 @@ def train_policy(
     train_steps(
         run, PolicyLearner(network, attention, views, threshold, config.max_views, rewards),
         attention, config, settings, views,
-        lambda step: draw_episodes(views, size, [config.seed, 1, step, run.fabric.global_rank]),
+        lambda step: draw_episodes(views, size, [config.seed, 1, step, run.fabric.global_rank],
+                                   rewards.episodes_alike),
         lambda: validate(attention), weight_decay=0.0)
