@@ -40,7 +40,7 @@ def train(
         help='The same, but the reconstruction is trained further.')] = None,
     steps: Annotated[int, typer.Option(min=1, help='Steps of the reconstruction.')] = 12000,
     policy_steps: Annotated[int, typer.Option(
-        min=0, help='Steps of the view policy; 0 leaves it out.')] = 200,
+        min=0, help='Steps of the view policy; 0 leaves it out.')] = 120,
     batch_size: Annotated[int, typer.Option(min=1, help='Objects in a batch.')] = 32,
     policy_batch_size: Annotated[int, typer.Option(min=2, help='Episodes in a batch.')] = 96,
     learning_rate: Annotated[float, typer.Option(help='At its peak; then half a cosine.')] = 1e-3,
