@@ -7,7 +7,7 @@ from active_recon.models.attention import AttentionModel
 from active_recon.models.network_2d3d import Network2d3d
 from active_recon.models.ogn import Ogn, OgnConfig
 from active_recon.models.weights import Bundle, save_weights
-from active_recon.paper import policies, systems, table1, table2
+from active_recon.paper import systems, table1, table2
 from active_recon.paper.study import Study
 import torch
 
@@ -27,7 +27,7 @@ def make_study(folder: Path, dataset: Path, tiny: NetworkConfig) -> Study:
         untrained(models / 'table1' / name, tiny, 20 + seed)
     study = Study(data, models, folder / 'results',
                   str(models / 'two-stage' / 'weights.safetensors'), samples=72, starts=2,
-                  threads=1, policy_seeds=1, policy_starts=2, views=3)
+                  threads=1, policy_seeds=1, policy_starts=2, subset_objects=0, views=3)
     root = table2.objects(study)['val'].root.parent
     for seed, pair in enumerate(table2.published.TABLE2):
         untrained(root / f'{pair[0]:g}-{pair[1]:g}', tiny, 40 + seed)
@@ -50,7 +50,6 @@ def untrained(folder: Path, tiny: NetworkConfig, seed: int, octree: bool = False
 
 def small_objects(monkeypatch) -> None:
     """Let the parts that want a category of their own take one that is there, and be fast."""
-    monkeypatch.setattr(policies, 'SUBSET_OBJECTS', 0)  # each is 12,720 passes
     monkeypatch.setattr(table1, 'CATEGORY', 'table')
     monkeypatch.setattr(table2, 'generators_hash', lambda: 'ab' * 32)
     monkeypatch.setattr(table2, 'CATEGORY', 'lamp')

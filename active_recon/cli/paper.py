@@ -40,6 +40,9 @@ def paper(
         min=1, max=24, help='The same, where policies are compared.')] = 24,
     policy_seeds: Annotated[int, typer.Option(
         min=1, help='Trainings of the view policy, and draws of the random one.')] = 5,
+    subset_objects: Annotated[int, typer.Option(
+        min=0, help='Objects of which every sequence of three views is tried, 12,720 passes '
+                    'each; 0 leaves that out.')] = 60,
     seed: Annotated[int, typer.Option(
         help='Of the trainings, of the starts, and of the random views.')] = 0,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
@@ -74,7 +77,7 @@ def paper(
         raise ConfigError(f'--device: expected cpu, or cuda where there is a card, got {device}')
     torch.set_num_threads(threads)
     study = Study(data, models, out, model, pascal3d, tuple(training or ('train',)), samples,
-                  starts, seed, threads, policy_seeds, policy_starts, device,
+                  starts, seed, threads, policy_seeds, policy_starts, subset_objects, device,
                   progress=progress_bar)
     wanted = [*PARTS, DOCUMENT] if ALL in parts else list(dict.fromkeys(parts))
     for part in wanted:

@@ -25,7 +25,6 @@ from active_recon.paper.writing import provenance
 from active_recon.training.loop import TrainingConfig
 from active_recon.training.plan import Plan
 
-SUBSET_OBJECTS = 60
 _OWN = 'attention'
 _BLIND = ('random', 'uniform', 'farthest')
 
@@ -61,7 +60,7 @@ def inputs(study: Study) -> dict[str, Any]:
         study, {'test': study.objects('test')},
         {f'seed {seed}': path for seed, path in enumerate(weights(study))},
         policy_starts=study.policy_starts, policy_seeds=study.policy_seeds,
-        subset_objects=SUBSET_OBJECTS)
+        subset_objects=study.subset_objects)
 
 
 def make(study: Study) -> Result:
@@ -72,10 +71,10 @@ def make(study: Study) -> Result:
                   cache=study.models / 'measured')
     attentions = [load_weights(path, study.device).attention for path in weights(study)]
     found = policy_study(trial, [model for model in attentions if model is not None],
-                         study.policy_seeds, SUBSET_OBJECTS, study.progress)
+                         study.policy_seeds, study.subset_objects, study.progress)
     text = (
-        f'All policies on one frozen network, in bfloat16, from {study.policy_starts} first views of each of '
-        f'{found["objects"]} parametric test objects. Attention was trained under '
+        f'All policies on one frozen network, in bfloat16, from {study.policy_starts} first views '
+        f'of each of {found["objects"]} parametric test objects. Attention was trained under '
         f'{len(attentions)} seeds, random drawn under {study.policy_seeds}. The greedy oracle '
         'sees the truth and takes, one step ahead, the view after which the IoU is highest: no '
         'policy can be built so, it shows what there is to be gained. `area` is the mean IoU '

@@ -68,6 +68,7 @@ class Study:
       compared; seed: draws them, and the random policy
     - device: where IoU is measured; table 4 and figure 10 always time a CPU
     - policy_seeds: trainings of the view policy, and draws of the random one
+    - subset_objects: objects of which every sequence of three views is tried
     """
 
     data: Path = Path('data')
@@ -82,6 +83,7 @@ class Study:
     threads: int = 2
     policy_seeds: int = 5
     policy_starts: int = 24
+    subset_objects: int = 60
     device: str = 'cpu'
     views: int = 5
     progress: Reporting = field(default=silent, compare=False)
@@ -108,7 +110,7 @@ class Study:
         told = ['active-recon', 'paper', part]
         usual = Study()
         for option in ('data', 'models', 'out', 'model', 'pascal3d', 'samples', 'starts', 'seed',
-                       'threads', 'policy_seeds', 'policy_starts', 'device'):
+                       'threads', 'policy_seeds', 'policy_starts', 'subset_objects', 'device'):
             if (value := getattr(self, option)) != getattr(usual, option):
                 told += [f'--{option.replace("_", "-")}', str(value)]
         if self.training != usual.training:
