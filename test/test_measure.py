@@ -141,6 +141,8 @@ def test_a_network_that_looks_at_the_azimuth_is_told_the_wrong_one_with_the_wron
 class Recognising(nn.Module):
     """An attention model whose proposal is the latent's first number, or nothing of it."""
 
+    view_separation = 0.0
+
     def __init__(self, sees):
         super().__init__()
         self.where = nn.Linear(2, 8)
