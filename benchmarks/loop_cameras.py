@@ -62,11 +62,13 @@ def moving_camera() -> Iterator[Callable[[], float]]:
     With a step from image to image this makes four to five views a second.
     """
     with _joined() as (hear, publish, spin):
-        goals: list[tuple[float, float]] = []  # when heard, and where; a goal is told repeatedly
+        goals: list[tuple[float, float]] = []  # when heard, and where
+        known: set[int] = set()  # a goal is told again under the same stamp
         taken: list[int] = []
 
-        def on_goal(_: int, azimuth: float) -> None:
-            if not goals or goals[-1][1] != azimuth:
+        def on_goal(stamp: int, azimuth: float) -> None:
+            if stamp not in known:
+                known.add(stamp)
                 goals.append((time.perf_counter(), azimuth))
 
         hear('next_view', on_goal)
