@@ -62,16 +62,10 @@ def moving_camera() -> Iterator[Callable[[], float]]:
     With a step from image to image this makes four to five views a second.
     """
     with _joined() as (hear, publish, spin):
-        goals: list[tuple[float, float]] = []  # when heard, and where
-        known: set[int] = set()  # a goal is told again under the same stamp
+        goals: dict[int, tuple[float, float]] = {}  # by stamp: when first heard, and where
         taken: list[int] = []
-
-        def on_goal(stamp: int, azimuth: float) -> None:
-            if stamp not in known:
-                known.add(stamp)
-                goals.append((time.perf_counter(), azimuth))
-
-        hear('next_view', on_goal)
+        hear('next_view', lambda stamp, azimuth: goals.setdefault(
+            stamp, (time.perf_counter(), azimuth)))
         hear('view', lambda stamp, _: taken.append(stamp))
         azimuth = 0.0
 
@@ -84,14 +78,15 @@ def moving_camera() -> Iterator[Callable[[], float]]:
                 if time.perf_counter() - begun > _BUDGET_S:
                     raise TimeoutError(f'streamed images for {_BUDGET_S} s, but got '
                                        f'{len(goals) - known_goals} goals, not {_GOALS}')
-                away = azimuth_difference(goals[-1][1] if goals else 0.0, azimuth)
+                goal = next(reversed(goals.values()))[1] if goals else 0.0
+                away = azimuth_difference(goal, azimuth)
                 azimuth += float(np.clip(away, -_STEP, _STEP))
                 start = time.perf_counter()
                 sent[publish(azimuth)] = start
                 due = max(due + 1 / _RATE, time.perf_counter())
                 while time.perf_counter() < due:
                     spin()
-            heard = [at for at, _ in goals]
+            heard = [at for at, _ in goals.values()]
             begins = [sent[stamp] for stamp in taken[known_views:] if stamp in sent]
             return 1e3 * float(np.median([
                 min(at for at in heard if at > begin) - begin for begin in begins

@@ -1,6 +1,7 @@
 """`active-recon train` and `evaluate`, from the command line to the files that they write."""
 
 import json
+import math
 
 from active_recon.cli.main import main
 from active_recon.models.weights import load_weights, weights_hash
@@ -83,6 +84,14 @@ def test_a_new_training_never_overwrites_the_checkpoints_of_another(
     line = refusal(monkeypatch, capsys, *training(dataset, run))
     assert 'go on with --resume' in line
     assert (run / 'reconstruction.safetensors').read_bytes() == before
+
+
+def test_only_weights_with_a_policy_say_how_far_apart_its_views_stay(
+        run, dataset, tmp_path, monkeypatch):
+    assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0)) == 0
+    separations = [json.loads((folder / 'weights.json').read_text())['config']['view_separation']
+                   for folder in (run, tmp_path)]
+    assert separations == [math.radians(60), 0]
 
 
 def test_a_training_is_told_as_it_goes(dataset, tmp_path, monkeypatch, capsys):

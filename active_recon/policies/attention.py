@@ -6,7 +6,7 @@ from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN
 from active_recon.errors import ViewError
 from active_recon.models.attention import AttentionModel
 from active_recon.models.encoder import LATENT_GRID
-from active_recon.policies.base import Choice, distance_to_taken, kept_apart, ROUNDING
+from active_recon.policies.base import are_apart, Choice, distance_to_taken, kept_apart
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -47,8 +47,9 @@ class AttentionPolicy:
         proposal, state = self._model(seen, azimuth, state)
         mean = proposal.mean_azimuth.cpu().numpy().astype(np.float64) % TURN
         away = azimuth_difference(AZIMUTHS[None], mean[:, None]) / self._sigma
-        lack = self._model.view_separation - distance_to_taken(taken)
-        worth = np.where(lack < ROUNDING, -away ** 2 / 2,
+        separation = self._model.view_separation
+        lack = separation - distance_to_taken(taken)
+        worth = np.where(are_apart(taken, separation), -away ** 2 / 2,
                          -(math.pi / self._sigma) ** 2 / 2 - lack / self._sigma)
-        goal = kept_apart(mean, taken, self._model.view_separation)
+        goal = kept_apart(mean, taken, separation)
         return Choice(goal, worth.astype(np.float32)), state

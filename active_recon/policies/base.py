@@ -7,7 +7,7 @@ from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN
 import numpy as np
 from numpy.typing import NDArray
 
-ROUNDING = 1e-3  # rad, of the azimuths that were rendered
+_ROUNDING = 1e-3  # rad, of the azimuths that were rendered
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +43,14 @@ def kept_apart(wanted: NDArray[np.float64], taken: NDArray[np.float64],
     """
     far_enough = np.abs(azimuth_difference(taken, wanted[:, None])).min(axis=1) >= separation
     away = np.abs(azimuth_difference(AZIMUTHS[None], wanted[:, None]))
-    gaps = distance_to_taken(taken)
     # All that are too near come after all that are not, which are at most half a turn away
-    rank = np.where(gaps > separation - ROUNDING, -away, gaps - TURN)
+    rank = np.where(are_apart(taken, separation), -away, distance_to_taken(taken) - TURN)
     return np.where(far_enough, wanted, AZIMUTHS[rank.argmax(axis=1)])
+
+
+def are_apart(taken: NDArray[np.float64], separation: float) -> NDArray[np.bool_]:
+    """Return which of the 24 azimuths are `separation` from all taken, (B, t) to (B, 24)."""
+    return distance_to_taken(taken) > separation - _ROUNDING
 
 
 def distance_to_taken(taken: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -60,9 +60,10 @@ class Plan:
 
     @property
     def config(self) -> Config:
-        """Return the sizes of the network."""
+        """Return the sizes of the network, and how far apart the views of its policy stay."""
         config = self.begun.config if self.begun else network_config(self.model, self.size)
-        if self.view_separation is None or not isinstance(config, NetworkConfig):
+        if self.view_separation is None or not (
+                isinstance(config, NetworkConfig) and (self.policy or self.joint)):
             return config
         return replace(config, view_separation=self.view_separation)
 
