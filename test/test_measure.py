@@ -103,12 +103,15 @@ class Oracle(ReconstructionNetwork):
         self.known = torch.stack([views.white(torch.full((24,), item), every)
                                   for item in range(len(views))])
 
-    def fold(self, images, azimuths, hidden=None):
-        away = [(self.known - image).abs().mean((2, 3, 4)) for image in images]
+    def look(self, images):
+        return images
+
+    def remember(self, seen, azimuths, hidden=None):
+        away = [(self.known - image).abs().mean((2, 3, 4)) for image in seen]
         item = torch.stack([each.amin(dim=1).argmin() for each in away])
         seen_from = torch.stack([each.amin(dim=0).argmin() for each in away])
         yaw = azimuths - self.views.azimuths[item, seen_from] if self.listens else 0 * azimuths
-        latent = torch.ones(len(images), 8, 4, 4) * (item.float() + 1)[:, None, None, None]
+        latent = torch.ones(len(seen), 8, 4, 4) * (item.float() + 1)[:, None, None, None]
         return Folded(latent, torch.column_stack([item, yaw])), hidden
 
     def decode(self, features):

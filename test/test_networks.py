@@ -79,9 +79,10 @@ def test_the_state_is_passed_and_not_kept(network):
 def test_no_state_is_the_state_before_any_view(network):
     with torch.no_grad():
         images = some_views(1, 2)[0]
-        features = network.encoder.blocks(network.encoder.stem(images))
+        features = network.encoder.look(images)
         empty = network.encoder.memory.initial_state(features)
-        assert_close(network.encoder(images, None), network.encoder(images, empty))
+        assert_close(network.encoder.remember(features, None),
+                     network.encoder.remember(features, empty))
 
 
 def test_a_view_more_changes_what_is_known(network):

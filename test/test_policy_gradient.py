@@ -208,9 +208,12 @@ class Bandit(ReconstructionNetwork):
         worth = (1 + torch.tensor(AZIMUTHS - best).cos()) / 2
         self.filled = (32 * worth).round()  # of 32 layers, by view
 
-    def fold(self, images, azimuths, hidden=None):
-        view = (images[:, 0, 0, 0] * 255 / 10).round().long()
-        return Folded(torch.ones(len(images), 4, 4, 4), self.filled[view]), hidden
+    def look(self, images):
+        return images
+
+    def remember(self, seen, azimuths, hidden=None):
+        view = (seen[:, 0, 0, 0] * 255 / 10).round().long()
+        return Folded(torch.ones(len(seen), 4, 4, 4), self.filled[view]), hidden
 
     def decode(self, features):
         layers = torch.arange(32)[None, :, None, None] < features[:, None, None, None]

@@ -1,10 +1,9 @@
 """3D-R2N2: its memory, its last doubling, and that it can learn."""
 
-from active_recon.models.r2n2 import ConvGRUCell, DoublingConv3d, R2n2, R2n2Config, SIZES
+from active_recon.models.r2n2 import ConvGRUCell, R2n2, R2n2Config, SIZES
 from learning_by_heart import iou_by_heart
 import torch
 from torch import nn
-from torch.nn import functional
 from torch.testing import assert_close
 
 
@@ -28,21 +27,6 @@ def test_the_memory_stays_between_minus_1_and_1():
     for code in 50 * torch.randn(20, 1, 3):
         hidden = cell(code, hidden)
         assert hidden.abs().max() <= 1
-
-
-def test_the_last_doubling_can_say_what_unpooling_and_a_convolution_say():
-    coarse, fine = torch.rand(2, 3, 4, 4, 4), nn.Conv3d(3, 1, 3, padding=1)
-    doubling = DoublingConv3d(3)
-    # A child at 0 sees its parent by two taps and the parent before by one; at 1 the reverse
-    taps = {0: ((0,), (1, 2), ()), 1: ((), (0, 1), (2,))}
-    with torch.no_grad():
-        for index, corner in enumerate(torch.cartesian_prod(*(torch.arange(2),) * 3).tolist()):
-            for cell in torch.cartesian_prod(*(torch.arange(3),) * 3).tolist():
-                x, y, z = (list(taps[c][t]) for c, t in zip(corner, cell, strict=True))
-                doubling.to_eight.weight[index, :, *cell] = (
-                    fine.weight[0][:, x][:, :, y][:, :, :, z].sum((1, 2, 3)))
-            doubling.to_eight.bias[index] = fine.bias[0]
-    assert_close(doubling(coarse), fine(functional.interpolate(coarse, scale_factor=2)))
 
 
 def test_the_published_decoder_doubles_three_times_and_the_small_one_too():

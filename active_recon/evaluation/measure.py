@@ -11,9 +11,8 @@ from active_recon.evaluation.metrics import half_the_set_away
 from active_recon.evaluation.oracle import oracle_batch, roll_out_oracle
 from active_recon.evaluation.rollouts import (
     batches,
-    fold_views,
-    logits_of,
     nearest_views,
+    Observer,
     roll_out,
     Step,
 )
@@ -145,14 +144,15 @@ def iou_by_yaw(
     and so does the azimuth that the network is told, if it listens.
     """
     found: dict[int, list[float]] = {yaw: [] for yaw in YAWS_DEG}
+    observer = Observer(network, views)
     signs = 1 - 2 * (torch.arange(len(objects)) % 2)
     for part in batches(len(objects), _BATCH):
         own = objects[part]
         turns = list(zip(own.tolist(), signs[part].tolist(), strict=True))
         for yaw in YAWS_DEG:
             angle = math.radians(yaw)
-            folded, _ = fold_views(network, views, own, starts[part], yaws=signs[part] * angle)
-            predicted = (logits_of(network, folded).sigmoid() > threshold).cpu()
+            folded, _ = observer.fold(own, starts[part], yaws=signs[part] * angle)
+            predicted = (observer.decode(folded).sigmoid() > threshold).cpu()
             truths = {turn: _turned_truth(views, turn[0], turn[1] * angle) for turn in set(turns)}
             found[yaw] += iou(predicted, torch.stack([truths[turn] for turn in turns])).tolist()
         progress(len(part))
@@ -184,6 +184,7 @@ def blindness(network: ReconstructionNetwork, policy: AttentionPolicy, views: Vi
     much the area under the IoU curve falls, paired by episode; its interval tells whether it does.
     Raises DataError on a set of a single object.
     """
+    observer = Observer(network, views)
     stand_ins = half_the_set_away(objects, len(views))
     moved = []
     for part in batches(len(objects), _BATCH):
@@ -191,7 +192,7 @@ def blindness(network: ReconstructionNetwork, policy: AttentionPolicy, views: Vi
         goals = []
         for shown in (objects[part], stand_ins[part]):
             alike = nearest_views(views.azimuths[shown].numpy(), taken)
-            folded, _ = fold_views(network, views, shown, alike)
+            folded, _ = observer.fold(shown, alike)
             goals.append(policy.choose(folded.latent.cpu().numpy(), taken[:, None])[0].azimuth)
         moved.append(np.degrees(np.abs(azimuth_difference(*goals))))
     seeing, swapped = (

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.rollouts import batches, fold_views, logits_of, Step
+from active_recon.evaluation.rollouts import batches, Observer, Step
 from active_recon.models.network import Folded, ReconstructionNetwork
 from active_recon.voxels import iou
 import numpy as np
@@ -43,15 +43,14 @@ class _Candidates:
 
 
 @torch.inference_mode()
-def _look_at(network: ReconstructionNetwork, views: ViewSet, objects: Tensor, candidates: Tensor,
-             hidden: Any, threshold: float, bfloat16: bool) -> _Candidates:
-    """Look at candidates (B, K) of objects (B,) after what is hidden so far, of B rows."""
+def _look_at(observer: Observer, truth: Tensor, objects: Tensor, candidates: Tensor, hidden: Any,
+             threshold: float) -> _Candidates:
+    """Look at candidates (B, K) of objects (B,) of this truth, after what is hidden, of B rows."""
     batch, count = candidates.shape
     rows = torch.arange(batch).repeat_interleave(count)
-    folded, hidden = fold_views(network, views, objects[rows], candidates.flatten(),
-                                rows_of(hidden, rows), bfloat16)
-    logits = logits_of(network, folded, bfloat16)
-    truth = views.voxels[objects].to(logits.device)[:, None]
+    folded, hidden = observer.fold(objects[rows], candidates.flatten(), rows_of(hidden, rows))
+    logits = observer.decode(folded)
+    truth = truth.to(logits.device)[:, None]
     occupied = logits.reshape(batch, count, *logits.shape[1:]).sigmoid() > threshold
     return _Candidates(folded, hidden, logits, iou(occupied, truth).cpu())
 
@@ -65,12 +64,13 @@ def roll_out_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Ten
     It sees the truth: of the views not yet taken it goes to the one after which the IoU is
     highest, one step ahead.
     """
+    observer, truth = Observer(network, views, bfloat16), views.voxels[objects]
     every = torch.arange(views.images.shape[1]).expand(len(objects), -1)
     fresh = torch.ones_like(every, dtype=torch.bool)
     candidates, hidden = starts[:, None], None
     taken = np.empty((len(objects), 0))
     for _ in range(count):
-        seen = _look_at(network, views, objects, candidates, hidden, threshold, bfloat16)
+        seen = _look_at(observer, truth, objects, candidates, hidden, threshold)
         best = seen.best
         chosen = candidates.flatten()[best]
         hidden = rows_of(seen.hidden, best)
@@ -99,7 +99,7 @@ def sequence_iou(network: ReconstructionNetwork, views: ViewSet, item: int, thre
     a view comes twice. Sequences share what was folded in before: 3 of 24 views are 12,720
     passes.
     """
-    count = views.images.shape[1]
+    count, observer = views.images.shape[1], Observer(network, views, bfloat16)
     table = np.full((count,) * length, np.nan, np.float32)
 
     def explore(sequences: Tensor, hidden: Any) -> None:
@@ -107,7 +107,7 @@ def sequence_iou(network: ReconstructionNetwork, views: ViewSet, item: int, thre
         taken = torch.zeros(len(sequences), count, dtype=torch.bool).scatter(1, sequences, True)
         fresh = torch.nonzero(~taken)[:, 1].reshape(len(sequences), -1)
         objects = torch.full((len(sequences),), item)
-        seen = _look_at(network, views, objects, fresh, hidden, threshold, bfloat16)
+        seen = _look_at(observer, views.voxels[objects], objects, fresh, hidden, threshold)
         longer = torch.cat([sequences.repeat_interleave(fresh.shape[1], dim=0),
                             fresh.reshape(-1, 1)], dim=1)
         if longer.shape[1] == length:

@@ -1,5 +1,6 @@
 """The 3D convolutional LSTM decoder of section 3.2: the attentive latent unit to occupancy."""
 
+from active_recon.models.doubling import DoublingTransposedConv3d
 from active_recon.models.encoder import group_norm, LATENT_GRID
 from active_recon.models.network import start_empty
 from active_recon.models.recurrent import ConvLSTMCell, LstmState
@@ -20,7 +21,7 @@ class Decoder(nn.Module):
         self.latent_channels = latent_channels
         self.memory = ConvLSTMCell(latent_channels, volume_channels, (LATENT_GRID,) * 3)
         wide, narrow = decoder_channels
-        to_logits = nn.ConvTranspose3d(narrow, 1, 4, stride=2, padding=1)
+        to_logits = DoublingTransposedConv3d(narrow)
         self.grow = nn.Sequential(
             nn.ConvTranspose3d(volume_channels, wide, 4, stride=2, padding=1), group_norm(wide),
             nn.LeakyReLU(0.1),

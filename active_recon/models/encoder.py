@@ -67,9 +67,13 @@ class Encoder(nn.Module):
             nn.Conv2d(bottleneck_channels, latent_channels * LATENT_GRID ** 3, 1),
             nn.GroupNorm(1, latent_channels * LATENT_GRID ** 3), nn.LeakyReLU(0.1))
 
-    def forward(self, images: Tensor, state: LstmState | None) -> tuple[Tensor, LstmState]:
+    def look(self, images: Tensor) -> Tensor:
+        """Return what the residual blocks make of images, (B, F, 4, 4)."""
+        features: Tensor = self.blocks(self.stem(2 * images - 1))
+        return features
+
+    def remember(self, features: Tensor, state: LstmState | None) -> tuple[Tensor, LstmState]:
         """Return A_t and the next state; a state of None is that of no view yet."""
-        features = self.blocks(self.stem(2 * images - 1))  # (B, F, 4, 4)
         state = self.memory(features, state or self.memory.initial_state(features))
         latent = self.to_latent(state.hidden)  # (B, 64 C, 1, 1)
-        return latent.reshape(len(images), -1, LATENT_GRID, LATENT_GRID), state
+        return latent.reshape(len(features), -1, LATENT_GRID, LATENT_GRID), state

@@ -51,10 +51,14 @@ class MeanCodeNetwork(ReconstructionNetwork):
         super().__init__()
         self.encoder = encoder
 
-    def fold(self, images: Tensor, azimuths: Tensor,
-             hidden: SeenCodes | None = None) -> tuple[Folded, SeenCodes]:
-        """Fold in one view of each object; the features are the mean code, (B, D)."""
-        code = self.encoder(images)
-        seen = SeenCodes(hidden.total + code, hidden.views + 1) if hidden else SeenCodes(code, 1)
-        mean = seen.total / seen.views
-        return Folded(mean[:, :, None, None], mean), seen
+    def look(self, images: Tensor) -> Tensor:
+        """Return the images' codes, (B, D)."""
+        codes: Tensor = self.encoder(images)
+        return codes
+
+    def remember(self, seen: Tensor, azimuths: Tensor,
+                 hidden: SeenCodes | None = None) -> tuple[Folded, SeenCodes]:
+        """Take in images' codes; the features of what is known are the mean code, (B, D)."""
+        known = SeenCodes(hidden.total + seen, hidden.views + 1) if hidden else SeenCodes(seen, 1)
+        mean = known.total / known.views
+        return Folded(mean[:, :, None, None], mean), known

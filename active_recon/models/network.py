@@ -42,21 +42,31 @@ class ReconstructionNetwork(nn.Module, ABC):
     - images: (B, 3, 64, 64) in [0, 1]; azimuths of their cameras: (B,) radians
     - hidden: whatever the network handed back after the view before; None before the first
 
-    Folding a view in and decoding what is known are apart, since training decodes after one view
-    of a sequence only.
+    Looking at an image, remembering what it shows and decoding what is known are apart: training
+    decodes after one view of a sequence only, and who tries many sequences of the same views
+    looks at each of them once.
     """
 
     resolution: int = 32
     """R, cells a side of the occupancy."""
 
     @abstractmethod
-    def fold(self, images: Tensor, azimuths: Tensor,
-             hidden: Any | None = None) -> tuple[Folded, Any]:
-        """Fold in one view of each object."""
+    def look(self, images: Tensor) -> Tensor:
+        """Return what each of the images shows by itself, (B, ...), whatever was seen before."""
+
+    @abstractmethod
+    def remember(self, seen: Tensor, azimuths: Tensor,
+                 hidden: Any | None = None) -> tuple[Folded, Any]:
+        """Take in what one image of each object shows, (B, ...)."""
 
     @abstractmethod
     def decode(self, features: Tensor) -> Tensor:
         """Return the occupancy's logits, (B, R, R, R), of what was folded in."""
+
+    def fold(self, images: Tensor, azimuths: Tensor,
+             hidden: Any | None = None) -> tuple[Folded, Any]:
+        """Fold in one view of each object: look at it, and remember."""
+        return self.remember(self.look(images), azimuths, hidden)
 
     def objective(self, features: Tensor, voxels: Tensor) -> Tensor | None:
         """

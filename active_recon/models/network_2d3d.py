@@ -38,10 +38,14 @@ class Network2d3d(ReconstructionNetwork):
                     config.bottleneck_channels, config.latent_channels),
             Decoder(config.latent_channels, config.volume_channels, config.decoder_channels))
 
-    def fold(self, images: Tensor, azimuths: Tensor,
-             hidden: Hidden | None = None) -> tuple[Folded, Hidden]:
-        """Fold in one view of each object; the features are the decoder's memory."""
-        latent, encoder = self.encoder(images, hidden and hidden.encoder)
+    def look(self, images: Tensor) -> Tensor:
+        """Return the images' features, (B, F, 4, 4)."""
+        return self.encoder.look(images)
+
+    def remember(self, seen: Tensor, azimuths: Tensor,
+                 hidden: Hidden | None = None) -> tuple[Folded, Hidden]:
+        """Take in images' features; those of what is known are the decoder's memory."""
+        latent, encoder = self.encoder.remember(seen, hidden and hidden.encoder)
         decoder = self.decoder.remember(latent, hidden and hidden.decoder)
         return Folded(latent, decoder.hidden), Hidden(encoder, decoder)
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError
+from active_recon.models.doubling import DoublingConv3d
 from active_recon.models.encoder import group_norm, LATENT_GRID
 from active_recon.models.network import Folded, ReconstructionNetwork, start_empty
 from torch import nn, Tensor
@@ -100,26 +101,6 @@ class ConvGRUCell(nn.Module):
         return result
 
 
-class DoublingConv3d(nn.Module):
-    """
-    Unpooling and a 3 x 3 x 3 convolution in one, (B, in, S, S, S) to (B, 1, 2 S, 2 S, 2 S).
-
-    A convolution of the coarse grid gives each of a cell's eight children a value: what unpooling
-    and a convolution of the fine grid can say, and at an eighth of the memory.
-    """
-
-    def __init__(self, in_channels: int) -> None:
-        super().__init__()
-        self.to_eight = nn.Conv3d(in_channels, 8, 3, padding=1)
-
-    def forward(self, features: Tensor) -> Tensor:
-        """Return the children in their places."""
-        batch, _, side, *_ = features.shape
-        eight = self.to_eight(features).reshape(batch, 2, 2, 2, side, side, side)
-        placed: Tensor = eight.permute(0, 4, 1, 5, 2, 6, 3).reshape(batch, 1, *(2 * side,) * 3)
-        return placed
-
-
 class R2n2(ReconstructionNetwork):
     """
     3D-R2N2 in its residual GRU variant, learned by voxel-wise cross entropy.
@@ -158,12 +139,16 @@ class R2n2(ReconstructionNetwork):
         return cls(config.encoder_channels, config.code_channels, config.hidden_channels,
                    config.decoder_channels)
 
-    def fold(self, images: Tensor, azimuths: Tensor,
-             hidden: Tensor | None = None) -> tuple[Folded, Tensor]:
-        """Fold in one view of each object; hidden and features are the memory, (B, H, 4, 4, 4)."""
-        code = self.encoder(2 * images - 1)
+    def look(self, images: Tensor) -> Tensor:
+        """Return the images' codes, (B, D)."""
+        codes: Tensor = self.encoder(2 * images - 1)
+        return codes
+
+    def remember(self, seen: Tensor, azimuths: Tensor,
+                 hidden: Tensor | None = None) -> tuple[Folded, Tensor]:
+        """Take in images' codes; hidden and features are the memory, (B, H, 4, 4, 4)."""
         known: Tensor = self.memory(
-            code, self.memory.initial_state(code) if hidden is None else hidden)
+            seen, self.memory.initial_state(seen) if hidden is None else hidden)
         return Folded(known.reshape(len(known), -1, LATENT_GRID, LATENT_GRID), known), known
 
     def decode(self, features: Tensor) -> Tensor:

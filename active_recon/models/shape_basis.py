@@ -89,23 +89,26 @@ class ShapeBasis(ReconstructionNetwork):
         """Build the model of a configuration, without any shapes yet."""
         return cls(config.categories, config.modes)
 
-    def fold(self, images: Tensor, azimuths: Tensor,
-             hidden: SeenOutlines | None = None) -> tuple[Folded, SeenOutlines]:
-        """Fold in one view of each object, seen from 30 degrees up, and fit to all so far."""
-        outline = outlines_of(images)
+    def look(self, images: Tensor) -> Tensor:
+        """Return the images' silhouettes, (B, 32, 32)."""
+        return outlines_of(images)
+
+    def remember(self, seen: Tensor, azimuths: Tensor,
+                 hidden: SeenOutlines | None = None) -> tuple[Folded, SeenOutlines]:
+        """Take in silhouettes, seen from 30 degrees up, and fit to all so far."""
         nearest = (azimuths / TURN * VIEW_COUNT).round().long() % VIEW_COUNT
-        here = outline[:, None]
+        here = seen[:, None]
         apart = (self.outlines[:, nearest].transpose(0, 1) - here).square().sum((2, 3))
         if hidden is None:
-            seen = SeenOutlines(here, azimuths[:, None], apart)
+            known = SeenOutlines(here, azimuths[:, None], apart)
         else:
-            seen = SeenOutlines(torch.cat([hidden.outlines, here], dim=1),
-                                torch.cat([hidden.azimuths, azimuths[:, None]], dim=1),
-                                hidden.apart + apart)
-        category = seen.apart.argmin(dim=1)
-        coefficients = self.fitted(category, seen.outlines, seen.azimuths)
+            known = SeenOutlines(torch.cat([hidden.outlines, here], dim=1),
+                                 torch.cat([hidden.azimuths, azimuths[:, None]], dim=1),
+                                 hidden.apart + apart)
+        category = known.apart.argmin(dim=1)
+        coefficients = self.fitted(category, known.outlines, known.azimuths)
         features = torch.cat([category[:, None].to(coefficients), coefficients], dim=1)
-        return Folded(coefficients[:, :, None, None], features), seen
+        return Folded(coefficients[:, :, None, None], features), known
 
     def fitted(self, category: Tensor, outlines: Tensor, azimuths: Tensor) -> Tensor:
         """Return the likeliest coefficients (B, modes) of objects of categories (B,)."""

@@ -47,8 +47,10 @@ class ReconstructionLearner(nn.Module):
         `seen_from`, (B,), are the cameras out of 24 whose silhouettes are compared.
         """
         hidden: Any = None
-        for image, azimuth in zip(images, azimuths, strict=True):
-            folded, hidden = self.network.fold(image, azimuth, hidden)
+        seen = self.network.look(images.flatten(0, 1))
+        seen = seen.reshape(*images.shape[:2], *seen.shape[1:])
+        for view, azimuth in zip(seen, azimuths, strict=True):
+            folded, hidden = self.network.remember(view, azimuth, hidden)
         return self.losses(folded.features, voxels, seen_from)
 
     def losses(self, features: Tensor, voxels: Tensor, seen_from: Tensor) -> dict[str, Tensor]:
