@@ -116,8 +116,7 @@ def test_what_is_fitted_in_one_go_is_fitted_where_others_are_trained(
     assert float(load_weights(path).reconstruction.state_dict()['means'].std()) > 0
 
 
-@pytest.mark.parametrize('system', [each for each in SYSTEMS if each.name != 'ogn-64'],
-                         ids=lambda system: system.name)
+@pytest.mark.parametrize('system', SYSTEMS, ids=lambda system: system.name)
 def test_what_ships_is_taken_under_the_usual_settings(system, tmp_path):
     assert find_system(Study(models=tmp_path), system) == FOLDER / f'{system.name}.safetensors'
     assert (FOLDER / f'{system.name}.safetensors').stat().st_size < 10e6
