@@ -1,6 +1,6 @@
 """The view policies on one frozen network: what each is worth, beside chance and an oracle."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -69,20 +69,28 @@ def make(study: Study) -> Result:
     trial = Trial(bundle.reconstruction, bundle.threshold, study.read(study.objects('test')),
                   study.policy_starts, study.views, study.seed, bfloat16=True,
                   cache=study.models / 'measured')
-    attentions = [load_weights(path, study.device).attention for path in weights(study)]
+    paths = weights(study)
+    attentions = [load_weights(path, study.device).attention for path in paths]
     found = policy_study(trial, [model for model in attentions if model is not None],
                          study.policy_seeds, study.subset_objects, study.progress)
     text = (
         f'All policies on one frozen network, in bfloat16, from {study.policy_starts} first views '
         f'of each of {found["objects"]} parametric test objects. Attention was trained under '
-        f'{len(attentions)} seeds, random drawn under {study.policy_seeds}. The greedy oracle '
-        'sees the truth and takes, one step ahead, the view after which the IoU is highest: no '
-        'policy can be built so, it shows what there is to be gained. `area` is the mean IoU '
-        'over the views; differences are paired by object, start and, where both have as many, '
-        f'seed. Brackets are 95 % intervals over objects, starts and seeds. '
-        f'{found["headroom_sentence"]}')
+        f'{len(attentions)} seeds{learned_from(paths)}, random drawn under '
+        f'{study.policy_seeds}. The greedy oracle sees the truth and takes, one step ahead, the '
+        'view after which the IoU is highest: no policy can be built so, it shows what there is '
+        'to be gained. `area` is the mean IoU over the views; differences are paired by object, '
+        'start and, where both have as many, seed. Brackets are 95 % intervals over objects, '
+        f'starts and seeds. {found["headroom_sentence"]}')
     return Result('View policies on one frozen network', text, _tables(found), claims(found),
                   _picture(found['policies']), found)
+
+
+def learned_from(paths: Sequence[Path]) -> str:
+    """Say what the policies learned from, where that is not the same for all."""
+    first, *others = (' and '.join(read_card(path).get('data') or ()) for path in paths)
+    unlike = sorted(set(others) - {first})
+    return f' (the first on {first}, others on {", ".join(unlike)})' if unlike else ''
 
 
 def claims(found: Mapping[str, Any]) -> list[Claim]:
