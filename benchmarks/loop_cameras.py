@@ -14,7 +14,7 @@ import numpy as np
 
 _RATE = 36.0  # images a second
 _VIEWS = 75  # of a run that shows views; all runs together are one episode, of at most 1000
-_GOALS = 40  # of a run that goes to them
+_EPISODES, _GOALS = 2, 20  # of a run that goes to goals, and of each of its episodes
 _STEP = math.radians(30)  # from image to image, while the camera moves
 _BUDGET_S = 120.0
 _AGAIN_S = 2.0
@@ -26,7 +26,7 @@ GoalTimes = AbstractContextManager[Callable[[], float]]
 @contextmanager
 def showing_camera() -> Iterator[Callable[[], float]]:
     """Join the loop as a camera that shows it one view after the other, wherever the goal is."""
-    with _joined() as (hear, publish, spin):
+    with _joined() as (hear, publish, spin, _):
         goals: dict[int, float] = {}
         hear('next_view', lambda stamp, _: goals.setdefault(stamp, time.perf_counter()))
 
@@ -59,25 +59,28 @@ def moving_camera() -> Iterator[Callable[[], float]]:
     """
     Join the loop as a camera in operation: it streams, and goes from goal to goal.
 
-    With a step from image to image this makes four to five views a second.
+    With a step from image to image this makes four to five views a second. An episode ends while
+    there are still views that were not taken: after them a policy has nowhere to go.
     """
-    with _joined() as (hear, publish, spin):
+    with _joined() as (hear, publish, spin, ask):
         goals: dict[int, tuple[float, float]] = {}  # by stamp: when first heard, and where
         taken: list[int] = []
         hear('next_view', lambda stamp, azimuth: goals.setdefault(
             stamp, (time.perf_counter(), azimuth)))
         hear('view', lambda stamp, _: taken.append(stamp))
+        sent: dict[int, float] = {}
         azimuth = 0.0
 
-        def goal_ms() -> float:
+        def follow() -> None:
+            """Stream images and go from goal to goal, for an episode."""
             nonlocal azimuth
-            sent: dict[int, float] = {}
-            known_goals, known_views = len(goals), len(taken)
+            ask('start_episode', _BUDGET_S, lambda: None)
+            known = len(goals)
             due = begun = time.perf_counter()
-            while len(goals) - known_goals < _GOALS:
+            while len(goals) - known < _GOALS:
                 if time.perf_counter() - begun > _BUDGET_S:
                     raise TimeoutError(f'streamed images for {_BUDGET_S} s, but got '
-                                       f'{len(goals) - known_goals} goals, not {_GOALS}')
+                                       f'{len(goals) - known} goals, not {_GOALS}')
                 goal = next(reversed(goals.values()))[1] if goals else 0.0
                 away = azimuth_difference(goal, azimuth)
                 azimuth += float(np.clip(away, -_STEP, _STEP))
@@ -86,6 +89,11 @@ def moving_camera() -> Iterator[Callable[[], float]]:
                 due = max(due + 1 / _RATE, time.perf_counter())
                 while time.perf_counter() < due:
                     spin()
+
+        def goal_ms() -> float:
+            known_views = len(taken)
+            for _ in range(_EPISODES):
+                follow()
             heard = [at for at, _ in goals.values()]
             begins = [sent[stamp] for stamp in taken[known_views:] if stamp in sent]
             return 1e3 * float(np.median([
@@ -96,9 +104,9 @@ def moving_camera() -> Iterator[Callable[[], float]]:
 
 
 @contextmanager
-def _joined() -> Iterator[tuple[Any, Any, Any]]:
-    """Yield what hears poses on a topic, what publishes an image from an azimuth, what spins."""
-    from active_recon.nodes.loop_watch import joined_domain
+def _joined() -> Iterator[tuple[Any, Any, Any, Any]]:
+    """Yield what hears poses, what publishes an image from an azimuth, what spins, what asks."""
+    from active_recon.nodes.loop_watch import joined_domain, LoopWatch
     from active_recon.nodes.qos import LATCHED
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import camera_to_msgs
@@ -128,4 +136,5 @@ def _joined() -> Iterator[tuple[Any, Any, Any]]:
                 publishers[type(msg)].publish(msg)
             return nanoseconds_from_stamp(header.stamp)
 
-        yield hear, publish, lambda: executor.spin_once(timeout_sec=0.001)
+        yield (hear, publish, lambda: executor.spin_once(timeout_sec=0.001),
+               LoopWatch(node, executor).ask)
