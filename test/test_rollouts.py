@@ -31,7 +31,7 @@ def test_an_observer_looks_at_every_view_once(network, views, looked_at):
     observer.fold(objects, torch.tensor([1, 1, 1, 2]))
     observer.fold(objects, torch.tensor([1, 2, 1, 0]))
     observer.fold(objects, torch.tensor([2, 1, 0, 0]))
-    assert looked_at == [3, 2]  # of object 0 the views 1 and 2, of object 3 all but these
+    assert looked_at == [3, 2]  # then view 2 of object 0 and view 0 of object 3
 
 
 @torch.inference_mode()

@@ -56,9 +56,8 @@ class DoublingTransposedConv3d(nn.ConvTranspose3d):
 
     def to_eight(self) -> Tensor:
         """Return the kernel of that convolution, (8, in, 3, 3, 3)."""
-        x, y, z = torch.meshgrid(*(torch.arange(2),) * 3, indexing='ij')
-        taps = _TAPS.to(self.weight.device)
+        x, y, z = (_TAPS.reshape(shape) for shape in (
+            (2, 1, 1, 3, 1, 1), (1, 2, 1, 1, 3, 1), (1, 1, 2, 1, 1, 3)))
         padded = functional.pad(self.weight[:, 0], (0, 1) * 3)  # (in, 5, 5, 5)
-        kernel = padded[:, taps[x][..., :, None, None], taps[y][..., None, :, None],
-                        taps[z][..., None, None, :]]  # (in, 2, 2, 2, 3, 3, 3)
+        kernel = padded[:, x, y, z]  # (in, 2, 2, 2, 3, 3, 3)
         return kernel.flatten(1, 3).transpose(0, 1)
