@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 
 RESOLUTION = 32
 FINE_RESOLUTION = 64
+_MOST_CELLS = 256  # a side
+# Centres of cells of different powers of two never coincide: where one fits, no other does
+_RESOLUTIONS = sorted(range(1, _MOST_CELLS + 1), key=lambda side: (side & (side - 1) > 0, side))
+_FEW = 300  # points that are tried before all of them are
+_TELLING = 8  # so many cells of an object are not all a multiple of 3 apart by chance
+_OFF_CENTRE = 1e-3  # of a cell: more than float32 rounds by, less than two grids' centres are apart
 MESH_FORMATS = ('ply', 'obj', 'stl')
 
 
@@ -86,6 +92,11 @@ class VoxelGrid:
         occupancy = np.where(self.occupied(threshold), self.occupancy, np.float32(0))
         return VoxelGrid(np.ascontiguousarray(occupancy), self.size)
 
+    def as_fine_as(self, other: 'VoxelGrid') -> 'VoxelGrid':
+        """Return an empty grid with the other's cells: no cloud told its own; any other stays."""
+        return self if self.occupancy.any() else VoxelGrid(
+            np.zeros_like(other.occupancy), self.size)
+
     def entropy(self) -> float:
         """Return the entropy of all cells in nats: -sum(p log p + (1 - p) log(1 - p))."""
         return float(entropy(self.occupancy.astype(np.float64)))
@@ -125,14 +136,66 @@ class VoxelGrid:
 
 def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
                      resolution: int = RESOLUTION) -> VoxelGrid:
-    """Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `points`."""
+    """
+    Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `points`.
+
+    It has the fewest cells a side with which every point is the centre of one, powers of two
+    before others; `resolution` is that of a grid without points, which do not tell it. Raises
+    DataError of the kind 'cloud' where points are outside the cube of `size` metres, are not
+    centres of one grid's cells or only of every third, fifth ... of them, share a cell, or have
+    an occupancy that is none.
+    """
+    if not len(points):
+        return VoxelGrid(np.zeros((resolution,) * 3, np.float32), size)
     with np.errstate(invalid='ignore', over='ignore'):  # what is not finite is refused below
-        index = np.floor((points[:, :3] + size / 2) / size * resolution)
-    if not ((index >= 0) & (index < resolution)).all():  # also where a coordinate is NaN
-        raise DataError(f'expected points inside a cube of {size} m about the origin')
-    occupancy = np.zeros((resolution,) * 3, np.float32)
-    occupancy[tuple(index.astype(int).T)] = points[:, 3]
-    return VoxelGrid(occupancy, size)
+        shares = points[:, :3] / size + np.float32(0.5)
+    if not ((shares >= 0) & (shares < 1)).all():  # also where a coordinate is NaN
+        raise DataError(f'expected points inside a cube of {size} m about the origin', 'cloud')
+    if not ((points[:, 3] >= 0) & (points[:, 3] <= 1)).all():
+        raise DataError('expected occupancies in [0, 1], got '
+                        f'{points[:, 3].min()} to {points[:, 3].max()}', 'cloud')
+    side = _cells_a_side(shares)
+    if side is None:
+        raise DataError(f'expected points at the centres of at most {_MOST_CELLS} cells a side '
+                        f'of a cube of {size} m, got {len(points)} that are at no such', 'cloud')
+    index = (shares * side).astype(np.intp)
+    if (spacing := _spacing(index)) > 1:
+        raise DataError(f'expected the cells of a cube of {size} m beside each other, got '
+                        f'{len(points)} that are {spacing} of {side} a side apart: they are of a '
+                        'cube of another size', 'cloud')
+    x, y, z = index.T
+    cells = (x * side + y) * side + z
+    occupancy, told = np.zeros(side ** 3, np.float32), np.zeros(side ** 3, bool)
+    occupancy[cells], told[cells] = points[:, 3], True
+    if (count := np.count_nonzero(told)) < len(points):
+        raise DataError(f'expected one point a cell, got {len(points)} in {count} cells of '
+                        f'{side} a side', 'cloud')
+    return VoxelGrid(occupancy.reshape((side,) * 3), size)
+
+
+def _cells_a_side(shares: NDArray[np.floating]) -> int | None:
+    """Return in how many cells a side points, (N, 3) in [0, 1), are centres, None if in none."""
+    def fit(shares: NDArray[np.floating], side: int) -> bool:
+        places = shares * side
+        return bool((np.abs(places - np.floor(places) - 0.5) <= _OFF_CENTRE).all())
+
+    return next((side for side in _RESOLUTIONS
+                 if fit(shares[:_FEW], side) and fit(shares, side)), None)
+
+
+def _spacing(index: NDArray[np.intp]) -> int:
+    """
+    Return by how many cells points, (N, 3), are apart where it tells of another grid, else 1.
+
+    Grids about one centre share centres of cells only where one is an odd number of times finer.
+    """
+    if len(index) < _TELLING:
+        return 1
+    for points in (index[:_FEW], index):
+        spacing = int(np.gcd.reduce(np.abs(points - index[0]), axis=None))
+        if spacing % 2 == 0 or spacing == 1:
+            return 1
+    return spacing
 
 
 def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:

@@ -1,6 +1,7 @@
 """Voxel grids to and from PointCloud2: one point for each cell above a threshold."""
 
-from active_recon.voxels import grid_from_points, VoxelGrid
+from active_recon.errors import DataError, MessageError
+from active_recon.voxels import grid_from_points, RESOLUTION, VoxelGrid
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
@@ -10,14 +11,20 @@ FLOOR = 0.02
 """Cells of less occupancy are left out of `probabilities`."""
 
 
-def voxel_grid_from_msg(msg: PointCloud2, size: float = 1.0) -> VoxelGrid:
+def voxel_grid_from_msg(msg: PointCloud2, size: float = 1.0,
+                        resolution: int = RESOLUTION) -> VoxelGrid:
     """
     Return the grid whose cells the points name; cells without a point are 0.
 
-    `size` is the grid's side in metres. Raises MessageError on a cloud of other fields, DataError
-    on points outside the grid.
+    `size` is the grid's side in metres. The points tell its resolution; `resolution`, cells a
+    side, is that of a cloud without any. Raises MessageError of the kind 'cloud' on a cloud of
+    other fields, and on points that are not cells of one grid.
     """
-    return grid_from_points(cloud_from_msg(msg, FIELDS), size)
+    points = cloud_from_msg(msg, FIELDS)
+    try:
+        return grid_from_points(points, size, resolution)
+    except DataError as error:
+        raise MessageError(str(error), 'cloud') from error
 
 
 def voxel_grid_to_msg(grid: VoxelGrid, threshold: float, header: Header) -> PointCloud2:

@@ -31,6 +31,8 @@ class LoopRun:
     id: str = 'first'
     begin: int = BEGIN
     azimuths: tuple[float, ...] = (0.0, 2.0, 4.0)
+    resolution: int = 32
+    threshold: float = 0.5
     messages: list = field(default_factory=list)
     stamps: list = field(default_factory=list)
 
@@ -38,7 +40,8 @@ class LoopRun:
         rng = np.random.default_rng(self.begin % 1000 + len(self.id))
         count = len(self.azimuths)
         self.images = rng.integers(0, 256, (count, 16, 16, 3), np.uint8)
-        self.grids = [VoxelGrid(np.float32(rng.random((32,) * 3) * (rng.random((32,) * 3) < 0.03)))
+        cells = (self.resolution,) * 3
+        self.grids = [VoxelGrid(np.float32(rng.random(cells) * (rng.random(cells) < 0.03)))
                       for _ in range(count)]
         self.latents = rng.normal(size=(count, 6, 4, 4)).astype(np.float32)
         self.candidates = np.arange(24) * np.pi / 12
@@ -77,7 +80,8 @@ class LoopRun:
             self._say(now + 3, '/camera/image_raw', image_to_msg(self.images[number], stamped))
         self.stamps.append(now)
         stamped, grid = header(now, 'object'), self.grids[number]
-        self._say(now + 1_000_000, '/occupancy', voxel_grid_to_msg(grid, 0.5, stamped))
+        self._say(now + 1_000_000, '/occupancy', voxel_grid_to_msg(
+            grid, self.threshold, stamped))
         self._say(now + 1_000_001, '/latent', latent_to_msg(self.latents[number], stamped))
         self._say(now + 1_000_002, '/view', pose_to_msg(camera.pose, stamped))
         self._say(now + 1_000_003, '/probabilities', voxel_grid_to_msg(grid, FLOOR, stamped))

@@ -1,6 +1,6 @@
 """Voxels, episodes and stamps between ROS and the core."""
 
-from active_recon.errors import DataError, MessageError
+from active_recon.errors import MessageError
 from active_recon.voxels import VoxelGrid
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.episodes import (
@@ -27,9 +27,27 @@ def test_the_cells_above_the_threshold_come_back(threshold):
     np.testing.assert_array_equal(voxel_grid_from_msg(msg, 0.4).occupancy, expected)
 
 
-def test_points_outside_the_grid_are_refused():
-    with pytest.raises(DataError, match='inside a cube of 0.1 m'):
-        voxel_grid_from_msg(voxel_grid_to_msg(GRID, 0.5, Header()), 0.1)
+def test_a_cloud_of_64_cells_a_side_is_read_as_such():
+    fine = VoxelGrid(np.random.default_rng(1).random((64, 64, 64), np.float32), size=0.4)
+    for threshold in (0.0, 0.99999):
+        msg = voxel_grid_to_msg(fine, threshold, Header())
+        np.testing.assert_array_equal(
+            voxel_grid_from_msg(msg, 0.4).occupancy, fine.above(threshold).occupancy)
+
+
+def test_a_cloud_without_points_says_nothing_of_its_cells():
+    msg = voxel_grid_to_msg(GRID, 1.0, Header())
+    assert voxel_grid_from_msg(msg, 0.4).occupancy.shape == (32, 32, 32)
+    assert voxel_grid_from_msg(msg, 0.4, resolution=64).occupancy.shape == (64, 64, 64)
+
+
+def test_points_outside_the_grid_or_between_its_cells_are_refused():
+    msg = voxel_grid_to_msg(GRID, 0.5, Header())
+    for size, said in ((0.1, 'inside a cube of 0.1 m'),
+                       (0.3 * 2 ** 0.5, 'at the centres of'), (0.41, '5 of 164 a side apart')):
+        with pytest.raises(MessageError, match=said) as caught:
+            voxel_grid_from_msg(msg, size)
+        assert caught.value.kind == 'cloud'
 
 
 def test_a_cloud_is_read_by_the_names_of_its_fields():

@@ -4,13 +4,16 @@
 from contextlib import closing, contextmanager, suppress
 import sqlite3
 
-from active_recon.bags.comparison import compare, NOTHING_RECORDED
+from active_recon.bags.comparison import compare, NOTHING_RECORDED, SAME_BITS
 from active_recon.bags.files import mcap_files
 from active_recon.bags.reading import read_run
 from active_recon.bags.replay import ReplayedEpisode, ReplayedView
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import DataError
 from active_recon.reconstructor import Reconstruction
+from active_recon.report.scene import scene
+from active_recon.report.subject import Subject
+from active_recon.viewer.playback import recorded_states
 from active_recon.voxels import VoxelGrid
 from loop_bags import BEGIN, DELAY, header, LENS, LoopRun, PERIOD, STILL, type_name, write_bag
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
@@ -18,7 +21,7 @@ from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
 from msg_tools.episodes import done_to_msg
 from msg_tools.images import image_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
-from msg_tools.voxels import FIELDS
+from msg_tools.voxels import FIELDS, voxel_grid_to_msg
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
@@ -73,6 +76,40 @@ def test_what_the_loop_published_is_what_is_read(loop, bag):
     assert run.counters == {'reconstructor': {'views': 3}}
     assert (run.begin, run.end) == (BEGIN + DELAY, loop.messages[-1][0] + DELAY)
     assert sum(topic.count for topic in run.topics) == len(loop.messages)
+
+
+@pytest.mark.parametrize('threshold', [0.5, 1.0], ids=['occupied', 'nothing occupied'])
+def test_grids_of_64_cells_a_side_are_read_as_such_where_none_is_occupied_too(
+        tmp_path, threshold):
+    loop = LoopRun(resolution=64, threshold=threshold)
+    run = read_run(write_bag(tmp_path / 'run', loop.messages))
+    for grid, view in zip(loop.grids, only(run).views, strict=True):
+        assert np.array_equal(view.occupied.occupancy, grid.above(threshold).occupancy)
+        assert np.array_equal(view.reconstruction.occupancy, grid.above(0.02).occupancy)
+    replayed = [ReplayedEpisode(only(run), None, [
+        ReplayedView(view, Reconstruction(grid, view.latent), None)
+        for grid, view in zip(loop.grids, only(run).views, strict=True)])]
+    assert compare(replayed, threshold).deviations['occupancy'].verdict == SAME_BITS
+    for state in recorded_states(run):
+        assert state.grid.occupancy.shape == (64, 64, 64)
+    cells = np.zeros((64, 64, 64), bool)
+    shown = Subject('A', run, only(run), cells)
+    assert shown.ious == [float(threshold == 1)] * 3
+    assert shown.threshold == pytest.approx(threshold, abs=0.01)
+    assert scene(shown)['side'] == 64
+
+
+def test_a_view_whose_grids_are_both_empty_has_the_cells_of_the_others(tmp_path):
+    loop = LoopRun(resolution=64)
+    empty = VoxelGrid(np.zeros((64, 64, 64), np.float32))
+    messages = [(time, topic, voxel_grid_to_msg(empty, 0, msg.header)
+                 if topic in ('/occupancy', '/probabilities')
+                 and msg.header == header(loop.stamps[0], 'object') else msg)
+                for time, topic, msg in loop.messages]
+    first, *_ = only(read_run(write_bag(tmp_path / 'run', messages))).views
+    for grid in (first.occupied, first.reconstruction):
+        assert grid.occupancy.shape == (64, 64, 64)
+        assert not grid.occupancy.any()
 
 
 def test_a_view_whose_background_was_taken_away_is_read_as_the_network_saw_it(loop, tmp_path):

@@ -16,6 +16,7 @@ from active_recon.cameras import orbit_camera, wrap_azimuth
 from active_recon.errors import DataError, WeightsError
 from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
 from active_recon.motion import MotionLimits
+from active_recon.voxels import VoxelGrid
 import numpy as np
 import pytest
 from recorded_runs import (
@@ -172,6 +173,16 @@ def test_a_cell_at_the_edge_of_the_cloud_is_off_by_what_it_is_beyond_the_edge(ru
     found = compare(replay(lacking, *make_loop()), THRESHOLD).deviations['probabilities']
     assert found.same == found.compared - 1
     assert found.largest == pytest.approx(beyond, abs=1e-6)
+
+
+def test_an_empty_cloud_is_compared_whatever_the_resolution_that_it_was_read_with(
+        run, make_loop):
+    view = run.episodes[0].views[1]
+    for cells in (32, 64):
+        empty = VoxelGrid(np.zeros((cells,) * 3, np.float32))
+        found = compare(replay(changed(run, occupied=empty), *make_loop()), THRESHOLD)
+        apart = found.deviations['occupancy'].largest
+        assert apart == pytest.approx(view.occupied.occupancy.max() - THRESHOLD, abs=1e-6)
 
 
 LIMITED = {'views': 4, 'motion_weight': 0.3, 'limits': MotionLimits((-1.0, 2.0), [0.6, 1.1])}

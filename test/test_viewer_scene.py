@@ -5,6 +5,7 @@ from types import SimpleNamespace
 from active_recon.cameras import AZIMUTHS
 from active_recon.viewer.scene import relative_scores, Scene
 from active_recon.viewer.state import LoopState, Scores
+from active_recon.voxels import VoxelGrid
 import numpy as np
 import pytest
 
@@ -17,7 +18,8 @@ class Shown:
 
     def add_batched_meshes_simple(self, name, vertices, faces, wxyzs, positions, **others):
         self.boxes[name] = SimpleNamespace(
-            vertices=vertices, batched_wxyzs=wxyzs, batched_positions=positions, **others)
+            vertices=vertices, batched_wxyzs=wxyzs, batched_positions=positions,
+            remove=lambda: None, **others)
         return self.boxes[name]
 
     def __getattr__(self, name):
@@ -45,3 +47,14 @@ def test_bars_are_as_high_as_the_scores_say_at_first_and_when_they_change(shown)
         np.testing.assert_allclose(found, 0.3 * relative_scores(scores), rtol=1e-5)
         # They stand on the floor
         np.testing.assert_allclose(bars.batched_positions[:, 2] - found / 2, -0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize('cells', [32, 64])
+def test_cells_are_as_long_as_the_grid_has_them_after_an_empty_one_too(shown, cells):
+    scene = Scene(shown, 1.0)
+    for side, occupancy in ((32, 0), (cells, 1), (32, 0), (cells, 1)):
+        grid = VoxelGrid(np.full((side,) * 3, occupancy, np.float32))
+        scene.draw(LoopState(grid=grid), 0.5)
+    boxes = shown.boxes['/occupancy']
+    assert len(boxes.batched_positions) == cells ** 3 - (cells - 2) ** 3
+    assert np.ptp(boxes.vertices[:, 0]) == pytest.approx(0.93 / cells)

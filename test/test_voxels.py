@@ -78,13 +78,65 @@ def test_iou_of_tensors_is_that_of_arrays(axes):
 
 
 @pytest.mark.parametrize('size', [0.3, 1.0, 2.0])
-@pytest.mark.parametrize('resolution', [7, 32])
+@pytest.mark.parametrize('resolution', [1, 7, 24, 32, 48, 64, 100])
 def test_points_come_back_as_the_grid_that_they_were(size, resolution):
     occupancy = RNG.random((resolution,) * 3, np.float32)
+    occupancy[0, 0, 0] = 1
     points = VoxelGrid(occupancy, size).points(0.4)
     assert (np.abs(points[:, :3]) < size / 2).all()
-    back = grid_from_points(points, size, resolution)
+    back = grid_from_points(points, size)
     np.testing.assert_array_equal(back.occupancy, np.where(occupancy > 0.4, occupancy, 0))
+
+
+@pytest.mark.parametrize('size', [0.35, 1.0])
+@pytest.mark.parametrize('resolution', [2, 4, 8, 16, 32, 64, 128, 256])
+def test_one_point_tells_a_grid_whose_side_is_a_power_of_two(size, resolution):
+    for cell in RNG.integers(0, resolution, (20, 3)):
+        center = (cell + 0.5) / resolution * size - size / 2
+        grid = grid_from_points(np.float32([[*center, 0.75]]), size)
+        assert grid.occupancy.shape == (resolution,) * 3
+        np.testing.assert_array_equal(np.argwhere(grid.occupancy), [cell])
+
+
+def test_points_that_a_coarser_grid_has_too_do_not_hide_those_that_it_has_not():
+    occupancy = np.zeros((96,) * 3, np.float32)
+    occupancy[1::3, 1::3, 1::3] = 0.5  # the centres of 32 cells a side
+    points = VoxelGrid(occupancy).points(0)
+    assert len(grid_from_points(points).occupancy) == 32
+    occupancy[95, 95, 95] = 0.5  # the last of all
+    np.testing.assert_array_equal(grid_from_points(VoxelGrid(occupancy).points(0)).occupancy,
+                                  occupancy)
+
+
+def test_no_points_are_an_empty_grid_of_the_resolution_that_is_asked_for():
+    none = np.empty((0, 4), np.float32)
+    assert grid_from_points(none).occupancy.shape == (32, 32, 32)
+    grid = grid_from_points(none, 0.5, 64)
+    assert (grid.size, grid.occupancy.shape, grid.occupancy.any()) == (0.5, (64, 64, 64), False)
+
+
+def test_an_empty_grid_becomes_as_fine_as_another_and_any_other_stays():
+    full, empty = VoxelGrid(np.ones((64, 64, 64), np.float32)), grid_from_points(
+        np.empty((0, 4), np.float32))
+    assert empty.as_fine_as(full).occupancy.shape == (64, 64, 64)
+    assert not empty.as_fine_as(full).occupancy.any()
+    assert full.as_fine_as(empty) is full
+
+
+HALF = 1 / 128  # of a cell, at 64 cells a side
+
+
+@pytest.mark.parametrize(('points', 'said'), [
+    ([[HALF, HALF, HALF, 0.5]] * 2, '2 in 1 cells of 64 a side'),
+    ([[HALF, HALF, HALF, 0.5], [HALF * 1.1, HALF, HALF, 0.5]], 'at most 256 cells a side'),
+    ([[HALF, HALF, HALF, 0.5], [0.3 / 7, 0.1, 0.2, 0.5]], 'at most 256 cells a side'),
+    ([[HALF, HALF, HALF, math.nan]], r'in \[0, 1\], got nan'),
+    ([[HALF, HALF, HALF, 1.5]], r'in \[0, 1\], got 1.5')],
+    ids=['two in a cell', 'beside a centre', 'no grid', 'no occupancy', 'too much'])
+def test_points_that_are_not_cells_of_one_grid_are_refused(points, said):
+    with pytest.raises(DataError, match=said) as caught:
+        grid_from_points(np.float32(points))
+    assert caught.value.kind == 'cloud'
 
 
 def test_a_point_is_the_centre_of_its_cell():

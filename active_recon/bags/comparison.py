@@ -123,6 +123,7 @@ def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, fl
 
     A cell that is missing in the cloud was at most at the threshold.
     """
+    recorded = recorded.as_fine_as(grid)
     if recorded.occupancy.shape != grid.occupancy.shape:
         return False, np.inf
     told = recorded.occupancy > 0

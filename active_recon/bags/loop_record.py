@@ -76,6 +76,7 @@ class LoopRecord:
                 self._take(roles[message.topic], message)
         for message in entropies:
             self._take('entropy', message)
+        self._refine_empty_grids()
 
     def _take(self, role: str, message: RawMessage) -> None:
         if message.type_name != LOOP[role]:
@@ -92,6 +93,16 @@ class LoopRecord:
                             error.kind) from error
         self.published[role][stamp] = message.published
         self.received[role][stamp] = message.received
+
+    def _refine_empty_grids(self) -> None:
+        """Give grids that were recorded without a cell those of the grid recorded next to them."""
+        recorded = self.parts['occupancy'], self.parts['probabilities']
+        told = {stamp: grid for grids in recorded for stamp, grid in grids.items()
+                if grid.occupancy.any()}
+        for grids in recorded if told else ():
+            for stamp in [stamp for stamp, grid in grids.items() if not grid.occupancy.any()]:
+                nearest = min(told, key=lambda other: abs(other - stamp))
+                grids[stamp] = grids[stamp].as_fine_as(told[nearest])
 
     def _stamp(self, role: str, message: RawMessage, msg: Any) -> int | None:
         if role == 'entropy':

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,6 +18,7 @@ from active_recon.meshes import load_mesh
 from active_recon.nodes.demo_watch import DemoWatch, watching
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.voxelise import voxelise
+from active_recon.voxels import RESOLUTION, VoxelGrid
 import cv2
 import numpy as np
 from rich.console import Console, RenderableType
@@ -52,13 +53,18 @@ def run_demo(demo: Demo, console: Console) -> Path:
     loop does not go on. However it ends, the nodes are stopped and the bag is closed.
     """
     mesh = load_mesh(demo.mesh)
-    truth = voxelise(mesh)
+
+    @cache
+    def truth(resolution: int) -> VoxelGrid:
+        return voxelise(mesh, resolution)
+
+    truth(RESOLUTION)  # most likely: later it would keep the loop's messages waiting
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
     title = f'{demo.mesh.stem}: {demo.views} views, policy {demo.policy}'
     with (held_interrupts() as raise_if_asked, TemporaryDirectory() as logs,
           NodeProcesses(Path(logs), environment) as nodes,
-          watching(truth.occupied(0.5)) as watch):
+          watching(lambda resolution: truth(resolution).occupied(0.5)) as watch):
         def check() -> None:
             raise_if_asked()
             nodes.check()
@@ -78,7 +84,8 @@ def run_demo(demo: Demo, console: Console) -> Path:
             watch.ask('stop', _ANSWER_S, check)
         finally:
             if watch.views:
-                picture = run_picture(f'active_recon: {title}', watch.views, mesh, truth)
+                picture = run_picture(f'active_recon: {title}', watch.views, mesh,
+                                      truth(len(watch.views[-1].occupied.occupancy)))
                 cv2.imwrite(str(folder / 'run.png'), picture[..., ::-1])
         if demo.view:
             _go_on(nodes, console)

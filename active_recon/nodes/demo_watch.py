@@ -1,6 +1,6 @@
 """The demo's own node: it follows the loop from outside and asks for the mesh and the bag."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import time
 
@@ -37,7 +37,7 @@ class DemoWatch(LoopWatch):
     """
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor,
-                 truth: NDArray[np.bool_]) -> None:
+                 truth: Callable[[int], NDArray[np.bool_]]) -> None:
         super().__init__(node, executor)
         self.views: list[SeenView] = []
         self.azimuth: float | None = None
@@ -80,7 +80,7 @@ class DemoWatch(LoopWatch):
                    (voxel_grid_from_msg(msg), (time.time_ns() - stamp) / 1e9))
 
     def _on_probabilities(self, msg: PointCloud2) -> None:
-        self._join('probabilities', msg.header, voxel_grid_from_msg(msg).entropy())
+        self._join('probabilities', msg.header, voxel_grid_from_msg(msg))
 
     def _on_done(self, msg: Header) -> None:
         _, self.done = done_from_msg(msg)
@@ -90,15 +90,21 @@ class DemoWatch(LoopWatch):
         parts = self._joiner.add(name, stamp, part)
         if parts is None:
             return
-        occupied: VoxelGrid
-        occupied, latency = parts['occupancy']
+        grid: VoxelGrid = parts['probabilities']
+        cloud, latency = parts['occupancy']
+        occupied = cloud.as_fine_as(grid)
+        truth = self._truth(len(occupied.occupancy))
         self.views.append(SeenView(
             len(self.views) + 1, parts['view'], self._images.get(stamp), occupied,
-            parts['probabilities'], float(iou(occupied.occupied(0), self._truth)), latency))
+            grid.entropy(), float(iou(occupied.occupied(0), truth)), latency))
 
 
 @contextmanager
-def watching(truth: NDArray[np.bool_]) -> Iterator[DemoWatch]:
-    """Join the domain that the environment names, (X, Y, Z) the object's true voxels."""
+def watching(truth: Callable[[int], NDArray[np.bool_]]) -> Iterator[DemoWatch]:
+    """
+    Join the domain that the environment names.
+
+    `truth` returns the object's true cells, (X, Y, Z), for so many a side.
+    """
     with joined_domain('_demo') as (node, executor):
         yield DemoWatch(node, executor, truth)
