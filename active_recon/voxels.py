@@ -19,8 +19,10 @@ _MOST_CELLS = 256  # a side
 _RESOLUTIONS = sorted(range(1, _MOST_CELLS + 1), key=lambda side: (side & (side - 1) > 0, side))
 _FEW = 300  # points that are tried before all of them are
 _TELLING = 8  # so many cells of an object are not all a multiple of 3 apart by chance
-_OFF_CENTRE = 1e-3  # of a cell: more than float32 rounds by, less than two grids' centres are apart
+_OFF_CENTRE = 1e-3  # of a cell: above float32's rounding, below what centres of grids differ by
 MESH_FORMATS = ('ply', 'obj', 'stl')
+PUBLISHED_FLOOR = 0.02
+"""Cells of no more occupancy are left out of the cloud of probabilities, and of its entropy."""
 
 
 def iou(predicted: Any, truth: Any, axes: tuple[int, ...] = (-3, -2, -1)) -> Any:
@@ -98,12 +100,13 @@ class VoxelGrid:
             np.zeros_like(other.occupancy), self.size)
 
     def entropy(self) -> float:
-        """Return the entropy of all cells in nats: -sum(p log p + (1 - p) log(1 - p))."""
-        return float(entropy(self.occupancy.astype(np.float64)))
+        """
+        Return the entropy in nats, -sum(p log p + (1 - p) log(1 - p)), of the published cells.
 
-    def paper_entropy(self) -> float:
-        """Return -sum(p log p) in nats, as section 4.6 writes it, without the second term."""
-        return float(paper_entropy(self.occupancy.astype(np.float64)))
+        Those are the cells above PUBLISHED_FLOOR: a grid and its cloud have the same, to the bit.
+        """
+        cells = self.occupancy[self.occupied(PUBLISHED_FLOOR)].astype(np.float64)
+        return float(entropy(cells[None, None]))
 
     def points(self, threshold: float) -> NDArray[np.float32]:
         """Return x, y, z (metres, object frame) and occupancy of the cells above, (N, 4)."""

@@ -5,13 +5,14 @@ from typing import Any
 from active_recon.cameras import Camera, CANONICAL_DISTANCE, CANONICAL_ELEVATION
 from active_recon.voxels import VoxelGrid
 from msg_tools.cameras import camera_to_msgs, OBJECT_FRAME, pose_to_msg
+from msg_tools.entropy import entropy_to_msg
 from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
 from numpy.typing import NDArray
-from std_msgs.msg import Float64, Header
+from std_msgs.msg import Header
 
 CAMERA_FRAME = 'camera_optical_frame'
 
@@ -42,7 +43,7 @@ def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
     if probabilities is not None:
         messages['probabilities'] = voxel_grid_to_msg(probabilities, 0, header)
     if entropy is not None:
-        messages['entropy'] = Float64(data=entropy)
+        messages['entropy'] = entropy_to_msg(entropy, header)
     return messages
 
 

@@ -7,8 +7,6 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 FIELDS = ('x', 'y', 'z', 'occupancy')
-FLOOR = 0.02
-"""Cells of less occupancy are left out of `probabilities`."""
 
 
 def voxel_grid_from_msg(msg: PointCloud2, size: float = 1.0,

@@ -4,18 +4,19 @@ from dataclasses import dataclass, field
 
 from active_recon.bags.writer import BagWriter
 from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
-from active_recon.voxels import VoxelGrid
+from active_recon.voxels import PUBLISHED_FLOOR, VoxelGrid
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
 from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
+from msg_tools.entropy import entropy_to_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
 from msg_tools.goals import scores_to_msg, view_goal_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
-from msg_tools.voxels import FLOOR, voxel_grid_to_msg
+from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
 from rclpy.serialization import serialize_message
 from recorded_messages import definition, LATCHED, SENSOR
-from std_msgs.msg import Float64, Header
+from std_msgs.msg import Header
 
 BEGIN = 1_700_000_000_000_000_000
 PERIOD = 100_000_000  # ns, of the camera
@@ -84,8 +85,9 @@ class LoopRun:
             grid, self.threshold, stamped))
         self._say(now + 1_000_001, '/latent', latent_to_msg(self.latents[number], stamped))
         self._say(now + 1_000_002, '/view', pose_to_msg(camera.pose, stamped))
-        self._say(now + 1_000_003, '/probabilities', voxel_grid_to_msg(grid, FLOOR, stamped))
-        self._say(now + 1_000_004, '/entropy', Float64(data=grid.entropy()))
+        self._say(now + 1_000_003, '/probabilities', voxel_grid_to_msg(
+            grid, PUBLISHED_FLOOR, stamped))
+        self._say(now + 1_000_004, '/entropy', entropy_to_msg(grid.entropy(), stamped))
         return now + 2_000_000
 
 

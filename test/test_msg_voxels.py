@@ -1,7 +1,7 @@
 """Voxels, episodes and stamps between ROS and the core."""
 
 from active_recon.errors import MessageError
-from active_recon.voxels import VoxelGrid
+from active_recon.voxels import PUBLISHED_FLOOR, VoxelGrid
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.episodes import (
     done_from_msg,
@@ -11,7 +11,7 @@ from msg_tools.episodes import (
     episode_to_msg,
 )
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
-from msg_tools.voxels import FLOOR, voxel_grid_from_msg, voxel_grid_to_msg
+from msg_tools.voxels import voxel_grid_from_msg, voxel_grid_to_msg
 import numpy as np
 import pytest
 from std_msgs.msg import Header
@@ -19,7 +19,7 @@ from std_msgs.msg import Header
 GRID = VoxelGrid(np.random.default_rng(0).random((32, 32, 32), np.float32), size=0.4)
 
 
-@pytest.mark.parametrize('threshold', [0.0, FLOOR, 0.5, 1.0])
+@pytest.mark.parametrize('threshold', [0.0, PUBLISHED_FLOOR, 0.5, 1.0])
 def test_the_cells_above_the_threshold_come_back(threshold):
     msg = voxel_grid_to_msg(GRID, threshold, Header(frame_id='object'))
     assert msg.width == GRID.occupied(threshold).sum()

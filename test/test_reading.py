@@ -33,6 +33,7 @@ from rosbags.rosbag2 import (
     StoragePlugin,
     Writer,
 )
+from std_msgs.msg import Float64
 
 
 @pytest.fixture(scope='module')
@@ -132,6 +133,26 @@ def test_each_goal_follows_the_view_that_it_was_decided_upon(loop, bag):
         assert goal.received == loop.goal_stamps[number] + 10 + DELAY  # when it first came
         np.testing.assert_allclose(goal.candidates, loop.candidates, atol=1e-6)
         assert np.array_equal(goal.scores, loop.scores[number])
+
+
+def test_an_entropy_of_an_older_recording_is_that_of_the_views_published_cells(
+        loop, bag, tmp_path):
+    older = [(time, topic, Float64(data=1e6) if topic == '/entropy' else msg)
+             for time, topic, msg in loop.messages]
+    run = read_run(write_bag(tmp_path / 'run', older))
+    assert same(run, read_run(bag))
+    view = only(run).views[0]
+    assert view.entropy == view.reconstruction.entropy()
+    assert view.received['entropy'] == view.received['probabilities']
+    none = [entry for entry in loop.messages if entry[1] != '/entropy']
+    assert [view.entropy for view in only(read_run(write_bag(tmp_path / 'none', none))).views] == [
+        None] * 3
+
+
+def test_an_entropy_belongs_to_the_view_of_its_stamp_whenever_it_comes(loop, bag, tmp_path):
+    late = [(loop.end if topic == '/entropy' else time, topic, msg)
+            for time, topic, msg in loop.messages]
+    assert same(read_run(write_bag(tmp_path / 'run', late)), read_run(bag))
 
 
 def test_what_bears_a_views_stamp_tells_when_it_was_received(loop, bag):

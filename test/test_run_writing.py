@@ -68,8 +68,8 @@ def test_numbers_come_back_as_they_were(run, bag):
             '/occupancy': lambda view: view.occupied.points(0).tobytes()}.items():
         assert [bytes(msg.data) for name, _, msg in messages if name == topic] == list(
             map(of_view, views))
-    assert [msg.data for name, _, msg in messages if name == '/entropy'] == [
-        view.entropy for view in views]
+    assert [list(msg.position) for name, _, msg in messages if name == '/entropy'] == [
+        [view.entropy] for view in views]
     goals = [msg.position[0] for name, _, msg in messages if name == '/next_azimuth']
     assert goals == [run.episodes[0].first_goal.azimuth, *(
         view.goal.azimuth for view in views if view.goal)]

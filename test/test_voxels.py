@@ -4,9 +4,12 @@ import math
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.voxels import (
+    entropy,
     grid_from_points,
     iou,
     MESH_FORMATS,
+    paper_entropy,
+    PUBLISHED_FLOOR,
     read_binvox,
     turned,
     VoxelGrid,
@@ -30,9 +33,9 @@ def ball(radius: float, resolution: int = 32, size: float = 1.0) -> VoxelGrid:
 
 
 def test_certain_cells_have_no_entropy():
-    grid = VoxelGrid((PROBABILITIES > 0.5).astype(np.float32))
-    assert grid.entropy() == 0
-    assert grid.paper_entropy() == 0
+    occupancy = (PROBABILITIES > 0.5).astype(np.float64)
+    assert VoxelGrid(occupancy.astype(np.float32)).entropy() == 0
+    assert entropy(occupancy) == paper_entropy(occupancy) == 0
 
 
 def test_cells_at_one_half_have_the_highest_entropy():
@@ -42,11 +45,26 @@ def test_cells_at_one_half_have_the_highest_entropy():
 
 
 def test_entropy_is_the_same_of_a_shape_and_its_complement_but_the_paper_s_is_not():
-    shape, complement = VoxelGrid(PROBABILITIES / 2), VoxelGrid(1 - PROBABILITIES / 2)
-    assert shape.entropy() == pytest.approx(complement.entropy(), rel=1e-5)
-    both = shape.paper_entropy() + complement.paper_entropy()
-    assert shape.entropy() == pytest.approx(both, rel=1e-5)
-    assert shape.paper_entropy() != pytest.approx(complement.paper_entropy(), rel=0.1)
+    shape, complement = PROBABILITIES / 2, 1 - PROBABILITIES / 2
+    assert entropy(shape) == pytest.approx(entropy(complement), rel=1e-5)
+    both = paper_entropy(shape) + paper_entropy(complement)
+    assert entropy(shape) == pytest.approx(both, rel=1e-5)
+    assert paper_entropy(shape) != pytest.approx(paper_entropy(complement), rel=0.1)
+
+
+@pytest.mark.parametrize('cells', [8, 32, 64])
+def test_a_grid_and_its_cloud_have_the_same_entropy_to_the_bit(cells):
+    grid = VoxelGrid(RNG.random((cells,) * 3, np.float32) ** 4, 0.3)
+    assert not grid.occupied(PUBLISHED_FLOOR).all()
+    cloud = grid_from_points(grid.points(PUBLISHED_FLOOR), 0.3)
+    assert cloud.entropy() == grid.entropy() == grid.above(PUBLISHED_FLOOR).entropy()
+    published = grid.above(PUBLISHED_FLOOR).occupancy.astype(np.float64)
+    assert grid.entropy() == pytest.approx(entropy(published))
+    assert grid.entropy() < entropy(grid.occupancy.astype(np.float64))
+
+
+def test_cells_that_are_not_published_have_no_entropy():
+    assert VoxelGrid(np.full((4, 4, 4), PUBLISHED_FLOOR, np.float32)).entropy() == 0
 
 
 def test_iou_is_symmetric_and_bounded_and_one_only_of_the_same():

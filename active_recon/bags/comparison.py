@@ -7,8 +7,7 @@ from active_recon.bags.replay import ReplayedEpisode, ReplayedView
 from active_recon.bags.run import RecordedGoal
 from active_recon.cameras import azimuth_difference, wrap_azimuth
 from active_recon.planner import Goal
-from active_recon.voxels import VoxelGrid
-from msg_tools.voxels import FLOOR
+from active_recon.voxels import PUBLISHED_FLOOR, VoxelGrid
 import numpy as np
 
 TOLERANCES: Mapping[str, float] = {
@@ -88,7 +87,7 @@ def _deviations(view: ReplayedView, done: str,
     """Yield the name of each recorded quantity, whether its bits are the same, and the gap."""
     recorded, grid = view.recorded, view.reconstruction.grid
     if recorded.reconstruction is not None:
-        yield 'probabilities', *_cells(recorded.reconstruction, grid, FLOOR)
+        yield 'probabilities', *_cells(recorded.reconstruction, grid, PUBLISHED_FLOOR)
     if recorded.occupied is not None:
         yield 'occupancy', *_cells(recorded.occupied, grid, threshold)
     if recorded.latent is not None:

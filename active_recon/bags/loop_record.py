@@ -17,6 +17,7 @@ from active_recon.bags.raw import Bag, RawMessage
 from active_recon.errors import ActiveReconError, DataError
 from msg_tools.cameras import pose_from_msg
 from msg_tools.diagnostics import diagnostics_from_msg
+from msg_tools.entropy import entropy_from_msg
 from msg_tools.episodes import done_from_msg, episode_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, scores_from_msg, view_goal_from_msg
 from msg_tools.images import image_from_msg, latent_from_msg
@@ -26,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 LOOP = {'episode': HEADER, 'view': POSE, 'occupancy': CLOUD, 'probabilities': CLOUD,
-        'latent': IMAGE, 'entropy': FLOAT, 'next_view': POSE, 'next_azimuth': JOINT_STATE,
+        'latent': IMAGE, 'entropy': JOINT_STATE, 'next_view': POSE, 'next_azimuth': JOINT_STATE,
         'azimuth_scores': CLOUD, 'done': HEADER, 'view_image': IMAGE}
 """The loop's own topics and their types."""
 _DIAGNOSTICS = '/diagnostics'
@@ -41,7 +42,8 @@ class LoopRecord:
     - counters: the last ones of `/diagnostics`, by node; counted: all of them, with the times at
       which they were received
 
-    An entropy bears no stamp and has that of the view that was published next to it.
+    In older recordings an entropy has no stamp and is that of all cells: there it is computed of
+    the `probabilities` of each view.
     `object_size` is the grid's side in metres. Raises DataError on what is not as the loop's
     nodes write it.
     """
@@ -59,23 +61,23 @@ class LoopRecord:
             'probabilities': lambda msg: voxel_grid_from_msg(msg, object_size),
             'latent': latent_from_msg,
             'view_image': image_from_msg,
-            'entropy': lambda msg: float(msg.data),
+            'entropy': entropy_from_msg,
             'next_view': lambda msg: view_goal_from_msg(msg, object_frame),
             'next_azimuth': azimuth_goal_from_msg,
             'azimuth_scores': _scores_from_msg,
             'done': done_from_msg,
         }
         roles = {namespace + role: role for role in LOOP}
-        entropies = []
+        unstamped = False
         for message in bag.messages({*roles, _DIAGNOSTICS}):
             if message.topic == _DIAGNOSTICS:
                 self._count(message)
-            elif roles[message.topic] == 'entropy':
-                entropies.append(message)
+            elif roles[message.topic] == 'entropy' and message.type_name == FLOAT:
+                unstamped = True
             else:
                 self._take(roles[message.topic], message)
-        for message in entropies:
-            self._take('entropy', message)
+        if unstamped:
+            self._compute_entropies()
         self._refine_empty_grids()
 
     def _take(self, role: str, message: RawMessage) -> None:
@@ -83,8 +85,8 @@ class LoopRecord:
             raise DataError(f'{message.topic}: expected messages of {LOOP[role]}, as the loop '
                             f'publishes them, got {message.type_name}', 'topics')
         msg = read_message(message)
-        stamp = self._stamp(role, message, msg)
-        if stamp is None or (stamp in self.parts[role] and role != 'done'):
+        stamp = nanoseconds_from_stamp(msg.stamp if LOOP[role] == HEADER else msg.header.stamp)
+        if stamp in self.parts[role] and role != 'done':
             return  # only an end can be taken back, under the stamp of the episode
         try:
             self.parts[role][stamp] = self._from_msg[role](msg)
@@ -104,12 +106,11 @@ class LoopRecord:
                 nearest = min(told, key=lambda other: abs(other - stamp))
                 grids[stamp] = grids[stamp].as_fine_as(told[nearest])
 
-    def _stamp(self, role: str, message: RawMessage, msg: Any) -> int | None:
-        if role == 'entropy':
-            views = self.published['view']
-            return min(views, key=lambda stamp: abs(views[stamp] - message.published),
-                       default=None)
-        return nanoseconds_from_stamp(msg.stamp if LOOP[role] == HEADER else msg.header.stamp)
+    def _compute_entropies(self) -> None:
+        for stamp, grid in self.parts['probabilities'].items():
+            self.parts['entropy'].setdefault(stamp, grid.entropy())
+            for times in (self.published, self.received):
+                times['entropy'].setdefault(stamp, times['probabilities'][stamp])
 
     def _count(self, message: RawMessage) -> None:
         if message.type_name != DIAGNOSTICS:

@@ -8,7 +8,8 @@ import hashlib
 from active_recon.bags.run import RecordedEpisode, RecordedRun, RecordedView
 from active_recon.planner import Decision, Goal, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
-from msg_tools.voxels import FLOOR
+from active_recon.voxels import entropy
+import numpy as np
 import torch
 
 
@@ -70,9 +71,8 @@ def _give_up(planner: Planner, azimuths: Sequence[float]) -> None:
 
 
 def decide(planner: Planner, reconstruction: Reconstruction, azimuth: float) -> Decision:
-    """Return what the planner decides of what its node hears: no cells of next to no occupancy."""
-    grid = reconstruction.grid
-    return planner.add_view(reconstruction.latent, azimuth, grid.above(FLOOR).entropy())
+    """Return what the planner decides of what its node hears."""
+    return planner.add_view(reconstruction.latent, azimuth, reconstruction.grid.entropy())
 
 
 def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:
@@ -82,7 +82,8 @@ def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:
         reconstruction, decision = view.reconstruction, view.decision
         digest.update(reconstruction.grid.occupancy.tobytes())
         digest.update(reconstruction.latent.tobytes())
-        digest.update(repr(reconstruction.grid.entropy()).encode())
+        of_all_cells = float(entropy(reconstruction.grid.occupancy.astype(np.float64)))
+        digest.update(repr(of_all_cells).encode())
         if decision is not None:
             digest.update(decision.reason.encode())
             if decision.goal is not None:

@@ -15,7 +15,7 @@ from active_recon.errors import DataError
 from active_recon.planner import Goal, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import GOAL_TOLERANCE
-from msg_tools.voxels import FLOOR
+from active_recon.voxels import PUBLISHED_FLOOR
 import numpy as np
 
 _BETWEEN_VIEWS = 1_000_000_000  # nanoseconds: views in another order need stamps of their own
@@ -148,7 +148,7 @@ def _known(view: RecordedView, reconstruction: Reconstruction, threshold: float)
     """Return the view with what the reconstructor would have published of it."""
     grid = reconstruction.grid
     return replace(
-        view, reconstruction=grid.above(FLOOR), occupied=grid.above(threshold),
+        view, reconstruction=grid.above(PUBLISHED_FLOOR), occupied=grid.above(threshold),
         latent=reconstruction.latent, entropy=grid.entropy())
 
 

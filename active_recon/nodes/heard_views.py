@@ -11,13 +11,13 @@ from active_recon.nodes.life_cycle import ManagedNode
 from active_recon.nodes.qos import LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
+from msg_tools.entropy import entropy_from_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
 from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
 from numpy.typing import NDArray
-from sensor_msgs.msg import Image, PointCloud2
+from sensor_msgs.msg import Image, JointState
 
 FIND_VIEWS_S = 0.5
 """What is latched comes so soon after its publishers were found."""
@@ -35,14 +35,14 @@ class HeardView:
 
 class HeardViews:
     """
-    Hears `latent`, `view` and `probabilities`, in any order, while the node is active.
+    Hears `latent`, `view` and `entropy`, in any order, while the node is active.
 
     Each view that is whole is handed to `take`, but for what is stamped before the episode. The
     last one is kept in `last`: it may be heard before the episode is that it belongs to.
     """
 
-    def __init__(self, node: ManagedNode, frame: str, object_size: float,
-                 diagnostics: Diagnostics, take: Callable[[HeardView], None]) -> None:
+    def __init__(self, node: ManagedNode, frame: str, diagnostics: Diagnostics,
+                 take: Callable[[HeardView], None]) -> None:
         self._node = node
         self._diagnostics = diagnostics
         self._take = take
@@ -55,8 +55,7 @@ class HeardViews:
             (Image, 'latent', 'latent', latent_from_msg),
             (PoseStamped, 'view', 'azimuth',
              lambda msg: Camera(pose_from_msg(msg, frame)).azimuth),
-            (PointCloud2, 'probabilities', 'entropy',
-             lambda msg: voxel_grid_from_msg(msg, object_size).entropy()))]
+            (JointState, 'entropy', 'entropy', entropy_from_msg))]
 
     def begin(self, stamp: int) -> None:
         """Leave out what is stamped before an episode's begin, nanoseconds."""

@@ -29,19 +29,20 @@ from active_recon.nodes.settings.reconstructor import ReconstructorSettings
 from active_recon.output import output_path
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import ViewGate
-from active_recon.voxels import write_mesh
+from active_recon.voxels import PUBLISHED_FLOOR, write_mesh
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg, pose_to_msg
+from msg_tools.entropy import entropy_to_msg
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.images import image_to_msg, latent_to_msg, mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 from msg_tools.views import UnreadView, ViewJoiner
-from msg_tools.voxels import FLOOR, voxel_grid_to_msg
+from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
-from std_msgs.msg import Float64, Header
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 import torch
 
@@ -75,7 +76,7 @@ class ReconstructorNode(ManagedNode):
         self._occupancy_pub = self.create_publisher(PointCloud2, 'occupancy', LATCHED)
         self._probabilities_pub = self.create_publisher(PointCloud2, 'probabilities', LATCHED)
         self._latent_pub = self.create_publisher(Image, 'latent', LATCHED)
-        self._entropy_pub = self.create_publisher(Float64, 'entropy', LATCHED)
+        self._entropy_pub = self.create_publisher(JointState, 'entropy', LATCHED)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED)
         self._diagnostics.measure('images', 'poses', 'views')
         self._diagnostics.tell('Weights SHA-256', self._reconstructor.weights_hash)
@@ -242,8 +243,8 @@ class ReconstructorNode(ManagedNode):
         if image is not view.image:
             self._view_image_pub.publish(image_to_msg(image, header))
         self._view_pub.publish(pose_to_msg(view.camera.pose, header))
-        self._probabilities_pub.publish(voxel_grid_to_msg(grid, FLOOR, header))
-        self._entropy_pub.publish(Float64(data=grid.entropy()))
+        self._probabilities_pub.publish(voxel_grid_to_msg(grid, PUBLISHED_FLOOR, header))
+        self._entropy_pub.publish(entropy_to_msg(grid.entropy(), header))
 
     def _warn_of(self, camera: Camera) -> None:
         away = camera.elevation - CANONICAL_ELEVATION

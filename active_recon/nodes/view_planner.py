@@ -58,8 +58,7 @@ class ViewPlannerNode(ManagedNode):
         self._begun_at = self.get_clock().now().nanoseconds
         self._forget()
         self.create_subscription(PoseStamped, 'camera/pose', self._on_camera, HEARD)
-        self._views = HeardViews(self, self._frame, self._settings.now.object_size,
-                                 self._diagnostics, self._decide)
+        self._views = HeardViews(self, self._frame, self._diagnostics, self._decide)
         self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
         self.create_timer(0.1, self._ask_first, clock=STEADY)
         self.create_timer(0.1, self._give_up_late, clock=STEADY)

@@ -26,7 +26,7 @@ STAGES = (
     Stage('reconstruct', 'the network takes the image in and publishes the shape',
           ('occupancy',)),
     Stage('hand over', 'until all that the planner needs has arrived',
-          ('latent', 'view', 'probabilities')),
+          ('latent', 'view', 'entropy')),
     Stage('decide', 'the planner names the next goal', ('goal',)),
 )
 

@@ -13,21 +13,20 @@ import time
 from typing import Any, IO
 
 from active_recon.cameras import CANONICAL_ELEVATION, orbit_camera
-from active_recon.voxels import VoxelGrid
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
 from msg_tools.diagnostics import diagnostics_from_msg, NodeStatus
+from msg_tools.entropy import entropy_to_msg
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
-from msg_tools.voxels import FLOOR, voxel_grid_to_msg
 import numpy as np
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 import trimesh
@@ -37,7 +36,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM = QoSProfile(depth=100)
 BUDGET_S = 60.0  # for what takes a second on an idle machine
 SEND_AGAIN_S = 5.0
-_GRID = VoxelGrid(np.random.default_rng(0).random((32, 32, 32), np.float32))
+_ENTROPY = 100.0  # nats
 _PIXELS = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
 
 
@@ -259,7 +258,7 @@ class FakeReconstructor:
     """A reconstructor in the bench's hand; it begins to publish when it is made."""
 
     TOPICS = {'episode': Header, 'latent': Image, 'view': PoseStamped,
-              'probabilities': PointCloud2}
+              'entropy': JointState}
 
     def __init__(self, bench: Bench, topics: Sequence[str] = tuple(TOPICS),
                  heard: bool = True) -> None:
@@ -281,16 +280,21 @@ class FakeReconstructor:
         self._publishers['episode'].publish(episode_to_msg(Episode(name, begin)))
 
     def show(self, latent: np.ndarray, azimuth: float, stamp: int | None = None,
-             parts: Sequence[str] = ('probabilities', 'latent', 'view')) -> int:
+             parts: Sequence[str] = ('entropy', 'latent', 'view')) -> int:
         """Publish a view's parts; return their stamp."""
         stamp = self.bench.now() if stamp is None else stamp
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
-        messages = {'probabilities': voxel_grid_to_msg(_GRID, FLOOR, header),
+        messages = {'entropy': entropy_to_msg(_ENTROPY, header),
                     'latent': latent_to_msg(latent, header),
                     'view': pose_to_msg(orbit_camera(azimuth).pose, header)}
         for part in parts:
             self._publishers[part].publish(messages[part])
         return stamp
+
+    def show_entropy(self, entropy: float) -> None:
+        """Publish an entropy in nats, or what is none, of now."""
+        header = Header(stamp=stamp_from_nanoseconds(self.bench.now()), frame_id='object')
+        self._publishers['entropy'].publish(entropy_to_msg(entropy, header))
 
     def wait_goal(self, after: int) -> PoseStamped:
         """Wait for the goal that was asked for after a time in nanoseconds."""

@@ -3,12 +3,13 @@
 from active_recon.background import off_color, off_reference, on_white
 from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.reconstructor import Reconstructor
+from active_recon.voxels import PUBLISHED_FLOOR
 from conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs
 from msg_tools.images import image_from_msg, image_to_msg, mask_to_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
-from msg_tools.voxels import FLOOR, voxel_grid_from_msg
+from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
 import pytest
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
@@ -86,7 +87,7 @@ def test_what_a_mask_calls_background_becomes_white_and_a_bad_mask_refuses_its_i
     expected = on_white(SHOWN, OBJECT)
     np.testing.assert_array_equal(room.take(SHOWN, OBJECT), expected)
     cloud = bench.until(lambda: room.probabilities, 'the probabilities')[0]
-    offline = Reconstructor.load().add_view(expected, CAMERA).grid.above(FLOOR)
+    offline = Reconstructor.load().add_view(expected, CAMERA).grid.above(PUBLISHED_FLOOR)
     np.testing.assert_allclose(voxel_grid_from_msg(cloud, 1.0).occupancy, offline.occupancy,
                                atol=1e-5)
 

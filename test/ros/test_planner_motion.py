@@ -139,7 +139,7 @@ def test_parts_of_a_late_view_are_not_joined_across_episodes(fake):
     dropped = count(fake, 'dropped/last_episode')
     fake.begin('across', begin)
     fake.wait_goal(begin)
-    fake.show(LATENT, 4.0, stamp, parts=('probabilities',))
+    fake.show(LATENT, 4.0, stamp, parts=('entropy',))
     fake.bench.until(lambda: count(fake, 'dropped/last_episode') == dropped + 1, 'its last part')
     assert azimuth(fake.goals[-1]) == pytest.approx(START)
 

@@ -37,6 +37,9 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
                 'the refusal of a latent of another network')
     line, = planner.log('WARN|ERROR|Traceback')
     assert 'refused: expected a latent of the shape' in line
+    fake.show_entropy(math.nan)
+    bench.until(lambda: bench.counts('view_planner').get('refused/entropy') == 1,
+                'the refusal of an entropy that is none')
 
     taken = fake.show(latent, 2.0)
     second = fake.wait_goal(taken)
@@ -83,7 +86,7 @@ def test_a_planner_that_comes_late_waits_until_it_could_hear_every_part_of_a_vie
     start_node('view_planner', policy='farthest', start_azimuth=1.0)
     bench.until(lambda: bench.counts('view_planner').get('episodes'), 'the episode')
     assert not bench.within(1.5, lambda: fake.goals)
-    fake.publish_on('probabilities', heard=False)
-    fake.show(latent, 1.0, stamp, parts=('probabilities',))
+    fake.publish_on('entropy', heard=False)
+    fake.show(latent, 1.0, stamp, parts=('entropy',))
     goal = view_goal_from_msg(fake.wait_goal(stamp))
     assert abs(azimuth_difference(goal, 1.0)) == pytest.approx(math.pi, abs=0.14)
