@@ -1,5 +1,6 @@
 """Images as cameras send them, over real DDS: compressed, in both forms, and too fast."""
 
+from collections import Counter
 import os
 import signal
 
@@ -9,7 +10,7 @@ from geometry_msgs.msg import PoseStamped
 from msg_tools.images import image_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 import pytest
-from sensor_msgs.msg import CompressedImage, PointCloud2
+from sensor_msgs.msg import CameraInfo, CompressedImage, PointCloud2
 
 pytestmark = pytest.mark.ros
 
@@ -153,3 +154,50 @@ def test_a_damaged_image_is_refused_and_the_next_one_is_a_view(
         return nanoseconds_from_stamp(image.header.stamp)
 
     sent_until_seen(shared_bench, send, camera.occupancy)
+
+
+def flood(bench, camera, size):
+    """
+    Have images wait for one pose until all of them came, so that they become complete at once.
+
+    Return the stamp of the newest and what the node has counted since; None where best effort
+    lost something, or the node waited in vain for the pose.
+    """
+    def counted():
+        return Counter(bench.counts('reconstructor'))
+
+    def came():
+        """Whether what is sent last on each topic was heard: nothing of before is on its way."""
+        since = counted() - before
+        return since['refused/duplicate'] and since['refused/camera_info']
+
+    episode = bench.call('start_episode').message
+    bench.until(lambda: bench.state('reconstructor').facts.get('Episode') == episode,
+                'the counters as they are when the episode begins')
+    before, begin = counted(), bench.now()
+    images, infos, poses = zip(*(
+        camera.messages(begin + later * 1_000_000) for later in range(size + 2)), strict=True)
+    camera.send(pose=poses[0])
+    for info in infos[1:-1]:
+        camera.send(info=info)
+    camera.send(info=CameraInfo(header=infos[-1].header))  # of no image at all: refused
+    for image in (*images[1:-1], images[-2]):  # the last one twice: refused
+        camera.send(image)
+    if not bench.within(5.0, came):
+        return None
+    camera.send(pose=poses[-1])
+    bench.within(5.0, lambda: (counted() - before)['views'])
+    since = counted() - before
+    lost = sum(since[key] for key in (
+        'dropped/unheard', 'refused/no_camera_info', 'refused/no_pose'))
+    return None if lost or not since['views'] else (stamps(images)[-2], since)
+
+
+def test_of_images_faster_than_views_the_newest_win_and_the_others_are_counted(
+        shared_bench, camera):
+    views = shared_bench.hear(PoseStamped, 'view')
+    newest, since = next(filter(None, (flood(shared_bench, camera, 8) for _ in range(30))))
+    assert since['images'] == 8 + 1
+    assert (since['views'], since['dropped/overtaken'], since['refused/duplicate']) == (1, 7, 1)
+    shared_bench.until(lambda: views, 'the view')
+    assert stamps(views)[-1] == newest

@@ -13,7 +13,6 @@ from active_recon.faults import FAULTS
 from active_recon.shown_object import rendered_object
 from hand_listed_loop import computed, DEGREES, Loop, RECOVERED_S
 import pytest
-from rclpy.parameter import Parameter
 import torch
 import trimesh
 
@@ -146,29 +145,6 @@ def test_faults_that_cannot_be_are_refused_with_a_reason_and_the_old_ones_stay(l
     assert not refused.successful
     assert 'a name of drop_images' in refused.reason
     loop.wait_told('refused/no_camera_info', loop.count('refused/no_camera_info'))
-
-
-@pytest.fixture
-def flooded(loop):
-    """Return the loop with more images than views can be made of, and all of them wanted."""
-    assert loop.set('turntable_camera', Parameter('rate', value=100.0)).successful
-    assert loop.set('reconstructor', Parameter('take_views', value='all')).successful
-    yield loop
-    assert loop.set('turntable_camera', Parameter('rate', value=RATE)).successful
-    assert loop.set('reconstructor', Parameter('take_views', value='at_goal')).successful
-
-
-def test_of_images_faster_than_views_the_newest_win_and_the_others_are_counted(flooded):
-    def overtaken():
-        return sum(flooded.count(f'dropped/{how}') for how in ('overtaken', 'unheard'))
-
-    before = overtaken()
-    flooded.begin()
-    flooded.wait_views(100)
-    assert overtaken() - before > 100
-    # A queue that grew would keep the last of them waiting for most of that time
-    facts = flooded.bench.state('reconstructor').facts
-    assert float(facts['Latency p99 (ms)']) < 2000
 
 
 @pytest.fixture
