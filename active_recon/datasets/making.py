@@ -11,10 +11,10 @@ from pathlib import Path
 
 from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.datasets.layout import ObjectFolder, write_object, write_voxels
-from active_recon.errors import ActiveReconError, ConfigError, DataError
+from active_recon.errors import ActiveReconError, DataError
 from active_recon.meshes import file_rotation, fit_to_grid, load_mesh
 from active_recon.rendering import Renderer
-from active_recon.shapes import ALL_CATEGORIES, make_shape
+from active_recon.shapes import check_category, make_shape
 from active_recon.voxelise import voxelise
 from active_recon.voxels import FINE_RESOLUTION
 import numpy as np
@@ -85,9 +85,7 @@ def _mesh_folder(out: Path, top: Path, path: Path) -> ObjectFolder:
 
 def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
     """Return a job for each seed of a parametric category; ConfigError if there is none such."""
-    if category not in ALL_CATEGORIES:
-        raise ConfigError('expected a category out of '
-                          f'{", ".join(ALL_CATEGORIES)}, got {category!r}')
+    check_category(category)
     return [Job(ObjectFolder(out, category, f'{category}-{seed:06d}'),
                 partial(make_shape, category, seed)) for seed in seeds]
 

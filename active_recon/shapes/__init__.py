@@ -15,6 +15,15 @@ CATEGORIES = ('airplane', 'bench', 'cabinet', 'car', 'cellphone', 'chair', 'fire
               'monitor', 'sofa', 'speaker', 'table', 'watercraft')
 UNSEEN_CATEGORIES = ('bed', 'bookshelf', 'motorbike')
 ALL_CATEGORIES = CATEGORIES + UNSEEN_CATEGORIES
+# What is none of them: things of every kind, made where they are asked for by name
+THINGS = ('thing',)
+
+
+def check_category(category: str) -> None:
+    """Raise ConfigError unless shapes of a category can be made."""
+    if category not in ALL_CATEGORIES + THINGS:
+        raise ConfigError('expected a category out of '
+                          f'{", ".join(ALL_CATEGORIES + THINGS)}, got {category!r}')
 
 
 def make_shape(category: str, seed: int) -> trimesh.Trimesh:
@@ -22,13 +31,12 @@ def make_shape(category: str, seed: int) -> trimesh.Trimesh:
     Return one object of a category, coloured, fitted to the grid; the same for the same seed.
 
     Each category is a module of this package with a function of its own name,
-    `(rng) -> Trimesh`, that draws structure, proportions and materials.
+    `(rng) -> Trimesh`, that draws structure, proportions and materials; things have a package.
     """
-    if category not in ALL_CATEGORIES:
-        raise ConfigError('expected a category out of '
-                          f'{", ".join(ALL_CATEGORIES)}, got {category!r}')
+    check_category(category)
+    module = 'things' if category in THINGS else category
     generate: Callable[[np.random.Generator], trimesh.Trimesh] = getattr(
-        import_module(f'{__name__}.{category}'), category)
+        import_module(f'{__name__}.{module}'), category)
     salt = int.from_bytes(hashlib.sha256(category.encode()).digest()[:4], 'big')
     return fit_to_grid(generate(np.random.default_rng([salt, seed])))
 
@@ -36,6 +44,8 @@ def make_shape(category: str, seed: int) -> trimesh.Trimesh:
 def generators_hash() -> str:
     """Return the SHA-256 of the generators' code: data made under one hash is the same data."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob('*.py')):
-        digest.update(source.name.encode() + b'\0' + source.read_bytes())
+    folder = Path(__file__).parent
+    for source in sorted(folder.rglob('*.py')):
+        name = source.relative_to(folder).as_posix()
+        digest.update(name.encode() + b'\0' + source.read_bytes())
     return digest.hexdigest()

@@ -1,0 +1,252 @@
+"""Things off a mill: blocks with holes, slots and steps, flanges, bolts, housings, fins."""
+
+import math
+
+from active_recon.shapes.parts import assemble, beam, box, Mesh
+from active_recon.shapes.things import outlines
+from active_recon.shapes.things.colors import draw_palette
+from active_recon.shapes.things.drawing import chance, choose, Generator, helix, smooth_profile
+from active_recon.shapes.things.fields import block, Body, column, half_space, molten
+from active_recon.shapes.things.solids import circle, extruded, moved, revolved, swept
+import numpy as np
+from numpy.typing import NDArray
+import trimesh
+
+Points = NDArray[np.float64]
+
+
+def milled(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a block or a round blank with holes, slots, pockets, steps and chamfers cut in."""
+    main, second, accent, detail = draw_palette(rng)
+    half = rng.uniform(0.3, 1, 3)
+    inside = [main, second][rng.integers(2)]
+    if chance(rng, 0.7):
+        bodies = [block(-half, half, main, rng.choice([0, 0.08]))]
+    else:
+        half[:2] = half[0]
+        bodies = [column([0, 0, -half[2]], [0, 0, half[2]], half[0], main)]
+    if chance(rng, 0.5):  # a boss
+        axis = int(rng.integers(3))
+        along = np.eye(3)[axis]
+        rise = half[axis] + rng.uniform(0.2, 0.6)
+        radius = rng.uniform(0.4, 0.85) * np.delete(half, axis).min()
+        bodies.append(column(along * 0, along * rise, radius, accent))
+    cuts: list[Body] = []
+    for _ in range(int(rng.integers(1, 6))):
+        cuts.append(_cut(rng, half, detail if chance(rng, 0.2) else inside))
+    return molten(bodies, cuts=cuts, cells=52)
+
+
+def _cut(rng: np.random.Generator, half: Points, color: Points) -> Body:
+    axis = int(rng.integers(3))
+    along = np.eye(3)[axis]
+    side, other = (i for i in range(3) if i != axis)
+    reach = 1.2 * half.max() * along
+    kind = choose(rng, {'hole': 0.4, 'slot': 0.2, 'pocket': 0.15, 'step': 0.13, 'chamfer': 0.12})
+    at = np.zeros(3)
+    at[side], at[other] = rng.uniform(-0.4, 0.4, 2) * half[[side, other]] * rng.choice([0, 1])
+    room = float(half[[side, other]].min())
+    if kind == 'hole':
+        start = at - reach if chance(rng, 0.7) else at
+        return column(start, at + reach * 1.5, rng.uniform(0.2, 0.65) * room, color)
+    low, high = -1.5 * half, 1.5 * half
+    if kind == 'slot':
+        wide = rng.uniform(0.15, 0.4) * half[side]
+        low[side], high[side] = at[side] - wide, at[side] + wide
+        low[other] = rng.uniform(-0.5, 0.4) * half[other]
+        return block(low, high, color)
+    if kind == 'pocket':
+        size = rng.uniform(0.5, 0.8) * half
+        low, high = -size, size
+        high[axis] = 1.5 * half[axis]
+        return block(low, high, color)
+    if kind == 'step':
+        low[side] = rng.uniform(0, 0.5) * half[side] * rng.choice([-1, 1])
+        low[other] = rng.uniform(-0.2, 0.5) * half[other]
+        if low[side] < 0:
+            low[side], high[side] = -1.5 * half[side], low[side]
+        return block(low, high, color)
+    signs = rng.choice([-1, 1], 2)
+    outward = np.zeros(3)
+    outward[side], outward[other] = signs
+    corner = np.zeros(3)
+    corner[side], corner[other] = signs * half[[side, other]]
+    depth = rng.uniform(0.3, 1) * room
+    return half_space(corner - outward * depth / 2, -outward, color)
+
+
+def flange(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a flanged hub, a bushing, a pulley or a knob: coaxial discs bored through."""
+    palette = draw_palette(rng)
+    bore = rng.uniform(0.12, 0.4)
+    hole = outlines.bore(rng, bore) if chance(rng, 0.5) else circle(28, bore)
+    parts: list[Mesh] = []
+    level = 0.0
+    reach = float(np.linalg.norm(hole, axis=1).max())
+    for i in range(int(rng.integers(2, 5))):
+        wide = rng.choice([rng.uniform(reach + 0.1, 0.7), rng.uniform(0.8, 1.2)])
+        thick = rng.uniform(0.1, 0.35) if wide > 0.7 else rng.uniform(0.15, 1)
+        outline = circle(40, wide)
+        kind = choose(rng, {'round': 0.6, 'hex': 0.15, 'square': 0.15, 'ears': 0.1})
+        if kind == 'hex':
+            outline = circle(6, max(wide, 1.3 * reach + 0.1))
+        elif kind == 'square':
+            outline = outlines.rounded([2 * wide, 2 * wide], 0.3 * wide)
+        elif kind == 'ears':
+            outline = circle(60, wide)
+            outline[:, 0] *= 1.45
+            outline[:, 1] *= 0.85
+        holes = [hole]
+        room = wide - reach
+        if room > 0.3 and kind != 'hex':
+            count = int(rng.integers(2, 9))
+            if kind == 'ears':
+                count, ring = 2, 1.05 * wide
+            else:
+                ring = reach + 0.55 * room
+            size = min(rng.uniform(0.06, 0.14), 0.25 * room)
+            if wide * 0.85 > reach + 0.1 or kind != 'ears':
+                holes += [circle(14, size) + ring * np.array([math.cos(a), math.sin(a)])
+                          for a in 2 * math.pi * np.arange(count) / count]
+        parts.append(extruded(outline, level - 0.01, level + thick, palette[i % 4], holes,
+                              palette[0]))
+        level += thick
+    mesh = assemble(parts)
+    return mesh if chance(rng, 0.5) else moved(mesh, axis=[1, 0, 0], angle=math.pi / 2)
+
+
+def bolt(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a bolt or a screw with its head and thread, with a nut or washers, or a nut alone."""
+    main, second, accent, _ = draw_palette(rng)
+    radius, long = rng.uniform(0.25, 0.5), rng.uniform(0.6, 3.5)
+    high = rng.uniform(0.25, 0.7)
+    heads = {'hex': circle(6, 0.9), 'square': circle(4, 1), 'round': circle(32, 0.8),
+             'wing': outlines.rounded([2.6, 0.35], 0.17), 'star': outlines.gear(rng, 12, 0.85),
+             'pan': circle(32, 0.9)}
+    kind = str(rng.choice([*heads]))
+    parts: list[Mesh] = []
+    if chance(rng, 0.2):
+        hole = circle(28, radius)
+        nut = extruded(heads['hex'], 0, high * 1.5, main, [hole], second)
+        if chance(rng, 0.5):
+            nut = assemble([nut, extruded(circle(40, 1.2), -0.12, 0.01, accent, [hole])])
+        return nut
+    if kind == 'pan':
+        parts.append(revolved(smooth_profile([[0.9, 0], [0.9, 0.3 * high], [0.5, high],
+                                              [0.01, high]], 2), second))
+    else:
+        holes = [circle(6, 0.35)] if kind == 'round' else []
+        parts.append(extruded(heads[kind], 0, high, second, holes))
+        if holes:
+            parts.append(revolved([[0.4, 0], [0.4, 0.3 * high]], second))
+    tip = radius * rng.choice([1, 0.05])
+    parts.append(revolved([[radius, 0.05], [radius, -0.8 * long], [tip, -long]], main))
+    if chance(rng, 0.6):
+        turns = rng.uniform(3, 9)
+        thread = helix(radius, turns, 0.75 * long, 16) - [0, 0, 0.85 * long]
+        parts.append(swept(thread, circle(4, 0.3 * 0.75 * long / turns + 0.02), main))
+    if chance(rng, 0.4):
+        at = rng.uniform(0.2, 0.7) * long
+        parts.append(extruded(circle(6, 0.85), -at - 0.3, -at, accent))
+    if chance(rng, 0.3):
+        parts.append(extruded(circle(36, 1.15), -0.1, 0.02, accent))
+    return assemble(parts)
+
+
+def housing(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a cast case: open or closed, with lugs, ribs, a bearing seat, windows."""
+    main, second, accent, _ = draw_palette(rng)
+    half = np.array([1, rng.uniform(0.5, 1), rng.uniform(0.3, 0.9)])
+    wall = rng.uniform(0.1, 0.18)
+    bodies = [block(-half, half, main, rng.choice([0, 0.12]))]
+    cuts = []
+    if chance(rng, 0.7):
+        inner = half - wall
+        cuts.append(block(-inner, inner + [0, 0, 2 * wall], second))
+    if chance(rng, 0.6):  # lugs with screw holes
+        reach = half + [rng.uniform(0.25, 0.45), 0, 0]
+        wide = rng.uniform(0.5, 1) * half[1]
+        bodies.append(block([-reach[0], -wide, -half[2]], [reach[0], wide, -half[2] + wall], main))
+        for x in (-1, 1):
+            at = np.array([x * (half[0] + reach[0]) / 2, 0, 0])
+            cuts.append(column(at - [0, 0, 2], at + [0, 0, 2], 0.35 * (reach[0] - half[0]),
+                               second))
+    if chance(rng, 0.5):  # a bearing seat through two walls
+        radius = rng.uniform(0.3, 0.8) * half[2]
+        axis = [0, 1.3 * half[1], 0] if chance(rng, 0.6) else [1.25 * half[0], 0, 0]
+        seat = column(np.negative(axis), axis, min(radius * 1.35, 0.98 * half[2]), accent)
+        bodies.append(seat)
+        cuts.append(column(np.multiply(axis, -2), np.multiply(axis, 2), 0.75 * radius, second))
+    if chance(rng, 0.4):
+        for x in np.linspace(-0.7, 0.7, int(rng.integers(2, 6))):
+            bodies.append(block([x - 0.05, -half[1] - 0.15, -half[2]],
+                                [x + 0.05, half[1] + 0.15, half[2] * rng.uniform(0.3, 1)], main))
+    if chance(rng, 0.3):
+        size = half * rng.uniform(0.3, 0.6, 3)
+        cuts.append(block([-size[0], -2, -size[2]], [size[0], 2, size[2]], second))
+    return molten(bodies, cuts=cuts, cells=52)
+
+
+def clevis(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a lever: eyes at the ends of arms, a crank, a connecting rod, a rocker, a fork."""
+    main, second, accent, _ = draw_palette(rng)
+    thick = rng.uniform(0.15, 0.5)
+    count = int(rng.integers(2, 5))
+    ends = np.cumsum(np.vstack([[0, 0], rng.uniform(0.9, 1.8, (count - 1, 1))
+                                * circle(40)[rng.choice(40, count - 1)]]), axis=0)
+    if chance(rng, 0.3):  # a spider: all arms from the first eye
+        ends = np.vstack([[[0, 0]], circle(count + 1) * rng.uniform(1, 1.6)])
+    parts: list[Mesh] = []
+    for i, (x, y) in enumerate(ends):
+        radius = rng.uniform(0.3, 0.55)
+        tall = thick * rng.choice([1, rng.uniform(1.2, 2.5)])
+        hole = outlines.bore(rng, rng.uniform(0.35, 0.65) * radius)
+        outline = circle(32 if chance(rng, 0.8) else 6, radius)
+        eye = extruded(outline, -tall / 2, tall / 2, main if i else second, [hole], accent)
+        parts.append(moved(eye, [x, y, 0]))
+        if i:
+            before = ends[i - 1] if len(ends) == count else ends[0]
+            gap = ends[i] - before
+            along = gap / np.linalg.norm(gap)
+            start, end = before + 0.28 * along, ends[i] - 0.8 * radius * along
+            parts.append(beam([*start, 0], [*end, 0], rng.uniform(0.25, 0.42), main,
+                              height=0.8 * thick))
+    mesh = assemble(parts)
+    return mesh if chance(rng, 0.5) else moved(mesh, axis=[1, 0, 0], angle=math.pi / 2)
+
+
+def finned(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a heat sink, a comb, a brick with studs, a rack or a connector with pins."""
+    main, second, accent, _ = draw_palette(rng)
+    half = np.array([1, rng.uniform(0.3, 1), rng.uniform(0.06, 0.3)])
+    parts = [box(-half, half, main)]
+    kind = choose(rng, {'fins': 0.4, 'studs': 0.4, 'pins': 0.2})
+    rise = half[2] + rng.uniform(0.15, 1.0)
+    if kind == 'fins':
+        count = int(rng.integers(3, 11))
+        thin = rng.uniform(0.25, 0.6) / count
+        tops = rise + rng.choice([0, 0.3]) * np.abs(np.linspace(-1, 1, count))
+        for x, top in zip(np.linspace(-1 + thin, 1 - thin, count), tops, strict=True):
+            parts.append(box([x - thin, -half[1], 0], [x + thin, half[1], top], second))
+    else:
+        columns, rows = int(rng.integers(2, 7)), int(rng.integers(1, 5))
+        pitch = 2 * half[:2] / [columns, rows]
+        radius = rng.uniform(0.25, 0.38) * pitch.min()
+        top = half[2] + 0.5 * radius if kind == 'studs' else rise
+        if kind == 'studs':  # a taller body, hollow below
+            parts = [box([-1, -half[1], -w], [1, half[1], half[2]], main)
+                     for w in [half[2] * rng.uniform(0.5, 3)]]
+        outline = circle(int(rng.choice([4, 18])), radius)
+        for i in range(columns):
+            for j in range(rows):
+                x, y = (np.array([i, j]) + 0.5) * pitch - half[:2]
+                stud = extruded(outline, 0, top, second if kind == 'pins' else main)
+                parts.append(moved(stud, [x, y, 0]))
+    if chance(rng, 0.3):
+        parts.append(box([-1.2, -0.4 * half[1], -half[2]], [1.2, 0.4 * half[1], half[2] * 0.8],
+                         accent))
+    return assemble(parts)
+
+
+MACHINED: dict[Generator, float] = {
+    milled: 0.3, flange: 0.18, bolt: 0.14, housing: 0.17, clevis: 0.11, finned: 0.1}

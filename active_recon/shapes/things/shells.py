@@ -1,0 +1,287 @@
+"""Thin walls: trays, crates, baskets, cartons, bags, bent sheets, shades, hats, bins."""
+
+import math
+
+from active_recon.shapes.parts import assemble, beam, box, Color, Mesh, rod
+from active_recon.shapes.soft_parts import filleted, smoothed
+from active_recon.shapes.things.colors import draw_palette
+from active_recon.shapes.things.drawing import arc, chance, choose, Generator, section, smooth_profile
+from active_recon.shapes.things.outlines import rounded
+from active_recon.shapes.things.solids import (
+    circle,
+    extruded,
+    hollow,
+    moved,
+    revolved,
+    skin,
+    swept,
+)
+import numpy as np
+from numpy.typing import NDArray
+import trimesh
+
+Points = NDArray[np.float64]
+
+
+def tray(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return an open box, a tray, a drawer or a sorting box, with compartments or handles."""
+    main, second, accent, _ = draw_palette(rng)
+    half = np.array([1, rng.uniform(0.4, 1)])
+    high = rng.choice([rng.uniform(0.12, 0.35), rng.uniform(0.35, 1.3)])
+    flat = rounded(2 * half, rng.uniform(0, 0.5) * half[1], 7) if chance(rng, 0.7) else (
+        circle(48) * half)
+    foot = rng.uniform(0.7, 1) if chance(rng, 0.5) else 1.0
+    wall = rng.uniform(0.05, 0.1)
+    levels = [[foot, 0], [1, high]]
+    if chance(rng, 0.3):
+        levels += [[1.12, high], [1.14, high + 0.04]]
+    profile = hollow(np.vstack([[0, 0], levels]), wall)
+    colors = np.tile(main, (len(profile) - 1, 1))
+    colors[len(levels) + 1:] = second if chance(rng, 0.5) else main
+    parts = [revolved(profile, colors, flat)]
+    square = len(flat) != 48
+    if square and chance(rng, 0.4):
+        thin, rise = 0.03, high * rng.uniform(0.5, 0.95)
+        for x in np.linspace(-1, 1, int(rng.integers(2, 6)))[1:-1]:
+            parts.append(box([x - thin, -half[1] * foot * 0.97, 0],
+                             [x + thin, half[1] * foot * 0.97, rise], accent))
+        if chance(rng, 0.5):
+            parts.append(box([-0.97 * foot, -thin, 0], [0.97 * foot, thin, rise], accent))
+    if chance(rng, 0.35):
+        for sign in (-1, 1):
+            path = smoothed([[sign * 0.97, -0.25, high], [sign * 1.02, -0.25, high + 0.25],
+                             [sign * 1.02, 0.25, high + 0.25], [sign * 0.97, 0.25, high]], 1)
+            path[[0, -1], 2] -= 0.1
+            parts.append(swept(path, circle(8, 0.05), accent))
+    return assemble(parts)
+
+
+def crate(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a crate or a cage of slats and posts, open above: wide gaps or narrow, or a pallet."""
+    main, second, _, _ = draw_palette(rng)
+    half, high = np.array([1, rng.uniform(0.5, 1)]), rng.uniform(0.3, 1.5)
+    thin, count = rng.uniform(0.03, 0.06), int(rng.integers(2, 6))
+    parts: list[Mesh] = []
+    wide = high / count * rng.uniform(0.25, 0.45)
+    for z in (np.arange(count) + 0.5) * high / count:
+        for sign in (-1, 1):
+            parts += [box([-half[0], sign * half[1] - thin, z - wide],
+                          [half[0], sign * half[1] + thin, z + wide], main),
+                      box([sign * half[0] - thin, -half[1], z - wide],
+                          [sign * half[0] + thin, half[1], z + wide], main)]
+    parts += [box([x * half[0] - 0.08, y * half[1] - 0.08, 0],
+                  [x * half[0] + 0.08, y * half[1] + 0.08, high * 1.03], second)
+              for x in (-1, 1) for y in (-1, 1)]
+    if chance(rng, 0.5):
+        parts.append(box([-half[0], -half[1], 0], [half[0], half[1], 2 * thin], main))
+    else:
+        count = int(rng.integers(3, 7))
+        pitch = 2 * half[1] / count
+        for y in -half[1] + (np.arange(count) + 0.5) * pitch:
+            parts.append(box([-half[0], y - 0.38 * pitch, 0], [half[0], y + 0.38 * pitch, 2 * thin],
+                             main))
+        parts += [box([x - 0.08, -half[1], -0.06], [x + 0.08, half[1], 0.02], second)
+                  for x in (-0.92, 0.92)]
+    if chance(rng, 0.25):
+        bow = arc(0, math.pi, 1, 20) * [half[0], rng.uniform(0.6, 1.2)]
+        parts.append(swept(np.column_stack([bow[:, 0], np.zeros(20), bow[:, 1] + high * 0.8]),
+                           circle(8, 0.06), second))
+        parts += [beam([x, 0, 0], [x, 0, high], 0.14, second) for x in (-half[0], half[0])]
+    return assemble(parts)
+
+
+def basket(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a basket woven of hoops and ribs, a bin or a cage, with a closed or an open floor."""
+    main, second, accent, _ = draw_palette(rng)
+    flat, high = section(rng, 0.5), rng.uniform(0.5, 2)
+    outer = smooth_profile([[rng.uniform(0.55, 0.95), 0], [rng.uniform(0.8, 1.15), 0.5 * high],
+                            [1, high]], 2)
+    thin, hoops = rng.uniform(0.04, 0.07), int(rng.integers(3, 9))
+    parts: list[Mesh] = []
+    for z in np.linspace(0, high, hoops):
+        radius = float(np.interp(z, outer[:, 1], outer[:, 0]))
+        ring = np.column_stack([radius * flat, np.full(len(flat), z)])
+        parts.append(swept(ring, circle(8, thin * (1.5 if z in (0, high) else 1)), main,
+                           closed=True))
+    ribs = int(rng.integers(6, 19))
+    for corner in flat[np.linspace(0, len(flat), ribs, endpoint=False).astype(int)]:
+        path = np.column_stack([outer[:, :1] * corner, outer[:, 1]])
+        parts.append(swept(path, circle(6, thin), second))
+    parts.append(revolved([[outer[0, 0], -thin], [outer[0, 0], thin]], second, flat))
+    if chance(rng, 0.4):
+        reach = float(np.abs(flat[:, 0]).max())
+        bow = arc(0, math.pi, 1, 24) * [reach, rng.uniform(0.6, 1.3)]
+        parts.append(swept(np.column_stack([bow[:, 0], np.zeros(24), bow[:, 1] + high - 0.03]),
+                           circle(8, 1.4 * thin), accent))
+    return assemble(parts)
+
+
+def carton(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a box of card with its flaps up, out or closed, or a chest with its lid open."""
+    main, second, accent, _ = draw_palette(rng)
+    half = rng.uniform([0.5, 0.4, 0.25], [1, 0.9, 1])
+    thin = rng.uniform(0.03, 0.06)
+    x, y, high = half[0], half[1], 2 * half[2]
+    parts: list[Mesh] = [box([-x, -y, 0], [x, y, 2 * thin], main)]
+    for sign in (-1, 1):
+        parts += [box([-x, sign * y - thin, 0], [x, sign * y + thin, high], main),
+                  box([sign * x - thin, -y, 0], [sign * x + thin, y, high], main)]
+    inside = second if chance(rng, 0.5) else main
+    if chance(rng, 0.35):  # one lid on a hinge
+        angle = rng.uniform(0.3, 2)
+        lid = box([0, -y, -thin], [2 * x, y, thin], accent)
+        parts.append(moved(lid, [-x, 0, high], [0, 1, 0], -angle))
+    else:
+        for sign in (-1, 1):
+            long = rng.uniform(0.5, 1) * y
+            for axis, reach, width in ((0, x, y), (1, y, x)):
+                if chance(rng, 0.15):
+                    continue
+                flap = box([0, -width, -thin], [long, width, thin], inside)
+                moved(flap, axis=[0, 1, 0], angle=-rng.uniform(-0.9, 2.2))
+                turn = math.pi / 2 * axis + (math.pi if sign < 0 else 0)
+                moved(flap, angle=turn)
+                offset = np.zeros(3)
+                offset[axis], offset[2] = sign * reach, high
+                parts.append(moved(flap, offset))
+    if chance(rng, 0.35):
+        wide = rng.uniform(0.1, 0.25)
+        parts.append(box([-wide, -y - 1.4 * thin, 0], [wide, -y, high], accent))
+        parts.append(box([-wide, y, 0], [wide, y + 1.4 * thin, high], accent))
+    return assemble(parts)
+
+
+def bag(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a bag: a tote, a sack, a paper bag, a handbag or a rucksack, open or tied."""
+    main, second, accent, _ = draw_palette(rng)
+    half = np.array([1, rng.uniform(0.25, 0.8)])
+    high, wall = rng.uniform(1, 2.4), 0.06
+    foot = rounded(2 * half, 0.4 * half[1], 6)
+    tied = chance(rng, 0.3)
+    levels = [0, 0.15, 0.4, 0.7, 0.88, 1]
+    sizes = np.array([0.9, 1, rng.uniform(0.95, 1.15), rng.uniform(0.85, 1.05),
+                      rng.uniform(0.75, 1.0), rng.uniform(0.75, 1.05)])
+    if tied:
+        sizes[-2:] = [0.25, rng.uniform(0.3, 0.6)]
+    squash = np.linspace(1, rng.uniform(0.5, 1), 6)
+    crease = rng.normal(0, 0.025, (6, len(foot), 2))
+    crease[0] = 0
+    rings = [np.column_stack([foot * size * [1, thin] + wrinkle, np.full(len(foot), level * high)])
+             for level, size, thin, wrinkle in zip(levels, sizes, squash, crease, strict=True)]
+    inner = [ring * [1 - wall, 1 - 1.6 * wall, 1] + [0, 0, 0] for ring in rings[::-1]]
+    inner[-1][:, 2] = wall
+    parts: list[Mesh] = [skin([*rings, *inner], np.vstack([np.tile(main, (6, 1)),
+                                                           np.tile(second, (5, 1))]))]
+    top = rings[-1]
+    reach = float(np.abs(top[:, 1]).max()) * 0.97
+    if not tied and chance(rng, 0.75):
+        wide, rise = rng.uniform(0.25, 0.6), rng.uniform(0.3, 1)
+        for sign in (-1, 1) if chance(rng, 0.8) else (1,):
+            y = sign * reach
+            path = smoothed([[-wide, y, high - 0.3], [-wide, y * 0.9, high + rise],
+                             [wide, y * 0.9, high + rise], [wide, y, high - 0.3]], 2)
+            path[:, 1] = np.where(path[:, 2] < high, y * np.interp(
+                path[:, 2], [high - 0.3, high], [1.04 / 0.97, 1]), path[:, 1])
+            parts.append(swept(path, circle(8) * [0.045, rng.uniform(0.045, 0.1)], accent))
+    if chance(rng, 0.3):
+        parts.append(box([-0.5, -half[1] - 0.12, 0.2 * high], [0.5, -0.8 * half[1], 0.6 * high],
+                         accent))
+    return assemble(parts)
+
+
+def sheet(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return a bent sheet: folded, rolled, waved, cupped, a gutter, a tile, a tent, a fan."""
+    main, second, _, _ = draw_palette(rng)
+    thick, wide = rng.uniform(0.03, 0.07), rng.uniform(0.5, 2.2)
+    kind = choose(rng, {'folded': 0.3, 'rolled': 0.25, 'waved': 0.2, 'cupped': 0.25})
+    if kind == 'cupped':
+        return _cupped(rng, main, second, thick)
+    if kind == 'folded':
+        angle = rng.uniform(0, 6.3)
+        line = [np.zeros(2)]
+        for _ in range(int(rng.integers(2, 7))):
+            line.append(line[-1] + rng.uniform(0.4, 1) * np.array([math.cos(angle),
+                                                                   math.sin(angle)]))
+            angle += rng.choice([-1, 1]) * rng.uniform(0.5, 1.9)
+        path = np.array(line)
+        path = filleted(path, 0.12) if chance(rng, 0.5) else path
+    elif kind == 'rolled':
+        t = np.linspace(0, rng.uniform(1.5, 9), 60)
+        radius = 1 - rng.uniform(0.05, 0.1) * t
+        path = np.column_stack([radius * np.cos(t), radius * np.sin(t)])
+    else:
+        x = np.linspace(-1.5, 1.5, 60)
+        path = np.column_stack([x, rng.uniform(0.1, 0.4) * np.sin(rng.uniform(3, 12) * x)
+                                + rng.uniform(-0.4, 0.4) * x**2])
+    flat = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [wide / 2, thick / 2]
+    scales = np.linspace(1, rng.uniform(0.6, 1), len(path)) if chance(rng, 0.3) else 1.0
+    line3 = np.column_stack([path[:, 0], np.zeros(len(path)), path[:, 1]])
+    # The section's first axis runs across: the frame's normal lies in the plane of the path
+    normal = np.array([-(path[1] - path[0])[1], 0, (path[1] - path[0])[0]])
+    colors = np.where((np.arange(len(path) - 1) % 2 == 0)[:, None], main,
+                      second if kind == 'folded' and chance(rng, 0.4) else main)
+    mesh = swept(line3, flat, colors, scales=scales, up=normal)
+    return mesh if chance(rng, 0.6) else moved(mesh, axis=[1, 0, 0], angle=math.pi / 2)
+
+
+def _cupped(rng: np.random.Generator, main: Color, second: Color, thick: float) -> Mesh:
+    """Return a sheet bent both ways: a saddle, a bowl's piece, a leaf, a crisp."""
+    side = np.linspace(-1, 1, 25)
+    x, y = np.meshgrid(side, side * rng.uniform(0.4, 1), indexing='ij')
+    z = (rng.uniform(-0.6, 0.6) * x**2 + rng.uniform(-0.6, 0.6) * y**2 + rng.uniform(-0.3, 0.3)
+         * x * y + rng.uniform(0, 0.12) * np.sin(rng.uniform(2, 8) * x + rng.uniform(0, 6)))
+    if chance(rng, 0.5):  # a round or a pointed edge
+        y = y * (1.02 - np.abs(x) ** rng.uniform(1.5, 4))
+    rings = [np.vstack([np.column_stack([x[i], y[i], z[i] + thick]),
+                        np.column_stack([x[i], y[i], z[i] - thick])[::-1]]) for i in range(25)]
+    mesh = skin(rings, main)
+    below = mesh.triangles_center[:, 2] * 0
+    del below
+    return mesh
+
+
+def shade(rng: np.random.Generator) -> trimesh.Trimesh:
+    """Return an open shell about an axis: a lampshade, bell, funnel, hat, helmet, half a tube."""
+    main, second, accent, _ = draw_palette(rng)
+    high, wall = rng.uniform(0.5, 1.8), rng.uniform(0.05, 0.09)
+    kind = choose(rng, {'shade': 0.35, 'hat': 0.25, 'funnel': 0.15, 'half': 0.25})
+    top = rng.uniform(0.25, 1)
+    line = smooth_profile([[1, 0], [rng.uniform(0.5, 1.1), 0.4 * high], [top, high]], 2)
+    flat = section(rng, 0.6)
+    if kind == 'half':
+        turn = rng.uniform(1.5, 5)
+        around = arc(0, turn, 1, 40)
+        both = np.vstack([around, around[::-1] * (1 - wall)])
+        rings = [np.column_stack([both * radius, np.full(80, level)]) for radius, level in line]
+        mesh = skin(rings, main)
+        return mesh if chance(rng, 0.5) else moved(mesh, axis=[0, 1, 0], angle=math.pi / 2)
+    inner = line[::-1] - [wall, 0]
+    if kind == 'shade':
+        parts = [revolved(np.vstack([line, inner]), np.vstack([
+            np.tile(main, (len(line), 1)), np.tile(second, (len(line), 1))]), flat, closed=True)]
+        if chance(rng, 0.6):  # a spider that holds it, and what it hangs from
+            level = high * 0.85
+            reach = float(np.interp(level, line[:, 1], line[:, 0])) * float(
+                np.abs(flat[:, 0]).max())
+            parts += [rod([-reach, 0, level], [reach, 0, level], 0.04, accent),
+                      rod([0, 0, level], [0, 0, high + rng.uniform(0.1, 0.8)], 0.07, accent)]
+        return assemble(parts)
+    if kind == 'funnel':
+        tip = rng.uniform(0.1, 0.2)
+        line = np.vstack([[[1, 0], [1, 0.12 * high], [tip, 0.7 * high], [tip, 1.3 * high]]])
+        inner = line[::-1] - [0.6 * tip, 0]
+        return revolved(np.vstack([line, inner]), main, closed=True)
+    crown = hollow(np.vstack([line, [[0.6 * top, high * 1.08], [0.0, high * 1.1]]])[::-1]
+                   * [1, -1], wall) * [1, -1]
+    parts = [revolved(crown, main, flat)]
+    if chance(rng, 0.6):
+        brim = rng.uniform(1.2, 1.8)
+        outline, hole = flat * brim, flat * 0.93
+        parts.append(extruded(outline, 0, wall, main if chance(rng, 0.6) else second, [hole]))
+    if chance(rng, 0.5):
+        parts.append(revolved(np.vstack([line[:3] * [1.03, 1]]), accent, flat))
+    return assemble(parts)
+
+
+SHELLS: dict[Generator, float] = {
+    tray: 0.2, carton: 0.17, sheet: 0.17, bag: 0.13, shade: 0.15, crate: 0.1, basket: 0.08}
