@@ -1,6 +1,7 @@
 """Parametric shapes: drawn by their seed, varied in structure, one solid, fronts at +x."""
 
 from pathlib import Path
+import shutil
 
 from active_recon import shapes
 from active_recon.errors import ConfigError
@@ -101,8 +102,8 @@ def test_an_unknown_category_is_refused():
 
 
 def test_the_generators_hash_changes_with_their_code_alone(tmp_path, monkeypatch):
-    for source in Path(shapes.__file__).parent.glob('*.py'):
-        (tmp_path / source.name).write_bytes(source.read_bytes())
+    shutil.copytree(Path(shapes.__file__).parent, tmp_path, dirs_exist_ok=True,
+                    ignore=shutil.ignore_patterns('__pycache__'))
     true_hash = generators_hash()
     assert len(bytes.fromhex(true_hash)) == 32
     monkeypatch.setattr(shapes, '__file__', str(tmp_path / '__init__.py'))
@@ -113,4 +114,7 @@ def test_the_generators_hash_changes_with_their_code_alone(tmp_path, monkeypatch
     changed = generators_hash()
     assert changed != true_hash
     (tmp_path / 'sofa.py').rename(tmp_path / 'couch.py')
-    assert generators_hash() not in (true_hash, changed)
+    renamed = generators_hash()
+    assert renamed not in (true_hash, changed)
+    (tmp_path / 'things' / 'vessels.py').rename(tmp_path / 'vessels.py')
+    assert generators_hash() not in (true_hash, changed, renamed)

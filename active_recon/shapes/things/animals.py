@@ -1,6 +1,8 @@
 """Animals of melted bodies: on four legs, sitting plush, birds, fish."""
 
 
+import math
+
 from active_recon.shapes.parts import Color
 from active_recon.shapes.things.colors import draw_palette, furry
 from active_recon.shapes.things.drawing import chance, choose
@@ -74,10 +76,12 @@ def beast(rng: np.random.Generator) -> trimesh.Trimesh:
     if tail == 'stub':
         bodies.append(ball(root, [0.16] * 3, second))
     else:
-        end = root + {'long': [-0.6, 0, -0.3], 'bushy': [-0.55, 0, 0.2], 'up': [-0.1, 0, 0.8]}[tail]
+        ways = {'long': [-0.6, 0, -0.3], 'bushy': [-0.55, 0, 0.2], 'up': [-0.1, 0, 0.8]}
+        end = root + ways[tail]
         bodies.append(limb(root + [0.15, 0, 0], end, 0.09, main, 0.2 if tail == 'bushy' else 0.07))
     if chance(rng, 0.15):  # a shell, a hump or wool
-        bodies.append(ball([0, 0, high + 0.3 * thick], [long * 0.9, thick * 1.2, thick * 1.2], dark))
+        bodies.append(ball([0, 0, high + 0.3 * thick], [long * 0.9, thick * 1.2, thick * 1.2],
+                           dark))
     return molten(bodies, rng.uniform(0.06, 0.16), cells=72)
 
 
@@ -140,25 +144,30 @@ def bird(rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def fish(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a fish or a whale with its fins, its tail upright or flat."""
+    """Return a fish or a whale, slim or deep, with its fins, its tail upright or flat."""
     main, second, dark, black = draw_palette(rng)
-    thick, high = rng.uniform(0.15, 0.4), rng.uniform(0.25, 0.6)
+    thick, high = rng.uniform(0.12, 0.45), rng.uniform(0.2, 0.85)
     bodies: list[Body] = [ball([0, 0, 0], [1, thick, high], main),
-                          limb([-0.6, 0, 0], [-1.2, 0, 0], thick * 0.7, main, 0.1)]
+                          limb([-0.5, 0, 0], [-1.2, 0, 0], 0.7 * min(thick, high), main, 0.1)]
+    if chance(rng, 0.4):
+        bodies.append(ball([0.2, 0, -0.1], [0.7, thick * 0.95, high], second))
 
     def fin(at: Points, reach: Points, color: Color) -> Body:
-        size = np.array([0.14, 0.05, 0.05]) + np.abs(reach)
-        return ball(at + 0.6 * reach, size, color)
+        tip = at + reach
+        return limb(at * [1, 0.8, 0.8], tip, 0.14, color, rng.uniform(0.05, 0.12))
 
     flat = chance(rng, 0.25)
+    reach = rng.uniform(0.25, 0.7)
     for sign in (-1, 1):
         across = np.array([0, sign, 0]) if flat else np.array([0, 0, sign])
-        bodies.append(limb([-1.15, 0, 0], np.array([-1.6, 0, 0]) + across * rng.uniform(0.3, 0.6),
-                           0.12, second, 0.09))
-        bodies.append(fin(np.array([0.2, sign * thick, -0.1]),
-                          np.array([-0.1, sign * 0.35, -0.1]), dark))
-        bodies.append(ball([0.7, sign * thick * 0.6, 0.1], [0.08] * 3, black))
-    bodies.append(fin(np.array([-0.1, 0, high]), np.array([0.3, 0, rng.uniform(0.1, 0.3)]), second))
-    return molten(bodies, 0.06, cells=68)
-
-
+        bodies.append(limb([-1.15, 0, 0], np.array([-1.5, 0, 0]) + across * reach, 0.12, second,
+                           0.09))
+        bodies.append(fin(np.array([0.3, sign * thick, -0.1]),
+                          np.array([-0.3, sign * rng.uniform(0.2, 0.5), -0.2]), dark))
+        bodies.append(ball([0.75, sign * thick * 0.6, 0.1], [0.08] * 3, black))
+    for x in np.linspace(0.4, -0.5, int(rng.integers(1, 5))):
+        bodies.append(fin(np.array([x, 0, high * math.sqrt(1 - x**2)]),
+                          np.array([-0.25, 0, rng.uniform(0.1, 0.4)]), second))
+    if chance(rng, 0.3):
+        bodies.append(limb([0.8, 0, 0], [rng.uniform(1.2, 1.7), 0, 0], 0.15, dark, 0.06))
+    return molten(bodies, 0.08, cells=68)

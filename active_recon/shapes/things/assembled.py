@@ -10,14 +10,15 @@ from active_recon.shapes.things.solids import moved, painted, superquadric, toru
 from active_recon.shapes.things.tools import hammer, handled, pincers, spanner
 from active_recon.shapes.things.toys import device, figure, peg_toy, plant, vehicle
 import numpy as np
+from numpy.typing import NDArray
 import trimesh
 
 
-def primitive(rng: np.random.Generator, color: Color) -> Mesh:
-    """Return one simple solid about 0, of a half size between 0.2 and 0.8."""
+def _primitive(rng: np.random.Generator, color: Color, rings: float = 0.08) -> Mesh:
+    """Return a simple solid about 0, of a half size from 0.2 to 0.8; rings is a ring's share."""
     size = rng.uniform(0.2, 0.8, 3)
     kind = choose(rng, {'box': 0.2, 'soft box': 0.08, 'cylinder': 0.18, 'cone': 0.12, 'ball': 0.14,
-                        'superquadric': 0.14, 'torus': 0.08, 'wedge': 0.06})
+                        'superquadric': 0.14, 'torus': rings, 'wedge': 0.06})
     if kind == 'box':
         return box(-size, size, color)
     if kind == 'soft box':
@@ -41,7 +42,7 @@ def primitive(rng: np.random.Generator, color: Color) -> Mesh:
     return painted(trimesh.convex.convex_hull(corners), color)
 
 
-def _spot(rng: np.random.Generator, mesh: Mesh) -> np.ndarray:  # type: ignore[type-arg]
+def _spot(rng: np.random.Generator, mesh: Mesh) -> NDArray[np.float64]:
     """Return a point of the surface, (3,), anywhere on it alike."""
     face = rng.choice(len(mesh.faces), p=mesh.area_faces / mesh.area)
     a, b = np.sort(rng.random(2))
@@ -54,8 +55,8 @@ def cluster(rng: np.random.Generator) -> trimesh.Trimesh:
     askew = chance(rng, 0.6)
     parts: list[Mesh] = []
     for i in range(int(rng.integers(2, 8))):
-        part = primitive(rng, palette[rng.integers(4)])
-        part.apply_scale(rng.uniform(0.6, 1.4))
+        part = _primitive(rng, palette[rng.integers(4)])
+        part.apply_transform(np.diag([*[rng.uniform(0.6, 1.4)] * 3, 1.0]))
         if askew and chance(rng, 0.7):
             moved(part, axis=rng.normal(size=3), angle=rng.uniform(0, math.pi))
         elif chance(rng, 0.5):
@@ -80,7 +81,7 @@ def tower(rng: np.random.Generator) -> trimesh.Trimesh:
     at = np.zeros(3)
     parts: list[Mesh] = []
     for _ in range(int(rng.integers(2, 7))):
-        part = primitive(rng, palette[rng.integers(4)])
+        part = _primitive(rng, palette[rng.integers(4)], rings=0)
         if chance(rng, 0.3):
             moved(part, axis=[1, 0, 0], angle=math.pi / 2)
         low, high = part.bounds
@@ -95,8 +96,9 @@ def tower(rng: np.random.Generator) -> trimesh.Trimesh:
     if axis == 0:  # a row stands on one board, stacked solids on their own feet
         wide = max(float(part.extents[1]) for part in parts)
         parts.append(box([-0.1, -wide / 2, -0.12], [at[0] + 0.1, wide / 2, 0.05], palette[1]))
-    elif chance(rng, 0.2):
-        parts.append(rod([0, 0, 0.1], [0, 0, at[2] + 0.2], 0.08, palette[3]))
+    else:  # a peg through all of them, at times seen above
+        above = 0.2 if chance(rng, 0.2) else -0.1
+        parts.append(rod([0, 0, 0.1], [0, 0, at[2] + above], 0.07, palette[3]))
     return assemble(parts)
 
 

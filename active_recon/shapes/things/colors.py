@@ -15,7 +15,7 @@ _MATERIALS = (materials.wood, materials.fabric, materials.metal, materials.paint
 def draw_palette(rng: np.random.Generator) -> Palette:
     """Return a main, a second and an accent colour and one for details, (4, 3) in [0, 255]."""
     schemes = (_mixed, _one_hue, _loud, _dark, _pale, _bare)
-    return schemes[rng.choice(len(schemes), p=[0.26, 0.14, 0.26, 0.14, 0.12, 0.08])](rng)
+    return schemes[rng.choice(len(schemes), p=[0.27, 0.14, 0.28, 0.11, 0.12, 0.08])](rng)
 
 
 def ripe(rng: np.random.Generator, hues: tuple[float, float]) -> NDArray[np.float64]:
@@ -61,7 +61,7 @@ def _loud(rng: np.random.Generator) -> Palette:
 
 def _dark(rng: np.random.Generator) -> Palette:
     """Return blacks and anthracites with one accent."""
-    palette = np.array([_hsv(rng.uniform(), rng.uniform(0, 0.25), rng.uniform(0.04, 0.26))
+    palette = np.array([_hsv(rng.uniform(), rng.uniform(0, 0.25), rng.uniform(0.05, 0.3))
                         for _ in range(4)])
     palette[2] = _hsv(rng.uniform(), rng.uniform(0, 1), rng.uniform(0.4, 1))
     return palette

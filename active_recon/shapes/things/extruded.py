@@ -51,7 +51,7 @@ def gear(rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def star(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a star, heart, moon, cloud, arrow, cross or flower made solid, or tapered to a top."""
+    """Return a star, heart, moon, arrow, cross or flower made solid, or tapered to a top."""
     main, second, _, _ = draw_palette(rng)
     outline = outlines.figure(rng)
     holes = []
@@ -120,7 +120,8 @@ def bracket(rng: np.random.Generator) -> trimesh.Trimesh:
         rows = [-across, across] if across else [0.0]
         room = long - thick
         pitch = room / max(count, 1)
-        holes = [circle(18, min(radius, 0.35 * pitch, 0.16 * wide)) + [thick + (i + 0.5) * pitch, y]
+        hole = circle(18, min(radius, 0.35 * pitch, 0.16 * wide))
+        holes = [hole + [thick + (i + 0.5) * pitch, y]
                  for i in range(count) for y in rows]
         corner = [[0, -wide / 2], [long, -wide / 2], [long, wide / 2], [0, wide / 2]]
         if chance(rng, 0.3):
@@ -130,29 +131,28 @@ def bracket(rng: np.random.Generator) -> trimesh.Trimesh:
         return extruded(corner, 0, thick, main, holes, second)
 
     def standing(at: float) -> Mesh:
-        return moved(drilled(rise), [at, 0, 0], [0, 1, 0], -math.pi / 2)
+        return moved(drilled(rise), [at, 0, 0.97 * thick], [0, 1, 0], -math.pi / 2)
 
     kind = choose(rng, {'L': 0.35, 'U': 0.2, 'T': 0.15, 'Z': 0.15, 'corner': 0.15})
     parts = [drilled(base)]
-    if kind in 'LZ' or kind == 'corner':
+    foot = thick  # where what stands ends
+    if kind in ('L', 'Z', 'corner'):
         parts.append(standing(thick))
     if kind == 'U':
         parts += [standing(thick), standing(base)]
     if kind == 'T':
-        parts.append(standing(base * rng.uniform(0.4, 0.7)))
+        foot = base * rng.uniform(0.4, 0.7)
+        parts.append(standing(foot))
     if kind == 'Z':
-        parts.append(moved(drilled(base), [thick, 0, rise], [0, 0, 1], math.pi))
-        parts[-1].apply_translation([0, 0, -thick])
+        parts.append(moved(drilled(base), [thick, 0, rise + 0.94 * thick], [0, 0, 1], math.pi))
     if kind == 'corner':
         parts.append(box([0, wide / 2 - thick, 0], [base, wide / 2, rise], main))
-    if kind in 'LT' and chance(rng, 0.6):
-        gusset = [[0, 0], [rng.uniform(0.4, 0.9) * base, 0], [0, rng.uniform(0.4, 0.9) * rise]]
-        if kind == 'T':
-            gusset = [[0, 0], [0.3 * base, 0], [0, 0.6 * rise]]
+    if kind in ('L', 'T') and chance(rng, 0.6):
+        reach = rng.uniform(0.4, 0.9) * (base - foot)
+        gusset = np.array([[0, 0], [reach, 0], [0, rng.uniform(0.4, 0.9) * rise]])
         for y in ([0.0] if chance(rng, 0.5) else [-0.4 * wide, 0.4 * wide - thick]):
             rib = moved(extruded(gusset, 0, thick, accent), axis=[1, 0, 0], angle=math.pi / 2)
-            parts.append(moved(rib, [thick / 2 if kind == 'L' else 0.7 * base - thick, y + thick,
-                                     thick / 2]))
+            parts.append(moved(rib, [foot - 0.1 * thick, y + thick, 0.9 * thick]))
     return assemble(parts)
 
 

@@ -7,6 +7,7 @@ from active_recon.shapes.parts import Color, Mesh
 from active_recon.shapes.things.solids import painted
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import label
 from skimage.measure import marching_cubes
 import trimesh
 
@@ -24,8 +25,8 @@ class Body:
 
 
 def _about(center: ArrayLike, reach: ArrayLike) -> NDArray[np.float64]:
-    middle = np.asarray(center, np.float64)
-    return np.array([middle - reach, middle + reach])
+    middle, size = np.asarray(center, np.float64), np.asarray(reach, np.float64)
+    return np.array([middle - size, middle + size])
 
 
 def ball(center: ArrayLike, radii: ArrayLike, color: Color,
@@ -54,7 +55,7 @@ def limb(start: ArrayLike, end: ArrayLike, radius: float, color: Color,
         along = b - a
         share = np.clip((points - a) @ along / (along @ along), 0, 1)
         off: Points = np.linalg.norm(points - a - share[:, None] * along, axis=1)
-        return off - (radius + (last - radius) * share)
+        return off - (radius + (last - radius) * share).astype(np.float32)
 
     reach = max(radius, last)
     return Body(distance, np.array([np.minimum(a, b) - reach, np.maximum(a, b) + reach]), color)
@@ -106,8 +107,9 @@ def molten(bodies: Sequence[Body], blend: float = 0.0, cuts: Sequence[Body] = ()
     """
     Return the surface of bodies melted together over a length, less the cuts.
 
-    It is meshed with so many cells along its longest side. A face has the colour of the body or
-    the cut whose surface is nearest. `bumps` is added to the distance.
+    It is meshed with so many cells along its longest side. A face has the colour of the body that
+    is nearest, or of the cut that made it. `bumps` is added to the distance. What the cuts leave is one
+    piece, the largest.
     """
     low = np.min([body.bounds[0] for body in bodies], axis=0)
     high = np.max([body.bounds[1] for body in bodies], axis=0)
@@ -117,21 +119,35 @@ def molten(bodies: Sequence[Body], blend: float = 0.0, cuts: Sequence[Body] = ()
     low = low - 2 * pitch
     axes = [low[i] + pitch * np.arange(counts[i]) for i in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing='ij'), axis=-1).reshape(-1, 3).astype(np.float32)
+    field = _melted(bodies, blend, bumps, points)
+    for cut in cuts:
+        field = np.maximum(field, -cut.distance(points))
+    grid = field.reshape(counts)
+    pieces, _ = label(grid < 0)
+    largest = np.bincount(pieces.ravel())[1:].argmax() + 1
+    grid = np.where(pieces == largest, grid, np.maximum(grid, np.float32(1e-3 * pitch)))
+    vertices, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
+        grid, 0.0, spacing=(pitch,) * 3)
+    mesh = trimesh.Trimesh(vertices.astype(np.float64) + low, faces, process=False)
+    centers = np.asarray(mesh.triangles_center, np.float32)
+    distances = np.stack([body.distance(centers) for body in bodies])
+    nearest = distances.argmin(axis=0)
+    if cuts:
+        inward = np.stack([-cut.distance(centers) for cut in cuts])
+        uncut = _melted(bodies, blend, bumps, centers)
+        nearest = np.where(inward.max(axis=0) > uncut, len(bodies) + inward.argmax(axis=0),
+                           nearest)
+    colors = np.array([body.color for body in (*bodies, *cuts)], np.float64)
+    return painted(mesh, colors[nearest])
+
+
+def _melted(bodies: Sequence[Body], blend: float, bumps: Distance | None,
+            points: Points) -> Points:
+    """Return the signed distance of bodies melted together at points, (N, 3) to (N,)."""
     field = bodies[0].distance(points)
     for body in bodies[1:]:
         field = _joined(field, body.distance(points), blend)
-    if bumps is not None:
-        field = field + bumps(points)
-    for cut in cuts:
-        field = np.maximum(field, -cut.distance(points))
-    vertices, faces, _, _ = marching_cubes(field.reshape(counts), 0.0, spacing=(pitch,) * 3)
-    mesh = trimesh.Trimesh(vertices.astype(np.float64) + low, faces, process=False)
-    centers = np.asarray(mesh.triangles_center, np.float32)
-    everything = [*bodies, *cuts]
-    distances = np.stack([body.distance(centers) for body in everything])
-    distances[len(bodies):] = np.abs(distances[len(bodies):])
-    colors = np.array([body.color for body in everything], np.float64)
-    return painted(mesh, colors[distances.argmin(axis=0)])
+    return field if bumps is None else field + bumps(points)
 
 
 def _joined(a: Points, b: Points, blend: float) -> Points:

@@ -73,7 +73,8 @@ def frame(rng: np.random.Generator) -> trimesh.Trimesh:
 def _rack(rng: np.random.Generator, main: Points, second: Points, thick: float) -> Mesh:
     """Return two rails with hoops or rungs across: a dish rack, a ladder, a toast rack."""
     long, wide, rise = rng.uniform(1.5, 3), rng.uniform(0.5, 1.5), rng.uniform(0, 1.2)
-    parts = [beam([-0.1, y, 0], [long + 0.1, y, 0], 2 * thick, main) for y in (-wide / 2, wide / 2)]
+    parts = [beam([-0.1, y, 0], [long + 0.1, y, 0], 2 * thick, main)
+             for y in (-wide / 2, wide / 2)]
     for x in np.linspace(0.05, long - 0.05, int(rng.integers(3, 10))):
         if rise < 0.3:
             parts.append(rod([x, -wide / 2, 0], [x, wide / 2, 0], 0.8 * thick, second))
@@ -105,7 +106,7 @@ def whisk(rng: np.random.Generator) -> trimesh.Trimesh:
         if kind == 0:  # a pane
             disc = moved(revolved([[1, -0.4], [1, 0.4]], accent), axis=[1, 0, 0],
                          angle=math.pi / 2)
-            disc.apply_scale([wide, wire, high])
+            disc.apply_transform(np.diag([wide, wire, high, 1.0]))
             parts.append(moved(disc, [0, 0, high]))
         elif kind == 1:  # strings
             for share in np.linspace(-0.7, 0.7, 6):

@@ -31,7 +31,7 @@ def vase(rng: np.random.Generator) -> trimesh.Trimesh:
     if chance(rng, 0.5):
         start = rng.integers(1, len(outer) - 3)
         colors[start:start + rng.integers(2, 8)] = accent
-    twist = rng.uniform(-2, 2) if chance(rng, 0.4) else 0.0
+    twist = rng.uniform(-1.2, 1.2) if chance(rng, 0.4) else 0.0
     return revolved(profile, colors, section(rng, 0.45), twist=twist)
 
 
@@ -124,7 +124,8 @@ def bottle(rng: np.random.Generator) -> trimesh.Trimesh:
     wide = neck * rng.uniform(1.03, 1.3)
     high = rng.uniform(0.15, 0.5)
     if cap == 'screw':
-        parts.append(revolved([[wide, top - high * 0.6], [wide, top + high * 0.4]], second, around))
+        parts.append(revolved([[wide, top - high * 0.6], [wide, top + high * 0.4]], second,
+                              around))
     elif cap == 'ball':
         parts.append(moved(revolved(globe(wide * 1.1), second), [0, 0, top + 0.5 * wide]))
     elif cap == 'cone':

@@ -227,15 +227,18 @@ def finned(rng: np.random.Generator) -> trimesh.Trimesh:
         thin = rng.uniform(0.25, 0.6) / count
         tops = rise + rng.choice([0, 0.3]) * np.abs(np.linspace(-1, 1, count))
         for x, top in zip(np.linspace(-1 + thin, 1 - thin, count), tops, strict=True):
-            parts.append(box([x - thin, -half[1], 0], [x + thin, half[1], top], second))
+            parts.append(box([x - thin, -half[1], 0.97 * half[2]], [x + thin, half[1], top],
+                             second))
     else:
         columns, rows = int(rng.integers(2, 7)), int(rng.integers(1, 5))
         pitch = 2 * half[:2] / [columns, rows]
         radius = rng.uniform(0.25, 0.38) * pitch.min()
         top = half[2] + 0.5 * radius if kind == 'studs' else rise
-        if kind == 'studs':  # a taller body, hollow below
-            parts = [box([-1, -half[1], -w], [1, half[1], half[2]], main)
-                     for w in [half[2] * rng.uniform(0.5, 3)]]
+        if kind == 'studs':  # a taller body, hollow below at times
+            deep = half[2] * rng.uniform(0.5, 3)
+            parts = [box([-1, -half[1], -deep], [1, half[1], half[2]], main)]
+            if chance(rng, 0.5):
+                parts = _hollow_box(half[:2], deep, half[2], main)
         outline = circle(int(rng.choice([4, 18])), radius)
         for i in range(columns):
             for j in range(rows):
@@ -243,9 +246,21 @@ def finned(rng: np.random.Generator) -> trimesh.Trimesh:
                 stud = extruded(outline, 0, top, second if kind == 'pins' else main)
                 parts.append(moved(stud, [x, y, 0]))
     if chance(rng, 0.3):
-        parts.append(box([-1.2, -0.4 * half[1], -half[2]], [1.2, 0.4 * half[1], half[2] * 0.8],
-                         accent))
+        parts.append(box([-1.2, -0.4 * half[1], -0.9 * half[2]],
+                         [1.2, 0.4 * half[1], 0.8 * half[2]], accent))
     return assemble(parts)
+
+
+def _hollow_box(half: Points, deep: float, top: float, color: Points) -> list[Mesh]:
+    """Return a box open below, from z = -deep up to top."""
+    wall = 0.09
+    parts = [box([-half[0], -half[1], 0], [half[0], half[1], top], color)]
+    for sign in (-1, 1):
+        parts += [box([sign * half[0], -half[1], -deep],
+                      [sign * (half[0] - wall), half[1], 0.02], color),
+                  box([-half[0], sign * half[1], -deep],
+                      [half[0], sign * (half[1] - wall), 0.02], color)]
+    return parts
 
 
 MACHINED: dict[Generator, float] = {

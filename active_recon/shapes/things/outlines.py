@@ -81,7 +81,7 @@ def _flower(rng: np.random.Generator) -> Points:
     lobes, depth = rng.integers(3, 10), rng.uniform(0.1, 0.4)
     wave = np.cos(lobes * angles)
     radius = 1 - depth + depth * (np.abs(wave) * 2 - 1 if chance(rng, 0.4) else wave)
-    return radius[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.asarray(radius[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
 def _heart(rng: np.random.Generator) -> Points:
@@ -122,7 +122,8 @@ def _blot(rng: np.random.Generator) -> Points:
     angles = np.arange(72) * 2 * math.pi / 72
     radius = 0.7 + sum(rng.uniform(-0.18, 0.18) * np.cos(k * angles + rng.uniform(0, 6.3))
                        for k in range(1, 6))
-    return np.maximum(radius, 0.2)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.asarray(np.maximum(radius, 0.2)[:, None]
+                      * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
 def _polygon(rng: np.random.Generator) -> Points:

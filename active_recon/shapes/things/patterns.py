@@ -36,7 +36,7 @@ def decorated(rng: np.random.Generator, mesh: Mesh, palette: Palette) -> Mesh:
     kept = found == 0
     if commonest is not None:
         kept |= (colors != commonest).any(axis=1)
-    inks = palette[[0, 1 + rng.integers(3), 1 + rng.integers(3)]]
+    inks = palette[np.array([0, *rng.integers(1, 4, 2)])]
     return painted(fine, np.where(kept[:, None], colors, inks[np.minimum(found, 2)]))
 
 
@@ -76,7 +76,7 @@ Pattern = tuple[list[Field], Callable[[Points], NDArray[np.int64]]]
 
 def _direction(rng: np.random.Generator) -> Points:
     if rng.random() < 0.75:
-        return np.eye(3)[rng.choice(3, p=[0.2, 0.2, 0.6])]
+        return np.asarray(np.eye(3)[rng.choice(3, p=[0.2, 0.2, 0.6])])
     direction = rng.normal(size=3)
     return np.asarray(direction / np.linalg.norm(direction))
 
@@ -92,7 +92,7 @@ def _halves(rng: np.random.Generator, mesh: Mesh) -> Pattern:
 
 
 def _plane(along: Points, level: float) -> Field:
-    return lambda points: points @ along - level
+    return lambda points: np.asarray(points @ along - level)
 
 
 def _banding(rng: np.random.Generator, mesh: Mesh, most: int) -> Pattern:
@@ -138,7 +138,7 @@ def _segments(rng: np.random.Generator, mesh: Mesh) -> Pattern:
     def classes(points: Points) -> NDArray[np.int64]:
         x, y, _ = (points - middle).T
         turn = (np.arctan2(y, x) - start) / (2 * math.pi) * count
-        return np.floor(turn).astype(np.int64) % 2
+        return np.asarray(np.floor(turn).astype(np.int64) % 2)
 
     return [plane(float(angle)) for angle in angles], classes
 
@@ -148,7 +148,7 @@ def _spots(rng: np.random.Generator, mesh: Mesh) -> Pattern:
     size = float(mesh.extents.max())
     edge = max(size / 28, math.sqrt(mesh.area / (0.2 * _MOST_FACES)))
     if len(mesh.faces) < _MOST_FACES / 2:
-        vertices, faces, index = trimesh.remesh.subdivide_to_size(
+        vertices, faces, index = trimesh.remesh.subdivide_to_size(  # type: ignore[no-untyped-call]
             mesh.vertices, mesh.faces, edge, max_iter=20, return_index=True)
         if len(faces) < 1.3 * _MOST_FACES:
             colors = _rgb(mesh)[index]

@@ -24,10 +24,12 @@ def laid(rng: np.random.Generator, mesh: Mesh) -> Mesh:
     if way < _UPRIGHT:
         turn = np.eye(4)
     elif way < _UPRIGHT + _TIPPED:
-        turn = trimesh.geometry.align_vectors(_resting_side(rng, mesh), [0, 0, -1])
+        turn = trimesh.geometry.align_vectors(  # type: ignore[no-untyped-call]
+            _resting_side(rng, mesh), [0, 0, -1])
     else:
         turn = trimesh.transformations.random_rotation_matrix(rng.random(3))
-    yaw = trimesh.transformations.rotation_matrix(rng.uniform(0, 2 * math.pi), [0, 0, 1])
+    yaw = trimesh.transformations.rotation_matrix(  # type: ignore[no-untyped-call]
+        rng.uniform(0, 2 * math.pi), [0, 0, 1])
     mesh.apply_transform(yaw @ turn)
     return mesh
 

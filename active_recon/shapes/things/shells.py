@@ -5,7 +5,14 @@ import math
 from active_recon.shapes.parts import assemble, beam, box, Color, Mesh, rod
 from active_recon.shapes.soft_parts import filleted, smoothed
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import arc, chance, choose, Generator, section, smooth_profile
+from active_recon.shapes.things.drawing import (
+    arc,
+    chance,
+    choose,
+    Generator,
+    section,
+    smooth_profile,
+)
 from active_recon.shapes.things.outlines import rounded
 from active_recon.shapes.things.solids import (
     circle,
@@ -57,7 +64,7 @@ def tray(rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def crate(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a crate or a cage of slats and posts, open above: wide gaps or narrow, or a pallet."""
+    """Return a crate of slats and posts, open above, its gaps wide or narrow."""
     main, second, _, _ = draw_palette(rng)
     half, high = np.array([1, rng.uniform(0.5, 1)]), rng.uniform(0.3, 1.5)
     thin, count = rng.uniform(0.03, 0.06), int(rng.integers(2, 6))
@@ -78,8 +85,8 @@ def crate(rng: np.random.Generator) -> trimesh.Trimesh:
         count = int(rng.integers(3, 7))
         pitch = 2 * half[1] / count
         for y in -half[1] + (np.arange(count) + 0.5) * pitch:
-            parts.append(box([-half[0], y - 0.38 * pitch, 0], [half[0], y + 0.38 * pitch, 2 * thin],
-                             main))
+            parts.append(box([-half[0], y - 0.38 * pitch, 0],
+                             [half[0], y + 0.38 * pitch, 2 * thin], main))
         parts += [box([x - 0.08, -half[1], -0.06], [x + 0.08, half[1], 0.02], second)
                   for x in (-0.92, 0.92)]
     if chance(rng, 0.25):
@@ -234,10 +241,9 @@ def _cupped(rng: np.random.Generator, main: Color, second: Color, thick: float) 
         y = y * (1.02 - np.abs(x) ** rng.uniform(1.5, 4))
     rings = [np.vstack([np.column_stack([x[i], y[i], z[i] + thick]),
                         np.column_stack([x[i], y[i], z[i] - thick])[::-1]]) for i in range(25)]
-    mesh = skin(rings, main)
-    below = mesh.triangles_center[:, 2] * 0
-    del below
-    return mesh
+    colors = np.where((np.arange(24) // 4 % 2 == 0)[:, None], main,
+                      second if chance(rng, 0.3) else main)
+    return skin(rings, colors)
 
 
 def shade(rng: np.random.Generator) -> trimesh.Trimesh:

@@ -8,7 +8,7 @@ from active_recon.shapes.things.animals import beast, bird, fish, plush
 from active_recon.shapes.things.colors import draw_palette, ripe
 from active_recon.shapes.things.drawing import chance, choose, Generator
 from active_recon.shapes.things.fields import ball, Body, half_space, limb, molten, waves
-from active_recon.shapes.things.solids import circle, moved, painted, revolved, swept
+from active_recon.shapes.things.solids import circle, extruded, moved, painted, revolved, swept
 import numpy as np
 from numpy.typing import NDArray
 import trimesh
@@ -34,7 +34,7 @@ def fruit(rng: np.random.Generator) -> trimesh.Trimesh:
         return molten(bodies, 0.04, cells=60)
     if kind in ('bent', 'root'):
         bend = rng.uniform(0.3, 1.3) if kind == 'bent' else rng.uniform(0, 0.2)
-        path = smoothed([[-1, 0, 0], [-0.4, 0, -bend], [0.4, 0, -bend], [1, 0, 0]], 3)
+        path = smoothed(np.array([[-1, 0, 0], [-0.4, 0, -bend], [0.4, 0, -bend], [1, 0, 0]]), 3)
         share = np.linspace(0, 1, len(path))
         swell = np.sin(math.pi * np.clip(share, 0.03, 0.98)) ** rng.uniform(0.3, 0.8)
         if kind == 'root':
@@ -107,12 +107,9 @@ def shoe(rng: np.random.Generator) -> trimesh.Trimesh:
     if chance(rng, 0.3):
         bodies.append(ball([0.75, 0, 0.2], [0.25, wide * 0.9, 0.2], detail))
     inner = wide - 0.1
-    cuts = [half_space([0, 0, 0], [0, 0, -1], second),
+    cuts = [half_space([0, 0, 0.02], [0, 0, 1], second),
             limb([-0.5, 0, 0.35], [-0.5, 0, 0.6 + 2 * high], inner, second, inner),
-            half_space([0, 0, 0.2 + high], [0, 0, 1], second)]
-    # The planes keep what is below the top and above the sole
-    cuts[0] = half_space([0, 0, 0.02], [0, 0, 1], second)
-    cuts[2] = half_space([0, 0, 0.2 + high], [0, 0, -1], second)
+            half_space([0, 0, 0.2 + high], [0, 0, -1], second)]
     if chance(rng, 0.6):
         cuts.append(limb([-0.4, 0, 0.33], [0.4, 0, 0.25], inner * 0.8, second))
     upper = molten(bodies, 0.12, cuts, cells=56)
@@ -121,7 +118,6 @@ def shoe(rng: np.random.Generator) -> trimesh.Trimesh:
     outline = smoothed([[-0.85, 0], [-0.8, -wide], [0.2, -wide * 0.9], [0.6, -wide * 1.1],
                         [0.95, 0], [0.6, wide * 1.1], [0.2, wide * 0.9], [-0.8, wide],
                         [-0.85, 0]], 2)[:-1]
-    from active_recon.shapes.things.solids import extruded
     parts.append(extruded(outline, -rng.uniform(0.05, 0.2), 0.08, second))
     if heel:
         parts.append(rod([-0.55, 0, 0], [-0.55, 0, -0.1 - heel], 0.9 * wide, second,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 import math
 
 from active_recon.shapes.parts import Color, Mesh
-from active_recon.shapes.things.polygons import triangulated
+from active_recon.shapes.things.polygons import area, triangulated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 import trimesh
@@ -101,10 +101,13 @@ def extruded(outline: ArrayLike, low: float, high: float, color: Color,
     count = len(flat)
     faces = [cap[:, ::-1], cap + (layers - 1) * count]
     start = 0
-    for loop in (outline, *holes):
+    for number, loop in enumerate((outline, *holes)):
         size = len(np.asarray(loop))
-        a = start + np.arange(size) + count * np.arange(layers - 1)[:, None]
-        a_next = start + (np.arange(size) + 1) % size + count * np.arange(layers - 1)[:, None]
+        around = start + np.arange(size)
+        if (area(loop) > 0) != (number == 0):  # the solid lies to the left of every edge
+            around = around[::-1]
+        a = around + count * np.arange(layers - 1)[:, None]
+        a_next = np.roll(around, -1) + count * np.arange(layers - 1)[:, None]
         faces.append(np.stack([a, a_next, a_next + count, a, a_next + count, a + count],
                               axis=-1).reshape(-1, 3))
         start += size
@@ -127,7 +130,8 @@ def swept(path: ArrayLike, section: ArrayLike, color: ArrayLike, closed: bool = 
 
 def pipe(path: ArrayLike, section: ArrayLike, wall: float, color: ArrayLike,
          up: ArrayLike | None = None) -> Mesh:
-    """Carry a section about 0, (M, 2), of radius 1 or so along a path as a tube open at the ends.
+    """
+    Carry a section about 0, (M, 2), of radius 1 or so along a path as a tube open at the ends.
 
     The wall is a share of the section's size.
     """
@@ -189,7 +193,7 @@ def superquadric(radii: ArrayLike, powers: tuple[float, float], color: Color) ->
     radius = np.abs(np.cos(up)) ** powers[0]
     level = np.sign(np.sin(up)) * np.abs(np.sin(up)) ** powers[0]
     mesh = revolved(np.column_stack([radius, level]), color, around)
-    mesh.apply_scale(np.asarray(radii, np.float64))
+    mesh.apply_transform(np.diag([*np.asarray(radii, np.float64), 1.0]))
     return mesh
 
 
@@ -204,7 +208,8 @@ def moved(mesh: Mesh, offset: ArrayLike = (0, 0, 0), axis: ArrayLike = (0, 0, 1)
     """Turn a mesh about an axis through 0, radians, then move it; the mesh itself."""
     transform = np.eye(4)
     if angle:
-        transform = trimesh.transformations.rotation_matrix(angle, np.asarray(axis, np.float64))
+        transform = trimesh.transformations.rotation_matrix(  # type: ignore[no-untyped-call]
+            angle, np.asarray(axis, np.float64))
     transform[:3, 3] = np.asarray(offset, np.float64)
     mesh.apply_transform(transform)
     return mesh

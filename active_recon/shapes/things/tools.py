@@ -50,7 +50,8 @@ def hammer(rng: np.random.Generator) -> trimesh.Trimesh:
                   box([-0.7 * deep, -0.8 * deep, -deep], [0.7 * deep, 0.8 * deep, 0.9 * deep],
                       second)]
         if chance(rng, 0.5):  # a claw
-            path = smoothed([[0, 0, 0], [-0.6 * half, 0, 0.1], [-1.1 * half, 0, -0.5 * half]], 2)
+            path = smoothed(np.array([[0, 0, 0], [-0.6 * half, 0, 0.1],
+                                      [-1.1 * half, 0, -0.5 * half]]), 2)
             for side in (-0.5, 0.5):
                 prong = path + np.array([0, side * deep, 0]) * np.linspace(
                     0.4, 1.2, len(path))[:, None]
@@ -69,8 +70,8 @@ def hammer(rng: np.random.Generator) -> trimesh.Trimesh:
                                [0, 1, 0], math.pi))
             moved(parts[-1], axis=[1, 0, 0], angle=math.pi / 2)
     elif kind == 'pick':
-        path = smoothed([[-1.5 * half, 0, -0.5 * half], [0, 0, 0.25], [1.5 * half, 0, -0.5 * half]],
-                        3)
+        path = smoothed([[-1.5 * half, 0, -0.5 * half], [0, 0, 0.25],
+                         [1.5 * half, 0, -0.5 * half]], 3)
         bow = 1 - 0.8 * np.abs(np.linspace(-1, 1, len(path)))
         parts.append(swept(path, circle(8, 0.8 * deep), second, scales=np.maximum(bow, 0.15)))
     else:
@@ -182,5 +183,6 @@ def pincers(rng: np.random.Generator) -> trimesh.Trimesh:
         if loops:
             size = rng.uniform(0.28, 0.42)
             ring = revolved(thick * circle(10) + [size, 0], second, closed=True)
-            parts.append(moved(ring, [-grip - size * 0.9, sign * -(open_by + 0.1 + 0.4 * size), 0]))
+            off = open_by + 0.1 + 0.4 * size
+            parts.append(moved(ring, [-grip - size * 0.9, -sign * off, 0]))
     return assemble(parts)

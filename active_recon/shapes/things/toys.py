@@ -31,8 +31,7 @@ def _wheels(rng: np.random.Generator, long: float, wide: float, color: Color,
     for x in np.linspace(0.18, 0.82, int(choose(rng, {2: 0.75, 3: 0.2, 4: 0.05}))) * long:
         parts.append(rod([x, -wide / 2, 0], [x, wide / 2, 0], 0.4 * radius, hub))
         for y in (-wide / 2, wide / 2):
-            wheel = torus(radius - thick / 2, thick / 2, color) if chance(rng, 0) else rod(
-                [0, 0, -thick / 2], [0, 0, thick / 2], radius, color, sections=28)
+            wheel = rod([0, 0, -thick / 2], [0, 0, thick / 2], radius, color, sections=28)
             parts.append(moved(wheel, [x, y, 0], [1, 0, 0], math.pi / 2))
             parts.append(rod([x, y - 0.6 * thick, 0], [x, y + 0.6 * thick, 0], 0.45 * radius, hub,
                              sections=16))
@@ -84,7 +83,8 @@ def vehicle(rng: np.random.Generator) -> trimesh.Trimesh:
         elbow = [mast[0] + rng.uniform(0.2, 0.6), 0, top + rng.uniform(0.6, 1.2)]
         tip = [elbow[0] + rng.uniform(0.5, 1.1), 0, elbow[2] - rng.uniform(-0.3, 0.7)]
         parts += [rod([mast[0], 0, top - 0.05], [mast[0], 0, top + 0.35], 0.75 * side, second),
-                  beam([mast[0], 0, top + 0.2], elbow, 0.17, accent), beam(elbow, tip, 0.15, accent),
+                  beam([mast[0], 0, top + 0.2], elbow, 0.17, accent),
+                  beam(elbow, tip, 0.15, accent),
                   ellipsoid(elbow, (0.14,) * 3, second),
                   box(np.array(tip) - 0.2, np.array(tip) + [0.15, 0.2, 0.1], detail)]
     if chance(rng, 0.4):
@@ -121,7 +121,8 @@ def peg_toy(rng: np.random.Generator) -> trimesh.Trimesh:
             moved(part, [*rng.normal(0, 0.05, 2), level - 0.01], angle=rng.uniform(-0.5, 0.5))
         else:
             part = revolved([[0.9 * size, level - 0.02], [size * 0.75, level + 0.8 * high],
-                             [size * 0.85, level + 0.8 * high], [size * 0.85, level + high]], color)
+                             [size * 0.85, level + 0.8 * high], [size * 0.85, level + high]],
+                            color)
         parts.append(part)
         level += high
     if kind in ('ring', 'disc'):
@@ -176,7 +177,7 @@ def figure(rng: np.random.Generator) -> trimesh.Trimesh:
 
 
 def device(rng: np.random.Generator) -> trimesh.Trimesh:
-    """Return a case with knobs, keys, a screen, a lens, an aerial, feet: radio, camera, toaster."""
+    """Return a case with knobs, keys, a screen, a lens, an aerial, feet: a radio, a camera."""
     main, second, accent, detail = draw_palette(rng)
     half = rng.uniform([0.5, 0.15, 0.25], [1.2, 0.6, 0.9])
     parts: list[Mesh] = [box(-half, half, main) if chance(rng, 0.4) else
@@ -205,8 +206,8 @@ def device(rng: np.random.Generator) -> trimesh.Trimesh:
                       and z + j * pitch + 0.1 < half[2]]
     if chance(rng, 0.3):
         x = rng.uniform(-0.8, 0.8) * half[0]
-        parts.append(rod([x, 0, half[2] - 0.1], [x + rng.uniform(-0.3, 0.3), 0, half[2] + 0.9], 0.04,
-                         detail))
+        tip = [x + rng.uniform(-0.3, 0.3), 0, half[2] + rng.uniform(0.3, 0.9)]
+        parts.append(rod([x, 0, half[2] - 0.1], tip, 0.04, detail))
     if chance(rng, 0.35):
         wide, rise = rng.uniform(0.5, 0.85) * half[0], rng.uniform(0.2, 0.5)
         path = smoothed([[-wide, 0, half[2] - 0.05], [-wide, 0, half[2] + rise],

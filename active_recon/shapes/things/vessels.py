@@ -26,13 +26,14 @@ def mug(rng: np.random.Generator) -> trimesh.Trimesh:
     main, second, accent, detail = draw_palette(rng)
     height, wall = rng.uniform(1, 3), rng.uniform(0.07, 0.15)
     foot, belly = rng.uniform(0.55, 1), rng.uniform(0.85, 1.25)
-    corners = {'straight': [[1, 0], [1, height]],
-               'taper': [[foot, 0], [1, height]],
-               'belly': [[foot, 0], [belly, 0.45 * height], [1, height]],
-               'tulip': [[foot, 0], [belly, 0.3 * height], [0.8, 0.7 * height], [1, height]],
-               'round': [[0.5, 0], [0.95, 0.15 * height], [1, height]]}
+    corners: dict[str, list[list[float]]] = {
+        'straight': [[1, 0], [1, height]],
+        'taper': [[foot, 0], [1, height]],
+        'belly': [[foot, 0], [belly, 0.45 * height], [1, height]],
+        'tulip': [[foot, 0], [belly, 0.3 * height], [0.8, 0.7 * height], [1, height]],
+        'round': [[0.5, 0], [0.95, 0.15 * height], [1, height]]}
     kind = str(rng.choice([*corners]))
-    outer = smooth_profile([[0, 0], *corners[kind]], 2 if kind != 'straight' else 1)
+    outer = smooth_profile([[0.0, 0.0], *corners[kind]], 2 if kind != 'straight' else 1)
     profile = hollow(outer, wall)
     colors = np.tile(main, (len(profile) - 1, 1))
     colors[len(outer):] = second if chance(rng, 0.5) else main
@@ -41,11 +42,9 @@ def mug(rng: np.random.Generator) -> trimesh.Trimesh:
     around = section(rng, 0.8)
     parts = [revolved(profile, colors, around)]
     handles = choose(rng, {0: 0.2, 1: 0.7, 2: 0.1})
-    for i in range(handles):
+    if handles:
         ear = _handle(rng, outer, wall, height, detail if chance(rng, 0.3) else main)
-        if handles == 2:
-            ear = _handle(np.random.default_rng(int(height * 1e6)), outer, wall, height, main)
-        parts.append(moved(ear, angle=math.pi * i))
+        parts += [moved(assemble([ear]), angle=math.pi * i) for i in range(handles)]
     if chance(rng, 0.15):  # a drink
         level = rng.uniform(0.6, 0.9) * height
         parts.append(revolved([[_radius(outer, level) - wall / 2, level - 0.02],
@@ -68,9 +67,7 @@ def _handle(rng: np.random.Generator, outer: Points, wall: float, height: float,
     a, b = _radius(outer, low) - 0.6 * wall, _radius(outer, high) - 0.6 * wall
     reach = max(a, b) + out
     kind = choose(rng, {'round': 0.5, 'square': 0.2, 'ear': 0.2, 'hook': 0.1})
-    if kind == 'round':
-        corners = [[a, low], [reach, low], [reach, high], [b, high]]
-    elif kind == 'square':
+    if kind in ('round', 'square'):
         corners = [[a, low], [reach, low], [reach, high], [b, high]]
     elif kind == 'ear':
         corners = [[a, low], [a + 0.5 * out, low], [reach + 0.2, high], [reach, high + 0.1],
