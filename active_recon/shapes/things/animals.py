@@ -51,7 +51,8 @@ def beast(rng: np.random.Generator) -> trimesh.Trimesh:
     """Return an animal on its legs: stout or slender, long- or short-necked, with a tail."""
     coat = furry(rng)
     main, second, dark, _ = coat
-    long, thick, leg = rng.uniform(0.5, 1.1), rng.uniform(0.25, 0.5), rng.uniform(0.1, 1)
+    long, thick = rng.uniform(0.35, 1), rng.uniform(0.25, 0.5)
+    leg = rng.uniform(0.1, 0.3) if chance(rng, 0.2) else rng.uniform(0.35, 1.2)
     high = leg + thick * 0.6
     bodies = [limb([-long, 0, high], [long, 0, high + rng.uniform(-0.1, 0.25)],
                    thick * rng.uniform(0.8, 1.1), main, thick * rng.uniform(0.7, 1.1))]
@@ -64,7 +65,7 @@ def beast(rng: np.random.Generator) -> trimesh.Trimesh:
         foot = hip * [1, 1.15, 0] + [stride[i] * leg, 0, slim]
         bodies += [limb(hip, foot, slim * 1.5, main, slim),
                    ball(foot + [0.05, 0, 0], [slim * 1.5, slim * 1.1, slim], dark)]
-    size = rng.uniform(0.2, 0.36)
+    size = rng.uniform(0.2, 0.45)
     neck = np.array([rng.uniform(0.15, 0.5), 0, rng.uniform(0, 0.4) if chance(rng, 0.7)
                      else rng.uniform(0.5, 1.6)])
     shoulder = np.array([0.9 * long, 0, high + 0.2 * thick])

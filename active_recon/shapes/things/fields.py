@@ -13,6 +13,8 @@ import trimesh
 
 Points = NDArray[np.float32]
 Distance = Callable[[Points], NDArray[np.float32]]
+_FAR = np.float32(1e3)
+_HIGHEST_BUMP = 0.4  # of `waves`, in the bodies' own unit
 
 
 @dataclass(frozen=True)
@@ -108,18 +110,29 @@ def molten(bodies: Sequence[Body], blend: float = 0.0, cuts: Sequence[Body] = ()
     Return the surface of bodies melted together over a length, less the cuts.
 
     It is meshed with so many cells along its longest side. A face has the colour of the body that
-    is nearest, or of the cut that made it. `bumps` is added to the distance. What the cuts leave is one
-    piece, the largest.
+    is nearest, or of the cut that made it. `bumps` is added to the distance. Of what the cuts
+    leave, the largest piece stays.
     """
     low = np.min([body.bounds[0] for body in bodies], axis=0)
     high = np.max([body.bounds[1] for body in bodies], axis=0)
-    low, high = low - 0.6 * blend, high + 0.6 * blend
+    swell = 0.6 * blend + (_HIGHEST_BUMP if bumps else 0)
+    low, high = low - swell, high + swell
     pitch = float((high - low).max()) / cells
     counts = np.ceil((high - low) / pitch).astype(int) + 5
     low = low - 2 * pitch
     axes = [low[i] + pitch * np.arange(counts[i]) for i in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing='ij'), axis=-1).reshape(-1, 3).astype(np.float32)
-    field = _melted(bodies, blend, bumps, points)
+    points = np.stack(np.meshgrid(*axes, indexing='ij'), axis=-1).astype(np.float32)
+    grid = np.full(counts, _FAR)
+    # A body moves the surface no farther than the blend, so the cells about it are enough
+    reach = blend + 2 * pitch + (_HIGHEST_BUMP if bumps else 0)
+    for body in bodies:
+        first = np.maximum(np.floor((body.bounds[0] - reach - low) / pitch), 0).astype(int)
+        last = np.ceil((body.bounds[1] + reach - low) / pitch).astype(int) + 1
+        near = tuple(slice(*ends) for ends in zip(first, last, strict=True))
+        distance = body.distance(points[near].reshape(-1, 3)).reshape(grid[near].shape)
+        grid[near] = _joined(grid[near], distance, blend)
+    points = points.reshape(-1, 3)
+    field = grid.ravel() if bumps is None else grid.ravel() + bumps(points)
     for cut in cuts:
         field = np.maximum(field, -cut.distance(points))
     grid = field.reshape(counts)

@@ -32,7 +32,7 @@ def milled(rng: np.random.Generator) -> trimesh.Trimesh:
         radius = rng.uniform(0.4, 0.85) * np.delete(half, axis).min()
         bodies.append(column(along * 0, along * rise, radius, accent))
     cuts: list[Body] = []
-    for _ in range(int(rng.integers(1, 6))):
+    for _ in range(int(rng.integers(2, 7))):
         cuts.append(_cut(rng, half, detail if chance(rng, 0.2) else inside))
     return molten(bodies, cuts=cuts, cells=52)
 

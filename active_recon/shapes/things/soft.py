@@ -77,7 +77,7 @@ def stone(rng: np.random.Generator) -> trimesh.Trimesh:
     if kind == 'rough':
         body = ball([0, 0, 0], rng.uniform(0.5, 1, 3), grey)
         bumps = waves(rng, rng.uniform(0.5, 1.6), rng.uniform(0.04, 0.17), int(rng.integers(4, 9)))
-        return molten([body, limb([0, 0, 0], [0.1, 0, 0], 0.3, grey)], 0.2, bumps=bumps, cells=50)
+        return molten([body, limb([0, 0, 0], [0.1, 0, 0], 0.3, grey)], 0.2, bumps=bumps, cells=66)
     if kind == 'faceted':
         points = rng.normal(size=(int(rng.integers(7, 40)), 3))
         points /= np.linalg.norm(points, axis=1, keepdims=True)
