@@ -21,10 +21,7 @@ from active_recon.shapes.things.solids import (
     swept,
 )
 import numpy as np
-from numpy.typing import NDArray
 import trimesh
-
-Points = NDArray[np.float64]
 
 
 def sheet(rng: np.random.Generator) -> trimesh.Trimesh:

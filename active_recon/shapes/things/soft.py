@@ -10,10 +10,7 @@ from active_recon.shapes.things.drawing import chance, choose, Generator
 from active_recon.shapes.things.fields import ball, Body, half_space, limb, molten, waves
 from active_recon.shapes.things.solids import circle, extruded, moved, painted, revolved, swept
 import numpy as np
-from numpy.typing import NDArray
 import trimesh
-
-Points = NDArray[np.float64]
 
 
 def fruit(rng: np.random.Generator) -> trimesh.Trimesh:

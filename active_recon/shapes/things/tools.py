@@ -8,10 +8,7 @@ from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import chance, choose, section, smooth_profile
 from active_recon.shapes.things.solids import circle, extruded, moved, revolved, swept
 import numpy as np
-from numpy.typing import NDArray
 import trimesh
-
-Points = NDArray[np.float64]
 
 
 def _grip(rng: np.random.Generator, long: float, thick: float, main: Color,
