@@ -6,6 +6,7 @@ voxel grid. A camera's pose is that of its optical frame: z forward, x right, y 
 counter-clockwise about +z from +x.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
@@ -63,6 +64,12 @@ class Intrinsics:
         """K of the paper's section 3.2, (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
 
+    @classmethod
+    def from_matrix(cls, matrix: NDArray[np.float64], width: int, height: int) -> 'Intrinsics':
+        """Return the pinhole of a matrix K, (3, 3), on an image of a size in pixels."""
+        return cls(float(matrix[0, 0]), float(matrix[1, 1]), float(matrix[0, 2]),
+                   float(matrix[1, 2]), width, height)
+
     def resized(self, width: int, height: int) -> 'Intrinsics':
         """Return the same lens seen on an image of another size."""
         across, down = width / self.width, height / self.height
@@ -110,6 +117,28 @@ class Camera:
         """Radians up from the horizon."""
         across = math.hypot(self.position[0], self.position[1])
         return math.atan2(self.position[2], across)
+
+    @property
+    def direction(self) -> NDArray[np.float64]:
+        """Unit vector from the object frame's origin to the camera, (3,)."""
+        return self.position / self.distance
+
+    def turned(self, yaw: float) -> 'Camera':
+        """Return the camera turned counter-clockwise about +z, radians; by 0 it stays as it is."""
+        if yaw == 0:
+            return self
+        turn = np.eye(4)
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        turn[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        return Camera(turn @ self.pose, self.intrinsics)
+
+    def scaled(self, factor: float) -> 'Camera':
+        """Return the camera at `factor` times its distance, in the same direction."""
+        if factor == 1:
+            return self
+        pose = self.pose.copy()
+        pose[:3, 3] *= factor
+        return Camera(pose, self.intrinsics)
 
     @property
     def object_to_camera(self) -> NDArray[np.float64]:
@@ -160,12 +189,46 @@ class Camera:
         return np.asarray(straight[..., :1] * right + straight[..., 1:] * below + forward)
 
 
+class OrbitCamera(Camera):
+    """
+    A camera made from azimuth, elevation and distance, which it has to the last bit.
+
+    What is None is that of the pose, as where a field was replaced.
+    """
+
+    def __init__(self, pose: NDArray[np.float64], intrinsics: Intrinsics = CANONICAL_INTRINSICS,
+                 azimuth: float | None = None, elevation: float | None = None,
+                 distance: float | None = None) -> None:
+        super().__init__(pose, intrinsics)
+        object.__setattr__(self, '_made_from', (
+            super().azimuth if azimuth is None else wrap_azimuth(azimuth),
+            super().elevation if elevation is None else elevation,
+            super().distance if distance is None else distance))
+
+    _made_from: tuple[float, float, float]
+
+    @property
+    def azimuth(self) -> float:
+        """Radians in [0, 2 pi), counter-clockwise about +z from +x."""
+        return self._made_from[0]
+
+    @property
+    def elevation(self) -> float:
+        """Radians up from the horizon."""
+        return self._made_from[1]
+
+    @property
+    def distance(self) -> float:
+        """Metres from the object frame's origin."""
+        return self._made_from[2]
+
+
 def orbit_camera(
     azimuth: float,
     elevation: float = CANONICAL_ELEVATION,
     distance: float = CANONICAL_DISTANCE,
     intrinsics: Intrinsics = CANONICAL_INTRINSICS,
-) -> Camera:
+) -> OrbitCamera:
     """
     Return the camera that looks at the origin from an azimuth, upright.
 
@@ -184,4 +247,38 @@ def orbit_camera(
     pose[:3, 1] = np.cross(-backward, right)
     pose[:3, 2] = -backward
     pose[:3, 3] = distance * backward
-    return Camera(pose, intrinsics)
+    return OrbitCamera(pose, intrinsics, azimuth, elevation, distance)
+
+
+def view_distance(a: Camera, b: Camera) -> float:
+    """
+    Return how far apart two views of the object are, radians in [0, pi].
+
+    The angle at the object's centre between the two cameras: how far each is away and how it is
+    rolled makes no other view. This is the one distance of goals, gates and policies.
+    """
+    return float(direction_distance(a.direction, b.direction))
+
+
+def direction_distance(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    """Return the angles between directions (..., 3) and (..., 3), radians; shapes broadcast."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    # The arc cosine alone would be off by 1e-8 near 0
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))
+
+
+def nearest_camera(camera: Camera, cameras: Sequence[Camera]) -> int:
+    """Return the index of the camera of the nearest view; the first of those alike."""
+    directions = np.array([each.direction for each in cameras])
+    return int(direction_distance(directions, camera.direction).argmin())
+
+
+def pose_directions(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the unit vectors from the object to cameras, poses (..., 4, 4) to (..., 3)."""
+    positions = poses[..., :3, 3]
+    return np.asarray(positions / np.linalg.norm(positions, axis=-1, keepdims=True))
+
+
+def pose_azimuths(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the azimuths of poses, (..., 4, 4) to (...), radians in [0, 2 pi)."""
+    return np.asarray(np.arctan2(poses[..., 1, 3], poses[..., 0, 3]) % TURN)

@@ -1,7 +1,6 @@
 """Frozen configurations: what is written beside the weights, and nothing a layer ever sees."""
 
 from dataclasses import asdict, dataclass, fields
-import math
 from typing import Any, Self
 
 from active_recon.errors import ConfigError
@@ -28,35 +27,6 @@ class Config:
     def to_dict(self) -> dict[str, Any]:
         """Return the plain mapping."""
         return asdict(self)
-
-
-@dataclass(frozen=True)
-class NetworkConfig(Config):
-    """
-    Sizes of the 2D-3D-attention network; the paper states none of them.
-
-    `view_separation`, radians, is how far its goals stay from every view taken; the paper's is 0.
-    """
-
-    stem_channels: int = 32
-    block_channels: tuple[int, int, int] = (48, 96, 128)
-    recurrent_channels: int = 128
-    bottleneck_channels: int = 352
-    latent_channels: int = 24
-    volume_channels: int = 64
-    decoder_channels: tuple[int, int] = (64, 24)
-    glimpse_channels: int = 128
-    view_separation: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse sizes that make no network."""
-        sizes = [size for name, value in self.to_dict().items() if name.endswith('channels')
-                 for size in (value if isinstance(value, tuple) else (value,))]
-        if min(sizes) < 1:
-            raise ConfigError(f'NetworkConfig: expected channels of 1 or more, got {min(sizes)}')
-        if not 0 <= self.view_separation <= math.pi:
-            raise ConfigError('NetworkConfig: expected a view_separation from 0 to pi, got '
-                              f'{self.view_separation}')
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,12 @@ def share_outside(camera: Camera, object_size: float) -> float:
     return float(np.clip(1 - inside / cv2.contourArea(silhouette), 0, 1))
 
 
+def cube_corners() -> NDArray[np.float64]:
+    """Return the corners of a cube of side 1 about the origin, (8, 3)."""
+    ends = (-0.5, 0.5)
+    return np.array([[x, y, z] for x in ends for y in ends for z in ends])
+
+
 def _edges() -> NDArray[np.float64]:
     """Return points on the twelve edges of a cube of side 1 about the origin, (108, 3)."""
     points = [np.insert([first, second], axis, along)

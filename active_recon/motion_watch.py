@@ -1,6 +1,6 @@
 """What a camera's poses show over time: that they jump, or that it does not go to its goal."""
 
-from active_recon.cameras import azimuth_difference, Camera
+from active_recon.cameras import Camera, view_distance
 from active_recon.stillness import Stillness
 from active_recon.stream_watch import CLOCK_BACK_S
 import numpy as np
@@ -13,7 +13,7 @@ class MotionWatch:
     Told of every pose, tells what is wrong with the camera's motion; stamps are nanoseconds.
 
     A camera has stalled that stands for `stall_timeout` seconds while an open goal is more than
-    `goal_tolerance` radians of azimuth away.
+    `goal_tolerance` radians away.
     """
 
     def __init__(self, goal_tolerance: float, stall_timeout: float) -> None:
@@ -25,21 +25,21 @@ class MotionWatch:
         """Begin anew, as if no pose had come yet."""
         self._stillness = Stillness()
         self._last = 0
-        self._goal: float | None = None
+        self._goal: Camera | None = None
         self._goal_since = 0
         self._away = 0.0
 
-    def heard(self, camera: Camera, stamp: int, goal: float | None) -> None:
-        """Note where the camera is and the azimuth of its open goal; older poses are passed by."""
+    def heard(self, camera: Camera, stamp: int, goal: Camera | None) -> None:
+        """Note where the camera is, and its open goal; older poses are passed by."""
         if stamp < self._last - CLOCK_BACK_S * 1e9:
             self.clear()
         if stamp <= self._last:
             return
         self._last = stamp
         self._stillness.add(camera, stamp)
-        if goal != self._goal:
+        if goal is not self._goal:
             self._goal, self._goal_since = goal, stamp
-        self._away = 0.0 if goal is None else abs(float(azimuth_difference(camera.azimuth, goal)))
+        self._away = 0.0 if goal is None else view_distance(camera, goal)
 
     def found(self) -> dict[str, str]:
         """Return what is wrong since the last pose: a short word of each fault, and a sentence."""

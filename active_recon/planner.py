@@ -1,28 +1,42 @@
 """A policy and the state of one episode: the core of the view planner's node."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import Any
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view, TURN, wrap_azimuth
+from active_recon.cameras import (
+    azimuth_difference,
+    AZIMUTHS,
+    Camera,
+    CANONICAL_DISTANCE,
+    nearest_camera,
+    orbit_camera,
+    OrbitCamera,
+    TURN,
+    view_distance,
+)
 from active_recon.errors import ConfigError, ViewError
 from active_recon.motion import MotionLimits, worth
-from active_recon.policies import Choice, load_policy, Policy
+from active_recon.policies import Choice, load_policy, Observation, Policy, PolicyOptions
+from active_recon.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
+
+_STEEPEST = math.radians(89)  # of goals at the camera's own elevation: above, nothing is upright
 
 
 @dataclass(frozen=True, eq=False)
 class Goal:
     """
-    Where to look next, and what every candidate that can be reached is worth (more is better).
+    The camera to look from next, and what every candidate that can be reached is worth.
 
-    The azimuth itself may lie between the candidates, (N,); azimuths in radians.
+    - camera: its pose in the object frame; it may lie between the candidates
+    - candidates: N cameras; scores: (N,), more is better
     """
 
-    azimuth: float
-    candidates: NDArray[np.float64]
+    camera: Camera
+    candidates: Sequence[Camera]
     scores: NDArray[np.float32]
 
 
@@ -38,20 +52,40 @@ class Decision:
     reason: str = ''
 
 
+@dataclass(frozen=True, eq=False)
+class _SeenView:
+    """A view that the planner was told of."""
+
+    latent: NDArray[np.float32]
+    camera: Camera
+    volume: VoxelGrid | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """Of a choice: the camera between the candidates, if any, and the candidates' scores (N,)."""
+
+    camera: Camera | None
+    scores: NDArray[np.float32]
+
+
 class Planner:
     """
     Decides after every view of an episode: where next, or that it is enough.
 
-    Azimuths come and go in the object frame. `object_yaw` is the azimuth of the object's front
-    (radians): a learned policy thinks relative to the front. A goal is what the policy chooses,
-    or the best of the candidates where the camera cannot go there, was there already, or has too
-    long a way: `motion_weight` is what half a turn costs, beside 1 for what lies between the
-    policy's worst and best candidate. An azimuth is asked for again only when no other is left.
+    Goals are cameras in the object frame that look at its centre, upright. They stand at
+    `elevation` (radians; None: that of the camera's last view) and `distance` (metres).
+    `object_yaw` is the azimuth of the object's front (radians): a policy that was learned with a
+    network that needs it thinks relative to the front. A goal is what the policy chooses, or the
+    best of the candidates where the camera cannot go there, was there already, or has too long a
+    way: `motion_weight` is what half a turn costs, beside 1 for what lies between the policy's
+    worst and best candidate. A view is asked for again only when no other is left.
     """
 
     def __init__(self, policy: Policy, max_views: int = 5, entropy_tolerance: float = 0.01,
                  object_yaw: float = 0.0, limits: MotionLimits | None = None,
-                 motion_weight: float = 0.0) -> None:
+                 motion_weight: float = 0.0, elevation: float | None = None,
+                 distance: float = CANONICAL_DISTANCE) -> None:
         if max_views < 1:
             raise ConfigError(f'max_views: expected 1 or more, got {max_views}')
         if not 0 <= entropy_tolerance < 1:
@@ -67,28 +101,37 @@ class Planner:
         self._yaw = object_yaw
         self._limits = limits or MotionLimits()
         self._motion_weight = motion_weight
-        self._candidates = self._limits.candidates((AZIMUTHS + object_yaw) % TURN)
+        self._elevation = elevation
+        self._distance = distance
+        self._azimuths = self._limits.candidates((AZIMUTHS + object_yaw) % TURN)
         self.reset()
 
     @classmethod
     def load(cls, policy: str = 'attention', weights: Path | None = None, seed: int = 0,
              max_views: int = 5, entropy_tolerance: float = 0.01, object_yaw: float = 0.0,
              device: str = 'cpu', limits: MotionLimits | None = None,
-             motion_weight: float = 0.0) -> 'Planner':
+             motion_weight: float = 0.0, elevation: float | None = None,
+             distance: float = CANONICAL_DISTANCE, threads: int | None = None) -> 'Planner':
         """Build the planner of a policy's name; raises ConfigError and WeightsError."""
-        rng = np.random.default_rng(seed)
-        return cls(load_policy(policy, weights, rng, max_views, device), max_views,
-                   entropy_tolerance, object_yaw, limits, motion_weight)
+        options = PolicyOptions(np.random.default_rng(seed), max_views, weights, device=device,
+                                threads=threads)
+        return cls(load_policy(policy, options), max_views, entropy_tolerance, object_yaw, limits,
+                   motion_weight, elevation, distance)
+
+    @property
+    def wants_volume(self) -> bool:
+        """Whether the policy looks at the reconstruction, and not at its latent alone."""
+        return self._policy.wants_volume
 
     def reset(self) -> None:
         """Forget the episode."""
-        self._taken: list[float] = []
-        self._latents: list[NDArray[np.float32]] = []
+        self._views: list[_SeenView] = []
         self._entropies: list[float] = []
-        self._state: Any = None
+        self._state = self._policy.initial_state(1)
         self._choice: Choice | None = None
-        self._wanted: tuple[float, NDArray[np.float32]] | None = None
-        self._failed: set[int] = set()
+        self._wanted: _Wanted | None = None
+        self._ring: list[OrbitCamera] = []
+        self._failed: list[Camera] = []
         self._stopped = False
         self._goal: Goal | None = None
 
@@ -98,70 +141,74 @@ class Planner:
 
         Raises ViewError where this planner's policy cannot use it, and then is good for nothing.
         """
-        self._taken, self._latents = list(other._taken), list(other._latents)
-        self._entropies, self._stopped = list(other._entropies), other._stopped
-        self._failed = {nearest_view(float(other._candidates[each]), self._candidates)
-                        for each in other._failed}
-        if self._policy is other._policy:
-            self._choice, self._state = other._choice, other._state
-        else:
-            for count, latent in enumerate(self._latents, 1):
-                self._choose(latent, self._taken[:count])
-        if self._taken:
-            self._aim(self._taken[-1])
-        elif other._wanted is not None:
-            self._aim_first(other._wanted[0])
+        self._views, self._entropies = list(other._views), list(other._entropies)
+        self._failed, self._stopped = list(other._failed), other._stopped
+        if self._views:
+            self._look_from(self._views[-1].camera)
+            if self._policy is other._policy and self._is_ring_of(other):
+                self._choice, self._state = other._choice, other._state
+            else:
+                for count in range(1, len(self._views) + 1):
+                    self._choose(self._views[:count])
+            self._aim(self._views[-1].camera)
+        elif other._wanted is not None and other._wanted.camera is not None:
+            self._aim_first(other._wanted.camera)
 
-    def first_goal(self, azimuth: float) -> Goal:
+    def first_goal(self, camera: Camera) -> Goal:
         """
-        Return the goal of the view that no policy chooses: there, or as near as can be.
+        Return the goal of the view that no policy chooses: a camera's, or as near as can be.
 
-        Raises ViewError where the azimuth is not finite, or none is left that was not given up.
+        Raises ViewError where none is left that was not given up.
         """
-        if not math.isfinite(azimuth):
-            raise ViewError(f'expected a finite azimuth, got {azimuth}', 'azimuth')
-        self._aim_first(azimuth)
+        self._aim_first(camera)
         return self.plan()
 
-    def add_view(self, latent: NDArray[np.float32], azimuth: float, entropy: float) -> Decision:
+    def add_view(self, latent: NDArray[np.float32], camera: Camera, entropy: float,
+                 volume: VoxelGrid | None = None) -> Decision:
         """
         Take in a view and decide.
 
-        - latent: (C, h, w), A_t after that view
-        - azimuth: of the view that was really taken, radians
+        - latent: (C, h, w), the network's after that view
+        - camera: of the view that was really taken, in the object frame
         - entropy: of the reconstruction after that view, nats
+        - volume: the published probabilities, for a policy that wants them
 
         Raises ViewError, and then nothing has changed.
         """
-        if not (math.isfinite(azimuth) and math.isfinite(entropy) and np.isfinite(latent).all()):
-            raise ViewError('expected a finite latent, azimuth and entropy, got azimuth '
-                            f'{azimuth} and entropy {entropy}', 'latent')
-        taken = [*self._taken, azimuth]
-        self._choose(latent, taken)
-        self._taken = taken
-        self._latents.append(latent)
+        if not (math.isfinite(entropy) and np.isfinite(latent).all()):
+            raise ViewError(f'expected a finite latent and entropy, got entropy {entropy}',
+                            'latent')
+        before = self._ring
+        self._look_from(camera)
+        views = [*self._views, _SeenView(latent, camera, volume)]
+        try:
+            self._choose(views)
+        except ViewError:
+            self._ring = before
+            raise
+        self._views = views
         self._entropies.append(entropy)
-        self._aim(azimuth)
+        self._aim(camera)
         if self._stopped:
             return self.stop()
-        if len(self._taken) >= self._max_views:
+        if len(self._views) >= self._max_views:
             return Decision(None, 'max_views')
         if self._settled():
             return Decision(None, 'entropy_settled')
         return self.next_goal()
 
-    def give_up(self, azimuth: float, camera: float | None = None) -> Decision:
+    def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:
         """
-        Leave a goal's azimuth out for the episode and decide on the next best.
+        Leave a goal's view out for the episode and decide on the next best.
 
-        `camera` is the azimuth where it is, None: where the last view was taken; radians. Raises
-        ViewError where nothing was asked for yet.
+        `camera` is where it is, None: where the last view was taken. Raises ViewError where
+        nothing was asked for yet.
         """
         if self._wanted is None:
             raise ViewError('expected a goal before it is given up, got none', 'plan')
-        self._failed.add(nearest_view(azimuth, self._candidates))
+        self._failed.append(goal)
         if camera is None:
-            camera = self._taken[-1] if self._taken else azimuth
+            camera = self._views[-1].camera if self._views else goal
         self._goal = self._best(camera)
         return self.next_goal()
 
@@ -183,48 +230,76 @@ class Planner:
         """Return the goal after the views so far, or that none can be reached."""
         return Decision(self._goal, '' if self._goal else 'no_reachable_azimuth')
 
-    def _choose(self, latent: NDArray[np.float32], taken: list[float]) -> None:
-        """Let the policy choose after a view."""
-        self._choice, self._state = self._policy.choose(
-            latent[None], np.array([taken]) - self._yaw, self._state)
+    def _look_from(self, camera: Camera) -> None:
+        """Place the candidates, where their elevation is the camera's."""
+        if not self._ring or self._ring[0].elevation != self._height(camera):
+            self._ring = [self._place(float(azimuth), camera) for azimuth in self._azimuths]
 
-    def _aim_first(self, azimuth: float) -> None:
-        """Make the best of an azimuth that no policy chose."""
-        away = azimuth_difference(self._candidates, azimuth)
-        self._wanted = wrap_azimuth(azimuth), -np.abs(away).astype(np.float32)
-        self._goal = self._best(azimuth)
+    def _height(self, camera: Camera) -> float:
+        """Return the elevation of goals while the camera's last view is that one."""
+        if self._elevation is not None:
+            return self._elevation
+        return min(max(camera.elevation, -_STEEPEST), _STEEPEST)
 
-    def _aim(self, azimuth: float) -> None:
-        """Make the best of the policy's choice for a camera that is at an azimuth."""
+    def _place(self, azimuth: float, camera: Camera) -> OrbitCamera:
+        return orbit_camera(azimuth, self._height(camera), self._distance)
+
+    def _is_ring_of(self, other: 'Planner') -> bool:
+        return (self._elevation == other._elevation and self._yaw == other._yaw
+                and np.array_equal(self._azimuths, other._azimuths))
+
+    def _choose(self, views: Sequence[_SeenView]) -> None:
+        """Let the policy choose after the last of some views."""
+        last = views[-1]
+        if last.volume is None and self._policy.wants_volume:
+            raise ViewError('expected the probabilities beside the latent, which this policy '
+                            'looks at, got none', 'volume')
+        taken, candidates = (
+            np.stack([each.turned(-self._yaw).pose for each in cameras])[None]
+            for cameras in ([view.camera for view in views], self._ring))
+        volume = None if last.volume is None else turned(
+            last.volume.occupancy, -self._yaw)[None]
+        seen = Observation(last.latent[None], taken, candidates, volume)
+        self._choice, self._state = self._policy.choose(seen, self._state)
+
+    def _aim_first(self, camera: Camera) -> None:
+        """Make the best of a camera that no policy chose."""
+        self._look_from(camera)
+        away = [view_distance(each, camera) for each in self._ring]
+        self._wanted = _Wanted(self._place(camera.azimuth, camera), -np.array(away, np.float32))
+        self._goal = self._best(camera)
+
+    def _aim(self, camera: Camera) -> None:
+        """Make the best of the policy's choice for a camera."""
         assert self._choice is not None
-        self._wanted = (wrap_azimuth(float(self._choice.azimuth[0]) + self._yaw),
-                        self._at_candidates(self._choice.scores[0]))
-        self._goal = self._best(azimuth)
+        proposed = np.nan if self._choice.azimuth is None else float(self._choice.azimuth[0])
+        self._wanted = _Wanted(
+            None if math.isnan(proposed) else self._place(proposed + self._yaw, camera),
+            self._choice.scores[0])
+        self._goal = self._best(camera)
 
-    def _best(self, azimuth: float) -> Goal | None:
-        """Return the best goal for a camera that is at an azimuth; None where none is left."""
+    def _best(self, camera: Camera) -> Goal | None:
+        """Return the best goal for a camera that is somewhere; None where none is left."""
         assert self._wanted is not None
-        choice, scores = self._wanted
-        options = np.append(choice, self._candidates)
-        nearest = np.array([nearest_view(choice, self._candidates),
-                            *range(len(self._candidates))])
-        open_ = self._limits.allows(options) & ~np.isin(nearest, list(self._failed))
-        taken = [nearest_view(view, self._candidates) for view in self._taken]
-        fresh = open_ & ~np.isin(nearest, taken)
-        travel = np.abs(azimuth_difference(options, azimuth))
-        value = worth(np.append(scores.max(), scores), travel,
-                      self._motion_weight if self._taken else 0.0)
-        if not open_.any():
+        scores, options = self._wanted.scores, list[Camera](self._ring)
+        nearest = np.arange(len(self._ring))
+        if self._wanted.camera is not None:  # first: it is as good as the best of the candidates
+            options.insert(0, self._wanted.camera)
+            nearest = np.insert(nearest, 0, nearest_camera(self._wanted.camera, self._ring))
+            scores = np.append(scores.max(), scores)
+        azimuths = np.array([option.azimuth for option in options])
+        failed, taken = ([nearest_camera(each, self._ring) for each in cameras]
+                         for cameras in (self._failed, [view.camera for view in self._views]))
+        is_open = self._limits.allows(azimuths) & ~np.isin(nearest, failed)
+        if not is_open.any():
             return None
-        best = int(np.where(fresh if fresh.any() else open_, value, -np.inf).argmax())
-        return Goal(float(options[best]), self._candidates[open_[1:]], value[1:][open_[1:]])
-
-    def _at_candidates(self, scores: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return a policy's scores of its 24 azimuths at the candidates, interpolated."""
-        if self._candidates.shape == AZIMUTHS.shape and not self._limits.reachable_azimuths:
-            return scores
-        return np.interp(self._candidates - self._yaw, AZIMUTHS, scores,
-                         period=TURN).astype(np.float32)
+        fresh = is_open & ~np.isin(nearest, taken)
+        travel = np.abs(azimuth_difference(azimuths, camera.azimuth))
+        value = worth(scores, travel, self._motion_weight if self._views else 0.0)
+        best = int(np.where(fresh if fresh.any() else is_open, value, -np.inf).argmax())
+        own = slice(len(options) - len(self._ring), None)
+        return Goal(options[best], [each for each, free in zip(
+            self._ring, is_open[own], strict=True) if free], value[own][is_open[own]])
 
     def _settled(self) -> bool:
         """Whether the last two views each changed the entropy by no more than the tolerance."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 import math
 
-from active_recon.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
+from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.rendering import composite, Renderer
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ import trimesh
 def contact_sheet(meshes: Sequence[trimesh.Trimesh], columns: int = 8, azimuth: float = 0.6,
                   tile: int = 160, background: int = 255) -> NDArray[np.uint8]:
     """Return the meshes seen from one azimuth (radians), row by row, (rows x tile, ..., 3) RGB."""
-    camera = orbit_camera(azimuth)
-    camera = Camera(camera.pose, CANONICAL_INTRINSICS.resized(tile, tile))
+    camera = orbit_camera(azimuth, intrinsics=CANONICAL_INTRINSICS.resized(tile, tile))
     rows = math.ceil(len(meshes) / columns)
     sheet = np.full((rows * tile, columns * tile, 3), background, np.uint8)
     for index, mesh in enumerate(meshes):

@@ -2,18 +2,18 @@
 
 from dataclasses import dataclass
 
-from active_recon.cameras import azimuth_difference, Camera
+from active_recon.cameras import Camera, view_distance
 from active_recon.errors import ConfigError
 from active_recon.stillness import STILL_TIME, Stillness
 
 TAKE_VIEWS = ('auto', 'at_goal', 'by_separation', 'all')
 GOAL_TOLERANCE = 0.14
-"""An azimuth this near to a goal reaches it, radians: 24 rendered views can be 7.5 degrees off."""
+"""A view this near to a goal reaches it, radians: 24 rendered views can be 7.5 degrees off."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Goal:
-    azimuth: float
+    camera: Camera
     stamp: int
 
 
@@ -21,11 +21,11 @@ class ViewGate:
     """
     Decides image by image; it knows the current goal and the view taken last.
 
-    `take_views` is `at_goal` (once for each goal, the camera still and its azimuth within
-    `goal_tolerance` radians), `by_separation` (the camera still and its azimuth at least
-    `min_view_separation` radians from the last view), `all`, or `auto`: at_goal where goals are
+    `take_views` is `at_goal` (once for each goal, the camera still and within `goal_tolerance`
+    radians of it), `by_separation` (the camera still and at least `min_view_separation` radians
+    from the last view), `all`, or `auto`: at_goal where goals are
     given or expected, else by_separation. A camera is still when it has rested for `settle_time`
-    seconds. All four may be changed in mid-episode.
+    seconds. All four may be changed in mid-episode. Distances are those of `view_distance`.
     """
 
     def __init__(self, take_views: str = 'auto', goal_tolerance: float = GOAL_TOLERANCE,
@@ -43,18 +43,18 @@ class ViewGate:
         """Begin an episode: no goal, no view."""
         self._goal: _Goal | None = None
         self._goal_taken = False
-        self._last_azimuth: float | None = None
+        self._last: Camera | None = None
         self._stillness = Stillness()
 
     @property
-    def open_goal(self) -> float | None:
-        """The azimuth of the goal that has no view yet, radians, None where there is none."""
-        return None if self._goal is None or self._goal_taken else self._goal.azimuth
+    def open_goal(self) -> Camera | None:
+        """The camera of the goal that has no view yet, None where there is none."""
+        return None if self._goal is None or self._goal_taken else self._goal.camera
 
-    def set_goal(self, azimuth: float, stamp: int) -> None:
-        """Ask for a view at an azimuth; the stamp (nanoseconds) tells goals apart."""
+    def set_goal(self, camera: Camera, stamp: int) -> None:
+        """Ask for a view from a camera; the stamp (nanoseconds) tells goals apart."""
         if self._goal is None or self._goal.stamp != stamp:
-            self._goal = _Goal(azimuth, stamp)
+            self._goal = _Goal(camera, stamp)
             self._goal_taken = False
 
     def wants(self, camera: Camera, stamp: int, goals_expected: bool = False) -> bool:
@@ -75,16 +75,12 @@ class ViewGate:
     def took(self, camera: Camera) -> None:
         """Note that the image of this camera became a view."""
         self._goal_taken = True
-        self._last_azimuth = camera.azimuth
+        self._last = camera
 
     def _at_new_goal(self, camera: Camera) -> bool:
-        if self.open_goal is None:
-            return False
-        away = abs(azimuth_difference(camera.azimuth, self.open_goal))
-        return bool(away <= self.goal_tolerance)
+        goal = self.open_goal
+        return goal is not None and view_distance(camera, goal) <= self.goal_tolerance
 
     def _is_separate(self, camera: Camera) -> bool:
-        if self._last_azimuth is None:
-            return True
-        away = abs(azimuth_difference(camera.azimuth, self._last_azimuth))
-        return bool(away >= self.min_view_separation)
+        return (self._last is None
+                or view_distance(camera, self._last) >= self.min_view_separation)

@@ -9,7 +9,6 @@ from active_recon.reconstructor import Reconstructor
 from active_recon.rendering import composite, Renderer
 from benchmarks.figures import Figure, timed_ms
 import numpy as np
-import torch
 
 OBJECTS = Path(__file__).parents[1] / 'active_recon' / 'objects'
 MODELS = Path(__file__).parent / 'real_cc0'
@@ -17,9 +16,8 @@ MODELS = Path(__file__).parent / 'real_cc0'
 
 def reconstruct_and_plan() -> Figure:
     """One view through network, grid, entropy and attention policy, on two threads."""
-    torch.set_num_threads(2)
-    reconstructor = Reconstructor.load()
-    planner = Planner.load('attention', max_views=10_000, entropy_tolerance=0)
+    reconstructor = Reconstructor.load(threads=2)
+    planner = Planner.load('attention', max_views=10_000, entropy_tolerance=0, threads=2)
     cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
     renderer = Renderer(load_mesh(OBJECTS / 'chair.glb'))
     images = [composite(renderer.render(camera), 255) for camera in cameras]
@@ -31,7 +29,7 @@ def reconstruct_and_plan() -> Figure:
             reconstructor.reset()
             planner.reset()
         seen = reconstructor.add_view(images[index], cameras[index])
-        planner.add_view(seen.latent, cameras[index].azimuth, seen.grid.entropy())
+        planner.add_view(seen.latent, cameras[index], seen.grid.entropy())
 
     return Figure('reconstruct and plan one view', 'ms', timed_ms(one_view, 300, 20), 15)
 

@@ -125,7 +125,8 @@ def _joined() -> Iterator[tuple[Any, Any, Any, Any]]:
 
         def hear(topic: str, then: Callable[[int, float], object]) -> None:
             node.create_subscription(PoseStamped, topic, lambda msg: then(
-                nanoseconds_from_stamp(msg.header.stamp), view_goal_from_msg(msg)), LATCHED)
+                nanoseconds_from_stamp(msg.header.stamp),
+                view_goal_from_msg(msg).azimuth), LATCHED)
 
         def publish(azimuth: float) -> int:
             header = Header(stamp=node.get_clock().now().to_msg(), frame_id='camera')

@@ -115,6 +115,11 @@ def pose_to_msg(pose: NDArray[np.float64], header: Header) -> PoseStamped:
         position=Point(x=px, y=py, z=pz), orientation=Quaternion(x=x, y=y, z=z, w=w)))
 
 
+def pose_through_msg(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what whoever reads the message of a pose, (4, 4), gets: its rotation is rounded."""
+    return pose_from_msg(pose_to_msg(pose, Header(frame_id=OBJECT_FRAME)))
+
+
 def camera_from_msgs(info: CameraInfo, pose: PoseStamped, frame: str = OBJECT_FRAME) -> Camera:
     """Return the camera of both messages; raises MessageError as the two readers do."""
     return Camera(pose_from_msg(pose, frame), intrinsics_from_msg(info))

@@ -1,8 +1,9 @@
 """Goals of the view planner to and from their messages."""
 
+from collections.abc import Sequence
 import math
 
-from active_recon.cameras import Camera, orbit_camera, wrap_azimuth
+from active_recon.cameras import Camera, wrap_azimuth
 from active_recon.errors import MessageError
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import OBJECT_FRAME, pose_from_msg, pose_to_msg
@@ -16,19 +17,14 @@ JOINT = 'camera_azimuth'
 SCORE_FIELDS = ('x', 'y', 'z', 'azimuth', 'score')
 
 
-def view_goal_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> float:
-    """Return the goal's azimuth in [0, 2 pi); raises MessageError as `pose_from_msg` does."""
-    return Camera(pose_from_msg(msg, frame)).azimuth
+def view_goal_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> Camera:
+    """Return the goal's camera; raises MessageError as `pose_from_msg` does."""
+    return Camera(pose_from_msg(msg, frame))
 
 
-def view_goal_to_msg(azimuth: float, elevation: float, distance: float,
-                     header: Header) -> PoseStamped:
-    """
-    Return the pose of a camera that looks at the object from there; the header's frame is its.
-
-    Angles in radians, distance in metres.
-    """
-    return pose_to_msg(orbit_camera(azimuth, elevation, distance).pose, header)
+def view_goal_to_msg(camera: Camera, header: Header) -> PoseStamped:
+    """Return the pose of a goal's camera; the header's frame is the object's."""
+    return pose_to_msg(camera.pose, header)
 
 
 def azimuth_goal_from_msg(msg: JointState) -> float:
@@ -68,16 +64,23 @@ def azimuth_goal_to_msg(azimuth: float, header: Header) -> JointState:
         velocity=[0.0], effort=[0.0])
 
 
-def scores_from_msg(msg: PointCloud2) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return azimuths (N,) in radians and their scores (N,)."""
+def scores_from_msg(msg: PointCloud2) -> tuple[
+        NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Return the candidates' positions (N, 3) in metres, azimuths (N,) and scores (N,)."""
     table = cloud_from_msg(msg, SCORE_FIELDS)
-    return table[:, 3], table[:, 4]
+    return table[:, :3], table[:, 3], table[:, 4]
 
 
-def scores_to_msg(azimuths: NDArray[np.float64], scores: NDArray[np.float32], elevation: float,
-                  distance: float, header: Header) -> PointCloud2:
-    """Return the candidates, azimuths (N,) and scores (N,), at their cameras' positions."""
-    positions = [orbit_camera(float(azimuth), elevation, distance).position
-                 for azimuth in azimuths]
+def scores_to_msg(candidates: Sequence[Camera], scores: NDArray[np.float32],
+                  header: Header) -> PointCloud2:
+    """Return N candidates and their scores, (N,), at the cameras' positions."""
+    return score_table_to_msg(
+        np.array([camera.position for camera in candidates]).reshape(-1, 3),
+        np.array([camera.azimuth for camera in candidates]), scores, header)
+
+
+def score_table_to_msg(positions: NDArray[np.floating], azimuths: NDArray[np.floating],
+                       scores: NDArray[np.floating], header: Header) -> PointCloud2:
+    """Return candidates by their positions (N, 3), azimuths (N,) and scores (N,)."""
     table = np.column_stack([positions, azimuths, scores]).astype(np.float32)
     return cloud_to_msg(table, SCORE_FIELDS, header)

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from active_recon.cameras import Camera, CANONICAL_DISTANCE, CANONICAL_ELEVATION
+from active_recon.cameras import Camera
 from active_recon.voxels import VoxelGrid
 from msg_tools.cameras import camera_to_msgs, OBJECT_FRAME, pose_to_msg
 from msg_tools.entropy import entropy_to_msg
-from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
+from msg_tools.goals import azimuth_goal_to_msg, score_table_to_msg, view_goal_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
@@ -17,23 +17,24 @@ from std_msgs.msg import Header
 CAMERA_FRAME = 'camera_optical_frame'
 
 
-def image_to_msgs(stamp: int, image: NDArray[np.uint8], camera: Camera) -> dict[str, Any]:
+def image_to_msgs(stamp: int, image: NDArray[np.uint8], camera: Camera,
+                  object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
     """Return what a camera publishes of an image, (H, W, 3) uint8 RGB, at a stamp in ns."""
     header = _header(stamp, CAMERA_FRAME)
-    info, pose = camera_to_msgs(camera, header)
+    info, pose = camera_to_msgs(camera, header, object_frame)
     return {'camera/pose': pose, 'camera/camera_info': info,
             'camera/image_raw': image_to_msg(image, header)}
 
 
 def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
                  occupied: VoxelGrid | None, latent: NDArray[np.float32] | None,
-                 entropy: float | None) -> dict[str, Any]:
+                 entropy: float | None, object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
     """
     Return what the reconstructor publishes of a view, at the stamp of its image in ns.
 
     The grids are 0 where a cell is not published; what is None is not published at all.
     """
-    header = _header(stamp, OBJECT_FRAME)
+    header = _header(stamp, object_frame)
     messages: dict[str, Any] = {}
     if occupied is not None:
         messages['occupancy'] = voxel_grid_to_msg(occupied, 0, header)
@@ -47,16 +48,21 @@ def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
     return messages
 
 
-def goal_to_msgs(stamp: int, azimuth: float, candidates: NDArray[np.float64] | None,
-                 scores: NDArray[np.float32] | None, object_size: float = 1.0) -> dict[str, Any]:
-    """Return what the planner publishes of a goal, an azimuth in radians, at a stamp in ns."""
-    header = _header(stamp, OBJECT_FRAME)
-    place = CANONICAL_ELEVATION, CANONICAL_DISTANCE * object_size
+def goal_to_msgs(
+        stamp: int, camera: Camera,
+        scores: tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]] | None,
+        object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
+    """
+    Return what the planner publishes of a goal at a stamp in ns: its camera, and its candidates.
+
+    `scores` are the candidates' positions (N, 3), azimuths (N,) and scores (N,); None: untold.
+    """
+    header = _header(stamp, object_frame)
     messages: dict[str, Any] = {}
-    if candidates is not None and scores is not None:
-        messages['azimuth_scores'] = scores_to_msg(candidates, scores, *place, header)
-    messages['next_view'] = view_goal_to_msg(azimuth, *place, header)
-    messages['next_azimuth'] = azimuth_goal_to_msg(azimuth, header)
+    if scores is not None:
+        messages['azimuth_scores'] = score_table_to_msg(*scores, header)
+    messages['next_view'] = view_goal_to_msg(camera, header)
+    messages['next_azimuth'] = azimuth_goal_to_msg(camera.azimuth, header)
     return messages
 
 

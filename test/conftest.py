@@ -2,13 +2,12 @@
 
 from pathlib import Path
 
-from active_recon.config import NetworkConfig
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
-from active_recon.models.network_2d3d import Network2d3d
+from active_recon.models.network_2d3d import Network2d3d, Network2d3dConfig
 import pytest
 import torch
 
@@ -29,22 +28,22 @@ def views(dataset: Path) -> ViewSet:
 
 
 @pytest.fixture(scope='session')
-def tiny() -> NetworkConfig:
+def tiny() -> Network2d3dConfig:
     """Return the sizes of a network that is fast, and need not be good."""
-    return NetworkConfig(
+    return Network2d3dConfig(
         stem_channels=4, block_channels=(6, 8, 8), recurrent_channels=8, bottleneck_channels=16,
         latent_channels=2, volume_channels=6, decoder_channels=(6, 4), glimpse_channels=8)
 
 
 @pytest.fixture
-def network(tiny: NetworkConfig) -> ReconstructionNetwork:
+def network(tiny: Network2d3dConfig) -> ReconstructionNetwork:
     """Return a small reconstruction network with the same fresh weights every time."""
     torch.manual_seed(0)
     return Network2d3d.from_config(tiny).eval()
 
 
 @pytest.fixture
-def attention(tiny: NetworkConfig) -> AttentionModel:
+def attention(tiny: Network2d3dConfig) -> AttentionModel:
     """Return a small attention model with the same fresh weights every time."""
     torch.manual_seed(0)
     return AttentionModel.from_config(tiny).eval()

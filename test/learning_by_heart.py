@@ -10,13 +10,13 @@ def iou_by_heart(network, views, wanted=0.9, steps=300):
     optimizer = torch.optim.Adam(network.parameters(), 5e-3)
     objects, chosen = torch.tensor([3, 3, 3]), torch.tensor([0, 7, 15])
     images, truth = views.white(objects, chosen), views.voxels[objects]
-    best = 0.0
+    cameras, best = views.cameras(objects, chosen), 0.0
     for _ in range(steps):
-        seen, _ = network(images, views.azimuths[objects, chosen])
-        best = iou(seen.logits > 0, truth).min().item()
+        logits, _ = network(images, cameras, network.initial_state(3))
+        best = iou(logits > 0, truth).min().item()
         if best > wanted:
             break
         optimizer.zero_grad()
-        volume_loss(seen.logits, truth.float(), 'bce').backward()
+        volume_loss(logits, truth.float(), 'bce').backward()
         optimizer.step()
     return best

@@ -45,7 +45,7 @@ class LoopRun:
         self.grids = [VoxelGrid(np.float32(rng.random(cells) * (rng.random(cells) < 0.03)))
                       for _ in range(count)]
         self.latents = rng.normal(size=(count, 6, 4, 4)).astype(np.float32)
-        self.candidates = np.arange(24) * np.pi / 12
+        self.candidates = [orbit_camera(azimuth, 0.5) for azimuth in np.arange(24) * np.pi / 12]
         self.scores = rng.normal(size=(count, 24)).astype(np.float32)
         self.goal_stamps = []
         self._say(self.begin, '/episode', episode_to_msg(Episode(self.id, self.begin)))
@@ -67,10 +67,10 @@ class LoopRun:
         self.goal_stamps.append(now)
         goal = header(now, 'object')
         self._say(now, '/azimuth_scores', scores_to_msg(
-            self.candidates, self.scores[number], 0.5, 2.1, goal))
+            self.candidates, self.scores[number], goal))
         for repeat in range(2):
             self._say(now + 10 + repeat * PERIOD, '/next_view',
-                      view_goal_to_msg(azimuth, 0.5, 2.1, goal))
+                      view_goal_to_msg(orbit_camera(azimuth, 0.5), goal))
         camera = orbit_camera(azimuth, intrinsics=LENS)
         for _ in range(STILL):
             now += PERIOD

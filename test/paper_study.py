@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from active_recon.config import NetworkConfig
 from active_recon.models.attention import AttentionModel
-from active_recon.models.network_2d3d import Network2d3d
+from active_recon.models.network_2d3d import Network2d3d, Network2d3dConfig
 from active_recon.models.ogn import Ogn, OgnConfig
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.paper import systems, table1, table2
@@ -14,7 +13,7 @@ import torch
 SETS = ('train', 'val', 'test', 'unseen', 'real_cc0')
 
 
-def make_study(folder: Path, dataset: Path, tiny: NetworkConfig) -> Study:
+def make_study(folder: Path, dataset: Path, tiny: Network2d3dConfig) -> Study:
     """Return a study whose sets are all the same six objects, and whose weights are all there."""
     data, models = folder / 'data', folder / 'models'
     data.mkdir()
@@ -34,7 +33,7 @@ def make_study(folder: Path, dataset: Path, tiny: NetworkConfig) -> Study:
     return study
 
 
-def untrained(folder: Path, tiny: NetworkConfig, seed: int, octree: bool = False) -> Path:
+def untrained(folder: Path, tiny: Network2d3dConfig, seed: int, octree: bool = False) -> Path:
     """Write weights that nobody trained; return where they lie."""
     torch.manual_seed(seed)
     path = folder / 'weights.safetensors'

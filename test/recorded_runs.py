@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
-from active_recon.cameras import orbit_camera, wrap_azimuth
-from active_recon.models.runtime import TorchRuntime
+from active_recon.cameras import Camera, orbit_camera
 from active_recon.planner import Decision, Planner
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import RandomPolicy
 from active_recon.reconstructor import Reconstructor
+from active_recon.runtimes.torch import TorchPolicyRuntime, TorchRuntime
 from active_recon.voxels import grid_from_points
 import numpy as np
 
@@ -23,12 +23,14 @@ def image_at(azimuth):
 
 
 def goal_of(goal, stamp):
-    return RecordedGoal(wrap_azimuth(goal.azimuth), stamp, goal.candidates, goal.scores, stamp)
+    return RecordedGoal.of(goal, stamp)
 
 
-def episode_of(reconstructor, planner, begin, azimuth, given_up=()):
+def episode_of(reconstructor, planner, begin, start, given_up=()):
     """
     Run the loop on the core alone and return what a recorder would have seen of it.
+
+    It begins where a camera stands, or a canonical one at an azimuth.
 
     `given_up`: how many goals are given up before the first view, after it, after the second, ...
     """
@@ -38,25 +40,26 @@ def episode_of(reconstructor, planner, begin, azimuth, given_up=()):
             return None, None, decision.reason
         goals = [goal_of(decision.goal, stamp)]
         for _ in range(next(failing, 0)):
-            decision = planner.give_up(decision.goal.azimuth)
+            decision = planner.give_up(decision.goal.camera)
             if decision.goal is None:
                 break
             goals.append(goal_of(decision.goal, stamp + len(goals)))
         return decision.goal, replace(goals[0], instead=goals[1:]), decision.reason
 
     failing = iter(given_up)
+    start = start if isinstance(start, Camera) else orbit_camera(start)
     reconstructor.reset()
     planner.reset()
-    goal, first, done = asked_for(Decision(planner.first_goal(azimuth)), begin)
+    goal, first, done = asked_for(Decision(planner.first_goal(start)), begin)
     views, stamp = [], begin
     while not done:
         stamp += SECOND
-        camera = orbit_camera(goal.azimuth)
-        image = image_at(goal.azimuth)
+        camera = goal.camera
+        image = image_at(camera.azimuth)
         known = reconstructor.add_view(image, camera)
         heard, occupied = (grid_from_points(known.grid.points(above)) for above in (
             FLOOR, THRESHOLD))
-        decision = planner.add_view(known.latent, camera.azimuth, heard.entropy())
+        decision = planner.add_view(known.latent, camera, heard.entropy())
         goal, asked, done = asked_for(decision, stamp + 1)
         views.append(RecordedView(
             stamp, image, camera, heard, occupied, known.latent, known.grid.entropy(),
@@ -65,11 +68,12 @@ def episode_of(reconstructor, planner, begin, azimuth, given_up=()):
 
 
 def loop_of(network, policy, views=3, **motion):
-    return (Reconstructor(TorchRuntime(network), THRESHOLD), Planner(policy, views, 0.0, **motion))
+    reconstructor = Reconstructor(TorchRuntime(network, THRESHOLD))
+    return reconstructor, Planner(policy, views, 0.0, **motion)
 
 
 def policies(attention):
-    return {'attention': lambda: AttentionPolicy(attention),
+    return {'attention': lambda: AttentionPolicy(TorchPolicyRuntime(attention)),
             'random': lambda: RandomPolicy(np.random.default_rng(7))}
 
 

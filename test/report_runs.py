@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-from active_recon.bags.replay import computing_with
 from active_recon.bags.run import (
     RecordedEpisode,
     RecordedGoal,
@@ -11,6 +10,7 @@ from active_recon.bags.run import (
     RecordedView,
     TopicSummary,
 )
+from active_recon.cameras import orbit_camera
 from active_recon.objects import find_object
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
@@ -29,17 +29,17 @@ ARRIVALS = {'camera/image_raw': WAY, 'occupancy': WAY + NETWORK, 'latent': WAY +
 def recorded_run(name='chair', policy='attention', views=5, start=0.5):
     """Return a run of one episode, as the loop would have made it, with round times."""
     shown = rendered_object(find_object(name))
-    reconstructor, planner = Reconstructor.load(), Planner.load(policy, max_views=views,
-                                                                entropy_tolerance=0)
-    goal = first = _recorded(planner.first_goal(start), BEGIN + 50 * MS)
+    # One thread: others give other last bits
+    reconstructor = Reconstructor.load(threads=1)
+    planner = Planner.load(policy, max_views=views, entropy_tolerance=0, threads=1)
+    goal = first = _recorded(planner.first_goal(orbit_camera(start)), BEGIN + 50 * MS)
     taken = []
     while goal is not None:
         stamp = goal.received + TURN
-        image, camera = shown.seen_from(goal.azimuth)
-        with computing_with(1):  # others give other last bits
-            known = reconstructor.add_view(image, camera)
-            entropy = known.grid.entropy()
-            decision = planner.add_view(known.latent, camera.azimuth, entropy)
+        image, camera = shown.seen_from(goal.camera.azimuth)
+        known = reconstructor.add_view(image, camera)
+        entropy = known.grid.entropy()
+        decision = planner.add_view(known.latent, camera, entropy)
         goal = decision.goal and _recorded(
             decision.goal, stamp + WAY + NETWORK + HAND_OVER + DECISION)
         occupancy = known.grid.occupancy
@@ -52,7 +52,7 @@ def recorded_run(name='chair', policy='attention', views=5, start=0.5):
     return RecordedRun(
         Path(f'bags/2026-09-21_14-13-20_{name}_{policy}'),
         [RecordedEpisode('5c3f09ab12de', BEGIN, first, taken, decision.reason)],
-        {'version': '0.1.0', 'weights_sha256': reconstructor.weights_hash, 'policy': policy,
+        {'version': '0.1.0', **reconstructor.provenance, 'policy': policy,
          'seed': '0', 'object': f'{name}.glb'},
         {'reconstructor': {'goal_tolerance': 0.14, 'object_size': 1.0, 'object_yaw': 0.0},
          'turntable_camera': {'mesh': str(find_object(name)), 'up': '', 'front': ''},
@@ -69,4 +69,4 @@ def changed(run, **changes):
 
 
 def _recorded(goal, received):
-    return RecordedGoal(goal.azimuth, received - MS, goal.candidates, goal.scores, received)
+    return RecordedGoal.of(goal, received - MS, received)

@@ -16,8 +16,8 @@ import torch
 
 def part(views, items):
     """Return some objects of a set."""
-    return replace(views, images=views.images[items], azimuths=views.azimuths[items],
-                   voxels=views.voxels[items],
+    return replace(views, images=views.images[items], poses=views.poses[items],
+                   intrinsics=views.intrinsics[items], voxels=views.voxels[items],
                    folders=tuple(views.folders[item] for item in items))
 
 

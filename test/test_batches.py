@@ -19,24 +19,30 @@ def draw(views, seed=0, size=64, length=3, varied=True):
     return draw_batch(views, size, length, np.random.default_rng([seed, 5]), varied)
 
 
-def sources(views, batch):
-    """Return for each image (T, B) the view it was drawn from, and whether it was mirrored."""
-    turned = azimuth_difference(batch.azimuths.numpy(), 0)
+def sources(views, batch, plain=None):
+    """
+    Return for each image (T, B) the view it was drawn from, and whether it was mirrored.
+
+    `plain` is the same batch without variation, where the batch is varied.
+    """
+    plain = plain or batch
+    azimuths = batch.cameras.azimuths.numpy()
     index, mirrored = [], []
     for b, item in enumerate(batch.objects):
-        straight = batch.voxels[b].bool().equal(views.voxels[item])
-        flipped = batch.voxels[b].bool().equal(views.voxels[item].flip(1))
-        assert straight or flipped
-        sign = -1 if (batch.azimuths[:, b] < 0).any() or not straight else 1
-        mirrored.append(sign < 0)
         own = views.azimuths[item].numpy()
-        index.append([np.abs(azimuth_difference(own, sign * at)).argmin() for at in turned[:, b]])
+        straight, flipped = ([int(np.abs(azimuth_difference(own, sign * at)).argmin())
+                              for at in azimuths[:, b]] for sign in (1, -1))
+        white = views.white(item.expand(len(straight)), torch.tensor(straight))
+        mirrored.append(not white.equal(plain.images[:, b]))
+        index.append(flipped if mirrored[-1] else straight)
+        voxels = views.voxels[item]
+        assert batch.voxels[b].bool().equal(voxels.flip(1) if mirrored[-1] else voxels)
     return np.array(index).T, np.array(mirrored)
 
 
 def test_the_same_seed_and_step_draw_the_same_batch(views):
     first, again, other = draw(views), draw(views), draw(views, seed=1)
-    for name in ('images', 'azimuths', 'voxels', 'objects'):
+    for name in ('images', 'cameras', 'voxels', 'objects'):
         assert_close(getattr(again, name), getattr(first, name), rtol=0, atol=0)
     assert (other.images != first.images).any()
 
@@ -44,19 +50,20 @@ def test_the_same_seed_and_step_draw_the_same_batch(views):
 def test_shapes_and_ranges_are_those_of_the_network(views):
     batch = draw(views, size=5, length=4)
     assert batch.images.shape == (4, 5, 3, 64, 64)
-    assert batch.azimuths.shape == (4, 5)
+    assert batch.cameras.poses.shape == (4, 5, 4, 4)
+    assert batch.cameras.intrinsics.shape == (4, 5, 3, 3)
     assert batch.voxels.shape == (5, 32, 32, 32)
     assert 0 <= batch.images.min() <= batch.images.max() <= 1
     assert set(batch.voxels.unique().tolist()) == {0.0, 1.0}
 
 
 def test_the_views_of_a_sequence_differ(views):
-    chosen, _ = sources(views, draw(views, length=24))
+    chosen, _ = sources(views, draw(views, length=24), draw(views, length=24, varied=False))
     assert (np.sort(chosen, axis=0) == np.arange(24)[:, None]).all()
 
 
 def test_every_object_is_drawn_and_half_of_the_sequences_are_mirrored(views):
-    batch = draw(views, size=400)
+    batch = draw(views, size=400, varied=False)
     _, mirrored = sources(views, batch)
     assert set(batch.objects.tolist()) == set(range(6))
     assert 0.4 < mirrored.mean() < 0.6
@@ -71,16 +78,19 @@ def test_without_variation_each_image_is_its_view_on_white_mirrored_with_its_obj
         assert_close(batch.images[t], white, rtol=0, atol=0)
 
 
-def test_variation_changes_the_images_alone(views):
+def test_variation_changes_the_images_and_where_their_pixels_are_alone(views):
     varied, plain = draw(views, size=40), draw(views, size=40, varied=False)
-    for name in ('azimuths', 'voxels', 'objects'):
+    for name in ('voxels', 'objects'):
         assert_close(getattr(varied, name), getattr(plain, name), rtol=0, atol=0)
+    assert_close(varied.cameras.poses, plain.cameras.poses, rtol=0, atol=0)
+    moved = (varied.cameras.intrinsics - plain.cameras.intrinsics).abs().amax((0, 2, 3)) > 0
+    assert 0 < moved.sum() < 40
     assert ((varied.images - plain.images).abs().amax((0, 2, 3, 4)) > 0.01).all()
 
 
 def test_voxels_come_in_the_set_s_resolution(views):
     fine = dataclasses.replace(views, voxels=torch.rand(6, 64, 64, 64) < 0.3)
-    batch = draw(fine, size=20)
+    batch = draw(fine, size=20, varied=False)
     _, mirrored = sources(fine, batch)
     assert batch.voxels.shape == (20, 64, 64, 64)
     assert 0 < mirrored.sum() < 20
@@ -112,7 +122,8 @@ def test_a_mirrored_sequence_is_the_mirrored_object_seen_from_the_mirrored_azimu
     for b in range(16):
         shown = mirrored if flipped[b] else straight
         for t in range(4):
-            away = azimuth_difference(shown.azimuths[0].numpy(), batch.azimuths[t, b].item())
+            own = batch.cameras.azimuths[t, b].item()
+            away = azimuth_difference(shown.azimuths[0].numpy(), own)
             nearest = np.abs(away).argmin()
             assert abs(away[nearest]) < 1e-5
             outline = shown.images[0, nearest, :, :, 3] > 10

@@ -10,8 +10,9 @@ from active_recon.cameras import (
     Intrinsics,
     orbit_camera,
 )
-from active_recon.canonical import canonical_image
+from active_recon.canonical import canonical_image, framed_image, network_image, NetworkSpec
 from active_recon.errors import ViewError
+from active_recon.framing import cube_corners
 from active_recon.lenses import Distortion
 from active_recon.rendering import composite, Renderer
 from active_recon.shapes import make_shape
@@ -28,6 +29,12 @@ PLACE = (0.7, math.radians(30), CANONICAL_DISTANCE)
 @pytest.fixture(scope='module')
 def renderer():
     return Renderer(make_shape('chair', 3))
+
+
+def shown_of(image, camera, **settings):
+    """Return the canonical image alone."""
+    shown, _ = canonical_image(image, camera, **settings)
+    return shown
 
 
 def seen(renderer, camera):
@@ -48,7 +55,7 @@ def turned(camera, angles_deg):
 def test_a_canonical_camera_s_image_is_only_resized_by_area(renderer):
     camera = orbit_camera(*PLACE)
     image = seen(renderer, camera)
-    np.testing.assert_array_equal(canonical_image(image, camera),
+    np.testing.assert_array_equal(shown_of(image, camera),
                                   cv2.resize(image, (64, 64), interpolation=cv2.INTER_AREA))
 
 
@@ -67,7 +74,7 @@ OTHERS = {
 @pytest.mark.parametrize('camera', OTHERS.values(), ids=OTHERS)
 def test_another_camera_s_image_becomes_nearly_the_canonical_one(camera, renderer):
     def brought(shown):
-        return [canonical_image(shown(renderer, one), one).astype(int)
+        return [shown_of(shown(renderer, one), one).astype(int)
                 for one in (camera, orbit_camera(*PLACE))]
 
     image, expected = brought(seen)
@@ -79,8 +86,8 @@ def test_another_camera_s_image_becomes_nearly_the_canonical_one(camera, rendere
 def test_an_object_of_another_size_is_shown_at_the_same_size(renderer):
     near, far = orbit_camera(*PLACE), orbit_camera(*PLACE[:2], CANONICAL_DISTANCE * 0.3)
     image = seen(renderer, near)
-    np.testing.assert_array_equal(canonical_image(image, far, object_size=0.3),
-                                  canonical_image(image, near))
+    np.testing.assert_array_equal(shown_of(image, far, object_size=0.3),
+                                  shown_of(image, near))
 
 
 @pytest.mark.parametrize('image', [
@@ -88,7 +95,7 @@ def test_an_object_of_another_size_is_shown_at_the_same_size(renderer):
     np.zeros((137, 137, 4), np.uint8), np.zeros((137, 137, 3), np.float32)])
 def test_an_image_that_is_not_the_camera_s_is_refused(image):
     with pytest.raises(ViewError, match='expected an image of 137 x 137 x 3 uint8') as refusal:
-        canonical_image(image, orbit_camera(0.0))
+        shown_of(image, orbit_camera(0.0))
     assert refusal.value.kind == 'image_size'
 
 
@@ -96,7 +103,7 @@ def test_a_camera_straight_above_has_no_canonical_one_and_is_refused():
     pose = np.diag([1.0, -1, -1, 1])
     pose[2, 3] = 2
     with pytest.raises(ViewError, match='expected an elevation within'):
-        canonical_image(np.zeros((137, 137, 3), np.uint8), Camera(pose))
+        shown_of(np.zeros((137, 137, 3), np.uint8), Camera(pose))
 
 
 BENT = {
@@ -115,9 +122,9 @@ def test_a_bent_image_becomes_nearly_what_a_straight_one_does(renderer, distorti
     images, silhouettes = [], []
     for camera in (straight, bent):
         shown = renderer.render(camera, samples=2)
-        images.append(canonical_image(composite(shown, 255), camera).astype(int))
+        images.append(shown_of(composite(shown, 255), camera).astype(int))
         covered_ones = np.ascontiguousarray(shown[..., 3:].repeat(3, axis=-1))
-        silhouettes.append(canonical_image(covered_ones, camera)[..., 0] > 127)
+        silhouettes.append(shown_of(covered_ones, camera)[..., 0] > 127)
     assert np.abs(images[1] - images[0]).mean() < 2
     assert iou(*silhouettes, (-2, -1)) > 0.93
 
@@ -131,8 +138,8 @@ def aside(width=300, height=260):
 def test_an_image_of_any_resolution_says_the_same(renderer, size):
     image = seen(renderer, aside())
     finer = cv2.resize(image, size, interpolation=cv2.INTER_NEAREST)
-    apart = np.abs(canonical_image(finer, aside(*size)).astype(int)
-                   - canonical_image(image, aside()))
+    apart = np.abs(shown_of(finer, aside(*size)).astype(int)
+                   - shown_of(image, aside()))
     assert apart.mean() < 1.5
 
 
@@ -140,7 +147,7 @@ def test_finer_stripes_than_the_network_can_see_become_their_mean():
     camera = aside(1200, 1040)
     image = np.zeros((1040, 1200, 3), np.uint8)
     image[:, ::2] = 200
-    np.testing.assert_allclose(canonical_image(image, camera).astype(int), 100, atol=3)
+    np.testing.assert_allclose(shown_of(image, camera).astype(int), 100, atol=3)
 
 
 @pytest.mark.parametrize('distortion', [None, BENT['barrel']], ids=['straight', 'bent'])
@@ -154,8 +161,8 @@ def test_a_camera_and_its_image_upside_down_show_the_same(renderer, size, distor
                                      -distortion.coefficients[3], 0.0)))
     upside_down = Camera(turned(camera, (0, 0, 180)).pose, over)
     image = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), np.uint8)
-    expected = canonical_image(image, Camera(camera.pose, lens))
-    found = canonical_image(np.ascontiguousarray(image[::-1, ::-1]), upside_down)
+    expected = shown_of(image, Camera(camera.pose, lens))
+    found = shown_of(np.ascontiguousarray(image[::-1, ::-1]), upside_down)
     np.testing.assert_allclose(found.astype(int), expected, atol=2)
 
 
@@ -165,14 +172,14 @@ def test_a_portrait_camera_shows_what_the_landscape_one_does(renderer):
     portrait = Camera(turned(landscape, (0, 0, -90)).pose, Intrinsics(
         lens.fy, lens.fx, lens.height - lens.cy, lens.cx, lens.height, lens.width))
     image = seen(renderer, landscape)
-    found = canonical_image(np.ascontiguousarray(np.rot90(image, -1)), portrait)
-    np.testing.assert_allclose(found.astype(int), canonical_image(image, landscape), atol=2)
+    found = shown_of(np.ascontiguousarray(np.rot90(image, -1)), portrait)
+    np.testing.assert_allclose(found.astype(int), shown_of(image, landscape), atol=2)
 
 
 def test_a_farther_camera_with_a_longer_lens_shows_the_object_as_large(renderer):
     near = orbit_camera(*PLACE, Intrinsics(300, 300, 200, 200, 400, 400))
     far = orbit_camera(*PLACE[:2], 3 * PLACE[2], Intrinsics(900, 900, 200, 200, 400, 400))
-    silhouettes = [canonical_image(covered(renderer, one), one)[..., 0] > 127
+    silhouettes = [shown_of(covered(renderer, one), one)[..., 0] > 127
                    for one in (near, far)]
     assert iou(*silhouettes, (-2, -1)) > 0.75  # from afar it is seen with less perspective
     assert silhouettes[0].sum() == pytest.approx(silhouettes[1].sum(), rel=0.1)
@@ -182,10 +189,44 @@ def test_an_image_of_one_color_stays_of_it_whatever_the_camera():
     for camera in OTHERS.values():
         lens = camera.intrinsics
         image = np.full((lens.height, lens.width, 3), (9, 100, 255), np.uint8)
-        assert (canonical_image(image, camera) == (9, 100, 255)).all()
+        assert (shown_of(image, camera) == (9, 100, 255)).all()
 
 
 def test_an_image_far_longer_than_wide_is_shown_too():
     camera = orbit_camera(*PLACE, Intrinsics(140, 140, 68.5, 39_000, 137, 40_000))
     image = np.full((40_000, 137, 3), 7, np.uint8)
-    assert (canonical_image(image, camera) == 7).all()
+    assert (shown_of(image, camera) == 7).all()
+
+
+@pytest.mark.parametrize('camera', OTHERS.values(), ids=OTHERS)
+def test_the_canonical_image_comes_with_the_canonical_camera(camera, renderer):
+    _, found = canonical_image(seen(renderer, camera), camera)
+    expected = orbit_camera(*PLACE, LENS.resized(64, 64))
+    np.testing.assert_allclose(found.pose, expected.pose, atol=1e-9)
+    assert found.intrinsics == expected.intrinsics
+
+
+@pytest.mark.parametrize('size', [64, 128])
+@pytest.mark.parametrize('camera', OTHERS.values(), ids=OTHERS)
+def test_a_framed_image_shows_what_its_camera_sees_from_where_the_real_one_stands(
+        camera, size, renderer):
+    silhouette, found = framed_image(covered(renderer, camera), camera, image_size=size)
+    assert silhouette.shape == (size, size, 3)
+    np.testing.assert_array_equal(found.position, camera.position)
+    assert found.pose[2, 0] == pytest.approx(0, abs=1e-9)  # upright
+    expected = covered(renderer, found)[..., 0] > 127
+    assert iou(silhouette[..., 0] > 127, expected, (-2, -1)) > 0.93
+    corners, _ = found.project(cube_corners())
+    assert 0 <= corners.min() < corners.max() <= size
+    assert max(-corners.min() + size / 2, corners.max() - size / 2) > 0.45 * size
+
+
+def test_a_network_gets_the_image_that_its_spec_asks_for(renderer):
+    camera = OTHERS['wide image']
+    image = seen(renderer, camera)
+    for spec, bring in ((NetworkSpec(64, 32, True), canonical_image),
+                        (NetworkSpec(128, 64, False), framed_image)):
+        (found, found_camera), (expected, expected_camera) = (
+            network_image(image, camera, spec), bring(image, camera, 1.0, spec.image_size))
+        np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(found_camera.pose, expected_camera.pose)

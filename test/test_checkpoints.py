@@ -23,7 +23,7 @@ def step(module, optimizer, seed):
     """Take a step of training on a random answer."""
     torch.manual_seed(seed)
     optimizer.zero_grad()
-    proposal, _ = module(torch.randn(4, 8, 4, 4), torch.rand(4))
+    proposal, _ = module(torch.randn(4, 8, 4, 4), torch.rand(4), module.initial_state(4))
     (proposal.mean_azimuth.square().mean() + proposal.baseline.square().mean()).backward()
     optimizer.step()
 

@@ -3,13 +3,15 @@
 from dataclasses import FrozenInstanceError
 import json
 
-from active_recon.config import LossConfig, NetworkConfig, RewardConfig
+from active_recon.config import LossConfig, RewardConfig
 from active_recon.errors import ConfigError
+from active_recon.models.network_2d3d import Network2d3dConfig
 from active_recon.training.supervised import TrainingConfig
 import pytest
 
-CONFIGS = [NetworkConfig(stem_channels=8, decoder_channels=(4, 2)), LossConfig(volume_loss='bce'),
-           RewardConfig(paper_distance=True), TrainingConfig(steps=7, bfloat16=False)]
+CONFIGS = [Network2d3dConfig(stem_channels=8, decoder_channels=(4, 2)),
+           LossConfig(volume_loss='bce'), RewardConfig(paper_distance=True),
+           TrainingConfig(steps=7, bfloat16=False)]
 
 
 @pytest.mark.parametrize('config', CONFIGS, ids=lambda config: type(config).__name__)
@@ -25,17 +27,17 @@ def test_a_configuration_cannot_be_changed(config):
 
 
 def test_unknown_keys_are_named_beside_the_known_ones():
-    with pytest.raises(ConfigError, match='NetworkConfig: unknown key depth, width; .*stem_chan'):
-        NetworkConfig.from_dict({'width': 3, 'depth': 2, 'stem_channels': 8})
+    with pytest.raises(ConfigError, match='Config: unknown key depth, width; .*stem_chan'):
+        Network2d3dConfig.from_dict({'width': 3, 'depth': 2, 'stem_channels': 8})
 
 
 @pytest.mark.parametrize(('kind', 'values'), [
-    (NetworkConfig, {'stem_channels': 0}), (NetworkConfig, {'block_channels': (8, -1, 8)}),
+    (Network2d3dConfig, {'stem_channels': 0}), (Network2d3dConfig, {'block_channels': (8, -1, 8)}),
     (LossConfig, {'volume_weight': -0.1}), (LossConfig, {'volume_loss': 'mae'}),
     (LossConfig, {'volume_weight': 0.0, 'silhouette_weight': 0.0}),
     (RewardConfig, {'distance_tau': 0.0}), (RewardConfig, {'policy_sigma': -1.0}),
     (RewardConfig, {'distance_weight': -1.0}), (RewardConfig, {'episodes_alike': 0}),
-    (NetworkConfig, {'view_separation': -0.1}), (NetworkConfig, {'view_separation': 3.2}),
+    (Network2d3dConfig, {'view_separation': -0.1}), (Network2d3dConfig, {'view_separation': 3.2}),
     (TrainingConfig, {'steps': 0}), (TrainingConfig, {'steps': 1, 'learning_rate': 0.0}),
     (TrainingConfig, {'steps': 1, 'batch_size': 0}),
 ])

@@ -15,12 +15,14 @@ from active_recon.evaluation.measure import (
     YAWS_DEG,
 )
 from active_recon.evaluation.metrics import episodes, iou_per_view
-from active_recon.models.network import Folded, ReconstructionNetwork
+from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
+from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.voxels import entropy, paper_entropy, turned
 import numpy as np
 import pytest
+from shown_views import part_of
 import torch
 from torch import nn
 
@@ -53,9 +55,9 @@ def test_a_run_measures_iou_both_entropies_and_azimuths_of_every_view(network, v
     expected = iou_per_view(network, UniformPolicy(3), views, objects, starts, np.array([0.1]), 3)
     np.testing.assert_allclose(run.iou, expected[..., 0])
     with torch.no_grad():
-        seen, _ = network(views.white(objects[:1], starts[:1]),
-                          views.azimuths[objects[:1], starts[:1]])
-    occupancy = seen.logits[0].sigmoid().double().numpy()
+        logits, _ = network(views.white(objects[:1], starts[:1]),
+                            views.cameras(objects[:1], starts[:1]), network.initial_state(1))
+    occupancy = logits[0].sigmoid().double().numpy()
     assert run.entropy[0, 0] == pytest.approx(entropy(occupancy), rel=1e-4)
     assert run.paper_entropy[0, 0] == pytest.approx(paper_entropy(occupancy), rel=1e-4)
     assert (run.paper_entropy < run.entropy).all()
@@ -96,6 +98,8 @@ def test_a_summary_is_ready_for_json_and_averages_over_objects_starts_and_seeds(
 class Oracle(ReconstructionNetwork):
     """Answers with the truth of the object whose image it is shown, turned as it is told."""
 
+    image_size, resolution, needs_front = 64, 32, True
+
     def __init__(self, views, listens=False):
         super().__init__()
         self.views, self.listens = views, listens
@@ -103,21 +107,25 @@ class Oracle(ReconstructionNetwork):
         self.known = torch.stack([views.white(torch.full((24,), item), every)
                                   for item in range(len(views))])
 
-    def look(self, images):
+    def initial_state(self, batch):
+        return {'answer': torch.zeros(batch, 2), 'latent': torch.zeros(batch, 8, 4, 4)}
+
+    def encode(self, images, cameras):
         return images
 
-    def remember(self, seen, azimuths, hidden=None):
-        away = [(self.known - image).abs().mean((2, 3, 4)) for image in seen]
+    def update(self, encoded, cameras, state):
+        away = [(self.known - image).abs().mean((2, 3, 4)) for image in encoded]
         item = torch.stack([each.amin(dim=1).argmin() for each in away])
         seen_from = torch.stack([each.amin(dim=0).argmin() for each in away])
-        yaw = azimuths - self.views.azimuths[item, seen_from] if self.listens else 0 * azimuths
-        latent = torch.ones(len(seen), 8, 4, 4) * (item.float() + 1)[:, None, None, None]
-        return Folded(latent, torch.column_stack([item, yaw])), hidden
+        yaw = cameras.azimuths - self.views.azimuths[item, seen_from]
+        latent = torch.ones(len(encoded), 8, 4, 4) * (item.float() + 1)[:, None, None, None]
+        return {'latent': latent,
+                'answer': torch.column_stack([item, yaw if self.listens else 0 * yaw])}
 
-    def decode(self, features):
+    def decode(self, state):
         return torch.stack([
             torch.from_numpy(20 * turned(self.views.voxels[int(item)].float().numpy(),
-                                         float(yaw)) - 10) for item, yaw in features])
+                                         float(yaw)) - 10) for item, yaw in state['answer']])
 
 
 def test_a_front_that_stands_right_gives_the_plain_iou(network, views):
@@ -144,22 +152,30 @@ def test_a_network_that_looks_at_the_azimuth_is_told_the_wrong_one_with_the_wron
 class Recognising(nn.Module):
     """An attention model whose proposal is the latent's first number, or nothing of it."""
 
-    view_separation = 0.0
+    facts = {'view_separation': 0.0, 'latent_shape': (8, 4, 4)}
 
     def __init__(self, sees):
         super().__init__()
         self.where = nn.Linear(2, 8)
         self.sees = sees
 
-    def forward(self, latent, azimuth, state=None):
+    def initial_state(self, batch):
+        return {}
+
+    def forward(self, latent, azimuth, state):
         from active_recon.models.attention import Attention
         mean = latent[:, 0, 0, 0] * np.radians(20) if self.sees else azimuth + 1
-        return Attention(mean, mean), (mean, mean)
+        return Attention(mean, mean), state
+
+
+def followed(model):
+    """Return the policy that follows an attention model."""
+    return AttentionPolicy(TorchPolicyRuntime(model))
 
 
 def test_a_policy_that_looks_at_nothing_loses_nothing_by_anothers_latent(network, views):
     objects, starts = episodes(views, 2)
-    blind = AttentionPolicy(Recognising(sees=False))
+    blind = followed(Recognising(sees=False))
     found = blindness(network, blind, views, objects, starts, 0.1, 3)
     assert found.goal_change_deg['mean'] == pytest.approx(0, abs=1e-9)
     assert found.auc_loss == {'mean': 0.0, 'low': 0.0, 'high': 0.0}
@@ -168,7 +184,7 @@ def test_a_policy_that_looks_at_nothing_loses_nothing_by_anothers_latent(network
 
 def test_a_policy_that_knows_its_object_goes_elsewhere_by_anothers_latent(views):
     objects, starts = episodes(views, 3)
-    found = blindness(Oracle(views), AttentionPolicy(Recognising(sees=True)), views, objects,
+    found = blindness(Oracle(views), followed(Recognising(sees=True)), views, objects,
                       starts, 0.5, 2)
     assert found.goal_change_deg['mean'] == pytest.approx(60, abs=1e-3)  # three objects away
     assert found.goal_change_deg['low'] == pytest.approx(60, abs=1e-3)
@@ -176,8 +192,6 @@ def test_a_policy_that_knows_its_object_goes_elsewhere_by_anothers_latent(views)
 
 
 def test_blindness_needs_two_objects(network, attention, views):
-    from dataclasses import replace
-    one = replace(views, images=views.images[:1], azimuths=views.azimuths[:1],
-                  voxels=views.voxels[:1], folders=views.folders[:1])
+    one = part_of(views, slice(1))
     with pytest.raises(DataError, match='two objects or more'):
-        blindness(network, AttentionPolicy(attention), one, *episodes(one, 2), 0.1)
+        blindness(network, followed(attention), one, *episodes(one, 2), 0.1)

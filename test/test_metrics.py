@@ -1,6 +1,6 @@
 """Episodes, IoU view by view, and the latents of other objects."""
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.cameras import azimuth_difference, AZIMUTHS, pose_azimuths
 from active_recon.errors import DataError
 from active_recon.evaluation.metrics import (
     episodes,
@@ -10,8 +10,10 @@ from active_recon.evaluation.metrics import (
 )
 from active_recon.evaluation.rollouts import nearest_views, roll_out
 from active_recon.evaluation.validation import best_threshold, policy_auc, reconstruction_iou
+from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Choice
-from active_recon.policies.geometric import FarthestPolicy, RandomPolicy
+from active_recon.policies.geometric import BlindPolicy, FarthestPolicy, RandomPolicy
+from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.voxels import iou
 import numpy as np
 import pytest
@@ -49,16 +51,17 @@ def test_the_nearest_view_is_the_short_way_round():
     assert nearest_views(azimuths, np.array([6.2, -0.1])).tolist() == [0, 23]
 
 
-class Listener:
+class Listener(BlindPolicy):
     """A policy that keeps what it was shown, and steps on by 45 degrees."""
 
     def __init__(self):
         self.latents, self.taken = [], []
 
-    def choose(self, latent, taken, state=None):
-        self.latents.append(latent)
-        self.taken.append(taken)
-        return Choice(taken[:, -1] + np.pi / 4, np.zeros((len(taken), 24), np.float32)), None
+    def choose(self, seen, state):
+        self.latents.append(seen.latent)
+        self.taken.append(pose_azimuths(seen.taken))
+        scores = np.zeros(seen.candidates.shape[:2], np.float32)
+        return Choice(scores, self.taken[-1][:, -1] + np.pi / 4), state
 
 
 def rolled_out(network, views, policy, stand_ins=None, count=3):
@@ -79,13 +82,13 @@ def test_a_rollout_yields_every_view_and_asks_the_policy_between_them(network, v
 
 def test_a_rollout_knows_what_the_network_knows(network, views):
     steps = rolled_out(network, views, Listener())
-    hidden = None
+    state, objects = network.initial_state(3), torch.tensor([0, 3, 5])
     for t, step in enumerate(steps):
         index = (torch.tensor([23, 4, 9]) + 3 * t) % 24
         with torch.no_grad():
-            seen, hidden = network(views.white(torch.tensor([0, 3, 5]), index),
-                                   views.azimuths[[0, 3, 5], index], hidden)
-        assert_close(step.occupancy, seen.logits.sigmoid())
+            logits, state = network(views.white(objects, index), views.cameras(objects, index),
+                                    state)
+        assert_close(step.occupancy, logits.sigmoid())
 
 
 def test_a_stand_in_is_seen_from_the_same_azimuths_and_changes_only_the_latent(network, views):
@@ -123,8 +126,9 @@ def test_the_threshold_is_the_best_on_validation(network, views):
 
 
 def test_what_a_training_looks_at_is_the_same_every_time(network, attention, views):
-    first = reconstruction_iou(network, views) | policy_auc(network, attention, views, 0.1)
-    again = reconstruction_iou(network, views) | policy_auc(network, attention, views, 0.1)
+    policy = AttentionPolicy(TorchPolicyRuntime(attention))
+    first = reconstruction_iou(network, views) | policy_auc(network, policy, views, 0.1)
+    again = reconstruction_iou(network, views) | policy_auc(network, policy, views, 0.1)
     assert first == again
     assert set(first) == {'validation_iou_1', 'validation_iou_5', 'validation_auc',
                           'validation_auc_random'}

@@ -1,13 +1,16 @@
 """Where the camera can go, and which goals follow from it."""
 
+from dataclasses import replace
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view
+from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.errors import ConfigError, ViewError
 from active_recon.motion import MotionLimits, worth
 from active_recon.planner import Planner
+from active_recon.policies import Observation
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+from active_recon.runtimes.torch import TorchPolicyRuntime
 import numpy as np
 import pytest
 
@@ -18,7 +21,7 @@ KINDS = ('attention', 'random', 'uniform', 'farthest')
 @pytest.fixture
 def policy(attention):
     """Return what makes a policy of a name."""
-    kinds = {'attention': lambda: AttentionPolicy(attention),
+    kinds = {'attention': lambda: AttentionPolicy(TorchPolicyRuntime(attention)),
              'random': lambda: RandomPolicy(np.random.default_rng(7)),
              'uniform': lambda: UniformPolicy(7), 'farthest': FarthestPolicy}
     return lambda kind: kinds[kind]()
@@ -26,8 +29,44 @@ def policy(attention):
 
 @pytest.fixture
 def planner(policy):
-    """Return what makes a planner that never settles, of a policy's name."""
-    return lambda kind, **settings: Planner(policy(kind), 100, 0.0, **settings)
+    """Return what makes a planner of azimuths that never settles, of a policy's name."""
+    return lambda kind, **settings: Turning(Planner(policy(kind), 100, 0.0, **settings))
+
+
+class Turning:
+    """A planner whose cameras are those of a turntable, told by their azimuths, radians."""
+
+    def __init__(self, planner):
+        self._planner = planner
+        self.reset, self.stop = planner.reset, planner.stop
+
+    def first_goal(self, azimuth):
+        return AzimuthGoal(self._planner.first_goal(orbit_camera(azimuth)))
+
+    def plan(self):
+        return AzimuthGoal(self._planner.plan())
+
+    def add_view(self, latent, azimuth, entropy):
+        return self._decided(self._planner.add_view(latent, orbit_camera(azimuth), entropy))
+
+    def give_up(self, azimuth, camera=None):
+        return self._decided(self._planner.give_up(
+            orbit_camera(azimuth), None if camera is None else orbit_camera(camera)))
+
+    def _decided(self, decision):
+        return replace(decision, goal=decision.goal and AzimuthGoal(decision.goal))
+
+
+class AzimuthGoal:
+    """A goal by its azimuth, and those of its candidates (N,)."""
+
+    def __init__(self, goal):
+        cameras = [goal.camera, *goal.candidates]
+        assert {(camera.elevation, camera.distance) for camera in cameras} == {
+            (orbit_camera(0.0).elevation, orbit_camera(0.0).distance)}
+        self.azimuth = goal.camera.azimuth
+        self.candidates = np.array([camera.azimuth for camera in goal.candidates])
+        self.scores = goal.scores
 
 
 def followed(planner, start, views, off=0.0):
@@ -106,13 +145,18 @@ def test_turned_limits_turn_the_goals_with_them(planner, kind, by):
 def test_without_limits_and_weight_the_goals_are_the_policys_own_bits(planner, policy, kind):
     alone = policy(kind)
     limited = planner(kind, limits=MotionLimits((0.0, math.tau), [], []), motion_weight=0.0)
-    taken, state = [], None
+    ring = np.stack([orbit_camera(azimuth).pose for azimuth in AZIMUTHS])[None]
+    taken, state = [], alone.initial_state(1)
     for azimuth in (0.7, 2.9, 4.4):
         taken.append(azimuth)
-        choice, state = alone.choose(LATENT[None], np.array([taken]), state)
+        poses = np.stack([orbit_camera(each).pose for each in taken])[None]
+        choice, state = alone.choose(Observation(LATENT[None], poses, ring), state)
         goal = limited.add_view(LATENT, azimuth, 10.0).goal
-        assert nearest_view(choice.azimuth[0]) not in map(nearest_view, taken)
-        assert goal.azimuth == choice.azimuth[0]
+        chosen = AZIMUTHS[choice.scores[0].argmax()]
+        if choice.azimuth is not None and not np.isnan(choice.azimuth[0]):
+            chosen = choice.azimuth[0]
+        assert nearest_view(chosen) not in map(nearest_view, taken)
+        assert goal.azimuth == chosen
         np.testing.assert_array_equal(goal.scores, choice.scores[0])
         np.testing.assert_array_equal(goal.candidates, AZIMUTHS)
 

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 TOLERANCE, TIMEOUT = 0.14, 1.0
+HORIZON = 0.0  # where views are as far apart as their azimuths
+
+GOAL = orbit_camera(1.0, 0.6)
 
 
 class Motion:
@@ -23,9 +26,10 @@ class Motion:
     def run(self, azimuth_at, seconds, goal=None):
         """Go on for a while; return the time from now at which each fault was first found."""
         began, found = self.now, {}
+        goal_camera = None if goal is None else orbit_camera(goal, HORIZON)
         for _ in range(round(seconds * self.rate)):
-            camera = orbit_camera(azimuth_at(self.now))
-            self.watch.heard(camera, round(self.now * 1e9), goal)
+            camera = orbit_camera(azimuth_at(self.now), HORIZON)
+            self.watch.heard(camera, round(self.now * 1e9), goal_camera)
             for kind in self.watch.found():
                 found.setdefault(kind, self.now - began)
             self.now += 1 / self.rate
@@ -68,6 +72,14 @@ def test_a_camera_that_stands_away_from_its_goal_has_stalled_until_it_moves_on()
     assert 'goal, 57 degrees away' in motion.watch.found()['stalled']
     began = motion.now - 0.1
     assert not motion.run(lambda now: min(1.0 + now - began, 2.0), 3.0, goal=2.0)
+
+
+def test_a_camera_at_the_goal_s_azimuth_below_it_has_stalled_too():
+    motion = Motion()
+    for _ in range(60):
+        motion.watch.heard(orbit_camera(1.0, 0.1), round(motion.now * 1e9), GOAL)
+        motion.now += 1 / motion.rate
+    assert 'goal, 29 degrees away' in motion.watch.found()['stalled']
 
 
 def test_a_camera_without_an_open_goal_or_near_it_may_stand_for_ever():

@@ -18,6 +18,7 @@ from msg_tools.cameras import (
     intrinsics_from_msg,
     intrinsics_to_msg,
     pose_from_msg,
+    pose_through_msg,
 )
 from msg_tools.goals import (
     azimuth_goal_from_msg,
@@ -29,6 +30,7 @@ from msg_tools.goals import (
 )
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, JointState, RegionOfInterest
 from std_msgs.msg import Header
 
@@ -162,9 +164,19 @@ def test_camera_info_of_no_calibrated_camera_is_refused(info):
 
 @pytest.mark.parametrize('azimuth', [0.0, 1.0, 3.5, 6.0])
 def test_both_forms_of_a_goal_say_the_same_azimuth(azimuth):
-    view = view_goal_to_msg(azimuth, 0.5, 2.1, OBJECT)
-    assert view_goal_from_msg(view) == pytest.approx(azimuth)
+    view = view_goal_to_msg(orbit_camera(azimuth, 0.5), OBJECT)
+    assert view_goal_from_msg(view).azimuth == pytest.approx(azimuth)
     assert azimuth_goal_from_msg(azimuth_goal_to_msg(azimuth, OBJECT)) == pytest.approx(azimuth)
+
+
+@pytest.mark.parametrize('elevation', [-0.8, 0.0, math.pi / 4, 1.5])
+def test_a_goal_that_is_written_and_read_back_is_the_same_camera(elevation):
+    pose = orbit_camera(4.0, elevation, 0.6).pose.copy()
+    pose[:3, :3] = pose[:3, :3] @ Rotation.from_euler('xyz', (0.1, -0.2, 2.0)).as_matrix()
+    read = view_goal_from_msg(view_goal_to_msg(Camera(pose), OBJECT))
+    np.testing.assert_allclose(read.pose, pose, atol=1e-12)
+    np.testing.assert_array_equal(read.position, pose[:3, 3])
+    np.testing.assert_array_equal(pose_through_msg(pose), read.pose)
 
 
 def test_an_azimuth_goal_is_wrapped():
@@ -180,7 +192,8 @@ def test_what_is_no_azimuth_goal_is_refused(positions):
 
 def test_scores_come_back_as_they_were_beside_their_cameras():
     scores = np.random.default_rng(0).random(24, np.float32)
-    msg = scores_to_msg(AZIMUTHS, scores, 0.5, 2.1, OBJECT)
-    azimuths, back = scores_from_msg(msg)
+    cameras = [orbit_camera(azimuth, 0.5) for azimuth in AZIMUTHS]
+    positions, azimuths, back = scores_from_msg(scores_to_msg(cameras, scores, OBJECT))
     np.testing.assert_allclose(azimuths, AZIMUTHS, atol=1e-6)
+    np.testing.assert_allclose(positions, [camera.position for camera in cameras], atol=1e-6)
     np.testing.assert_array_equal(back, scores)

@@ -2,16 +2,19 @@
 
 from dataclasses import replace
 
+from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.errors import ConfigError
+from active_recon.models.network import Cameras
 from active_recon.models.ogn import OgnConfig
 from active_recon.models.ptn import PtnConfig
 from active_recon.models.r2n2 import R2n2Config
 from active_recon.models.registry import network_config, network_entry
-from active_recon.models.runtime import TorchRuntime
 from active_recon.models.shape_basis import ShapeBasisConfig
 from active_recon.models.weights import Bundle, load_weights, save_weights
+from active_recon.runtimes.torch import TorchRuntime
 import numpy as np
 import pytest
+from shown_views import cameras_at, known_after
 import torch
 from torch.testing import assert_close
 
@@ -71,21 +74,37 @@ def some_views(count, batch):
 @torch.no_grad()
 def folded(network, images):
     """Return what is known after views (T, B, ...)."""
-    hidden = None
-    for t, view in enumerate(images):
-        seen, hidden = network(view, torch.full((len(view),), 0.5 * t), hidden)
-    return seen
+    return known_after(network, images)
 
 
 def test_a_sequence_is_answered_after_every_view(tiny_network):
-    resolution, hidden = tiny_network.resolution, None
+    resolution, state = tiny_network.resolution, tiny_network.initial_state(2)
     for view in some_views(3, 2):
         with torch.no_grad():
-            seen, hidden = tiny_network(view, torch.zeros(2), hidden)
-        assert seen.logits.shape == (2, *(resolution,) * 3)
-        assert seen.logits.isfinite().all()
-        assert seen.latent.ndim == 4
-        assert len(seen.latent) == 2
+            logits, state = tiny_network(view, cameras_at([0, 0]), state)
+        assert logits.shape == (2, *(resolution,) * 3)
+        assert logits.isfinite().all()
+        assert state['latent'].ndim == 4
+        assert all(len(part) == 2 for part in state.values())
+
+
+def test_a_state_has_the_same_names_before_any_view_and_after(tiny_network):
+    before = tiny_network.initial_state(2)
+    after = folded(tiny_network, some_views(1, 2)).state
+    assert before.keys() == after.keys()
+    assert before['latent'].shape == after['latent'].shape
+    assert all(part.isfinite().all() for part in before.values())
+
+
+def test_what_is_told_of_the_camera_is_the_azimuth_alone(tiny_network):
+    view, state = some_views(1, 2)[0], tiny_network.initial_state(2)
+    near = cameras_at([0.3, 1.9])
+    far = Cameras(near.poses.clone(), near.intrinsics * 1.3)
+    far.poses[:, :3, 3] *= 2
+    with torch.no_grad():
+        expected, found = (tiny_network(view, cameras, state)[0] for cameras in (near, far))
+    assert tiny_network.needs_front
+    assert_close(found, expected, rtol=0, atol=0)
 
 
 def test_the_runtime_answers_as_the_network_does(tiny_network):
@@ -93,7 +112,9 @@ def test_the_runtime_answers_as_the_network_does(tiny_network):
     runtime = TorchRuntime(tiny_network)
     state = runtime.initial_state()
     for t, image in enumerate(images):
-        occupancy, latent, state = runtime.step(image.permute(1, 2, 0).numpy(), 0.5 * t, state)
+        lens = CANONICAL_INTRINSICS.resized(64, 64)
+        occupancy, latent, state = runtime.step(
+            image.permute(1, 2, 0).numpy(), orbit_camera(0.5 * t, intrinsics=lens), state)
     expected = folded(tiny_network, images[:, None].float() / 255)
     assert_close(torch.from_numpy(occupancy), expected.logits[0].sigmoid())
     assert_close(torch.from_numpy(latent), expected.latent[0])
@@ -107,14 +128,15 @@ def test_a_view_more_changes_what_is_known(tiny_network):
 
 def test_the_state_is_passed_and_not_kept(tiny_network):
     first, second = some_views(2, 2)
-    azimuths = torch.zeros(2)
+    cameras = cameras_at([0, 0])
     with torch.no_grad():
-        _, hidden = tiny_network(first, azimuths)
-        once, _ = tiny_network(second, azimuths, hidden)
-        tiny_network(first, azimuths, hidden)
-        again, _ = tiny_network(second, azimuths, hidden)
-    assert_close(again.logits, once.logits, rtol=0, atol=0)
-    assert_close(again.latent, once.latent, rtol=0, atol=0)
+        _, state = tiny_network(first, cameras, tiny_network.initial_state(2))
+        before = {name: part.clone() for name, part in state.items()}
+        once = tiny_network(second, cameras, state)
+        tiny_network(first, cameras, state)
+        again = tiny_network(second, cameras, state)
+    assert_close(again, once, rtol=0, atol=0)
+    assert_close(state, before, rtol=0, atol=0)
 
 
 def test_an_object_is_reconstructed_alike_alone_and_among_others(tiny_network):
@@ -129,13 +151,12 @@ def test_an_object_is_reconstructed_alike_alone_and_among_others(tiny_network):
 @pytest.mark.parametrize('learned', LEARNED, ids=name_of)
 def test_every_parameter_learns_from_two_views(learned):
     network = built(learned)
-    hidden, voxels = None, torch.zeros(2, *(network.resolution,) * 3)
+    voxels = torch.zeros(2, *(network.resolution,) * 3)
     voxels[:, 9:23, 9:23, 9:23] = 1
-    for view in some_views(2, 2):
-        seen, hidden = network.fold(view, torch.zeros(2), hidden)
-    loss = network.objective(seen.features, voxels)
+    seen = known_after(network, some_views(2, 2))
+    loss = network.objective(seen.state, voxels)
     if loss is None:
-        loss = network.decode(seen.features).square().mean()
+        loss = seen.logits.square().mean()
     loss.backward()
     for name, parameter in network.named_parameters():
         assert parameter.grad is not None, name

@@ -7,6 +7,7 @@ from active_recon.models.octree import cells_per_level, EMPTY, FILLED, MIXED, st
 from active_recon.models.ogn import octree_report, Ogn, OgnConfig, SIZES
 from active_recon.voxels import iou
 import pytest
+from shown_views import cameras_at
 import torch
 from torch.testing import assert_close
 
@@ -17,6 +18,11 @@ TINY = OgnConfig(image_channels=(4, 8, 8), code_channels=(16, 16), level_channel
 def tiny_ogn():
     torch.manual_seed(0)
     return Ogn.from_config(TINY).eval()
+
+
+def of_codes(codes):
+    """Return the state whose mean codes are (B, D)."""
+    return {'latent': codes[:, :, None, None]}
 
 
 def answering(network, level, state, by=10.0):
@@ -38,7 +44,7 @@ def ball():
 @torch.no_grad()
 def test_an_answer_of_empty_at_the_coarsest_level_makes_an_empty_grid():
     network = answering(tiny_ogn(), 0, EMPTY)
-    logits = network.decode(torch.rand(2, 16))
+    logits = network.decode(of_codes(torch.rand(2, 16)))
     assert logits.shape == (2, 64, 64, 64)
     assert_close(logits, torch.full_like(logits, -10))
     assert len(list(network.levels(torch.rand(2, 16)))) == 1
@@ -47,7 +53,7 @@ def test_an_answer_of_empty_at_the_coarsest_level_makes_an_empty_grid():
 @torch.no_grad()
 def test_where_a_cell_ends_all_its_voxels_have_its_log_odds():
     network = answering(answering(tiny_ogn(), 0, MIXED), 1, FILLED, by=3.0)
-    assert_close(network.decode(torch.rand(1, 16)), torch.full((1, 64, 64, 64), 3.0))
+    assert_close(network.decode(of_codes(torch.rand(1, 16))), torch.full((1, 64, 64, 64), 3.0))
 
 
 @torch.no_grad()
@@ -78,20 +84,20 @@ def test_the_report_counts_cells_and_bytes_of_what_is_predicted():
 def test_objects_of_a_batch_are_decoded_independently():
     torch.manual_seed(3)
     network, codes = tiny_ogn(), 3 * torch.rand(3, 16)
-    together = network.decode(codes)
+    together = network.decode(of_codes(codes))
     for index in range(3):
-        assert_close(network.decode(codes[index:index + 1]), together[index:index + 1],
+        assert_close(network.decode(of_codes(codes[index:index + 1])), together[index:index + 1],
                      rtol=1e-4, atol=1e-4)
 
 
 def test_an_object_without_mixed_cells_has_an_objective_too():
     voxels = torch.zeros(2, 64, 64, 64)
-    assert tiny_ogn().objective(torch.rand(2, 16), voxels).isfinite()
+    assert tiny_ogn().objective(of_codes(torch.rand(2, 16)), voxels).isfinite()
 
 
 def test_voxels_of_another_resolution_are_refused_in_words():
     with pytest.raises(ConfigError, match='expected voxels of 64 cells a side .* got 32'):
-        tiny_ogn().objective(torch.rand(1, 16), torch.zeros(1, 32, 32, 32))
+        tiny_ogn().objective(of_codes(torch.rand(1, 16)), torch.zeros(1, 32, 32, 32))
 
 
 @pytest.mark.parametrize(('size', 'resolution'), [('small', 32), ('published-64', 64)])
@@ -107,16 +113,16 @@ def learned(config, image, truth, steps):
     network = Ogn.from_config(config)
     optimizer = torch.optim.Adam(network.parameters(), 5e-3)
     for step in range(steps):
-        folded, _ = network.fold(image, torch.zeros(1))
+        state = network.step(image, cameras_at([0]), network.initial_state(1))
         if step % 10 == 9:
             with torch.no_grad():
-                best = iou(network.decode(folded.features) > 0, truth).min().item()
+                best = iou(network.decode(state) > 0, truth).min().item()
             if best > 0.9:
                 break
         optimizer.zero_grad()
-        network.objective(folded.features, truth.float()).backward()
+        network.objective(state, truth.float()).backward()
         optimizer.step()
-    return best, network, folded.features
+    return best, network, state['latent'].flatten(1)
 
 
 def test_a_small_network_learns_one_object_by_heart(views):

@@ -1,49 +1,38 @@
 """The greedy oracle and every sequence of views, against doing it one by one."""
 
-from dataclasses import replace
 from itertools import permutations
-from typing import Any, NamedTuple
 
 from active_recon.evaluation.measure import run_oracle, run_policy
 from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.oracle import roll_out_oracle, rows_of, sequence_iou
 from active_recon.evaluation.rollouts import nearest_views, roll_out
 from active_recon.policies.base import Choice
-from active_recon.policies.geometric import RandomPolicy
+from active_recon.policies.geometric import BlindPolicy, RandomPolicy
 from active_recon.voxels import iou
 import numpy as np
 import pytest
+from shown_views import part_of
 import torch
-from torch import Tensor
 from torch.testing import assert_close
 
 THRESHOLD = 0.1
 
 
-class Inner(NamedTuple):
-    cells: Tensor
-    count: int
-
-
-class Outer(NamedTuple):
-    left: Inner
-    right: Any
-
-
-class Itinerary:
+class Itinerary(BlindPolicy):
     """A policy that goes where it was told before."""
 
     def __init__(self, azimuths):
         self.azimuths = azimuths
 
-    def choose(self, latent, taken, state=None):
-        return Choice(self.azimuths[:, taken.shape[1]], np.zeros((len(taken), 24))), None
+    def choose(self, seen, state):
+        scores = np.zeros(seen.candidates.shape[:2], np.float32)
+        return Choice(scores, self.azimuths[:, seen.taken.shape[1]]), state
 
 
 @pytest.fixture(scope='module')
 def few(views):
     """Return the six objects with every fourth view alone: six."""
-    return replace(views, images=views.images[:, ::4], azimuths=views.azimuths[:, ::4])
+    return part_of(views, chosen=slice(None, None, 4))
 
 
 def iou_along(network, views, item, sequences):
@@ -55,17 +44,11 @@ def iou_along(network, views, item, sequences):
     return np.stack([iou(step.occupancy > THRESHOLD, truth).numpy() for step in steps], axis=1)
 
 
-def test_rows_of_a_hidden_state_are_taken_wherever_it_holds_tensors():
-    cells, more = torch.arange(12).reshape(4, 3), [torch.arange(4), (torch.ones(4, 2), None)]
-    found = rows_of(Outer(Inner(cells, 7), more), torch.tensor([2, 2, 0]))
-    assert isinstance(found, Outer)
-    assert isinstance(found.left, Inner)
-    assert found.left.count == 7
-    assert_close(found.left.cells, cells[[2, 2, 0]])
-    assert found.right[0].tolist() == [2, 2, 0]
-    assert found.right[1][0].shape == (3, 2)
-    assert found.right[1][1] is None
-    assert rows_of(None, torch.tensor([0])) is None
+def test_rows_of_a_state_are_taken_of_all_that_it_holds():
+    state = {'cells': torch.arange(12).reshape(4, 3), 'views': torch.arange(4)}
+    found = rows_of(state, torch.tensor([2, 2, 0]))
+    assert_close(found['cells'], state['cells'][[2, 2, 0]])
+    assert found['views'].tolist() == [2, 2, 0]
 
 
 def test_the_oracle_goes_where_the_iou_is_highest_of_all_views_not_yet_taken(network, few):

@@ -12,6 +12,7 @@ from active_recon.paper.results import PUBLISHED
 from paper_study import make_study, small_objects
 from PIL import Image
 import pytest
+from shown_views import part_of
 import torch
 
 
@@ -125,8 +126,7 @@ def test_the_steps_of_a_reconstruction_sum_to_its_time(study):
 
 def test_figure_7_shows_photographs_where_pascal3d_is_given(study, tmp_path, monkeypatch):
     views = study.read(study.objects('test'))
-    photographs = replace(views, images=views.images[:, :1], azimuths=views.azimuths[:, :1],
-                          unreadable=('one',))
+    photographs = replace(part_of(views, chosen=slice(1)), unreadable=('one',))
     (tmp_path / 'Annotations' / 'sofa_pascal').mkdir(parents=True)
     (tmp_path / 'Annotations' / 'sofa_pascal' / '1.mat').write_bytes(b'12')
     monkeypatch.setattr(examples, 'list_photographs', lambda root: ([], []))

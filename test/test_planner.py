@@ -2,25 +2,31 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.cameras import azimuth_difference, AZIMUTHS, Camera, orbit_camera
 from active_recon.errors import ConfigError, ViewError
 from active_recon.planner import Planner
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+from active_recon.runtimes.torch import TorchPolicyRuntime
+from active_recon.voxels import VoxelGrid
 import numpy as np
 import pytest
 
 LATENT = np.random.default_rng(0).normal(size=(8, 4, 4)).astype(np.float32)
 
 
+def learned(attention):
+    return AttentionPolicy(TorchPolicyRuntime(attention))
+
+
 def views_until_done(planner, entropies):
     """Follow every goal; return the number of views taken and the reason for the end."""
-    azimuth = planner.first_goal(0.0).azimuth
+    camera = planner.first_goal(orbit_camera(0.0)).camera
     for count, entropy in enumerate(entropies, 1):
-        decision = planner.add_view(LATENT, azimuth, entropy)
+        decision = planner.add_view(LATENT, camera, entropy)
         if decision.goal is None:
             return count, decision.reason
-        azimuth = decision.goal.azimuth
+        camera = decision.goal.camera
     return len(entropies), ''
 
 
@@ -51,40 +57,41 @@ def test_a_tolerance_of_zero_never_settles():
 
 
 def test_the_first_view_is_where_it_is_asked_for():
-    goal = Planner(FarthestPolicy()).first_goal(-1.0)
-    assert goal.azimuth == pytest.approx(math.tau - 1.0)
-    assert abs(azimuth_difference(goal.candidates[goal.scores.argmax()], -1.0)) < math.pi / 24
+    goal = Planner(FarthestPolicy()).first_goal(orbit_camera(-1.0))
+    assert goal.camera.azimuth == pytest.approx(math.tau - 1.0)
+    best = goal.candidates[goal.scores.argmax()]
+    assert abs(azimuth_difference(best.azimuth, -1.0)) < math.pi / 24
 
 
 def test_a_plan_repeats_the_goal_also_when_the_episode_is_done():
     planner = Planner(FarthestPolicy(), max_views=2)
-    first = planner.first_goal(0.3)
+    first = planner.first_goal(orbit_camera(0.3))
     assert planner.plan() is first
-    second = planner.add_view(LATENT, 0.3, 10).goal
+    second = planner.add_view(LATENT, orbit_camera(0.3), 10).goal
     assert planner.plan() is second
     assert planner.plan() is second
-    assert planner.add_view(LATENT, second.azimuth, 9).goal is None
+    assert planner.add_view(LATENT, second.camera, 9).goal is None
     after = planner.plan()
     assert after is planner.plan()
-    assert abs(azimuth_difference(after.azimuth, second.azimuth)) > 1
+    assert abs(azimuth_difference(after.camera.azimuth, second.camera.azimuth)) > 1
 
 
 def test_there_is_no_plan_before_the_first_view_nor_after_a_reset():
     planner = Planner(FarthestPolicy())
     with pytest.raises(ViewError, match='expected a view before a plan'):
         planner.plan()
-    planner.first_goal(0.0)
+    planner.first_goal(orbit_camera(0.0))
     planner.reset()
     with pytest.raises(ViewError, match='expected a view before a plan'):
         planner.plan()
 
 
 def test_a_reset_planner_is_as_good_as_new(attention):
-    planner = Planner(AttentionPolicy(attention), max_views=4, entropy_tolerance=0)
+    planner = Planner(learned(attention), max_views=4, entropy_tolerance=0)
     runs = []
     for _ in range(2):
-        runs.append([planner.add_view(LATENT, azimuth, 10.0).reason or planner.plan().azimuth
-                     for azimuth in (0.0, 2.0, 4.0, 1.0)])
+        runs.append([planner.add_view(LATENT, orbit_camera(azimuth), 10.0).reason
+                     or planner.plan().camera.azimuth for azimuth in (0.0, 2.0, 4.0, 1.0)])
         planner.reset()
     assert runs[0] == runs[1]
     assert runs[0][-1] == 'max_views'
@@ -95,41 +102,43 @@ def test_a_reset_planner_is_as_good_as_new(attention):
 def test_a_turned_object_turns_everything_with_it(attention, kind, yaw):
     def make(object_yaw):
         policy = {'farthest': FarthestPolicy(), 'uniform': UniformPolicy(5),
-                  'attention': AttentionPolicy(attention)}[kind]
+                  'attention': learned(attention)}[kind]
         return Planner(policy, object_yaw=object_yaw, entropy_tolerance=0)
 
     straight, turned = make(0.0), make(yaw)
     for azimuth in (AZIMUTHS[3], AZIMUTHS[9], AZIMUTHS[16]):
-        goal = straight.add_view(LATENT, azimuth, 10.0).goal
-        other = turned.add_view(LATENT, azimuth + yaw, 10.0).goal
-        assert azimuth_difference(other.azimuth, goal.azimuth + yaw) == pytest.approx(0, abs=1e-5)
+        goal = straight.add_view(LATENT, orbit_camera(azimuth), 10.0).goal
+        other = turned.add_view(LATENT, orbit_camera(azimuth + yaw), 10.0).goal
         np.testing.assert_allclose(
-            azimuth_difference(other.candidates, goal.candidates + yaw), 0, atol=1e-9)
+            other.camera.pose, goal.camera.turned(yaw).pose, atol=1e-5)
+        for candidate, before in zip(other.candidates, goal.candidates, strict=True):
+            np.testing.assert_allclose(candidate.pose, before.turned(yaw).pose, atol=1e-9)
         np.testing.assert_allclose(other.scores, goal.scores, atol=1e-4)
-        assert 0 <= other.azimuth < math.tau
-        assert ((other.candidates >= 0) & (other.candidates < math.tau)).all()
+        assert all(0 <= camera.azimuth < math.tau for camera in (other.camera, *other.candidates))
 
 
 @pytest.mark.parametrize('wrong', [
-    (np.full_like(LATENT, math.nan), 1.0, 10.0), (LATENT, math.nan, 10.0),
-    (LATENT, math.inf, 10.0), (LATENT, 1.0, math.nan), (LATENT[:3], 1.0, 10.0)],
-    ids=['latent', 'azimuth', 'infinite azimuth', 'entropy', 'another latent'])
+    (np.full_like(LATENT, math.nan), orbit_camera(1.0), 10.0),
+    (LATENT, orbit_camera(1.0), math.nan), (LATENT, orbit_camera(1.0), math.inf),
+    (LATENT[:3], orbit_camera(1.0), 10.0)],
+    ids=['latent', 'entropy', 'infinite entropy', 'another latent'])
 def test_a_view_that_is_refused_changes_nothing(attention, wrong):
-    disturbed, undisturbed = (Planner(AttentionPolicy(attention), 3, 0) for _ in range(2))
-    disturbed.add_view(LATENT, 0.0, 10.0)
+    disturbed, undisturbed = (Planner(learned(attention), 3, 0) for _ in range(2))
+    disturbed.add_view(LATENT, orbit_camera(0.0), 10.0)
     before = disturbed.plan()
     with pytest.raises(ViewError, match='expected a'):
         disturbed.add_view(*wrong)
     assert disturbed.plan() is before
-    undisturbed.add_view(LATENT, 0.0, 10.0)
-    assert (disturbed.add_view(LATENT, 1.0, 10.0).goal.azimuth
-            == undisturbed.add_view(LATENT, 1.0, 10.0).goal.azimuth)
+    undisturbed.add_view(LATENT, orbit_camera(0.0), 10.0)
+    one, other = (planner.add_view(LATENT, orbit_camera(1.0), 10.0).goal
+                  for planner in (disturbed, undisturbed))
+    np.testing.assert_array_equal(one.camera.pose, other.camera.pose)
 
 
 @pytest.mark.parametrize('azimuth', [math.nan, math.inf, -math.inf])
-def test_a_first_azimuth_that_is_not_finite_is_refused(azimuth):
-    with pytest.raises(ViewError, match='expected a finite azimuth, got'):
-        Planner(FarthestPolicy()).first_goal(azimuth)
+def test_a_camera_that_is_not_finite_is_none(azimuth):
+    with pytest.raises(ViewError, match='expected finite angles'):
+        Planner(FarthestPolicy()).first_goal(orbit_camera(azimuth))
 
 
 @pytest.mark.parametrize(('settings', 'message'), [
@@ -144,7 +153,8 @@ def test_settings_out_of_range_are_refused_with_the_range(settings, message):
 
 
 def test_it_is_loaded_by_the_name_of_its_policy_and_repeats_with_its_seed():
-    goals = [Planner.load('random', seed=seed).add_view(LATENT, 0.0, 1.0).goal.azimuth
+    goals = [Planner.load('random', seed=seed).add_view(LATENT, orbit_camera(0.0), 1.0)
+             .goal.camera.azimuth
              for seed in (1, 1, 2)]
     assert goals[0] == goals[1] != goals[2]
     with pytest.raises(ConfigError, match='policy: expected one of'):
@@ -152,42 +162,88 @@ def test_it_is_loaded_by_the_name_of_its_policy_and_repeats_with_its_seed():
 
 
 def seen(planner, count):
-    """Follow the planner's goals for so many views."""
-    azimuth = planner.first_goal(1.0).azimuth
+    """Follow the planner's goals for so many views; return it, and where they were taken."""
+    cameras = [planner.first_goal(orbit_camera(1.0)).camera]
     for number in range(count):
         latent = np.random.default_rng(number).normal(size=LATENT.shape).astype(np.float32)
-        azimuth = planner.add_view(latent, azimuth, 100.0 / (number + 1)).goal.azimuth
-    return planner
+        cameras.append(
+            planner.add_view(latent, cameras[-1], 100.0 / (number + 1)).goal.camera)
+    return planner, cameras[:-1]
 
 
 @pytest.mark.parametrize('policy', [
     lambda: RandomPolicy(np.random.default_rng(3)), FarthestPolicy, lambda: UniformPolicy(7)])
 def test_a_planner_goes_on_from_what_another_has_seen_as_if_it_had_been_there(policy):
-    before = seen(Planner(UniformPolicy(5), max_views=9), 3)
+    before, cameras = seen(Planner(UniformPolicy(5), max_views=9), 3)
     after = Planner(policy(), max_views=9)
     after.go_on_from(before)
     always = Planner(policy(), max_views=9)
-    for number, azimuth in enumerate(before._taken):
+    for number, camera in enumerate(cameras):
         latent = np.random.default_rng(number).normal(size=LATENT.shape).astype(np.float32)
-        always.add_view(latent, azimuth, 100.0 / (number + 1))
-    assert after.plan().azimuth == always.plan().azimuth
-    one, other = (each.add_view(LATENT, 2.0, 20.0) for each in (after, always))
-    assert one.goal.azimuth == other.goal.azimuth
+        always.add_view(latent, camera, 100.0 / (number + 1))
+    assert after.plan().camera.azimuth == always.plan().camera.azimuth
+    one, other = (each.add_view(LATENT, orbit_camera(2.0), 20.0) for each in (after, always))
+    assert one.goal.camera.azimuth == other.goal.camera.azimuth
 
 
 def test_a_planner_that_goes_on_with_the_same_policy_draws_nothing_anew():
     policy = RandomPolicy(np.random.default_rng(3))
-    before = seen(Planner(policy, max_views=9), 2)
+    before, _ = seen(Planner(policy, max_views=9), 2)
     goal = before.plan()
     after = Planner(policy, max_views=3)
     after.go_on_from(before)
-    assert after.plan().azimuth == goal.azimuth
-    assert after.add_view(LATENT, 2.0, 20.0).reason == 'max_views'
+    assert after.plan().camera.azimuth == goal.camera.azimuth
+    assert after.add_view(LATENT, orbit_camera(2.0), 20.0).reason == 'max_views'
 
 
 def test_a_first_goal_that_is_open_stays_the_plan_of_the_planner_that_goes_on():
     before = Planner(UniformPolicy(5))
-    goal = before.first_goal(1.0)
+    goal = before.first_goal(orbit_camera(1.0))
     after = Planner(FarthestPolicy())
     after.go_on_from(before)
-    assert after.plan().azimuth == goal.azimuth
+    assert after.plan().camera.azimuth == goal.camera.azimuth
+
+
+@pytest.mark.parametrize('policy', [FarthestPolicy, lambda: UniformPolicy(5)])
+@pytest.mark.parametrize('elevation_deg', [-20, 0, 45, 80])
+def test_a_camera_at_any_elevation_gets_goals_at_its_own(policy, elevation_deg):
+    planner, elevation = Planner(policy(), 9, 0.0, distance=0.6), math.radians(elevation_deg)
+    goal = planner.first_goal(orbit_camera(1.0, elevation, 0.8))
+    for _ in range(4):
+        for camera in (goal.camera, *goal.candidates):
+            assert (camera.elevation, camera.distance) == pytest.approx((elevation, 0.6))
+        goal = planner.add_view(LATENT, orbit_camera(goal.camera.azimuth, elevation, 0.8), 9).goal
+
+
+def test_goals_stand_at_the_elevation_that_is_given_wherever_the_camera_is():
+    planner = Planner(FarthestPolicy(), elevation=0.9, entropy_tolerance=0)
+    goals = [planner.first_goal(orbit_camera(1.0, 0.2))]
+    goals.append(planner.add_view(LATENT, orbit_camera(1.0, 0.4), 9).goal)
+    assert {camera.elevation for goal in goals for camera in (goal.camera, *goal.candidates)} == {
+        0.9}
+
+
+def test_a_camera_straight_above_the_object_gets_goals_too():
+    pose = np.diag([1.0, -1, -1, 1])
+    pose[2, 3] = 2
+    goal = Planner(FarthestPolicy()).add_view(LATENT, Camera(pose), 9).goal
+    assert math.radians(88) < goal.camera.elevation < math.pi / 2
+
+
+class Looking(FarthestPolicy):
+    """A policy that looks at the volume."""
+
+    wants_volume = True
+
+
+def test_a_policy_that_looks_at_the_volume_refuses_a_view_without_one():
+    planner, volume = Planner(Looking()), VoxelGrid(np.zeros((32,) * 3, np.float32))
+    with pytest.raises(ViewError, match='expected the probabilities beside the latent'):
+        planner.add_view(LATENT, orbit_camera(1.0), 9)
+    assert planner.add_view(LATENT, orbit_camera(1.0), 9, volume).goal is not None
+
+
+def test_a_policy_that_looks_at_the_volume_cannot_go_on_from_views_without_one():
+    before, _ = seen(Planner(FarthestPolicy(), max_views=9), 2)
+    with pytest.raises(ViewError, match='expected the probabilities beside the latent'):
+        Planner(Looking(), max_views=9).go_on_from(before)

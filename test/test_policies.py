@@ -2,13 +2,14 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view
+from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.errors import ConfigError, ViewError, WeightsError
 from active_recon.models.weights import Bundle, save_weights
-from active_recon.policies import load_policy, POLICIES
-from active_recon.policies.attention import AttentionPolicy
-from active_recon.policies.base import distance_to_taken, kept_apart
+from active_recon.policies import load_policy, Observation, POLICIES, PolicyOptions
+from active_recon.policies.attention import AttentionPolicy, gaps_to_taken, kept_apart
+from active_recon.policies.base import distance_to_taken
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+from active_recon.runtimes.torch import TorchPolicyRuntime
 import numpy as np
 import pytest
 
@@ -21,31 +22,62 @@ def latent(tiny):
         np.float32)
 
 
+def poses(azimuths, elevation=0.5):
+    """Return cameras' poses, azimuths (B, t) to (B, t, 4, 4)."""
+    return np.array([[orbit_camera(azimuth, elevation).pose for azimuth in row]
+                     for row in np.asarray(azimuths, np.float64)])
+
+
+RING = poses([AZIMUTHS])
+
+
+def observed(latent, taken):
+    """Return what was seen after views from azimuths, (B, t), with the ring to choose from."""
+    return Observation(latent, poses(taken), RING)
+
+
+def choose(policy, latent, taken, state=None):
+    return policy.choose(observed(latent, taken),
+                         policy.initial_state(len(taken)) if state is None else state)
+
+
+def chosen(choice):
+    """Return the azimuths (B,) that a choice leads to: those proposed, else the best ones."""
+    best = AZIMUTHS[choice.scores.argmax(axis=1)]
+    return best if choice.azimuth is None else np.where(
+        np.isnan(choice.azimuth), best, choice.azimuth)
+
+
 def episode(policy, start, count, latent):
     """Return the azimuths of an episode of `count` views, every goal reached exactly."""
-    taken, state = np.array([[start]]), None
+    taken, state = np.array([[start]]), policy.initial_state(1)
     while taken.shape[1] < count:
-        choice, state = policy.choose(latent[:1], taken, state)
-        taken = np.column_stack([taken, choice.azimuth])
+        choice, state = choose(policy, latent[:1], taken, state)
+        taken = np.column_stack([taken, chosen(choice)])
     return taken[0]
+
+
+def made_of(attention, **settings):
+    return AttentionPolicy(TorchPolicyRuntime(attention), **settings)
 
 
 def all_policies(attention):
     return [RandomPolicy(np.random.default_rng(0)), UniformPolicy(5), FarthestPolicy(),
-            AttentionPolicy(attention)]
+            made_of(attention)]
 
 
 @pytest.mark.parametrize('index', range(4), ids=['random', 'uniform', 'farthest', 'attention'])
 def test_the_choice_is_the_candidate_worth_most(attention, latent, index):
     policy = all_policies(attention)[index]
     taken = np.array([[0.0, 1.0], [AZIMUTHS[5], AZIMUTHS[20]], [6.2, 3.3]])
-    choice, _ = policy.choose(latent, taken, None)
-    assert choice.azimuth.shape == (3,)
+    choice, _ = choose(policy, latent, taken)
+    goes_to = chosen(choice)
+    assert goes_to.shape == (3,)
     assert choice.scores.shape == (3, 24)
     assert np.isfinite(choice.scores).all()
-    assert ((choice.azimuth >= 0) & (choice.azimuth < math.tau)).all()
+    assert ((goes_to >= 0) & (goes_to < math.tau)).all()
     np.testing.assert_array_equal(choice.scores.argmax(axis=1),
-                                  [nearest_view(azimuth) for azimuth in choice.azimuth])
+                                  [nearest_view(azimuth) for azimuth in goes_to])
 
 
 @pytest.mark.parametrize('start', [0.0, AZIMUTHS[7], 0.1])
@@ -61,13 +93,13 @@ def test_random_goes_on_when_every_view_was_taken(latent):
 
 def test_random_takes_all_that_are_left_alike_and_repeats_with_its_seed(latent):
     taken = np.tile([[0.0, AZIMUTHS[1]]], (4400, 1))
-    chosen = [RandomPolicy(np.random.default_rng(seed)).choose(latent, taken)[0].azimuth
-              for seed in (1, 1, 2)]
-    counts = np.bincount([nearest_view(azimuth) for azimuth in chosen[0]], minlength=24)
+    draws = [chosen(choose(RandomPolicy(np.random.default_rng(seed)), latent, taken)[0])
+             for seed in (1, 1, 2)]
+    counts = np.bincount([nearest_view(azimuth) for azimuth in draws[0]], minlength=24)
     assert not counts[:2].any()
     assert abs(counts[2:] - 200).max() < 5 * math.sqrt(200)  # five sigma
-    np.testing.assert_array_equal(chosen[0], chosen[1])
-    assert (chosen[0] != chosen[2]).any()
+    np.testing.assert_array_equal(draws[0], draws[1])
+    assert (draws[0] != draws[2]).any()
 
 
 @pytest.mark.parametrize('count', [1, 2, 5, 8, 24])
@@ -78,7 +110,7 @@ def test_uniform_for_n_views_divides_the_turn_into_n(latent, count):
 
 
 def test_uniform_keeps_to_its_sweep_however_roughly_it_is_followed(latent):
-    choice, _ = UniformPolicy(4).choose(latent[:1], np.array([[1.0, 2.9, 3.9]]))
+    choice, _ = choose(UniformPolicy(4), latent[:1], np.array([[1.0, 2.9, 3.9]]))
     assert choice.azimuth[0] == pytest.approx(1.0 + 3 * math.pi / 2)
 
 
@@ -95,36 +127,46 @@ def test_farthest_settles_ties_alike_for_azimuths_of_single_precision(latent):
         exact = episode(FarthestPolicy(), AZIMUTHS[start], 12, latent)
         taken = np.float32(exact)
         for count in range(1, 12):
-            choice, _ = FarthestPolicy().choose(latent[:1], taken[None, :count].astype(float))
-            assert choice.azimuth[0] == exact[count]
+            choice, _ = choose(FarthestPolicy(), latent[:1], taken[None, :count].astype(float))
+            assert chosen(choice)[0] == exact[count]
 
 
-def test_the_distance_to_the_nearest_view_is_the_short_way():
-    distances = distance_to_taken(np.array([[AZIMUTHS[23], AZIMUTHS[2]]]))[0]
+def test_the_distance_to_the_nearest_view_is_the_short_way(latent):
+    taken, ring = [[AZIMUTHS[23], AZIMUTHS[2]]], [AZIMUTHS]
+    horizon = Observation(latent, poses(taken, 0.0), poses(ring, 0.0))
+    distances = distance_to_taken(horizon)[0]
     np.testing.assert_allclose(distances[[23, 0, 1, 2, 12]] / STEP, [0, 1, 1, 0, 10], atol=1e-9)
+
+
+def test_the_distance_to_a_view_above_is_how_far_above_it_is(latent):
+    above = Observation(latent, poses([[1.0]], 0.9), poses([[1.0, 1.0, 1.0]], 0.2))
+    np.testing.assert_allclose(distance_to_taken(above), [[0.7] * 3], atol=1e-9)
 
 
 def test_attention_takes_the_mean_of_its_model_and_carries_its_memory(attention, latent):
     import torch
-    policy = AttentionPolicy(attention)
+    policy = made_of(attention)
     taken = np.array([[0.5], [1.5], [2.5]])
-    choice, state = policy.choose(latent, taken)
+    choice, state = choose(policy, latent, taken)
     with torch.no_grad():
-        proposal, expected = attention(torch.from_numpy(latent), torch.tensor([0.5, 1.5, 2.5]))
+        proposal, expected = attention(torch.from_numpy(latent), torch.tensor([0.5, 1.5, 2.5]),
+                                       attention.initial_state(3))
     np.testing.assert_allclose(
         azimuth_difference(choice.azimuth, proposal.mean_azimuth.numpy()), 0, atol=1e-6)
-    np.testing.assert_allclose(state[1], expected[1], atol=1e-6)
-    with_memory, _ = policy.choose(latent, taken, state)
+    assert state.keys() == expected.keys()
+    for name, part in expected.items():
+        np.testing.assert_allclose(state[name], part, atol=1e-6)
+    with_memory, _ = choose(policy, latent, taken, state)
     assert np.abs(azimuth_difference(with_memory.azimuth, choice.azimuth)).max() > 1e-5
 
 
 def test_attention_leaves_what_it_is_shown_as_it_is(attention, latent):
     latent.setflags(write=False)
-    AttentionPolicy(attention).choose(latent, np.zeros((3, 1)))
+    choose(made_of(attention), latent, np.zeros((3, 1)))
 
 
 def test_attention_scores_an_azimuth_by_its_log_density(attention, latent):
-    choice, _ = AttentionPolicy(attention, sigma=0.5).choose(latent, np.zeros((3, 1)))
+    choice, _ = choose(made_of(attention, sigma=0.5), latent, np.zeros((3, 1)))
     away = azimuth_difference(AZIMUTHS, choice.azimuth[:, None])
     np.testing.assert_allclose(choice.scores, -(away / 0.5) ** 2 / 2, atol=1e-4)
 
@@ -142,30 +184,32 @@ def draws():
 
 def test_what_is_far_enough_is_left_where_it_is_wanted(draws):
     wanted, taken = draws
-    np.testing.assert_array_equal(kept_apart(wanted, taken, 0.0), wanted)
+    np.testing.assert_array_equal(kept_apart(wanted, taken, AZIMUTHS[None], 0.0), wanted)
     far_enough = apart(wanted, taken) >= 0.5
     assert 0 < far_enough.sum() < len(wanted)
-    np.testing.assert_array_equal(kept_apart(wanted, taken, 0.5)[far_enough], wanted[far_enough])
+    np.testing.assert_array_equal(
+        kept_apart(wanted, taken, AZIMUTHS[None], 0.5)[far_enough], wanted[far_enough])
 
 
 def test_what_is_too_near_gives_way_to_the_nearest_that_is_not(draws):
     wanted, taken = draws
-    kept = kept_apart(wanted, taken, 0.5)
+    kept = kept_apart(wanted, taken, AZIMUTHS[None], 0.5)
     assert (apart(kept, taken) > 0.5 - 2e-3).all()
     moved = kept != wanted
-    enough = np.where(distance_to_taken(taken) > 0.502, AZIMUTHS, np.nan)
+    enough = np.where(gaps_to_taken(AZIMUTHS[None], taken) > 0.502, AZIMUTHS, np.nan)
     nearest = np.nanmin(np.abs(azimuth_difference(enough, wanted[:, None])), axis=1)
     assert (np.abs(azimuth_difference(kept, wanted))[moved] <= nearest[moved] + 1e-9).all()
 
 
 def test_where_nothing_is_far_enough_the_farthest_is_taken():
     taken = np.delete(AZIMUTHS, [6, 7, 8])[None]
-    np.testing.assert_array_equal(kept_apart(np.array([0.1]), taken, 1.0), AZIMUTHS[[7]])
+    np.testing.assert_array_equal(
+        kept_apart(np.array([0.1]), taken, AZIMUTHS[None], 1.0), AZIMUTHS[[7]])
 
 
 def kept_policy(attention, separation):
     attention.view_separation = separation
-    return AttentionPolicy(attention)
+    return made_of(attention)
 
 
 def test_attention_that_keeps_apart_takes_every_view_once_before_any_twice(attention, latent):
@@ -176,26 +220,26 @@ def test_attention_that_keeps_apart_takes_every_view_once_before_any_twice(atten
 
 def test_what_is_too_near_to_a_view_is_worth_less_than_all_else(attention, latent):
     taken = np.array([[0.0, 1.0], [AZIMUTHS[5], AZIMUTHS[20]], [6.2, 3.3]])
-    choice, _ = kept_policy(attention, 0.7).choose(latent, taken)
-    near = distance_to_taken(taken) < 0.699
+    choice, _ = choose(kept_policy(attention, 0.7), latent, taken)
+    near = gaps_to_taken(AZIMUTHS[None], taken) < 0.699
     for scores, here in zip(choice.scores, near, strict=True):
         assert scores[here].max() < scores[~here].min()
     np.testing.assert_array_equal(choice.scores.argmax(axis=1),
-                                  [nearest_view(azimuth) for azimuth in choice.azimuth])
+                                  [nearest_view(azimuth) for azimuth in chosen(choice)])
 
 
 @pytest.mark.parametrize('shape', [(1, 3, 4, 4), (1, 8, 5, 4), (1, 8, 4)])
 def test_a_latent_of_another_model_is_refused(attention, shape):
     with pytest.raises(ViewError, match=r'expected a latent of the shape \(8, 4, 4\).*got'):
-        AttentionPolicy(attention).choose(np.zeros(shape, np.float32), np.zeros((1, 1)))
+        choose(made_of(attention), np.zeros(shape, np.float32), np.zeros((1, 1)))
 
 
 def test_policies_are_loaded_by_name(tmp_path, network, attention, tiny):
     path = tmp_path / 'weights.safetensors'
     save_weights(path, Bundle(network, attention, tiny, 0.4))
-    kinds = [type(load_policy(name, path)).__name__ for name in POLICIES]
+    kinds = [type(load_policy(name, PolicyOptions(weights=path))).__name__ for name in POLICIES]
     assert kinds == ['AttentionPolicy', 'RandomPolicy', 'UniformPolicy', 'FarthestPolicy']
     with pytest.raises(ConfigError, match="expected one of attention, random.*got 'greedy'"):
         load_policy('greedy')
     with pytest.raises(WeightsError, match='no such file'):
-        load_policy('attention', tmp_path / 'nothing.safetensors')
+        load_policy('attention', PolicyOptions(weights=tmp_path / 'nothing.safetensors'))

@@ -9,7 +9,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
 from active_recon.evaluation.rollouts import nearest_views
 from active_recon.models.attention import AttentionModel
-from active_recon.models.network import Folded, ReconstructionNetwork
+from active_recon.models.network import ReconstructionNetwork
 from active_recon.training import policy_gradient
 from active_recon.training.loop import make_fabric, Run, TrainingConfig, TrainingDivergedError
 from active_recon.training.policy_gradient import (
@@ -25,6 +25,7 @@ from active_recon.training.policy_gradient import (
 from active_recon.voxels import iou
 import numpy as np
 import pytest
+from shown_views import cameras_at
 import torch
 from torch.testing import assert_close
 
@@ -203,20 +204,25 @@ def test_proposals_one_way_have_no_entropy_and_proposals_every_way_the_most():
 class Bandit(ReconstructionNetwork):
     """An episode's IoU depends on the azimuth of the view alone, which the image's red tells."""
 
+    image_size, resolution, needs_front = 64, 32, True
+
     def __init__(self, best: float) -> None:
         super().__init__()
         worth = (1 + torch.tensor(AZIMUTHS - best).cos()) / 2
         self.filled = (32 * worth).round()  # of 32 layers, by view
 
-    def look(self, images):
+    def initial_state(self, batch):
+        return {'filled': torch.zeros(batch), 'latent': torch.ones(batch, 4, 4, 4)}
+
+    def encode(self, images, cameras):
         return images
 
-    def remember(self, seen, azimuths, hidden=None):
-        view = (seen[:, 0, 0, 0] * 255 / 10).round().long()
-        return Folded(torch.ones(len(seen), 4, 4, 4), self.filled[view]), hidden
+    def update(self, encoded, cameras, state):
+        view = (encoded[:, 0, 0, 0] * 255 / 10).round().long()
+        return state | {'filled': self.filled[view]}
 
-    def decode(self, features):
-        layers = torch.arange(32)[None, :, None, None] < features[:, None, None, None]
+    def decode(self, state):
+        layers = torch.arange(32)[None, :, None, None] < state['filled'][:, None, None, None]
         return torch.where(layers.expand(-1, -1, 32, 32), 9.0, -9.0)
 
 
@@ -227,15 +233,16 @@ def bandit_views(tmp_path_factory):
     images[..., 0] = (10 * torch.arange(24))[None, :, None, None]
     images[..., 3] = 255
     folder = ObjectFolder(tmp_path_factory.mktemp('none'), 'cube', 'cube')
-    return ViewSet(images, torch.tensor(AZIMUTHS, dtype=torch.float32)[None],
+    cameras = cameras_at(AZIMUTHS)
+    return ViewSet(images, cameras.poses[None], cameras.intrinsics[None],
                    torch.ones(1, 32, 32, 32, dtype=torch.bool), (folder,))
 
 
 @torch.no_grad()
 def mean_direction(attention):
     """Return where the policy looks after one view, averaged over the 24 first views."""
-    proposal, _ = attention(torch.ones(24, 4, 4, 4),
-                            torch.tensor(AZIMUTHS, dtype=torch.float32))
+    proposal, _ = attention(torch.ones(24, 4, 4, 4), torch.tensor(AZIMUTHS, dtype=torch.float32),
+                            attention.initial_state(24))
     mean = proposal.mean_azimuth
     return math.atan2(mean.sin().mean(), mean.cos().mean())
 

@@ -7,7 +7,7 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.evaluation.measure import Episodes
 from active_recon.evaluation.policy_study import (
     compare,
-    CONTENDERS,
+    contender_names,
     contenders,
     decision_ms,
     load_attentions,
@@ -22,6 +22,7 @@ from active_recon.models.network_2d3d import Network2d3d
 from active_recon.models.weights import Bundle, load_weights, save_weights
 import numpy as np
 import pytest
+from shown_views import part_of
 import torch
 
 
@@ -35,8 +36,7 @@ def attentions(attention, tiny):
 @pytest.fixture
 def few(views):
     """Return the six objects with every fourth view alone."""
-    from dataclasses import replace
-    return replace(views, images=views.images[:, ::4], azimuths=views.azimuths[:, ::4])
+    return part_of(views, chosen=slice(None, None, 4))
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ class Listener:
 def test_the_study_tells_everything_of_every_policy_and_json_holds_it(trial, attentions):
     found = policy_study(trial, attentions, seeds=3, subset_objects=4)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
-    assert set(found['policies']) == set(CONTENDERS)
+    assert set(found['policies']) == set(contender_names())
     assert {name: figures['seeds'] for name, figures in found['policies'].items()} == {
         'random': 3, 'uniform': 1, 'farthest': 1, 'attention': 2, 'oracle': 1}
     for name, figures in found['policies'].items():
@@ -158,7 +158,7 @@ def test_every_run_is_reported_to_its_end(trial, attention):
 
 
 def test_a_decision_takes_a_time_and_the_oracle_s_is_not_told(trial, attention):
-    every = contenders(CONTENDERS, [attention], 3, seeds=1)
+    every = contenders(contender_names(), [attention], 3, seeds=1)
     times = {contender.policy: decision_ms(trial, contender) for contender in every}
     assert times.pop('oracle') is None
     assert all(0 < spent < 1000 for spent in times.values())

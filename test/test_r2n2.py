@@ -2,6 +2,7 @@
 
 from active_recon.models.r2n2 import ConvGRUCell, R2n2, R2n2Config, SIZES
 from learning_by_heart import iou_by_heart
+from shown_views import known_after
 import torch
 from torch import nn
 from torch.testing import assert_close
@@ -9,10 +10,10 @@ from torch.testing import assert_close
 
 def test_the_latent_is_the_memory_laid_flat():
     network = R2n2.from_config(SIZES['small'])
-    folded, hidden = network.fold(torch.rand(2, 3, 64, 64), torch.zeros(2))
-    assert hidden.shape == (2, 32, 4, 4, 4)
-    assert folded.latent.shape == (2, 128, 4, 4)
-    assert_close(folded.latent.flatten(), hidden.flatten())
+    known = known_after(network, torch.rand(1, 2, 3, 64, 64))
+    assert known.state['memory'].shape == (2, 32, 4, 4, 4)
+    assert known.latent.shape == (2, 128, 4, 4)
+    assert_close(known.latent.flatten(), known.state['memory'].flatten())
 
 
 def test_the_memory_keeps_what_an_update_gate_of_1_tells_it_to_keep():
@@ -32,8 +33,8 @@ def test_the_memory_stays_between_minus_1_and_1():
 def test_the_published_decoder_doubles_three_times_and_the_small_one_too():
     for config in (SIZES['small'], SIZES['published']):
         with torch.device('meta'):
-            logits = R2n2.from_config(config).decode(
-                torch.empty(1, config.hidden_channels, 4, 4, 4))
+            network = R2n2.from_config(config)
+            logits = network.decode(network.initial_state(1))
         assert logits.shape == (1, 32, 32, 32)
 
 

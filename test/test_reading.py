@@ -128,10 +128,14 @@ def test_each_goal_follows_the_view_that_it_was_decided_upon(loop, bag):
     goals = [episode.first_goal, *(view.goal for view in episode.views[:-1])]
     assert episode.views[-1].goal is None
     for number, goal in enumerate(goals):
-        assert goal.azimuth == pytest.approx(loop.azimuths[number])
+        assert goal.camera.azimuth == pytest.approx(loop.azimuths[number])
+        assert (goal.camera.elevation, goal.camera.distance) == pytest.approx((0.5, 2.1))
         assert goal.stamp == loop.goal_stamps[number]
         assert goal.received == loop.goal_stamps[number] + 10 + DELAY  # when it first came
-        np.testing.assert_allclose(goal.candidates, loop.candidates, atol=1e-6)
+        np.testing.assert_allclose(goal.candidates.azimuths, [
+            camera.azimuth for camera in loop.candidates], atol=1e-6)
+        np.testing.assert_allclose(goal.candidates.positions, [
+            camera.position for camera in loop.candidates], atol=1e-6)
         assert np.array_equal(goal.scores, loop.scores[number])
 
 
@@ -171,7 +175,7 @@ def test_two_episodes_keep_their_views_apart(tmp_path):
     assert [episode.id for episode in run.episodes] == ['first', 'second']
     assert [len(episode.views) for episode in run.episodes] == [3, 2]
     assert [episode.done for episode in run.episodes] == ['max_views', 'max_views']
-    assert run.episodes[1].first_goal.azimuth == pytest.approx(1.0)
+    assert run.episodes[1].first_goal.camera.azimuth == pytest.approx(1.0)
 
 
 def test_views_before_any_episode_are_one_without_an_id(loop, tmp_path):

@@ -35,7 +35,7 @@ def set_gate(cell, gate, value):
 
 def test_memory_starts_empty_and_keeps_its_shape(cell, grid):
     features = torch.randn(5, 3, *grid)
-    state = cell.initial_state(features)
+    state = cell.initial_state(5)
     assert not state.hidden.any()
     assert not state.memory.any()
     after = cell(features, state)

@@ -10,13 +10,14 @@ from active_recon.bags.comparison import (
     TOLERANCES,
     WITHIN_TOLERANCE,
 )
-from active_recon.bags.replay import computing_with, replay, replay_hash
+from active_recon.bags.replay import replay, replay_hash
 from active_recon.bags.settings import recorded_settings
-from active_recon.cameras import orbit_camera, wrap_azimuth
+from active_recon.cameras import orbit_camera
 from active_recon.errors import DataError, WeightsError
-from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
 from active_recon.motion import MotionLimits
+from active_recon.policies.geometric import FarthestPolicy
 from active_recon.voxels import VoxelGrid
+from active_recon.weights_files import FOLDER, SHIPPED, weights_hash
 import numpy as np
 import pytest
 from recorded_runs import (
@@ -91,7 +92,9 @@ def off_by(view, name, gap):
         case 'entropy':
             return {'entropy': view.entropy * (1 + gap)}
         case 'goal':
-            return {'goal': replace(view.goal, azimuth=wrap_azimuth(view.goal.azimuth + gap))}
+            camera = view.goal.camera
+            return {'goal': replace(view.goal, camera=orbit_camera(
+                camera.azimuth, camera.elevation + gap, camera.distance))}
         case 'scores':
             return {'goal': replace(view.goal, scores=view.goal.scores + np.float32(gap))}
     raise AssertionError(name)
@@ -125,12 +128,12 @@ def test_a_view_more_that_was_asked_for_after_the_end_is_no_difference(make_loop
     reconstructor, planner = make_loop()
     episode = episode_of(reconstructor, planner, SECOND, 1.0)
     goal = planner.plan()
-    camera = orbit_camera(goal.azimuth)
-    known = reconstructor.add_view(image_at(goal.azimuth), camera)
-    planner.add_view(known.latent, camera.azimuth, known.grid.entropy())
+    camera = goal.camera
+    known = reconstructor.add_view(image_at(camera.azimuth), camera)
+    planner.add_view(known.latent, camera, known.grid.entropy())
     *views, last = episode.views
     asked = replace(last, done='max_views', goal=goal_of(goal, last.stamp + 1))
-    more = replace(last, stamp=last.stamp + SECOND, image=image_at(goal.azimuth), camera=camera,
+    more = replace(last, stamp=last.stamp + SECOND, image=image_at(camera.azimuth), camera=camera,
                    reconstruction=None, occupied=None, latent=known.latent, entropy=None)
     run = run_of([replace(episode, views=[*views, asked, more])])
     found = compare(replay(run, *make_loop()), THRESHOLD).deviations
@@ -214,11 +217,54 @@ def test_an_end_that_a_service_asked_for_is_no_difference(run, make_loop):
         assert found.deviations['stop'].compared == decided
 
 
-def test_threads_are_fixed_inside_and_as_before_outside():
-    before = torch.get_num_threads()
-    with computing_with(before + 1):
-        assert torch.get_num_threads() == before + 1
+@pytest.mark.parametrize('given_up', [(), (1, 0, 2)])
+def test_goals_of_a_planner_that_follows_the_camera_s_elevation_replay_to_the_same_bits(
+        make_loop, given_up):
+    loop = make_loop()
+    episode = episode_of(*loop, SECOND, orbit_camera(1.0, 0.8, 2.4), given_up)
+    assert {round(view.camera.elevation, 9) for view in episode.views} == {0.8}
+    assert compare(replay(run_of([episode]), *make_loop()), THRESHOLD).verdict == SAME_BITS
+
+
+def test_a_policy_that_looks_at_the_volume_is_shown_what_is_published_of_it(network):
+    class Looks(FarthestPolicy):
+        wants_volume = True
+
+        def choose(self, seen, state):
+            volumes.append(seen.occupancy[0])
+            return super().choose(seen, state)
+
+    volumes = []
+    reconstructor, planner = loop_of(network, FarthestPolicy())
+    run = run_of([episode_of(reconstructor, planner, SECOND, 1.0)])
+    replay(run, *loop_of(network, Looks()))
+    for view, volume in zip(run.episodes[0].views, volumes, strict=True):
+        np.testing.assert_array_equal(volume, view.reconstruction.occupancy)
+
+
+@pytest.mark.parametrize(('recorded', 'elevation', 'distance'), [
+    ({}, 0.3, 2.1 * 0.5), ({'elevation': float('nan'), 'distance': float('nan')}, 0.3, 2.1 * 0.5),
+    ({'elevation': 0.7, 'distance': 2}, 0.7, 2.0)])
+def test_goals_of_a_replay_stand_where_the_recorded_parameters_say(recorded, elevation, distance):
+    bag = replace(run_of([]), parameters={
+        'reconstructor': {'object_size': 0.5},
+        'view_planner': {'policy': 'farthest', **recorded}})
+    camera = recorded_settings(bag).load_planner().first_goal(orbit_camera(1.0, 0.3)).camera
+    assert (camera.elevation, camera.distance) == pytest.approx((elevation, distance))
+
+
+def test_a_replay_computes_with_the_threads_of_the_run_and_leaves_torch_as_it_was(monkeypatch):
+    before, set_to = torch.get_num_threads(), []
+    settings = recorded_settings(replace(run_of([]), parameters={
+        'reconstructor': {'threads': before + 1}}))
+    reconstructor = settings.load_reconstructor()
+    setting = torch.set_num_threads
+    monkeypatch.setattr(torch, 'set_num_threads',
+                        lambda count: (set_to.append(count), setting(count)))
+    reconstructor.add_view(image_at(1.0), orbit_camera(1.0))
+    assert set_to == [before + 1, before]
     assert torch.get_num_threads() == before
+    assert f'{before + 1} threads' in reconstructor.provenance['runtime']
 
 
 def test_settings_are_those_of_the_bag_and_what_it_lacks_is_the_cores():
@@ -235,8 +281,8 @@ def test_settings_are_those_of_the_bag_and_what_it_lacks_is_the_cores():
     assert settings.planner == {
         'policy': 'random', 'seed': 5, 'max_views': 3, 'weights': SHIPPED, 'motion_weight': 1.0,
         'azimuth_range': [-1.0, 2.0], 'forbidden_sectors': [0.6, 1.1], 'reachable_azimuths': []}
-    goal = settings.load_planner().first_goal(0.8)
-    assert goal.azimuth == pytest.approx(np.pi / 6)
+    goal = settings.load_planner().first_goal(orbit_camera(0.8))
+    assert goal.camera.azimuth == pytest.approx(np.pi / 6)
     assert settings.load_reconstructor().object_size == 0.25
 
 

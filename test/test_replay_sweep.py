@@ -46,7 +46,8 @@ def test_each_policy_takes_the_views_that_it_asks_for(
     (episode,) = read_run(out).episodes
     goals = [episode.first_goal, *(view.goal for view in episode.views[:-1])]
     for goal, view in zip(goals, episode.views, strict=True):
-        assert abs(azimuth_difference(goal.azimuth, view.camera.azimuth)) <= np.radians(7.5) + 1e-9
+        away = azimuth_difference(goal.camera.azimuth, view.camera.azimuth)
+        assert abs(away) <= np.radians(7.5) + 1e-9
     assert episode.done in ('max_views', 'entropy_settled')
     code, said = replayed(monkeypatch, capsys, out)
     assert code == 0

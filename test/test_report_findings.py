@@ -69,19 +69,25 @@ def test_run_without_a_planner_is_not_cut_off(run):
     assert any('No planner' in text for text in said(unplanned, 'note'))
 
 
-@pytest.mark.parametrize(('off_deg', 'warned'), [(5, False), (12, True), (-12, True)])
-def test_view_off_its_goal_is_told_beyond_the_tolerance(run, off_deg, warned):
-    azimuth = run.episodes[0].views[0].camera.azimuth + math.radians(off_deg)
-    asked = RecordedGoal(azimuth, 0, None, None, 0)
-    assert (said(changed(run, first_goal=asked))
-            == ['View 1 was taken 12° away from its goal.'] * warned)
+@pytest.mark.parametrize(('aside_deg', 'above_deg', 'told'), [
+    (5, 0, []), (14, 0, [12]), (-14, 0, [12]), (0, 5, []), (0, 12, [12]), (0, -12, [12])])
+def test_view_off_its_goal_is_told_beyond_the_tolerance(run, aside_deg, above_deg, told):
+    camera = run.episodes[0].views[0].camera
+    asked = RecordedGoal(
+        orbit_camera(camera.azimuth + math.radians(aside_deg),
+                     camera.elevation + math.radians(above_deg)), 0, None, None, 0)
+    assert said(changed(run, first_goal=asked)) == [
+        f'View 1 was taken {off}° away from its goal.' for off in told]
 
 
 @pytest.mark.parametrize(('elevation_deg', 'warned'), [(30, False), (34, False), (45, True)])
 def test_other_elevation_is_told(run, elevation_deg, warned):
     view = run.episodes[0].views[0]
     camera = orbit_camera(view.camera.azimuth, math.radians(elevation_deg))
-    assert bool(said(changed(run, views=[replace(view, camera=camera)]))) == warned
+    there = changed(run, first_goal=None, views=[replace(view, camera=camera)])
+    assert bool(said(there)) == warned
+    anywhere = replace(there, provenance={**there.provenance, 'needs_front': 'false'})
+    assert not said(anywhere)
 
 
 def test_shape_that_was_not_recorded_is_told(run):

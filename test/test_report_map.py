@@ -3,8 +3,8 @@
 from dataclasses import replace
 import math
 
-from active_recon.bags.run import RecordedGoal
-from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.bags.run import Candidates, RecordedGoal
+from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
 from active_recon.report.subject import Subject
 from active_recon.report.turntable_map import place, spread_out, turntable_map
 import numpy as np
@@ -23,7 +23,8 @@ def drawn(run):
 
 def petals(run, scores):
     """Return the outer ends of the first view's petals, (24,) radii."""
-    goal = RecordedGoal(0.0, 0, AZIMUTHS, np.asarray(scores, np.float32), 0)
+    candidates = Candidates.of([orbit_camera(azimuth) for azimuth in AZIMUTHS])
+    goal = RecordedGoal(orbit_camera(0.0), 0, candidates, np.asarray(scores, np.float32), 0)
     [trace] = [trace for trace in drawn(changed(run, first_goal=goal))['data']
                if trace.get('fill') == 'toself' and trace['meta'] == {'of': 0}]
     radii = [math.hypot(x, y) if x is not None else 0.0
@@ -79,7 +80,7 @@ def test_view_that_came_back_to_a_place_stands_beside_the_first(run):
 
 
 def test_goal_without_scores_is_still_drawn(run):
-    goal = RecordedGoal(1.0, 0, None, None, 0)
+    goal = RecordedGoal(orbit_camera(1.0), 0, None, None, 0)
     views = [replace(view, goal=None) for view in run.episodes[0].views]
     figure = drawn(changed(run, first_goal=goal, views=views))
     assert not any(trace.get('fill') == 'toself' for trace in figure['data'])

@@ -75,7 +75,7 @@ def test_shapes_made_up_for_are_those_that_the_loop_would_have_found(run):
                                for view in run.episodes[0].views])
     assert lacks_reconstruction(bare)
     assert not lacks_reconstruction(run)
-    made = with_reconstruction(bare, Reconstructor.load())
+    made = with_reconstruction(bare, Reconstructor.load(threads=1))
     for view, recorded in zip(made.episodes[0].views, run.episodes[0].views, strict=True):
         assert (view.occupied.occupied(0) == recorded.occupied.occupied(0)).all()
         assert view.entropy == recorded.entropy

@@ -8,37 +8,41 @@ from torch.testing import assert_close
 
 @pytest.fixture
 def looked_at(network, monkeypatch):
-    """Return a list that the number of images of every look is added to."""
-    counts, look = [], network.look
-    monkeypatch.setattr(network, 'look', lambda images: counts.append(len(images)) or look(images))
+    """Return a list that the number of images of every encoding is added to."""
+    counts, encode = [], network.encode
+    monkeypatch.setattr(network, 'encode', lambda images, cameras: (
+        counts.append(len(images)) or encode(images, cameras)))
     return counts
 
 
 @torch.inference_mode()
 def test_an_observer_knows_what_the_network_knows(network, views):
-    observer, hidden, own = Observer(network, views), None, None
-    objects = torch.tensor([0, 0, 3])
+    observer, objects = Observer(network, views), torch.tensor([0, 0, 3])
+    state = own = network.initial_state(3)
     for chosen in (torch.tensor([5, 5, 5]), torch.tensor([1, 5, 2])):
-        folded, hidden = observer.fold(objects, chosen, hidden)
-        seen, own = network(views.white(objects, chosen), views.azimuths[objects, chosen], own)
-        assert_close(folded.latent, seen.latent, rtol=0, atol=1e-3)
-        assert_close(observer.decode(folded), seen.logits, rtol=0, atol=1e-2)
+        state = observer.update(objects, chosen, state)
+        logits, own = network(views.white(objects, chosen), views.cameras(objects, chosen), own)
+        assert_close(state['latent'], own['latent'], rtol=0, atol=1e-3)
+        assert_close(observer.decode(state), logits, rtol=0, atol=1e-2)
 
 
 @torch.inference_mode()
-def test_an_observer_looks_at_every_view_once(network, views, looked_at):
+def test_an_observer_encodes_every_view_once(network, views, looked_at):
     observer, objects = Observer(network, views), torch.tensor([0, 0, 3, 3])
-    observer.fold(objects, torch.tensor([1, 1, 1, 2]))
-    observer.fold(objects, torch.tensor([1, 2, 1, 0]))
-    observer.fold(objects, torch.tensor([2, 1, 0, 0]))
+    state = network.initial_state(4)
+    for chosen in ([1, 1, 1, 2], [1, 2, 1, 0], [2, 1, 0, 0]):
+        observer.update(objects, torch.tensor(chosen), state)
     assert looked_at == [3, 2]  # then view 2 of object 0 and view 0 of object 3
 
 
 @torch.inference_mode()
 def test_a_front_that_is_told_wrongly_reaches_the_network(network, views, monkeypatch):
-    told, remember = [], network.remember
-    monkeypatch.setattr(network, 'remember', lambda seen, azimuths, hidden=None: (
-        told.append(azimuths), remember(seen, azimuths, hidden))[1])
+    told, update = [], network.update
+    monkeypatch.setattr(network, 'update', lambda encoded, cameras, state: (
+        told.append(cameras), update(encoded, cameras, state))[1])
     objects, chosen = torch.tensor([0, 1]), torch.tensor([3, 4])
-    Observer(network, views).fold(objects, chosen, yaws=torch.tensor([0.5, -0.5]))
-    assert_close(told[0], views.azimuths[objects, chosen] + torch.tensor([0.5, -0.5]))
+    Observer(network, views).update(objects, chosen, network.initial_state(2),
+                                    yaws=torch.tensor([0.5, -0.5]))
+    assert_close(told[0].azimuths, views.azimuths[objects, chosen] + torch.tensor([0.5, -0.5]))
+    assert_close(told[0].intrinsics, views.intrinsics[objects, chosen])
+    assert_close(told[0].poses[:, 2], views.poses[objects, chosen][:, 2])  # all heights

@@ -18,6 +18,7 @@ from active_recon.silhouettes import frustum, project
 from active_recon.voxels import iou
 import numpy as np
 import pytest
+from shown_views import cameras_at
 import torch
 from torch.testing import assert_close
 
@@ -57,11 +58,11 @@ def model():
 
 def after_views(model, voxels, count):
     """Return the category's index and the IoU of objects (B, ...) after views from all around."""
-    hidden = None
+    state = model.initial_state(len(voxels))
     for t in range(count):
         azimuths = torch.full((len(voxels),), 0.4 + 2 * t)
-        folded, hidden = model.fold(seen(voxels, azimuths), azimuths, hidden)
-    return folded.features[:, 0].long(), iou(model.decode(folded.features) > 0, voxels)
+        state = model.step(seen(voxels, azimuths), cameras_at(azimuths), state)
+    return state['features'][:, 0].long(), iou(model.decode(state) > 0, voxels)
 
 
 def test_the_categories_known_by_default_are_those_of_the_data():
@@ -104,7 +105,7 @@ def test_as_many_modes_as_objects_less_one_hold_every_object():
     coefficients = (distances - model.means[0]).flatten(1) @ torch.linalg.pinv(modes)
     assert_close(coefficients.square().mean(dim=0), torch.ones(3), rtol=1e-3, atol=1e-3)
     features = torch.cat([torch.zeros(4, 1), coefficients], dim=1)
-    assert (model.decode(features) > 0).equal(members)
+    assert (model.decode({'features': features}) > 0).equal(members)
 
 
 def test_the_category_is_told_by_the_silhouettes(model):
@@ -131,14 +132,15 @@ def test_coefficients_stay_at_the_mean_where_the_silhouettes_are_the_means(model
 @pytest.mark.parametrize('mode', [torch.inference_mode, torch.no_grad, torch.enable_grad])
 def test_it_answers_alike_however_gradients_are_switched(model, mode):
     azimuths = torch.tensor([0.3, 5.0])
-    expected = model.fold(seen(BOXES[:2], azimuths), azimuths)[0].features
+    expected = model.step(seen(BOXES[:2], azimuths), cameras_at(azimuths),
+                          model.initial_state(2))['features']
     with mode():
         images, at = seen(BOXES[:2], azimuths), azimuths.clone()
-        folded, hidden = model.fold(images, at)
-        again, _ = model.fold(images, at + 1, hidden)
-    assert_close(folded.features, expected)
-    assert not again.features.requires_grad
-    assert again.features.isfinite().all()
+        once = model.step(images, cameras_at(at), model.initial_state(2))
+        again = model.step(images, cameras_at(at + 1), once)
+    assert_close(once['features'], expected)
+    assert not again['features'].requires_grad
+    assert again['features'].isfinite().all()
 
 
 def test_objects_of_other_categories_are_left_out(model):

@@ -1,6 +1,5 @@
 """The first stage of training: it learns, repeats, goes on after a cut, says what went wrong."""
 
-from dataclasses import replace
 
 from active_recon.config import LossConfig
 from active_recon.errors import ConfigError
@@ -15,6 +14,7 @@ from active_recon.training.loop import (
 from active_recon.training.supervised import longest_sequence, steps_for, train_reconstruction
 import numpy as np
 import pytest
+from shown_views import part_of
 import torch
 from torch.testing import assert_close
 
@@ -133,8 +133,7 @@ def test_a_loss_that_is_not_finite_names_its_batch_and_leaves_the_checkpoint(
 
 @pytest.mark.parametrize('bfloat16', [False, True])
 def test_the_loss_falls(views, tiny, tmp_path, bfloat16):
-    one = replace(views, images=views.images[:1], azimuths=views.azimuths[:1],
-                  voxels=views.voxels[:1], folders=views.folders[:1])
+    one = part_of(views, slice(1))
     config = TrainingConfig(steps=60, batch_size=4, learning_rate=3e-2, max_views=2,
                             bfloat16=bfloat16)
     _, told = train(config, one, tiny, tmp_path / 'run.safetensors',

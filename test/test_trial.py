@@ -10,6 +10,7 @@ from active_recon.evaluation.trial import Contender, data_hash, Trial
 from active_recon.models.weights import state_hash
 import numpy as np
 import pytest
+from shown_views import part_of
 import torch
 
 
@@ -64,13 +65,15 @@ def test_whatever_episodes_depend_on_has_a_folder_of_its_own(network, tiny, view
     from active_recon.models.network_2d3d import Network2d3d
     torch.manual_seed(1)
     other = Network2d3d.from_config(tiny).eval()
-    fewer = replace(views, images=views.images[:5], azimuths=views.azimuths[:5],
-                    voxels=views.voxels[:5], folders=views.folders[:5])
+    fewer = part_of(views, slice(5))
+    moved = replace(views, poses=views.poses.flip(1))
+    zoomed = replace(views, intrinsics=views.intrinsics * 1.1)
     turned = replace(views, voxels=views.voxels.flip(1))
     plain = {'starts': 2, 'count': 3, 'cache': tmp_path}
     trials = [Trial(network, 0.1, views, **plain), Trial(other, 0.1, views, **plain),
               Trial(network, 0.2, views, **plain), Trial(network, 0.1, fewer, **plain),
-              Trial(network, 0.1, turned, **plain)]
+              Trial(network, 0.1, turned, **plain), Trial(network, 0.1, moved, **plain),
+              Trial(network, 0.1, zoomed, **plain)]
     trials += [Trial(network, 0.1, views, **plain | change) for change in (
         {'starts': 3}, {'count': 2}, {'seed': 1}, {'bfloat16': True})]
     assert len({trial.folder for trial in trials}) == len(trials)
@@ -111,4 +114,4 @@ def test_hashes_tell_states_and_sets_apart(network, views):
         next(network.parameters()).add_(1)
     assert state_hash(network) != before
     assert data_hash(views) == data_hash(replace(views))
-    assert data_hash(replace(views, azimuths=views.azimuths + 1)) != data_hash(views)
+    assert data_hash(replace(views, poses=views.poses + 1)) != data_hash(views)

@@ -1,5 +1,7 @@
 """Variation when read: the same for the same numbers, true to the object, and of every kind."""
 
+from dataclasses import replace
+
 from active_recon.training.variation import (
     BACKGROUNDS,
     draw_kinds,
@@ -16,6 +18,12 @@ from torch.nn.functional import max_pool2d
 from torch.testing import assert_close
 
 LENGTH, SIZE = 3, 60
+
+
+def varied(images, views, generator):
+    """Return pictures and intrinsics of images (T, B, ...), all of the same camera before."""
+    intrinsics = views.intrinsics[0, 0].expand(*images.shape[:2], 3, 3)
+    return vary(images, intrinsics, views, generator)
 
 
 def rng(seed=0):
@@ -35,14 +43,14 @@ def planes(images):
 
 
 def test_the_same_numbers_vary_alike_and_others_otherwise(images, views):
-    first, again, other = (vary(images, views, rng(seed)) for seed in (0, 0, 1))
+    first, again, other = (varied(images, views, rng(seed)) for seed in (0, 0, 1))
     assert_close(again, first, rtol=0, atol=0)
-    assert (other != first).any()
+    assert (other[0] != first[0]).any()
 
 
 def test_pictures_are_in_range_and_their_originals_are_untouched(images, views):
     before = images.clone()
-    pictures = vary(images, views, rng())
+    pictures, _ = varied(images, views, rng())
     assert pictures.shape == (LENGTH, SIZE, 3, 64, 64)
     assert pictures.isfinite().all()
     assert 0 <= pictures.min() < pictures.max() <= 1
@@ -52,7 +60,8 @@ def test_pictures_are_in_range_and_their_originals_are_untouched(images, views):
 @pytest.mark.parametrize('size', [1, 2, 3])
 def test_the_smallest_batches_can_be_varied(size, images, views):
     for seed in range(8):
-        assert vary(images[:1, :size], views, rng(seed)).shape == (1, size, 3, 64, 64)
+        pictures, _ = varied(images[:1, :size], views, rng(seed))
+        assert pictures.shape == (1, size, 3, 64, 64)
 
 
 def test_every_kind_of_background_occurs_in_its_share():
@@ -64,7 +73,7 @@ def test_every_kind_of_background_occurs_in_its_share():
 
 
 def test_half_of_the_sequences_stay_in_place_on_pure_white(images, views):
-    pictures = vary(images, views, rng())
+    pictures, _ = varied(images, views, rng())
     alpha = images[..., 3].float()[:, :, None] / 255
     white = ((pictures == 1) | (alpha > 0)).all((0, 2, 3, 4))
     assert 0.35 < white.float().mean() < 0.65
@@ -74,10 +83,34 @@ def test_half_of_the_sequences_stay_in_place_on_pure_white(images, views):
     assert (where_white != plain)[solid[:, white]].float().mean() > 0.5  # its colours changed
 
 
+def centers_of(planes):
+    """Return the centres of what is opaque in planes (N, 4, S, S), x and y in pixels, (2, N)."""
+    alpha = planes[:, 3]
+    along = torch.arange(alpha.shape[-1]) + 0.5
+    return torch.stack([(alpha.sum(axis) * along).sum(1) / alpha.sum((1, 2)) for axis in (1, 2)])
+
+
+def test_a_camera_told_of_the_motion_sees_a_point_where_its_image_went():
+    dot = torch.zeros(200, 4, 64, 64)
+    dot[:, :, 14:16, 44:46] = 1
+    shown, motion = moved(dot, rng())
+    went = motion @ torch.tensor([45.0, 15.0, 1.0], dtype=torch.float64)  # (200, 3)
+    assert_close(centers_of(shown), went[:, :2].T.float(), rtol=0, atol=0.1)
+    assert (went[:, :2] - torch.tensor([45.0, 15.0])).abs().amax() > 1
+
+
+def test_the_intrinsics_move_with_the_pictures_and_stay_where_they_stay(images, views):
+    pictures, intrinsics = varied(images, views, rng())
+    stayed = (intrinsics == views.intrinsics[0, 0]).all((0, 2, 3))
+    alpha = images[..., 3].float()[:, :, None] / 255
+    white = ((pictures == 1) | (alpha > 0)).all((0, 2, 3, 4))
+    assert (stayed == white).all()
+
+
 def test_a_moved_object_keeps_its_shape_and_stays_within_the_shift(planes):
-    shifted = moved(planes, rng())
+    shifted, _ = moved(planes, rng())
     assert (shifted[:, :3] <= shifted[:, 3:] + 1e-5).all()  # the colours moved with the alpha
-    reach = 1 + int(np.ceil(MOST_SHIFT + MOST_SCALE * 32))
+    reach = 1 + int(np.ceil(64 * MOST_SHIFT + MOST_SCALE * 32))
     grown = max_pool2d(planes[:, 3:], 2 * reach + 1, 1, reach)
     assert (shifted[:, 3:] <= grown + 1e-5).all()
     area = shifted[:, 3].sum((1, 2)) / planes[:, 3].sum((1, 2))
@@ -88,13 +121,10 @@ def test_a_moved_object_keeps_its_shape_and_stays_within_the_shift(planes):
 def test_objects_are_moved_each_in_its_own_way_and_by_up_to_two_pixels():
     dot = torch.zeros(400, 4, 64, 64)
     dot[:, :, 31:33, 31:33] = 1  # about the middle, which a change of scale leaves where it is
-    alpha = moved(dot, rng())[:, 3]
-    along = torch.arange(64) + 0.5
-    centers = torch.stack([(alpha.sum(axis) * along).sum(1) / alpha.sum((1, 2))
-                           for axis in (1, 2)])
+    centers = centers_of(moved(dot, rng())[0])
     away = (centers - 32).abs().amax(dim=1)
-    assert (away <= MOST_SHIFT + 0.1).all()
-    assert (away > MOST_SHIFT - 0.3).all()
+    assert (away <= 64 * MOST_SHIFT + 0.1).all()
+    assert (away > 64 * MOST_SHIFT - 0.3).all()
     assert len(centers.round(decimals=3).unique(dim=1)[0]) > 390
 
 
@@ -123,7 +153,7 @@ def test_a_plain_background_is_of_one_colour_and_a_gradient_runs_one_way(views):
 def test_pieces_show_colours_of_the_set_s_own_images(views):
     plain = views.images.clone()
     plain[..., :3] = plain[..., 3:] // 2
-    grey = type(views)(plain, views.azimuths, views.voxels, views.folders)
+    grey = replace(views, images=plain)
     drawn = BACKGROUNDS['pieces'](grey, 4, 30, rng())
     shown = ((drawn - 127 / 255).abs() < 0.01).all(dim=2).float().mean().item()
     covered = (plain[..., 3] == 255).float().mean().item()

@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.cameras import orbit_camera
+from active_recon.cameras import Camera, orbit_camera
 from active_recon.errors import ConfigError
 from active_recon.view_gate import ViewGate
 import pytest
@@ -38,17 +38,45 @@ def test_separation_is_the_short_way_round():
 def test_a_goal_is_taken_once_and_only_near_it():
     gate = ViewGate('at_goal', goal_tolerance=0.14)
     assert offer(gate, [0, 0, 0]) == []
-    gate.set_goal(1.0, stamp=1)
-    assert offer(gate, [0.85, 0.85, 0.87, 0.87, 0.87, 1.0, 1.0], start=10 * PERIOD) == [3]
+    gate.set_goal(orbit_camera(1.0), stamp=1)
+    assert offer(gate, [0.83, 0.83, 0.85, 0.85, 0.85, 1.0, 1.0], start=10 * PERIOD) == [3]
+
+
+@pytest.mark.parametrize(('elevation_off', 'azimuth_off', 'taken'), [
+    (0.13, 0.0, True), (-0.13, 0.0, True), (0.15, 0.0, False), (-0.15, 0.0, False),
+    (0.12, 0.12, False), (0.08, 0.08, True)])
+def test_a_view_at_another_elevation_reaches_the_goal_within_the_tolerance_alone(
+        elevation_off, azimuth_off, taken):
+    gate = ViewGate('at_goal', goal_tolerance=0.14)
+    gate.set_goal(orbit_camera(1.0, 0.5), stamp=1)
+    camera = orbit_camera(1.0 + azimuth_off, 0.5 + elevation_off)
+    assert [gate.wants(camera, number * PERIOD) for number in range(3)] == [False, taken, taken]
+
+
+def test_how_far_the_camera_is_away_and_how_it_is_rolled_makes_no_other_view():
+    gate = ViewGate('at_goal', goal_tolerance=0.01)
+    gate.set_goal(orbit_camera(1.0, 0.5), stamp=1)
+    pose = orbit_camera(1.0, 0.5, 3.0).pose.copy()
+    pose[:3, :3] = pose[:3, :3] @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    assert [gate.wants(Camera(pose), number * PERIOD) for number in range(2)] == [False, True]
+
+
+def test_views_of_one_azimuth_at_two_elevations_are_separate():
+    gate = ViewGate('by_separation', min_view_separation=0.2)
+    low, high = orbit_camera(1.0, 0.3), orbit_camera(1.0, 0.6)
+    assert gate.wants(low, 0) or gate.wants(low, PERIOD)
+    gate.took(low)
+    assert not gate.wants(high, 2 * PERIOD)
+    assert gate.wants(high, 3 * PERIOD)
 
 
 def test_the_same_azimuth_under_a_new_stamp_is_a_new_goal_and_under_the_old_one_is_not():
     gate = ViewGate('at_goal')
-    gate.set_goal(1.0, stamp=1)
+    gate.set_goal(orbit_camera(1.0), stamp=1)
     assert offer(gate, [1, 1, 1]) == [1]
-    gate.set_goal(1.0, stamp=1)
+    gate.set_goal(orbit_camera(1.0), stamp=1)
     assert offer(gate, [1, 1], start=10 * PERIOD) == []
-    gate.set_goal(1.0, stamp=2)
+    gate.set_goal(orbit_camera(1.0), stamp=2)
     assert offer(gate, [1, 1], start=20 * PERIOD) == [0]
 
 
@@ -57,13 +85,13 @@ def test_auto_goes_by_separation_until_goals_are_given_or_expected():
     assert offer(gate, [0, 0]) == [1]
     assert offer(gate, [1, 1], goals_expected=True, start=10 * PERIOD) == []
     assert offer(gate, [2, 2], start=20 * PERIOD) == [1]
-    gate.set_goal(0.0, stamp=1)
+    gate.set_goal(orbit_camera(0.0), stamp=1)
     assert offer(gate, [3, 3, 0, 0], start=30 * PERIOD) == [3]
 
 
 def test_a_view_that_was_not_used_leaves_its_goal_open():
     gate = ViewGate('at_goal')
-    gate.set_goal(0.0, stamp=1)
+    gate.set_goal(orbit_camera(0.0), stamp=1)
     offer(gate, [0.5])
     camera = orbit_camera(0.0)
     assert not gate.wants(camera, PERIOD)
@@ -83,7 +111,7 @@ def test_a_camera_that_turns_in_place_is_not_still():
 
 def test_an_episode_begins_without_goal_and_view():
     gate = ViewGate('auto')
-    gate.set_goal(2.0, stamp=1)
+    gate.set_goal(orbit_camera(2.0), stamp=1)
     assert offer(gate, [2, 2]) == [1]
     gate.reset()
     assert offer(gate, [2, 2], start=10 * PERIOD) == [1]
@@ -92,7 +120,7 @@ def test_an_episode_begins_without_goal_and_view():
 @pytest.mark.parametrize(('settle_time', 'taken'), [(0.0, 5), (0.08, 6), (0.25, 8), (0.3, 8)])
 def test_after_a_motion_the_camera_settles_before_an_image_becomes_a_view(settle_time, taken):
     gate = ViewGate('at_goal', settle_time=settle_time)
-    gate.set_goal(1.0, stamp=1)
+    gate.set_goal(orbit_camera(1.0), stamp=1)
     assert offer(gate, [0, 0, 0, 0.4, 0.7, *[1.0] * 8]) == [taken]
 
 

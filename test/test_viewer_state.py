@@ -1,9 +1,18 @@
 """What is known of the loop, in whatever order it is heard, and the words that tell it."""
 
 from itertools import permutations
+from pathlib import Path
 
+from active_recon.bags.run import (
+    Candidates,
+    RecordedEpisode,
+    RecordedGoal,
+    RecordedRun,
+    RecordedView,
+)
 from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.viewer.link import ago, link_words, TopicLink
+from active_recon.viewer.playback import recorded_states
 from active_recon.viewer.scene import certainty_colors, relative_scores, shown_cells
 from active_recon.viewer.state import (
     entropy_lines,
@@ -200,3 +209,16 @@ def test_the_last_view_the_end_and_a_silent_camera_are_told():
     (0.2, '0 s'), (59.4, '59 s'), (61, '1 min'), (3500, '58 min'), (7300, '2 h')])
 def test_spans_of_time_are_told_in_whole_units(seconds, words):
     assert ago(seconds) == words
+
+
+def test_a_recorded_goal_is_shown_where_its_own_camera_stands():
+    camera = orbit_camera(2.0, 0.9, 3.0)
+    ring = Candidates.of([orbit_camera(azimuth, 0.9, 3.0) for azimuth in AZIMUTHS])
+    goal = RecordedGoal(camera, 101, ring, np.arange(24, dtype=np.float32), 101)
+    taken = RecordedView(100, np.zeros((8, 8, 3), np.uint8), orbit_camera(0.1, 0.9, 3.0), GRID,
+                         None, None, 1.0, goal, {})
+    run = RecordedRun(Path('run'), [RecordedEpisode('a', 0, None, [taken], '')], {}, {}, {}, [],
+                      0, 1)
+    (state,) = recorded_states(run)
+    assert state.goal is camera
+    np.testing.assert_allclose(state.scores.azimuths, AZIMUTHS)

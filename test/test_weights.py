@@ -4,18 +4,12 @@ import json
 from pathlib import Path
 
 from active_recon.errors import WeightsError
-from active_recon.models.registry import DEFAULT_MODEL
-from active_recon.models.weights import (
-    Bundle,
-    find_weights,
-    load_weights,
-    save_weights,
-    SHIPPED,
-    weights_hash,
-)
+from active_recon.models.weights import Bundle, load_weights, save_weights
+from active_recon.weights_files import DEFAULT_MODEL, find_weights, SHIPPED, weights_hash
 import numpy as np
 import pytest
 from safetensors.torch import load_file, save_file
+from shown_views import known_after
 import torch
 from torch.testing import assert_close
 
@@ -46,8 +40,8 @@ def test_what_was_saved_is_loaded_to_half_precision(saved, network, attention, t
 def test_a_loaded_network_answers_as_the_one_that_was_saved(saved, network):
     images = torch.rand(2, 3, 64, 64)
     with torch.no_grad():
-        expected, _ = network(images, torch.zeros(2))
-    found, _ = load_weights(saved).reconstruction(images, torch.zeros(2))
+        expected = known_after(network, images[None])
+    found = known_after(load_weights(saved).reconstruction, images[None])
     assert_close(found.logits, expected.logits, rtol=0, atol=0.01)
 
 

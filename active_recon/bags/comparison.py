@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 
 from active_recon.bags.replay import ReplayedEpisode, ReplayedView
 from active_recon.bags.run import RecordedGoal
-from active_recon.cameras import azimuth_difference, wrap_azimuth
+from active_recon.cameras import Camera, view_distance
 from active_recon.planner import Goal
 from active_recon.voxels import PUBLISHED_FLOOR, VoxelGrid
+from msg_tools.cameras import pose_through_msg
 import numpy as np
 
 TOLERANCES: Mapping[str, float] = {
@@ -20,7 +21,8 @@ TOLERANCES: Mapping[str, float] = {
     'stop': 0.0,
 }
 """How far another machine's replay may be off: probabilities and latents as they are, entropy as a
-share, goals in radians, scores in the policy's units, and whether the episode ended not at all."""
+share, goals in radians between the views, scores in the policy's units, and whether the episode
+ended not at all."""
 
 SAME_BITS, WITHIN_TOLERANCE, DIFFERENT, NOTHING_RECORDED = (
     'same bits', 'within tolerance', 'different', 'nothing recorded')
@@ -108,12 +110,17 @@ def _deviations(view: ReplayedView, done: str,
 
 
 def _goal(recorded: RecordedGoal, goal: Goal) -> Iterator[tuple[str, bool, float]]:
-    azimuth = wrap_azimuth(goal.azimuth)
-    yield ('goal', recorded.azimuth == azimuth,
-           abs(float(azimuth_difference(recorded.azimuth, azimuth))))
+    yield ('goal', _is_pose_of(recorded.camera, goal.camera),
+           view_distance(recorded.camera, goal.camera))
     if recorded.scores is not None:
         yield ('scores', np.array_equal(recorded.scores, goal.scores),
                _largest(recorded.scores, goal.scores))
+
+
+def _is_pose_of(recorded: Camera, camera: Camera) -> bool:
+    """Return whether a pose is that of the camera, or what its message makes of it, bit by bit."""
+    return any(np.array_equal(recorded.pose, pose)
+               for pose in (camera.pose, pose_through_msg(camera.pose)))
 
 
 def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, float]:

@@ -14,6 +14,7 @@ from active_recon.bags.message_types import (
     read_message,
 )
 from active_recon.bags.raw import Bag, RawMessage
+from active_recon.bags.run import Candidates
 from active_recon.errors import ActiveReconError, DataError
 from msg_tools.cameras import pose_from_msg
 from msg_tools.diagnostics import diagnostics_from_msg
@@ -120,6 +121,6 @@ class LoopRecord:
             self.counted.setdefault(name.lstrip('/'), []).append((message.received, known))
 
 
-def _scores_from_msg(msg: Any) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    candidates, scores = scores_from_msg(msg)
-    return candidates.astype(np.float64), scores
+def _scores_from_msg(msg: Any) -> tuple[Candidates, NDArray[np.float32]]:
+    positions, azimuths, scores = scores_from_msg(msg)
+    return Candidates(positions.astype(np.float64), azimuths.astype(np.float64)), scores

@@ -10,8 +10,9 @@ from active_recon.errors import DataError
 _KINDS: Mapping[str, type] = {
     'weights': str, 'policy': str, 'threads': int, 'seed': int, 'max_views': int,
     'object_size': float, 'object_yaw': float, 'threshold': float, 'entropy_tolerance': float,
-    'goal_tolerance': float, 'motion_weight': float, 'azimuth_range': list,
-    'forbidden_sectors': list, 'reachable_azimuths': list}
+    'goal_tolerance': float, 'motion_weight': float, 'elevation': float, 'distance': float,
+    'azimuth_range': list, 'forbidden_sectors': list, 'reachable_azimuths': list,
+    'object_frame': str}
 _RANGES = {'threads': (1, 256), 'seed': (0, 2**32 - 1), 'max_views': (1, 1000)}  # as the nodes'
 
 

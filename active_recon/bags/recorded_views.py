@@ -10,10 +10,13 @@ from typing import Any
 from active_recon.bags.camera_stream import CameraStream
 from active_recon.bags.loop_record import LoopRecord
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedView
+from active_recon.cameras import azimuth_difference, Camera, OrbitCamera, view_distance
 from active_recon.errors import DataError, MessageError
 from active_recon.view_gate import ViewGate
 from msg_tools.episodes import Episode
 from msg_tools.views import View
+
+_ROUNDING = 1e-9  # rad
 
 
 def recorded_episodes(stream: CameraStream, record: LoopRecord) -> list[RecordedEpisode]:
@@ -98,7 +101,8 @@ def _episode(episode: Episode, views: Sequence[View], end: float, stream: Camera
     for goal in _goals(record, episode.begin, end):
         after = bisect_right(published, record.published['next_view'][goal.stamp])
         before = asked.setdefault(after, [])
-        if not before or before[-1].azimuth != goal.azimuth:  # else `plan` asked for it again
+        # One from where the last was: `plan` asked for it again
+        if not before or view_distance(before[-1].camera, goal.camera) > _ROUNDING:
             before.append(goal)
     decided = {after: replace(first, instead=instead)
                for after, (first, *instead) in asked.items()}
@@ -113,14 +117,21 @@ def _episode(episode: Episode, views: Sequence[View], end: float, stream: Camera
 
 def _goals(record: LoopRecord, begin: int, end: float) -> list[RecordedGoal]:
     goals = []
-    for stamp, azimuth in sorted(record.parts['next_view'].items()):
+    for stamp, camera in sorted(record.parts['next_view'].items()):
         if begin <= stamp < end:
             candidates, scores = record.parts['azimuth_scores'].get(stamp, (None, None))
-            # A joint's angle has all of its bits, that of a pose has been through sine and cosine
-            azimuth = record.parts['next_azimuth'].get(stamp, azimuth)
-            goals.append(RecordedGoal(azimuth, stamp, candidates, scores,
-                                      record.received['next_view'][stamp]))
+            azimuth = record.parts['next_azimuth'].get(stamp)
+            goals.append(RecordedGoal(
+                camera if azimuth is None else _with_azimuth(camera, azimuth), stamp, candidates,
+                scores, record.received['next_view'][stamp]))
     return goals
+
+
+def _with_azimuth(camera: Camera, azimuth: float) -> Camera:
+    """Return a goal's camera with the bits of a joint's angle: its own went through a sine."""
+    if abs(float(azimuth_difference(azimuth, camera.azimuth))) > _ROUNDING:
+        return camera  # a joint that counts otherwise
+    return OrbitCamera(camera.pose, camera.intrinsics, azimuth)
 
 
 def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,

@@ -1,16 +1,16 @@
 """Replay: the recorded views through the core again, with no ROS and no clock."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import hashlib
 
+from active_recon.bags.recorded_object import seen_again
 from active_recon.bags.run import RecordedEpisode, RecordedRun, RecordedView
+from active_recon.cameras import Camera
 from active_recon.planner import Decision, Goal, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
-from active_recon.voxels import entropy
+from active_recon.voxels import entropy, PUBLISHED_FLOOR
 import numpy as np
-import torch
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,34 +45,34 @@ def replay(run: RecordedRun, reconstructor: Reconstructor, planner: Planner | No
 
 def _replay_episode(episode: RecordedEpisode, reconstructor: Reconstructor,
                     planner: Planner | None, advance: Callable[[], None]) -> ReplayedEpisode:
-    reconstructor.reset()
     first_goal = None
     if planner is not None:
         planner.reset()
         if episode.first_goal is not None:
-            first_goal = planner.first_goal(episode.first_goal.azimuth)
+            first_goal = planner.first_goal(episode.first_goal.camera)
             _give_up(planner, episode.given_up(None))
     views = []
-    for view in sorted(episode.views, key=lambda view: view.stamp):
-        reconstruction = reconstructor.add_view(view.image, view.camera)
-        decision = None if planner is None else decide(
-            planner, reconstruction, view.camera.azimuth)
+    for step in seen_again(episode.views, reconstructor):
+        decision = None
         if planner is not None:
-            _give_up(planner, episode.given_up(view))
-        views.append(ReplayedView(view, reconstruction, decision))
+            decision = decide(planner, step.known, step.view.camera)
+            _give_up(planner, episode.given_up(step.view))
+        views.append(ReplayedView(step.view, step.known, decision))
         advance()
     return ReplayedEpisode(episode, first_goal, views)
 
 
-def _give_up(planner: Planner, azimuths: Sequence[float]) -> None:
+def _give_up(planner: Planner, goals: Sequence[Camera]) -> None:
     """Leave out what the run left out: no clock tells again when a goal took too long."""
-    for azimuth in azimuths:
-        planner.give_up(azimuth)
+    for goal in goals:
+        planner.give_up(goal)
 
 
-def decide(planner: Planner, reconstruction: Reconstruction, azimuth: float) -> Decision:
+def decide(planner: Planner, reconstruction: Reconstruction, camera: Camera) -> Decision:
     """Return what the planner decides of what its node hears."""
-    return planner.add_view(reconstruction.latent, azimuth, reconstruction.grid.entropy())
+    grid = reconstruction.grid
+    return planner.add_view(reconstruction.latent, camera, grid.entropy(),
+                            grid.above(PUBLISHED_FLOOR) if planner.wants_volume else None)
 
 
 def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:
@@ -87,22 +87,6 @@ def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:
         if decision is not None:
             digest.update(decision.reason.encode())
             if decision.goal is not None:
-                digest.update(repr(decision.goal.azimuth).encode())
+                digest.update(repr(decision.goal.camera.azimuth).encode())
                 digest.update(decision.goal.scores.tobytes())
     return digest.hexdigest()
-
-
-@contextmanager
-def computing_with(threads: int) -> Iterator[None]:
-    """
-    Let torch compute with so many threads: sums that are shared out otherwise round otherwise.
-
-    Nothing else has to be fixed. The networks' operations on a CPU all add in the same order
-    every time, and torch's switch for deterministic algorithms takes seconds to import.
-    """
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -8,6 +8,7 @@ from typing import Any
 from active_recon.bags.image_gaps import ImageGaps
 from active_recon.bags.metadata import QosProfile
 from active_recon.cameras import Camera
+from active_recon.planner import Goal
 from active_recon.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -28,22 +29,43 @@ class TopicSummary:
 
 
 @dataclass(frozen=True, eq=False)
+class Candidates:
+    """Cameras that the planner chose among: positions (N, 3) in metres, azimuths (N,) radians."""
+
+    positions: NDArray[np.float64]
+    azimuths: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, cameras: Sequence[Camera]) -> 'Candidates':
+        """Return those of a goal."""
+        return cls(np.array([camera.position for camera in cameras]).reshape(-1, 3),
+                   np.array([camera.azimuth for camera in cameras]))
+
+
+@dataclass(frozen=True, eq=False)
 class RecordedGoal:
     """
-    Where the planner wanted to look, and what it thought of every candidate.
+    Where the planner wanted to look from, and what it thought of every candidate.
 
-    - azimuth: radians, object frame; stamp: the goal's identity, nanoseconds
-    - candidates (radians) and scores: (N,) each, None where they were not recorded
+    - camera: in the object frame, with the lens of none; its azimuth has all of its bits where
+      `next_azimuth` was recorded; stamp: the goal's identity, nanoseconds
+    - candidates, N of them, and scores (N,): None where they were not recorded
     - received: when the recorder received the goal, nanoseconds
     - instead: the goals that followed as this one was given up, and then those, until a view came
     """
 
-    azimuth: float
+    camera: Camera
     stamp: int
-    candidates: NDArray[np.float64] | None
+    candidates: Candidates | None
     scores: NDArray[np.float32] | None
     received: int
     instead: Sequence['RecordedGoal'] = ()
+
+    @classmethod
+    def of(cls, goal: Goal, stamp: int, received: int | None = None) -> 'RecordedGoal':
+        """Return what is recorded of a goal; by default it is received as it is stamped."""
+        return cls(goal.camera, stamp, Candidates.of(goal.candidates), goal.scores,
+                   stamp if received is None else received)
 
     @property
     def followed(self) -> 'RecordedGoal':
@@ -99,12 +121,12 @@ class RecordedEpisode:
         ends = not view.done and view is self._last and view.goal is None
         return self.done if ends else view.done
 
-    def given_up(self, view: RecordedView | None) -> list[float]:
-        """Return the azimuths of the goals given up after a view, None: before the first one."""
+    def given_up(self, view: RecordedView | None) -> list[Camera]:
+        """Return the cameras of the goals given up after a view, None: before the first one."""
         goal = view.goal if view else self.first_goal
         if goal is None:
             return []
-        asked = [goal.azimuth, *(later.azimuth for later in goal.instead)]
+        asked = [goal.camera, *(later.camera for later in goal.instead)]
         none_left = view is self._last and self.done == 'no_reachable_azimuth'
         return asked if none_left else asked[:-1]
 

@@ -9,6 +9,7 @@ from active_recon.bags.parameters import node_parameters
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun
 from active_recon.bags.whole_bag import whole_bag, write_message
 from active_recon.bags.writer import BagWriter
+from msg_tools.cameras import OBJECT_FRAME
 from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
 from msg_tools.loop import goal_to_msgs, image_to_msgs, view_to_msgs
 
@@ -21,8 +22,9 @@ def write_run(run: RecordedRun, folder: Path) -> None:
     """
     Write a run as a new bag, whole or not at all.
 
-    What a view or a goal does not tell when it was received bears its stamp. Raises
-    RecordingError where the folder exists or the disk is full.
+    Poses and clouds are in the run's own `object_frame`. What a view or a goal does not tell when
+    it was received bears its stamp. Raises RecordingError where the folder exists or the disk is
+    full.
     """
     with whole_bag(folder) as bag:
         _write(run, bag)
@@ -32,42 +34,44 @@ def _write(run: RecordedRun, bag: BagWriter) -> None:
     bag.add_provenance(run.provenance)
     for node, parameters in run.parameters.items():
         bag.attach_parameters(node, parameters)
-    size = node_parameters(run, 'reconstructor').get('object_size', 1.0)
-    messages = (found for episode in run.episodes for found in _messages(episode, size))
+    frame = node_parameters(run, 'reconstructor').get('object_frame', OBJECT_FRAME)
+    messages = (found for episode in run.episodes for found in _messages(episode, frame))
     for received, topic, stamp, msg in sorted(messages, key=lambda found: found[0]):
         qos = _STREAM if topic.startswith('camera/') else _LATCHED
         write_message(bag, f'/{topic}', msg, received, stamp, qos)
 
 
-def _messages(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str, int, Any]]:
+def _messages(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
     """Yield when each message was received, its topic, its stamp, and itself."""
     received = episode.begin
-    for message in _of_views(episode, size):
+    for message in _of_views(episode, frame):
         received = max(received, message[0])
         yield message
     if episode.done and not any(map(episode.done_after, episode.views)):  # no view has ended it
         yield received, 'done', received, done_to_msg(received, episode.done)
 
 
-def _of_views(episode: RecordedEpisode, size: float) -> Iterator[tuple[int, str, int, Any]]:
+def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
     begin = Episode(episode.id or _UNNAMED, episode.begin)
     yield episode.begin, 'episode', episode.begin, episode_to_msg(begin)
     yield episode.begin, 'done', episode.begin, done_to_msg(episode.begin, '')
-    yield from _of_goal(episode.first_goal, size)
+    yield from _of_goal(episode.first_goal, frame)
     for view in episode.views:
-        messages = image_to_msgs(view.stamp, view.image, view.camera) | view_to_msgs(
+        messages = image_to_msgs(view.stamp, view.image, view.camera, frame) | view_to_msgs(
             view.stamp, view.camera, view.reconstruction, view.occupied, view.latent,
-            view.entropy)
+            view.entropy, frame)
         yield from _at(messages, view.stamp, view.received)
         if reason := episode.done_after(view):
             received = max([view.stamp, *view.received.values()])
             yield received, 'done', view.stamp, done_to_msg(view.stamp, reason)
-        yield from _of_goal(view.goal, size)
+        yield from _of_goal(view.goal, frame)
 
 
-def _of_goal(asked: RecordedGoal | None, size: float) -> Iterator[tuple[int, str, int, Any]]:
+def _of_goal(asked: RecordedGoal | None, frame: str) -> Iterator[tuple[int, str, int, Any]]:
     for goal in () if asked is None else (asked, *asked.instead):
-        messages = goal_to_msgs(goal.stamp, goal.azimuth, goal.candidates, goal.scores, size)
+        scores = None if goal.candidates is None or goal.scores is None else (
+            goal.candidates.positions, goal.candidates.azimuths, goal.scores)
+        messages = goal_to_msgs(goal.stamp, goal.camera, scores, frame)
         yield from _at(messages, goal.stamp, dict.fromkeys(messages, goal.received))
 
 

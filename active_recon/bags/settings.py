@@ -8,16 +8,17 @@ from typing import Any
 
 from active_recon.bags.parameters import node_parameters
 from active_recon.bags.run import RecordedRun
+from active_recon.cameras import CANONICAL_DISTANCE
 from active_recon.errors import WeightsError
-from active_recon.models.weights import FOLDER, SHIPPED, weights_hash
 from active_recon.motion import MotionLimits
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
+from active_recon.weights_files import FOLDER, SHIPPED, weights_hash
 
 _OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
 _OF_LIMITS = tuple(field.name for field in fields(MotionLimits))
 _OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw', 'motion_weight',
-               *_OF_LIMITS)
+               'elevation', 'distance', *_OF_LIMITS)
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Settings:
 
     def load_reconstructor(self) -> Reconstructor:
         """Raise WeightsError or ConfigError where it cannot be."""
-        return Reconstructor.load(self.weights, **self.reconstructor)
+        return Reconstructor.load(self.weights, threads=self.threads, **self.reconstructor)
 
     def load_planner(self) -> Planner | None:
         """Return None where nothing tells which policy chose; raise as the reconstructor does."""
@@ -60,7 +61,8 @@ class Settings:
             return None
         limits = MotionLimits(**{name: self.planner[name] for name in _OF_LIMITS
                                  if name in self.planner})
-        return Planner.load(limits=limits, **{
+        place = {'distance': CANONICAL_DISTANCE * self.reconstructor.get('object_size', 1.0)}
+        return Planner.load(limits=limits, threads=self.threads, **place | {
             name: value for name, value in self.planner.items() if name not in _OF_LIMITS})
 
 

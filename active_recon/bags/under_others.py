@@ -7,12 +7,14 @@ from pathlib import Path
 
 from active_recon import __version__
 from active_recon.bags.parameters import node_parameters
+from active_recon.bags.recorded_object import RecordedObject, seen_again
 from active_recon.bags.replay import decide
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
 from active_recon.bags.settings import Settings
-from active_recon.cameras import azimuth_difference, wrap_azimuth
+from active_recon.cameras import Camera, nearest_camera, view_distance
+from active_recon.environment import run_episode, TimeStep
 from active_recon.errors import DataError
-from active_recon.planner import Goal, Planner
+from active_recon.planner import Decision, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import GOAL_TOLERANCE
 from active_recon.voxels import PUBLISHED_FLOOR
@@ -65,8 +67,7 @@ def run_under(run: RecordedRun, recorded: Settings, others: Others,
         tolerance = node_parameters(run, 'reconstructor').get('goal_tolerance', GOAL_TOLERANCE)
         episodes = [explored(episode, reconstructor, planner, tolerance, advance)
                     for episode in before]
-    made_by = {'weights_sha256': reconstructor.weights_hash,
-               'config_sha256': reconstructor.config_hash}
+    made_by = dict(reconstructor.provenance)
     provenance = {**run.provenance, **made_by, 'version': __version__,
                   'replay_of': run.path.resolve().name}
     parameters = {'/reconstructor': {
@@ -86,11 +87,9 @@ def run_under(run: RecordedRun, recorded: Settings, others: Others,
 def reconstructed(episode: RecordedEpisode, reconstructor: Reconstructor,
                   advance: Callable[[], None] = lambda: None) -> RecordedEpisode:
     """Return the episode with the same views and goals, reconstructed by another model."""
-    reconstructor.reset()
     views = []
-    for view in sorted(episode.views, key=lambda view: view.stamp):
-        views.append(_known(view, reconstructor.add_view(view.image, view.camera),
-                            reconstructor.threshold))
+    for step in seen_again(episode.views, reconstructor):
+        views.append(_known(step.view, step.known, reconstructor.threshold))
         advance()
     return replace(episode, views=views)
 
@@ -107,41 +106,45 @@ def explored(episode: RecordedEpisode, reconstructor: Reconstructor, planner: Pl
     if not episode.views:
         raise DataError('expected an episode with views to choose from, got one without',
                         'no_views')
-    reconstructor.reset()
     planner.reset()
-    began = (min(episode.views, key=lambda view: view.stamp).camera.azimuth
-             if episode.first_goal is None else episode.first_goal.azimuth)
+    began = (min(episode.views, key=lambda view: view.stamp).camera
+             if episode.first_goal is None else episode.first_goal.camera)
     first = planner.first_goal(began)
-    goal: Goal | None = first
-    views: list[RecordedView] = []
-    while goal is not None:
-        view = _nearest(episode.views, goal.azimuth, goal_tolerance, len(views))
-        stamp = episode.begin + (len(views) + 1) * _BETWEEN_VIEWS
-        reconstruction = reconstructor.add_view(view.image, view.camera)
-        decision = decide(planner, reconstruction, view.camera.azimuth)
-        goal = decision.goal
-        known = _known(view, reconstruction, reconstructor.threshold)
+    decision = Decision(first)
+
+    def follow(step: TimeStep[RecordedView, Reconstruction]) -> RecordedView | None:
+        if decision.goal is None:
+            return None
+        return _nearest(episode.views, decision.goal.camera, goal_tolerance, step.number)
+
+    views = []
+    for step in run_episode(RecordedObject(reconstructor),
+                            _nearest(episode.views, first.camera, goal_tolerance, 0), follow):
+        stamp = episode.begin + step.number * _BETWEEN_VIEWS
+        decision = decide(planner, step.known, step.view.camera)
+        known = _known(step.view, step.known, reconstructor.threshold)
         views.append(replace(
             known, stamp=stamp, received={}, done=decision.reason,
             # A nanosecond later: the goal comes after the view that led to it
-            goal=None if goal is None else _recorded(goal, stamp + 1)))
+            goal=None if decision.goal is None else RecordedGoal.of(decision.goal, stamp + 1)))
         advance()
-    return replace(episode, first_goal=_recorded(first, episode.begin), views=views,
+    return replace(episode, first_goal=RecordedGoal.of(first, episode.begin), views=views,
                    done=decision.reason)
 
 
-def _nearest(views: Sequence[RecordedView], azimuth: float, tolerance: float,
+def _nearest(views: Sequence[RecordedView], goal: Camera, tolerance: float,
              taken: int) -> RecordedView:
-    away = np.abs(azimuth_difference([view.camera.azimuth for view in views], azimuth))
-    nearest = int(away.argmin())
-    if away[nearest] > tolerance:
+    view = views[nearest_camera(goal, [view.camera for view in views])]
+    away = view_distance(view.camera, goal)
+    if away > tolerance:
         raise DataError(
             f'after view {taken} the policy asks for a view from an azimuth of '
-            f'{np.degrees(wrap_azimuth(azimuth)):.1f} degrees; expected one within '
+            f'{np.degrees(goal.azimuth):.1f} degrees and an elevation of '
+            f'{np.degrees(goal.elevation):.1f}; expected one within '
             f'{np.degrees(tolerance):.1f} degrees of it among the {len(views)} recorded, the '
-            f'nearest is {np.degrees(away[nearest]):.1f} off. A view that was never taken is not '
+            f'nearest is {np.degrees(away):.1f} off. A view that was never taken is not '
             'made up: record all azimuths by `active-recon record-sweep`', 'missing_view')
-    return views[nearest]
+    return view
 
 
 def _known(view: RecordedView, reconstruction: Reconstruction, threshold: float) -> RecordedView:
@@ -150,7 +153,3 @@ def _known(view: RecordedView, reconstruction: Reconstruction, threshold: float)
     return replace(
         view, reconstruction=grid.above(PUBLISHED_FLOOR), occupied=grid.above(threshold),
         latent=reconstruction.latent, entropy=grid.entropy())
-
-
-def _recorded(goal: Goal, stamp: int) -> RecordedGoal:
-    return RecordedGoal(wrap_azimuth(goal.azimuth), stamp, goal.candidates, goal.scores, stamp)

@@ -1,28 +1,18 @@
 """`active-recon demo`: the loop over real ROS 2, live in the terminal."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
+from active_recon.cli.policy_option import policy_option
 from active_recon.demo.interrupts import held_interrupts
 import typer
-
-
-class PolicyName(StrEnum):
-    """How the next view is chosen."""
-
-    attention = 'attention'
-    random = 'random'
-    uniform = 'uniform'
-    farthest = 'farthest'
 
 
 def demo(
     object_name: Annotated[str, typer.Option(
         '--object', help='bed, car, chair, sofa, table, or the path of a mesh file.')] = 'chair',
     views: Annotated[int, typer.Option(min=1, max=24, help='Views to take.')] = 5,
-    policy: Annotated[PolicyName, typer.Option(help='How the next view is chosen.')] = (
-        PolicyName.attention),
+    policy: Annotated[str, policy_option('How the next view is chosen.')] = 'attention',
     seed: Annotated[int, typer.Option(
         min=0, help='Of the first view and of the policy random.')] = 0,
     output_dir: Annotated[Path, typer.Option(
@@ -40,7 +30,7 @@ def demo(
             from active_recon.objects import find_object
 
         folder = run_demo(
-            Demo(find_object(object_name), views, policy.value, seed, output_dir, view),
+            Demo(find_object(object_name), views, policy, seed, output_dir, view),
             console)
     except KeyboardInterrupt:
         console.print('interrupted; the nodes are stopped and the bag is closed')

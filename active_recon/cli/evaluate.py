@@ -10,6 +10,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import read_objects, Split
 from active_recon.errors import ConfigError
+from active_recon.policies import POLICIES
 import typer
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ def evaluate(
         help='A model that ships, by its name, or a .safetensors file; default: '
              '2d3d-attention.')] = None,
     policy: Annotated[str | None, typer.Option(
-        help='Policies, separated by commas, out of random, uniform, farthest, attention, oracle '
-             '(sees the truth; ninety times the work). Default: the first four, attention only '
-             'where the model has it.')] = None,
+        help=f'Policies, separated by commas, out of {", ".join(POLICIES)}, oracle (sees the '
+             'truth; ninety times the work). Default: all but the oracle, attention only where '
+             'the model has it.')] = None,
     views: Annotated[int, typer.Option(min=1, max=24, help='Views of an episode.')] = 5,
     starts: Annotated[int, typer.Option(
         min=1, max=24, help='First views of each object; 24 are all.')] = 4,
@@ -57,10 +58,17 @@ def evaluate(
     """
     from active_recon.evaluation.measure import blindness, iou_by_yaw
     from active_recon.evaluation.metrics import episodes
-    from active_recon.evaluation.policy_study import compare, contenders, run_all
+    from active_recon.evaluation.policy_study import (
+        compare,
+        contender_names,
+        contenders,
+        run_all,
+    )
     from active_recon.evaluation.trial import Trial
-    from active_recon.models.weights import find_weights, load_weights, weights_hash
-    from active_recon.policies.attention import AttentionPolicy
+    from active_recon.models.weights import load_weights
+    from active_recon.policies import learned_policy
+    from active_recon.runtimes.torch import TorchPolicyRuntime
+    from active_recon.weights_files import find_weights, weights_hash
     import torch
 
     if training and validation is None:
@@ -71,15 +79,15 @@ def evaluate(
     bundle = load_weights(weights)
     network, threshold = bundle.reconstruction, bundle.threshold
     attentions = [bundle.attention] if bundle.attention else []
-    names = policy.split(',') if policy else [
-        'random', 'uniform', 'farthest', *(['attention'] if attentions else [])]
-    held_out = read_objects([data], 'objects', network.resolution, split_file, 'test')
+    names = policy.split(',') if policy else contender_names(
+        bool(attentions), oracle=False)
+    held_out = read_objects([data], 'objects', network.spec, split_file, 'test')
     shown = held_out.azimuths.shape[1]
     if max(views, starts) > shown:
         typer.echo(f'objects of {shown} views: {min(views, shown)} views from '
                    f'{min(starts, shown)} starts are measured', err=True)
     views, starts = min(views, shown), min(starts, shown)
-    every = contenders(names, attentions, views, seeds, seed)
+    every = contenders(names, attentions, views, seeds, seed, bundle.model)
     trial = Trial(network, threshold, held_out, starts, views, seed, bf16, cache)
     result: dict[str, Any] = {
         'command': ' '.join(['active-recon', *sys.argv[1:]]),
@@ -97,8 +105,9 @@ def evaluate(
         f'{yaw} deg {values["mean"]:.3f}' for yaw, values in result['yaw'].items()))
     if bundle.attention and 'attention' in names and len(held_out) > 1 and views > 1:
         with progress_bar("other objects' latents", 2 * len(objects)) as advance:
-            seeing = blindness(network, AttentionPolicy(bundle.attention), held_out, objects,
-                               first, threshold, views, lambda done: advance(done, ''))
+            seeing = blindness(
+                network, learned_policy(bundle.model, TorchPolicyRuntime(bundle.attention)),
+                held_out, objects, first, threshold, views, lambda done: advance(done, ''))
         result['blindness'] = asdict(seeing)
         typer.echo(f'another object\'s latent: goals move by {seeing.goal_change_deg["mean"]:.1f} '
                    f'deg, area under IoU falls by {_spread(seeing.auc_loss, 4)}')
@@ -132,10 +141,10 @@ def _baselines(training: list[Path], validation: Path, trial: 'Trial') -> dict[s
     import torch
 
     held_out = trial.views
-    cells = held_out.voxels.shape[-1]
-    known = read_objects(training, 'training data', cells)
+    asked = trial.network.spec
+    known = read_objects(training, 'training data', asked)
     means = category_means(known)
-    chosen_on = read_objects([validation], 'validation data', cells)
+    chosen_on = read_objects([validation], 'validation data', asked)
     threshold = max(THRESHOLDS, key=lambda at: mean_shape_iou(means, chosen_on, at).mean())
     result = {
         'mean_shape': interval(mean_shape_iou(means, held_out, float(threshold)),

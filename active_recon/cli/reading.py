@@ -8,6 +8,7 @@ from active_recon.cli.progress import progress_bar
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.canonical import NetworkSpec
     from active_recon.datasets.views import ViewSet
 
 Split = Annotated[str | None, typer.Option(
@@ -15,10 +16,10 @@ Split = Annotated[str | None, typer.Option(
                          'each category, the last fifth for the test. Default: whole folders.')]
 
 
-def read_objects(roots: Sequence[Path], title: str, resolution: int = 32,
+def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
                  split: str | None = None, part: str = '') -> 'ViewSet':
     """
-    Read the objects of some datasets into memory, their truth with so many cells a side.
+    Read the objects of some datasets into memory, in the sizes that a network asks for.
 
     With a `split`, only those of its `part` (train, val or test). A single root may be PASCAL3D+'s
     folder, whose photographs are objects of one view each.
@@ -28,25 +29,26 @@ def read_objects(roots: Sequence[Path], title: str, resolution: int = 32,
     from active_recon.datasets.views import read_views
 
     if len(roots) == 1 and (roots[0] / 'Annotations').is_dir():
-        return _read_photographs(roots[0], title, resolution)
+        return _read_photographs(roots[0], title, spec)
     folders, missing = [], []
     for root in roots:
         found, lacking = list_split(root, split, part) if split else (list_objects(root), [])
         folders += found
         missing += lacking
     with progress_bar(f'reading {title}', len(folders)) as advance:
-        views = read_views(folders, lambda: advance(1, ''), resolution)
+        views = read_views(folders, lambda: advance(1, ''), spec.resolution, spec.image_size)
     _tell_left_out(title, len(views), missing, views.unreadable)
     return views
 
 
-def _read_photographs(root: Path, title: str, resolution: int) -> 'ViewSet':
+def _read_photographs(root: Path, title: str, spec: 'NetworkSpec') -> 'ViewSet':
     from active_recon.datasets.pascal3d import list_photographs
     from active_recon.datasets.photographs import read_photographs
 
     photographs, left_out = list_photographs(root)
     with progress_bar(f'reading {title}', len(photographs)) as advance:
-        views = read_photographs(photographs, left_out, lambda: advance(1, ''), resolution)
+        views = read_photographs(photographs, left_out, lambda: advance(1, ''),
+                                 spec.resolution)
     _tell_left_out(title, len(views), (), views.unreadable)
     return views
 

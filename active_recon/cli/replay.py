@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 import math
 from pathlib import Path
 import time
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.bag_topics import with_topics
-from active_recon.cli.demo import PolicyName
+from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
 from active_recon.errors import ConfigError
 import typer
@@ -29,9 +30,9 @@ def replay(
     model: Annotated[str | None, typer.Option(
         help='Another model: its name, or a weights file. The views stay those that were taken.',
     )] = None,
-    policy: Annotated[PolicyName | None, typer.Option(
-        help='Another policy. It chooses among the views of the bag, and is refused where it '
-             'wants one that was never taken.')] = None,
+    policy: Annotated[str | None, policy_option(
+        'Another policy. It chooses among the views of the bag, and is refused where it wants '
+        'one that was never taken.')] = None,
     threshold: Annotated[float | None, typer.Option(
         help='Another occupancy above which a cell is occupied.')] = None,
     out: Annotated[Path | None, typer.Option(
@@ -62,14 +63,12 @@ def replay(
     Example: active-recon replay bags/sweep --policy farthest
     """
     from active_recon.bags.reading import read_run
-    from active_recon.bags.replay import computing_with
     from active_recon.bags.settings import recorded_settings
     from active_recon.bags.under_others import Others
     from active_recon.bags.verification import verify
-    from active_recon.models.weights import find_weights
+    from active_recon.weights_files import find_weights
 
-    others = Others(find_weights(model) if model else None, policy.value if policy else None,
-                    threshold)
+    others = Others(find_weights(model) if model else None, policy, threshold)
     if out and others == Others():
         raise ConfigError('--out: expected with --model, --policy or --threshold, for a new bag; '
                           'without them nothing is written')
@@ -80,14 +79,14 @@ def replay(
         run, others.weights or weights, others.weights is not None, {
             'object_size': object_size,
             'object_yaw': None if object_yaw_deg is None else math.radians(object_yaw_deg)})
-    with computing_with(threads or settings.threads):
-        if others != Others():
-            _write_under(run, settings, others, out)
-            return
-        reconstructor, planner = settings.load_reconstructor(), settings.load_planner()
-        began = time.monotonic()
-        with _bar('replaying', run) as advance:
-            verified = verify(run, reconstructor, planner, lambda: advance(1, ''))
+    settings = replace(settings, threads=threads or settings.threads)
+    if others != Others():
+        _write_under(run, settings, others, out)
+        return
+    reconstructor, planner = settings.load_reconstructor(), settings.load_planner()
+    began = time.monotonic()
+    with _bar('replaying', run) as advance:
+        verified = verify(run, reconstructor, planner, lambda: advance(1, ''))
     _tell(verified, run, reading_s + time.monotonic() - began)
 
 

@@ -74,12 +74,12 @@ def _subjects(run: 'RecordedRun', truth: Path | None, episode: int | None, model
 
     computed = ''
     if lacks_reconstruction(run):
-        from active_recon.models.weights import find_weights
         from active_recon.reconstructor import Reconstructor
+        from active_recon.weights_files import find_weights
 
         reconstructor = Reconstructor.load(find_weights(model))
         run = with_reconstruction(run, reconstructor)
-        computed = f'the weights {reconstructor.weights_hash[:12]}'
+        computed = f'the weights {reconstructor.provenance["weights_sha256"][:12]}'
     cells = known_truth(run) if truth is None else read_truth(truth, run)
     episodes = run.episodes if episode is None else run.episodes[episode - 1:episode]
     shown = [each for each in episodes if each.views]

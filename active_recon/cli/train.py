@@ -83,10 +83,11 @@ def train(
     """
     from active_recon.config import LossConfig, RewardConfig
     from active_recon.models.registry import network_entry
-    from active_recon.models.weights import find_weights, save_weights
+    from active_recon.models.weights import save_weights
     from active_recon.shapes import generators_hash
     from active_recon.training.loop import make_fabric, TrainingConfig
     from active_recon.training.plan import Plan, train_plan
+    from active_recon.weights_files import find_weights
     import torch
 
     if scheme not in ('two-stage', 'joint'):
@@ -113,7 +114,7 @@ def train(
         episodes_alike = 1 if joint else 6
     if view_separation_deg is None:
         view_separation_deg = 0 if joint else 60
-    with_policy = entry.attentive and not joint and policy_steps > 0
+    with_policy = entry.policy is not None and not joint and policy_steps > 0
     plan = Plan(model, size, loss, first, second if with_policy else None,
                 RewardConfig(episodes_alike=episodes_alike), joint,
                 begun=_begun(find_weights(begun)) if begun else None,
@@ -122,9 +123,9 @@ def train(
     torch.manual_seed(seed)
     fabric = make_fabric(bf16, devices, nodes)
     fabric.launch()
-    cells = entry.build(plan.config).resolution
-    training = read_objects(data, 'training data', cells, split_file, 'train')
-    held_out = read_objects([validation], 'validation data', cells, split_file, 'val')
+    asked = entry.build(plan.config).spec
+    training = read_objects(data, 'training data', asked, split_file, 'train')
+    held_out = read_objects([validation], 'validation data', asked, split_file, 'val')
     bundle = train_plan(plan, training, held_out, out,
                         lambda stage, count: _reporting(stage, count, out), fabric, resume)
     if fabric.is_global_zero:
@@ -137,7 +138,8 @@ def train(
 
 
 def _begun(path: Path) -> 'Bundle':
-    from active_recon.models.weights import load_weights, read_card
+    from active_recon.models.weights import load_weights
+    from active_recon.weights_files import read_card
 
     return replace(load_weights(path), card=read_card(path))
 

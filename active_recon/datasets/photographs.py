@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from active_recon.cameras import orbit_camera, wrap_azimuth
+from active_recon.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ActiveReconError, DataError
 from active_recon.meshes import load_mesh
 from active_recon.models.encoder import IMAGE_SIZE
+from active_recon.models.network import Cameras
 from active_recon.voxelise import voxelise
 from active_recon.voxels import RESOLUTION
 import cv2
@@ -72,8 +73,9 @@ def read_photographs(photographs: Sequence[Photograph], left_out: Sequence[str] 
     if not good:
         raise DataError('expected photographs, none can be read'
                         + ''.join(f'\n  {reason}' for reason in unreadable[:5]))
-    azimuths = torch.tensor([[wrap_azimuth(photograph.azimuth)] for photograph in good])
-    return ViewSet(torch.from_numpy(np.stack(images))[:, None], azimuths,
+    cameras = Cameras.of([_canonical_camera(photograph) for photograph in good])
+    return ViewSet(torch.from_numpy(np.stack(images))[:, None], cameras.poses[:, None],
+                   cameras.intrinsics[:, None],
                    torch.from_numpy(np.stack(voxels)),
                    tuple(photograph.item for photograph in good), tuple(unreadable))
 
@@ -102,10 +104,14 @@ def _read_picture(path: Path) -> NDArray[np.uint8]:
         raise DataError(f'{path}: expected a whole image: {error}') from error
 
 
+def _canonical_camera(photograph: Photograph) -> Camera:
+    lens = CANONICAL_INTRINSICS.resized(IMAGE_SIZE, IMAGE_SIZE)
+    return orbit_camera(photograph.azimuth, photograph.elevation, intrinsics=lens)
+
+
 def _shown_at(corners: NDArray[np.float64], photograph: Photograph) -> Box:
     """Return the box of a model on the canonical camera's image, in the network's pixels."""
-    camera = orbit_camera(photograph.azimuth, photograph.elevation)
-    pixels = camera.project(corners)[0] * IMAGE_SIZE / camera.intrinsics.width
+    pixels = _canonical_camera(photograph).project(corners)[0]
     (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
     return float(left), float(top), float(right), float(bottom)
 

@@ -18,7 +18,7 @@ from active_recon.meshes import load_mesh
 from active_recon.nodes.demo_watch import DemoWatch, watching
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.voxelise import voxelise
-from active_recon.voxels import RESOLUTION, VoxelGrid
+from active_recon.voxels import RESOLUTION
 import cv2
 import numpy as np
 from rich.console import Console, RenderableType
@@ -53,11 +53,7 @@ def run_demo(demo: Demo, console: Console) -> Path:
     loop does not go on. However it ends, the nodes are stopped and the bag is closed.
     """
     mesh = load_mesh(demo.mesh)
-
-    @cache
-    def truth(resolution: int) -> VoxelGrid:
-        return voxelise(mesh, resolution)
-
+    truth = cache(partial(voxelise, mesh))
     truth(RESOLUTION)  # most likely: later it would keep the loop's messages waiting
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
@@ -84,8 +80,8 @@ def run_demo(demo: Demo, console: Console) -> Path:
             watch.ask('stop', _ANSWER_S, check)
         finally:
             if watch.views:
-                picture = run_picture(f'active_recon: {title}', watch.views, mesh,
-                                      truth(len(watch.views[-1].occupied.occupancy)))
+                side = len(watch.views[-1].occupied.occupancy)
+                picture = run_picture(f'active_recon: {title}', watch.views, mesh, truth(side))
                 cv2.imwrite(str(folder / 'run.png'), picture[..., ::-1])
         if demo.view:
             _go_on(nodes, console)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 import math
 
+from active_recon.cameras import Camera
 from active_recon.seen_view import SeenView
 from rich.console import Group
 from rich.table import Table
@@ -20,9 +21,9 @@ def loop_table(title: str, views: Sequence[SeenView], now: str) -> Group:
     return Group(table, Text(now, style='dim'))
 
 
-def turning(azimuth: float | None, goal: float | None) -> str:
-    """Return where the camera is and where it goes (radians) as a line for people."""
+def turning(azimuth: float | None, goal: Camera | None) -> str:
+    """Return where the camera is (radians) and where it goes as a line for people."""
     if azimuth is None:
         return 'waiting for the camera'
     here = f'the camera is at {math.degrees(azimuth):.0f} deg'
-    return here if goal is None else f'{here}, its goal is {math.degrees(goal):.0f} deg'
+    return here if goal is None else f'{here}, its goal is {math.degrees(goal.azimuth):.0f} deg'

@@ -13,13 +13,13 @@ from active_recon.evaluation.rollouts import (
     batches,
     nearest_views,
     Observer,
+    RenderedObjects,
     roll_out,
     Step,
 )
 from active_recon.evaluation.statistics import by_object, mean_interval
 from active_recon.models.network import ReconstructionNetwork
-from active_recon.policies.attention import AttentionPolicy
-from active_recon.policies.base import Policy
+from active_recon.policies import Policy
 from active_recon.voxels import entropy, iou, paper_entropy, turned
 import numpy as np
 from numpy.typing import NDArray
@@ -151,8 +151,9 @@ def iou_by_yaw(
         turns = list(zip(own.tolist(), signs[part].tolist(), strict=True))
         for yaw in YAWS_DEG:
             angle = math.radians(yaw)
-            folded, _ = observer.fold(own, starts[part], yaws=signs[part] * angle)
-            predicted = (observer.decode(folded).sigmoid() > threshold).cpu()
+            state = observer.update(own, starts[part], observer.initial_state(len(own)),
+                                    signs[part] * angle)
+            predicted = (observer.occupancy(state) > threshold).cpu()
             truths = {turn: _turned_truth(views, turn[0], turn[1] * angle) for turn in set(turns)}
             found[yaw] += iou(predicted, torch.stack([truths[turn] for turn in turns])).tolist()
         progress(len(part))
@@ -174,7 +175,7 @@ class Blindness:
 
 
 @torch.inference_mode()
-def blindness(network: ReconstructionNetwork, policy: AttentionPolicy, views: ViewSet,
+def blindness(network: ReconstructionNetwork, policy: Policy, views: ViewSet,
               objects: Tensor, starts: Tensor, threshold: float, count: int = 5,
               progress: Callable[[int], None] = lambda done: None) -> Blindness:
     """
@@ -189,11 +190,15 @@ def blindness(network: ReconstructionNetwork, policy: AttentionPolicy, views: Vi
     moved = []
     for part in batches(len(objects), _BATCH):
         taken = views.azimuths[objects[part], starts[part]].double().numpy()
-        goals = []
+        own = RenderedObjects(observer, objects[part])
+        own.reset()
+        seen, goals = own.step(starts[part]), []
         for shown in (objects[part], stand_ins[part]):
             alike = nearest_views(views.azimuths[shown].numpy(), taken)
-            folded, _ = observer.fold(shown, alike)
-            goals.append(policy.choose(folded.latent.cpu().numpy(), taken[:, None])[0].azimuth)
+            state = observer.update(shown, alike, observer.initial_state(len(shown)))
+            choice, _ = policy.choose(own.observation(state['latent'], seen),
+                                      policy.initial_state(len(shown)))
+            goals.append(own.goal_azimuths(choice))
         moved.append(np.degrees(np.abs(azimuth_difference(*goals))))
     seeing, swapped = (
         run_policy(network, policy, views, objects, starts, threshold, count, shown,

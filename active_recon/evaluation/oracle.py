@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.rollouts import batches, Observer, Step
-from active_recon.models.network import Folded, ReconstructionNetwork
+from active_recon.environment import run_episode, TimeStep
+from active_recon.evaluation.rollouts import batches, Observer, RenderedObjects, Seen, Step
+from active_recon.models.network import ReconstructionNetwork, State
 from active_recon.voxels import iou
 import numpy as np
 from numpy.typing import NDArray
@@ -16,45 +16,73 @@ from torch import Tensor
 _ROWS = 240  # candidates that go through the network at once
 
 
-def rows_of(state: Any, rows: Tensor) -> Any:
-    """Return some rows of a hidden state: tensors, batch first, in (named) tuples and lists."""
-    if isinstance(state, Tensor):
-        return state[rows.to(state.device)]
-    if isinstance(state, (tuple, list)):
-        parts = [rows_of(part, rows) for part in state]
-        return type(state)(*parts) if hasattr(state, '_fields') else type(state)(parts)
-    return state  # a count of views, or nothing yet: the same for all
+def rows_of(state: State, rows: Tensor) -> State:
+    """Return some rows of a state."""
+    return {name: part[rows.to(part.device)] for name, part in state.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class _Candidates:
     """What the network would know after each of B x K candidate views; rows of B x K."""
 
-    folded: Folded
-    hidden: Any
+    views: Tensor
+    state: State
     logits: Tensor
     iou: Tensor
 
     @property
     def best(self) -> Tensor:
-        """The rows of the candidates of the highest IoU, (B,); the first of those alike."""
-        batch, count = self.iou.shape
-        return self.iou.argmax(dim=1) + torch.arange(batch) * count
+        """The candidates of the highest IoU, (B,), out of K; the first of those alike."""
+        return self.iou.argmax(dim=1)
 
 
 @torch.inference_mode()
-def _look_at(observer: Observer, truth: Tensor, objects: Tensor, candidates: Tensor, hidden: Any,
+def _look_at(observer: Observer, truth: Tensor, objects: Tensor, candidates: Tensor, state: State,
              threshold: float) -> _Candidates:
-    """Look at candidates (B, K) of objects (B,) of this truth, after what is hidden, of B rows."""
+    """Look at candidates (B, K) of objects (B,) of this truth, after a state of B rows."""
     batch, count = candidates.shape
     rows = torch.arange(batch).repeat_interleave(count)
-    folded, hidden = observer.fold(objects[rows], candidates.flatten(), rows_of(hidden, rows))
-    logits = observer.decode(folded)
+    after = observer.update(objects[rows], candidates.flatten(), rows_of(state, rows))
+    logits = observer.decode(after)
     truth = truth.to(logits.device)[:, None]
     occupied = logits.reshape(batch, count, *logits.shape[1:]).sigmoid() > threshold
-    return _Candidates(folded, hidden, logits, iou(occupied, truth).cpu())
+    return _Candidates(candidates, after, logits, iou(occupied, truth).cpu())
 
 
+class _LookedAhead(RenderedObjects):
+    """Objects whose candidate views are all tried before one of them is taken."""
+
+    def __init__(self, observer: Observer, objects: Tensor, starts: Tensor,
+                 threshold: float) -> None:
+        super().__init__(observer, objects)
+        self._observer, self._threshold = observer, threshold
+        self._starts = starts
+        self.logits = torch.empty(0)
+
+    def reset(self) -> None:
+        """Begin an episode of each with its start as the only candidate."""
+        super().reset()
+        self.look_ahead(self._starts[:, None])
+
+    def look_ahead(self, candidates: Tensor) -> Tensor:
+        """Try candidate views (B, K); return the best of each object, (B,)."""
+        self._ahead = _look_at(self._observer, self._observer.views.voxels[self.objects],
+                               self.objects, candidates, self.seen.state, self._threshold)
+        best: Tensor = candidates.gather(1, self._ahead.best[:, None])[:, 0]
+        return best
+
+    def step(self, view: Tensor) -> Seen:
+        """Take one of the candidates (B,) that were tried."""
+        batch, count = self._ahead.views.shape
+        column = (self._ahead.views == view[:, None]).int().argmax(dim=1)
+        rows = column + torch.arange(batch) * count
+        self.logits = self._ahead.logits[rows.to(self._ahead.logits.device)]
+        self.seen = Seen(rows_of(self._ahead.state, rows),
+                         torch.column_stack([self.seen.chosen, view]))
+        return self.seen
+
+
+@torch.inference_mode()
 def roll_out_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Tensor,
                     starts: Tensor, count: int, threshold: float,
                     bfloat16: bool = False) -> Iterator[Step]:
@@ -64,24 +92,17 @@ def roll_out_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Ten
     It sees the truth: of the views not yet taken it goes to the one after which the IoU is
     highest, one step ahead.
     """
-    observer, truth = Observer(network, views, bfloat16), views.voxels[objects]
+    own = _LookedAhead(Observer(network, views, bfloat16), objects, starts, threshold)
     every = torch.arange(views.images.shape[1]).expand(len(objects), -1)
-    fresh = torch.ones_like(every, dtype=torch.bool)
-    candidates, hidden = starts[:, None], None
-    taken = np.empty((len(objects), 0))
-    for _ in range(count):
-        seen = _look_at(observer, truth, objects, candidates, hidden, threshold)
-        best = seen.best
-        chosen = candidates.flatten()[best]
-        hidden = rows_of(seen.hidden, best)
-        at = views.azimuths[objects, chosen].double().numpy()
-        taken = np.column_stack([taken, at])
-        own = best.to(seen.logits.device)
-        yield Step(seen.logits[own].sigmoid(), seen.folded.latent[own], taken)
-        fresh = fresh.scatter(1, chosen[:, None], False)
-        if not fresh.any():
-            return
-        candidates = every[fresh].reshape(len(objects), -1)
+
+    def choose(step: TimeStep[Tensor, Seen]) -> Tensor | None:
+        taken = torch.zeros_like(every, dtype=torch.bool).scatter(1, step.known.chosen, True)
+        fresh = every[~taken].reshape(len(objects), -1)
+        return own.look_ahead(fresh) if fresh.shape[1] else None
+
+    for step in run_episode(own, starts, choose, count):
+        yield Step(own.logits.sigmoid(), step.known.state['latent'].float(),
+                   own.azimuths(step.known))
 
 
 def oracle_batch(views: ViewSet) -> int:
@@ -96,18 +117,18 @@ def sequence_iou(network: ReconstructionNetwork, views: ViewSet, item: int, thre
     Return the IoU of one object after every ordered sequence of so many views, (V, ..., V).
 
     Entry [i, j, k] is that of view i, then j, then k: a network may care for the order. NaN where
-    a view comes twice. Sequences share what was folded in before: 3 of 24 views are 12,720
+    a view comes twice. Sequences share the states before: 3 of 24 views are 12,720
     passes.
     """
     count, observer = views.images.shape[1], Observer(network, views, bfloat16)
     table = np.full((count,) * length, np.nan, np.float32)
 
-    def explore(sequences: Tensor, hidden: Any) -> None:
-        """Look at all that may follow sequences (P, t), after which the network is `hidden`."""
+    def explore(sequences: Tensor, state: State) -> None:
+        """Look at all that may follow sequences (P, t), after which the network's state is."""
         taken = torch.zeros(len(sequences), count, dtype=torch.bool).scatter(1, sequences, True)
         fresh = torch.nonzero(~taken)[:, 1].reshape(len(sequences), -1)
         objects = torch.full((len(sequences),), item)
-        seen = _look_at(observer, views.voxels[objects], objects, fresh, hidden, threshold)
+        seen = _look_at(observer, views.voxels[objects], objects, fresh, state, threshold)
         longer = torch.cat([sequences.repeat_interleave(fresh.shape[1], dim=0),
                             fresh.reshape(-1, 1)], dim=1)
         if longer.shape[1] == length:
@@ -115,7 +136,7 @@ def sequence_iou(network: ReconstructionNetwork, views: ViewSet, item: int, thre
             return
         at_once = max(1, _ROWS // (count - longer.shape[1]))
         for rows in batches(len(longer), at_once):
-            explore(longer[rows], rows_of(seen.hidden, rows))
+            explore(longer[rows], rows_of(seen.state, rows))
 
-    explore(torch.empty(1, 0, dtype=torch.long), None)
+    explore(torch.empty(1, 0, dtype=torch.long), network.initial_state(1))
     return table

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
+import hashlib
 from pathlib import Path
 import time
 from typing import Any
@@ -19,30 +20,48 @@ from active_recon.evaluation.statistics import (
 )
 from active_recon.evaluation.subsets import best_subsets
 from active_recon.evaluation.trial import Contender, Trial
-from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights, state_hash
-from active_recon.policies import load_policy
-from active_recon.policies.attention import AttentionPolicy
-from active_recon.policies.base import Choice, Policy
+from active_recon.policies import (
+    Choice,
+    learned_policy,
+    load_policy,
+    Observation,
+    POLICIES,
+    Policy,
+    PolicyOptions,
+)
 from active_recon.reporting import Advance, Reporting, silent
+from active_recon.runtimes import State
+from active_recon.runtimes.torch import TorchPolicyRuntime
+from active_recon.weights_files import DEFAULT_MODEL
 import numpy as np
-from numpy.typing import NDArray
+from torch import nn
 
-CONTENDERS = ('random', 'uniform', 'farthest', 'attention', 'oracle')
-_BLIND = ('random', 'uniform', 'farthest')
 _TIMED_EPISODES = 8
 
 Runs = Mapping[str, Sequence[Episodes]]
 """The same episodes under each seed of each policy."""
 
 
-def contenders(names: Sequence[str], attentions: Sequence[AttentionModel] = (), count: int = 5,
-               seeds: int = 5, seed: int = 0) -> list[Contender]:
+def blind_names() -> list[str]:
+    """Return the policies that no network brings."""
+    return [name for name, entry in POLICIES.items() if not entry.is_learned]
+
+
+def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
+    """Return all policies, the learned ones after the others, and the oracle, which is none."""
+    own = [name for name, entry in POLICIES.items() if entry.is_learned and learned]
+    return [*blind_names(), *own, *(['oracle'] if oracle else [])]
+
+
+def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count: int = 5,
+               seeds: int = 5, seed: int = 0, model: str = DEFAULT_MODEL) -> list[Contender]:
     """
     Return the policies named, under all of their seeds.
 
-    - attentions: the attentive models, one for each seed it was trained under
+    - attentions: the learned policy's models, one for each seed it was trained under
+    - model: the network's name, beside which they were trained
     - count: views of an episode, which uniform divides the turn by
     - seeds: how often random is drawn, from `seed` on
 
@@ -50,29 +69,27 @@ def contenders(names: Sequence[str], attentions: Sequence[AttentionModel] = (), 
     """
     made: list[Contender] = []
     for name in names:
-        match name:
-            case 'random':
-                made += [Contender(name, f'random-{each}', partial(_blind, name, count))
-                         for each in range(seed, seed + seeds)]
-            case 'uniform' | 'farthest':
-                made.append(Contender(name, name, partial(_blind, name, count)))
-            case 'attention':
-                if not attentions:
-                    raise WeightsError('attention: expected weights with a view policy in them, '
-                                       'as `active-recon train --model 2d3d-attention` makes; '
-                                       'there is none')
-                made += [Contender(
-                    name, f'attention-{state_hash(model)[:16]}-{model.view_separation:.4f}',
-                    partial(_attentive, model)) for model in attentions]
-            case 'oracle':
-                made.append(Contender(name, name, None))
-            case _:
-                raise ConfigError(f'policy: expected some of {", ".join(CONTENDERS)}, '
-                                  f'got {name!r}')
+        if name not in contender_names():
+            raise ConfigError(f'policy: expected some of {", ".join(contender_names())}, '
+                              f'got {name!r}')
+        if name not in POLICIES:
+            made.append(Contender(name, name, None))
+        elif POLICIES[name].is_learned:
+            if not attentions:
+                raise WeightsError(f'{name}: expected weights with a view policy in them, as '
+                                   '`active-recon train --model 2d3d-attention` makes; there is '
+                                   'none')
+            made += [Contender(name, f'{name}-{_model_hash(each)}', partial(_learned, model, each))
+                     for each in attentions]
+        elif POLICIES[name].draws:
+            made += [Contender(name, f'{name}-{each}', partial(_blind, name, count))
+                     for each in range(seed, seed + seeds)]
+        else:
+            made.append(Contender(name, name, partial(_blind, name, count)))
     return made
 
 
-def load_attentions(files: Sequence[Path], network: ReconstructionNetwork) -> list[AttentionModel]:
+def load_attentions(files: Sequence[Path], network: ReconstructionNetwork) -> list[nn.Module]:
     """
     Return the attentive models of weights files, trained on this very network.
 
@@ -117,7 +134,7 @@ def compare(trial: Trial, runs: Runs) -> dict[str, Any]:
     policies = {name: summary(seeds, trial.views, trial.objects) for name, seeds in runs.items()}
     for name, figures in policies.items():
         figures['auc_above'] = {other: asdict(difference(areas[name], areas[other]))
-                                for other in _BLIND if other in areas and other != name}
+                                for other in blind_names() if other in areas and other != name}
     found: dict[str, Any] = {'policies': policies}
     if 'random' in areas and 'oracle' in areas:
         for name, figures in policies.items():
@@ -140,7 +157,7 @@ def decision_ms(trial: Trial, contender: Contender) -> float | None:
     return float(np.median(watch.milliseconds))
 
 
-def policy_study(trial: Trial, attentions: Sequence[AttentionModel] = (), seeds: int = 5,
+def policy_study(trial: Trial, attentions: Sequence[nn.Module] = (), seeds: int = 5,
                  subset_objects: int = 60, reporting: Reporting = silent) -> dict[str, Any]:
     """
     Compare all policies, ready for JSON: `compare`, and `identity`, `decision_ms`, `best_subset`.
@@ -150,8 +167,7 @@ def policy_study(trial: Trial, attentions: Sequence[AttentionModel] = (), seeds:
     - subset_objects: objects, drawn over the categories, of which every sequence of three views
       is tried; 0 leaves it out
     """
-    names = CONTENDERS if attentions else [name for name in CONTENDERS if name != 'attention']
-    every = contenders(names, attentions, trial.count, seeds)
+    every = contenders(contender_names(bool(attentions)), attentions, trial.count, seeds)
     runs = run_all(trial, every, reporting)
     found: dict[str, Any] = {
         'identity': trial.identity, 'objects': len(trial.views),
@@ -167,11 +183,17 @@ def policy_study(trial: Trial, attentions: Sequence[AttentionModel] = (), seeds:
 
 
 def _blind(name: str, count: int, rng: np.random.Generator) -> Policy:
-    return load_policy(name, rng=rng, views=count)
+    return load_policy(name, PolicyOptions(rng, count))
 
 
-def _attentive(model: AttentionModel, rng: np.random.Generator) -> Policy:
-    return AttentionPolicy(model)
+def _learned(model: str, module: nn.Module, rng: np.random.Generator) -> Policy:
+    return learned_policy(model, TorchPolicyRuntime(module))
+
+
+def _model_hash(module: nn.Module) -> str:
+    """Return what tells a learned policy apart: its weights, and what it says of itself."""
+    facts = sorted(TorchPolicyRuntime(module).facts.items())
+    return hashlib.sha256(f'{state_hash(module)} {facts}'.encode()).hexdigest()[:16]
 
 
 def _advance(advance: Advance, done: int) -> None:
@@ -189,10 +211,18 @@ class _Stopwatch:
         self._policy = policy
         self.milliseconds: list[float] = []
 
-    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
-               state: Any = None) -> tuple[Choice, Any]:
+    @property
+    def wants_volume(self) -> bool:
+        """Whether the policy looks at the occupancy."""
+        return self._policy.wants_volume
+
+    def initial_state(self, batch: int) -> State:
+        """Return the policy's."""
+        return self._policy.initial_state(batch)
+
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """Let the policy choose."""
         begun = time.perf_counter()
-        chosen = self._policy.choose(latent, taken, state)
+        chosen = self._policy.choose(seen, state)
         self.milliseconds.append(1e3 * (time.perf_counter() - begun))
         return chosen

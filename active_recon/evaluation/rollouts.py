@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import chain
-from typing import Any
+from typing import Protocol
 
-from active_recon.cameras import azimuth_difference
+from active_recon.cameras import azimuth_difference, pose_azimuths
 from active_recon.datasets.views import ViewSet
-from active_recon.models.network import Folded, ReconstructionNetwork
-from active_recon.policies.base import Policy
+from active_recon.environment import run_episode, TimeStep
+from active_recon.models.network import ReconstructionNetwork, State
+from active_recon.policies import Choice, Observation, Policy
+from active_recon.voxels import PUBLISHED_FLOOR
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -17,11 +18,78 @@ from torch import Tensor
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """B episodes after one more view: occupancy (B, X, Y, Z), A_t, and the azimuths taken."""
+    """B episodes after one more view: occupancy (B, R, R, R), the latent, and azimuths taken."""
 
     occupancy: Tensor
     latent: Tensor
     taken: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """B episodes after t views: the network's state, and the views' indices, (B, t)."""
+
+    state: State
+    chosen: Tensor
+
+
+class Shows(Protocol):
+    """Shows a network views of a set, by their indices."""
+
+    views: ViewSet
+
+    def initial_state(self, batch: int) -> State: ...
+
+    def update(self, objects: Tensor, chosen: Tensor, state: State) -> State: ...
+
+
+class RenderedObjects:
+    """The environment of B objects of a set, whose rendered views are named by their indices."""
+
+    def __init__(self, shows: Shows, objects: Tensor) -> None:
+        self._shows, self.objects = shows, objects
+
+    def reset(self) -> None:
+        """Begin an episode of each."""
+        count = len(self.objects)
+        self.seen = Seen(self._shows.initial_state(count), torch.empty(count, 0, dtype=torch.long))
+
+    def step(self, view: Tensor) -> Seen:
+        """Take a view (B,) of each object."""
+        state = self._shows.update(self.objects, view, self.seen.state)
+        self.seen = Seen(state, torch.column_stack([self.seen.chosen, view]))
+        return self.seen
+
+    def azimuths(self, seen: Seen) -> NDArray[np.float64]:
+        """Return the azimuths of all views so far, (B, t), radians."""
+        return self._shows.views.azimuths[self.objects[:, None], seen.chosen].double().numpy()
+
+    def observation(self, latent: Tensor, seen: Seen,
+                    occupancy: Tensor | None = None) -> Observation:
+        """Return what a policy sees: all views of an object are its candidates."""
+        poses = self._shows.views.poses
+        published = None if occupancy is None else torch.where(
+            occupancy > PUBLISHED_FLOOR, occupancy, 0).float().cpu().numpy()
+        return Observation(
+            latent.float().cpu().numpy(), poses[self.objects[:, None], seen.chosen].numpy(),
+            poses[self.objects].numpy(), published)
+
+    def goal_azimuths(self, choice: Choice) -> NDArray[np.float64]:
+        """Return the azimuths (B,) that a policy's choice goes to, radians."""
+        own = pose_azimuths(self._shows.views.poses[self.objects].numpy())
+        best = np.take_along_axis(own, choice.scores.argmax(axis=1)[:, None], axis=1)[:, 0]
+        if choice.azimuth is None:
+            return best
+        return np.where(np.isnan(choice.azimuth), best, choice.azimuth)
+
+    def view_of(self, choice: Choice) -> Tensor:
+        """Return the views (B,) that show a policy's choice: the nearest, or the best."""
+        best = torch.from_numpy(choice.scores.argmax(axis=1))
+        if choice.azimuth is None:
+            return best
+        own = self._shows.views.azimuths[self.objects].numpy()
+        proposed = nearest_views(own, np.nan_to_num(choice.azimuth))
+        return torch.where(torch.from_numpy(np.isnan(choice.azimuth)), best, proposed)
 
 
 @torch.inference_mode()
@@ -31,73 +99,87 @@ def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, obj
     """
     Run one episode for each object (B,) from the view it starts at (B,), yielding every view.
 
-    The policy's azimuth is shown by the nearest rendered view, as on the turntable. `stand_ins`,
-    (B,), are objects whose latents, seen from the same azimuths, the policy is given instead of
-    the true ones: what a policy loses by it is what it owes to seeing.
+    An azimuth between the views is shown by the nearest rendered view, as on the turntable.
+    `stand_ins`, (B,), are objects whose latents, seen from the same azimuths, the policy is given
+    instead of the true ones: what a policy loses by it is what it owes to seeing.
     """
     observer = Observer(network, views, bfloat16)
-    azimuths = views.azimuths.numpy()
-    chosen, hidden, other_hidden, state = starts, None, None, None
-    taken = np.empty((len(objects), 0))
-    for _ in range(count):
-        at = azimuths[objects.numpy(), chosen.numpy()].astype(np.float64)
-        taken = np.column_stack([taken, at])
-        folded, hidden = observer.fold(objects, chosen, hidden)
-        latent = folded.latent
-        yield Step(observer.decode(folded).sigmoid(), latent, taken)
-        if taken.shape[1] == count:
-            return
+    own = RenderedObjects(observer, objects)
+    other = own if stand_ins is None else RenderedObjects(observer, stand_ins)
+    other.reset()
+    memory = policy.initial_state(len(objects))
+
+    def choose(step: TimeStep[Tensor, Seen]) -> Tensor:
+        nonlocal memory
+        told = step.known
         if stand_ins is not None:
-            alike = nearest_views(azimuths[stand_ins.numpy()], at)
-            other, other_hidden = observer.fold(stand_ins, alike, other_hidden)
-            latent = other.latent
-        choice, state = policy.choose(latent.cpu().numpy(), taken, state)
-        chosen = nearest_views(azimuths[objects.numpy()], choice.azimuth)
+            at = own.azimuths(step.known)[:, -1]
+            told = other.step(nearest_views(views.azimuths[stand_ins].numpy(), at))
+        volume = observer.occupancy(told.state) if policy.wants_volume else None
+        latent = told.state['latent']
+        choice, memory = policy.choose(own.observation(latent, step.known, volume), memory)
+        return own.view_of(choice)
+
+    for step in run_episode(own, starts, choose, count):
+        yield Step(observer.occupancy(step.known.state), step.known.state['latent'].float(),
+                   own.azimuths(step.known))
 
 
 class Observer:
-    """A frozen network that is shown views of a set, on white; it looks at each of them once."""
+    """A frozen network that is shown views of a set, on white; it encodes each of them once."""
 
     def __init__(self, network: ReconstructionNetwork, views: ViewSet,
                  bfloat16: bool = False) -> None:
-        self._network, self._views, self._bfloat16 = network, views, bfloat16
-        self._device = device_of(network)
-        self._rows: dict[tuple[int, int], int] = {}  # of `_seen`, by object and view
-        self._seen: Tensor | None = None
+        self.views = views
+        self._network, self._bfloat16 = network, bfloat16
+        self._device = network.device
+        self._rows: dict[tuple[int, int], int] = {}  # of `_encoded`, by object and view
+        self._encoded: Tensor | None = None
 
-    def fold(self, objects: Tensor, chosen: Tensor, hidden: Any = None,
-             yaws: Tensor | float = 0.0) -> tuple[Folded, Any]:
+    def initial_state(self, batch: int) -> State:
+        """Return the network's state before any view."""
+        return self._network.initial_state(batch)
+
+    def update(self, objects: Tensor, chosen: Tensor, state: State,
+               yaws: Tensor | None = None) -> State:
         """
-        Fold in views (B,) of objects (B,); the latent comes in float32.
+        Take in views (B,) of objects (B,).
 
-        `yaws`, radians, are added to the azimuths that the network is told: its error about the
-        front.
+        By `yaws` (B,), radians, the cameras that the network is told are turned about +z: its
+        error about the front.
         """
-        azimuths = (self._views.azimuths[objects, chosen] + yaws).to(self._device)
+        cameras = self.views.cameras(objects, chosen)
+        if yaws is not None:
+            cameras = cameras.turned(yaws)
         with self._precision():
-            folded, hidden = self._network.remember(
-                self._look(objects, chosen), azimuths, hidden)
-        return Folded(folded.latent.float(), folded.features), hidden
+            return self._network.update(
+                self._encode(objects, chosen), cameras.to(self._device), state)
 
-    def decode(self, folded: Folded) -> Tensor:
-        """Return the occupancy's logits of what was folded in, (B, R, R, R) float32."""
-        features = folded.features
-        if features.ndim == 5:  # 3D convolutions take two thirds of the time if channels are last
-            features = features.contiguous(memory_format=torch.channels_last_3d)
+    def decode(self, state: State) -> Tensor:
+        """Return the occupancy's logits of a state, (B, R, R, R) float32."""
+        # 3D convolutions take two thirds of the time if channels are last
+        placed = {name: part.contiguous(memory_format=torch.channels_last_3d)
+                  if part.ndim == 5 else part for name, part in state.items()}
         with self._precision():
-            return self._network.decode(features).float()
+            return self._network.decode(placed).float()
 
-    def _look(self, objects: Tensor, chosen: Tensor) -> Tensor:
+    def occupancy(self, state: State) -> Tensor:
+        """Return the occupancy of a state, (B, R, R, R) in [0, 1]."""
+        return self.decode(state).sigmoid()
+
+    def _encode(self, objects: Tensor, chosen: Tensor) -> Tensor:
         wanted = list(zip(objects.tolist(), chosen.tolist(), strict=True))
         fresh = [each for each in dict.fromkeys(wanted) if each not in self._rows]
         if fresh:
-            images = self._views.white(*torch.tensor(fresh).T).to(
+            index = torch.tensor(fresh).T
+            images = self.views.white(*index).to(
                 self._device, memory_format=torch.channels_last)
-            seen = self._network.look(images)
+            encoded = self._network.encode(images, self.views.cameras(*index).to(self._device))
             self._rows |= {each: row for row, each in enumerate(fresh, start=len(self._rows))}
-            self._seen = seen if self._seen is None else torch.cat([self._seen, seen])
-        assert self._seen is not None
-        return self._seen[torch.tensor([self._rows[each] for each in wanted])]
+            self._encoded = (encoded if self._encoded is None
+                             else torch.cat([self._encoded, encoded]))
+        assert self._encoded is not None
+        return self._encoded[torch.tensor([self._rows[each] for each in wanted])]
 
     def _precision(self) -> torch.autocast:
         return torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16)
@@ -113,9 +195,3 @@ def nearest_views(azimuths: NDArray[np.float32], wanted: NDArray[np.float64]) ->
     """Return the index of the view nearest to each azimuth wanted, (B, V) and (B,) to (B,)."""
     away = np.abs(azimuth_difference(azimuths, wanted[:, None]))
     return torch.from_numpy(away.argmin(axis=1))
-
-
-def device_of(network: ReconstructionNetwork) -> torch.device:
-    """Return where a network lies; one that is fitted, not trained, has buffers alone."""
-    held = next(chain(network.parameters(), network.buffers()), None)
-    return torch.device('cpu') if held is None else held.device

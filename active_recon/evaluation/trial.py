@@ -15,7 +15,7 @@ from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.rollouts import batches
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import state_hash
-from active_recon.policies.base import Policy
+from active_recon.policies import Policy
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
@@ -91,7 +91,7 @@ class Trial:
 def data_hash(views: ViewSet) -> str:
     """Return the SHA-256 of what a set shows and of its truth."""
     digest = hashlib.sha256()
-    for part in (views.images, views.azimuths, views.voxels):
+    for part in (views.images, views.poses, views.intrinsics, views.voxels):
         digest.update(str(tuple(part.shape)).encode())
         digest.update(part.contiguous().numpy().data)
     return digest.hexdigest()

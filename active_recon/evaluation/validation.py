@@ -2,10 +2,8 @@
 
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.metrics import episodes, iou_per_view, THRESHOLDS
-from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
-from active_recon.policies.attention import AttentionPolicy
-from active_recon.policies.base import Policy
+from active_recon.policies import Policy
 from active_recon.policies.geometric import RandomPolicy
 import numpy as np
 
@@ -29,12 +27,12 @@ def best_threshold(network: ReconstructionNetwork, views: ViewSet) -> float:
     return float(THRESHOLDS[values.mean(axis=(0, 1)).argmax()])
 
 
-def policy_auc(network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet,
+def policy_auc(network: ReconstructionNetwork, learned: Policy, views: ViewSet,
                threshold: float) -> dict[str, float]:
-    """Return the mean IoU over views 1 to 5 under the policy's means and at random."""
+    """Return the mean IoU over views 1 to 5 under a learned policy and at random."""
     objects, starts = episodes(views, 2)
     at = np.array([threshold])
-    policies: dict[str, Policy] = {'validation_auc': AttentionPolicy(attention),
-                'validation_auc_random': RandomPolicy(np.random.default_rng(0))}
+    policies: dict[str, Policy] = {'validation_auc': learned,
+                                  'validation_auc_random': RandomPolicy(np.random.default_rng(0))}
     return {name: iou_per_view(network, policy, views, objects, starts, at).mean()
             for name, policy in policies.items()}

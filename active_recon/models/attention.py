@@ -1,9 +1,10 @@
 """The attentive-recurrent visual model of section 3.3: where to look next."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from active_recon.config import NetworkConfig
 from active_recon.models.encoder import LATENT_GRID
+from active_recon.models.network import State
+from active_recon.models.network_2d3d import Network2d3dConfig
 import torch
 from torch import nn, Tensor
 from torch.nn import functional
@@ -21,7 +22,7 @@ class AttentionModel(nn.Module):
     Glimpse, LSTM, location and baseline (figures 3 and 4).
 
     - latent A_t: (B, 4 C, 4, 4), azimuth l_t of the view just taken: (B,) radians
-    - state: the LSTM's h and c, (B, hidden) each, passed in and handed back
+    - state: the LSTM's h and c as `hidden` and `memory`, (B, hidden) each
 
     The glimpse is g_t = A_t * ReLU(W [sin l_t, cos l_t]), broadcast over the grid: a product with
     the bare angle would erase A_t at azimuth 0. The mean azimuth is the angle of a vector of two.
@@ -40,18 +41,30 @@ class AttentionModel(nn.Module):
         self.baseline = nn.Linear(hidden_channels, 1)
 
     @classmethod
-    def from_config(cls, config: NetworkConfig) -> 'AttentionModel':
+    def from_config(cls, config: Network2d3dConfig) -> 'AttentionModel':
         """Build the model of a configuration, with fresh weights."""
         return cls(config.latent_channels, config.glimpse_channels, config.view_separation)
 
-    def forward(self, latent: Tensor, azimuth: Tensor, state: tuple[Tensor, Tensor] | None = None,
-                ) -> tuple[Attention, tuple[Tensor, Tensor]]:
-        """Return the proposal after this view and the next state; None is no view yet."""
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What who follows the model has to know: `view_separation`, and A_t's `latent_shape`."""
+        return {'view_separation': self.view_separation,
+                'latent_shape': (self.where.out_features, LATENT_GRID, LATENT_GRID)}
+
+    def initial_state(self, batch: int) -> State:
+        """Return the memory of so many episodes before any view, zeros of (B, hidden)."""
+        empty = self.memory.weight_hh.new_zeros(batch, self.memory.hidden_size)
+        return {'hidden': empty, 'memory': empty}
+
+    def forward(self, latent: Tensor, azimuth: Tensor,
+                state: State) -> tuple[Attention, State]:
+        """Return the proposal after this view and the next state."""
         direction = torch.stack([azimuth.sin(), azimuth.cos()], dim=-1)
         gate = functional.relu(self.where(direction))  # (B, 4 C)
         glimpse = (latent * gate[:, :, None, None]).flatten(1)  # (B, 4 C x 16)
-        hidden, memory = self.memory(glimpse, state)
+        hidden, memory = self.memory(glimpse, (state['hidden'], state['memory']))
         sine, cosine = self.location(hidden).unbind(dim=-1)
         # The baseline learns from the return alone; its gradient must not shape the policy.
         baseline = self.baseline(hidden.detach())[:, 0]
-        return Attention(torch.atan2(sine, cosine), baseline), (hidden, memory)
+        proposal = Attention(torch.atan2(sine, cosine), baseline)
+        return proposal, {'hidden': hidden, 'memory': memory}

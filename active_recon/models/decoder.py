@@ -30,14 +30,14 @@ class Decoder(nn.Module):
             to_logits)
         start_empty(to_logits.bias)
 
-    def remember(self, latent: Tensor, state: LstmState | None) -> LstmState:
-        """Return the next state; a state of None is that of no view yet."""
+    def update(self, latent: Tensor, state: LstmState) -> LstmState:
+        """Return the next state."""
         volume = latent.reshape(
             len(latent), self.latent_channels, LATENT_GRID, LATENT_GRID, LATENT_GRID)
-        remembered: LstmState = self.memory(volume, state or self.memory.initial_state(volume))
-        return remembered
+        updated: LstmState = self.memory(volume, state)
+        return updated
 
-    def forward(self, remembered: Tensor) -> Tensor:
-        """Return the logits of what is remembered, (B, V, 4, 4, 4) to (B, 32, 32, 32)."""
-        logits: Tensor = self.grow(remembered)[:, 0]
+    def forward(self, hidden: Tensor) -> Tensor:
+        """Return the logits of the memory's H_t, (B, V, 4, 4, 4) to (B, 32, 32, 32)."""
+        logits: Tensor = self.grow(hidden)[:, 0]
         return logits

@@ -67,13 +67,20 @@ class Encoder(nn.Module):
             nn.Conv2d(bottleneck_channels, latent_channels * LATENT_GRID ** 3, 1),
             nn.GroupNorm(1, latent_channels * LATENT_GRID ** 3), nn.LeakyReLU(0.1))
 
-    def look(self, images: Tensor) -> Tensor:
+    @property
+    def latent_shape(self) -> tuple[int, int, int]:
+        """The shape of an object's A_t, (4 C, 4, 4)."""
+        last = self.to_latent[-2]
+        assert isinstance(last, nn.GroupNorm)
+        return last.num_channels // LATENT_GRID ** 2, LATENT_GRID, LATENT_GRID
+
+    def encode(self, images: Tensor) -> Tensor:
         """Return what the residual blocks make of images, (B, F, 4, 4)."""
         features: Tensor = self.blocks(self.stem(2 * images - 1))
         return features
 
-    def remember(self, features: Tensor, state: LstmState | None) -> tuple[Tensor, LstmState]:
-        """Return A_t and the next state; a state of None is that of no view yet."""
-        state = self.memory(features, state or self.memory.initial_state(features))
+    def update(self, features: Tensor, state: LstmState) -> tuple[Tensor, LstmState]:
+        """Return A_t and the next state."""
+        state = self.memory(features, state)
         latent = self.to_latent(state.hidden)  # (B, 64 C, 1, 1)
         return latent.reshape(len(features), -1, LATENT_GRID, LATENT_GRID), state

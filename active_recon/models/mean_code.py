@@ -1,10 +1,10 @@
 """An image as one code, and several views as the mean of theirs."""
 
 from itertools import pairwise
-from typing import NamedTuple
 
 from active_recon.models.encoder import group_norm, IMAGE_SIZE
-from active_recon.models.network import Folded, ReconstructionNetwork
+from active_recon.models.network import Cameras, ReconstructionNetwork, State
+import torch
 from torch import nn, Tensor
 
 
@@ -26,6 +26,7 @@ class ImageEncoder(nn.Module):
         for before, after in pairwise((image_channels[-1] * cells, *code_channels)):
             layers += [nn.Linear(before, after), nn.GroupNorm(1, after), nn.ReLU()]
         self.layers = nn.Sequential(*layers)
+        self.code_size = code_channels[-1]
 
     def forward(self, images: Tensor) -> Tensor:
         """Return the codes of images (B, 3, 64, 64) in [0, 1]."""
@@ -33,32 +34,33 @@ class ImageEncoder(nn.Module):
         return codes
 
 
-class SeenCodes(NamedTuple):
-    """The sum of the codes of all views so far, (B, D), and how many those are."""
-
-    total: Tensor
-    views: int
-
-
 class MeanCodeNetwork(ReconstructionNetwork):
     """
     A single-view network over several views: the mean of their codes is decoded.
 
-    The order of the views is of no matter. The latent is the mean code as (B, D, 1, 1).
+    The order of the views is of no matter. The latent is the mean code as (B, D, 1, 1); the rest
+    of the state is the codes' sum, (B, D), and their number, (B, 1).
     """
+
+    image_size, needs_front = IMAGE_SIZE, True
 
     def __init__(self, encoder: ImageEncoder) -> None:
         super().__init__()
         self.encoder = encoder
 
-    def look(self, images: Tensor) -> Tensor:
+    def initial_state(self, batch: int) -> State:
+        """Return no code yet."""
+        empty = torch.zeros(batch, self.encoder.code_size, device=self.device)
+        return {'total': empty, 'views': empty[:, :1], 'latent': empty[:, :, None, None]}
+
+    def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
         """Return the images' codes, (B, D)."""
         codes: Tensor = self.encoder(images)
         return codes
 
-    def remember(self, seen: Tensor, azimuths: Tensor,
-                 hidden: SeenCodes | None = None) -> tuple[Folded, SeenCodes]:
-        """Take in images' codes; the features of what is known are the mean code, (B, D)."""
-        known = SeenCodes(hidden.total + seen, hidden.views + 1) if hidden else SeenCodes(seen, 1)
-        mean = known.total / known.views
-        return Folded(mean[:, :, None, None], mean), known
+    def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
+        """Take in images' codes."""
+        total = (state['total'] + encoded).to(encoded.dtype)
+        views = state['views'] + 1
+        mean = (total / views).to(encoded.dtype)
+        return {'total': total, 'views': views, 'latent': mean[:, :, None, None]}

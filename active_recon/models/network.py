@@ -1,9 +1,18 @@
 """What every reconstruction network is: views in one by one, occupancy out after every view."""
 
 from abc import ABC, abstractmethod
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from itertools import chain
+from typing import NamedTuple, Self
 
+from active_recon.cameras import Camera, TURN
+from active_recon.canonical import NetworkSpec
+import numpy as np
+import torch
 from torch import nn, Tensor
+
+State = dict[str, Tensor]
+"""What a network knows of B objects: named tensors, (B, ...) each; `latent` is among them."""
 
 
 def start_empty(bias: Tensor | None) -> None:
@@ -16,59 +25,103 @@ def start_empty(bias: Tensor | None) -> None:
     nn.init.constant_(bias, -2.2)
 
 
-class Folded(NamedTuple):
+class Cameras(NamedTuple):
     """
-    What a network knows after a view, not yet decoded.
+    The cameras of images, one each.
 
-    - latent: (B, C, h, w), what a view policy sees
-    - features: (B, ...), what `decode` makes occupancy of
+    - poses: (..., 4, 4) float64, object from optical frame; lengths count in sides of the grid
+    - intrinsics: (..., 3, 3) float64, K in pixels of the image that the network gets
     """
 
-    latent: Tensor
-    features: Tensor
+    poses: Tensor
+    intrinsics: Tensor
 
+    @classmethod
+    def of(cls, cameras: Sequence[Camera]) -> Self:
+        """Return a batch of cameras, whose distances count in sides of the grid, (N, ...)."""
+        return cls(torch.from_numpy(np.stack([camera.pose for camera in cameras])),
+                   torch.from_numpy(np.stack([camera.intrinsics.matrix for camera in cameras])))
 
-class Reconstructed(NamedTuple):
-    """What is known after a view: occupancy logits (B, R, R, R), indexed [x, y, z], and A_t."""
+    @property
+    def azimuths(self) -> Tensor:
+        """Azimuths, (...) float32, radians in [0, 2 pi): all that the paper's family looks at."""
+        angle = torch.atan2(self.poses[..., 1, 3], self.poses[..., 0, 3])
+        return torch.remainder(angle, TURN).float()
 
-    logits: Tensor
-    latent: Tensor
+    def rows(self, *index: Tensor | int | slice) -> Self:
+        """Return some of the cameras, by an index of the axes before the last two."""
+        return type(self)(self.poses[index], self.intrinsics[index])
+
+    def turned(self, yaws: Tensor) -> Self:
+        """Return the cameras turned counter-clockwise about +z, radians (...)."""
+        yaws = yaws.double()
+        turn = torch.zeros(*yaws.shape, 4, 4, dtype=torch.float64)
+        turn[..., 0, 0] = turn[..., 1, 1] = yaws.cos()
+        turn[..., 1, 0] = yaws.sin()
+        turn[..., 0, 1] = -yaws.sin()
+        turn[..., 2, 2] = turn[..., 3, 3] = 1
+        return type(self)(turn.to(self.poses.device) @ self.poses, self.intrinsics)
+
+    def to(self, device: torch.device | str) -> Self:
+        """Return the cameras on a device."""
+        return type(self)(self.poses.to(device), self.intrinsics.to(device))
 
 
 class ReconstructionNetwork(nn.Module, ABC):
     """
-    The interface of all networks of the registry; the hidden state is passed in and handed back.
+    The interface of all networks of the registry; the state is passed in and handed back.
 
-    - images: (B, 3, 64, 64) in [0, 1]; azimuths of their cameras: (B,) radians
-    - hidden: whatever the network handed back after the view before; None before the first
+    - images: (B, 3, S, S) in [0, 1], S the `image_size`; their cameras: (B, ...)
+    - state: (B, ...) named tensors; `initial_state` gives the first, `update` the next one
 
-    Looking at an image, remembering what it shows and decoding what is known are apart: training
-    decodes after one view of a sequence only, and who tries many sequences of the same views
-    looks at each of them once.
+    Encoding an image, updating the state and decoding it are apart: training decodes after one
+    view of a sequence only, and who tries many sequences of the same views encodes each of them
+    once.
     """
 
-    resolution: int = 32
+    image_size: int
+    """S, pixels a side of the images."""
+    resolution: int
     """R, cells a side of the occupancy."""
+    needs_front: bool
+    """Whether it predicts with the front at +x, from canonical cameras; else from any camera."""
+
+    @property
+    def spec(self) -> NetworkSpec:
+        """What it asks of its images, and what it gives."""
+        return NetworkSpec(self.image_size, self.resolution, self.needs_front)
+
+    @property
+    def device(self) -> torch.device:
+        """Where it lies; one that is fitted, not trained, has buffers alone."""
+        held = next(chain(self.parameters(), self.buffers()), None)
+        return torch.device('cpu') if held is None else held.device
 
     @abstractmethod
-    def look(self, images: Tensor) -> Tensor:
+    def initial_state(self, batch: int) -> State:
+        """Return the state before any view of so many objects, on the network's device."""
+
+    @abstractmethod
+    def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
         """Return what each of the images shows by itself, (B, ...), whatever was seen before."""
 
     @abstractmethod
-    def remember(self, seen: Tensor, azimuths: Tensor,
-                 hidden: Any | None = None) -> tuple[Folded, Any]:
-        """Take in what one image of each object shows, (B, ...)."""
+    def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
+        """
+        Take in what one image of each object shows, (B, ...), and return the next state.
+
+        Its `latent`, (B, C, h, w), is what a view policy sees.
+        """
 
     @abstractmethod
-    def decode(self, features: Tensor) -> Tensor:
-        """Return the occupancy's logits, (B, R, R, R), of what was folded in."""
+    def decode(self, state: State) -> Tensor:
+        """Return the occupancy's logits, (B, R, R, R), indexed [x, y, z]."""
 
-    def fold(self, images: Tensor, azimuths: Tensor,
-             hidden: Any | None = None) -> tuple[Folded, Any]:
-        """Fold in one view of each object: look at it, and remember."""
-        return self.remember(self.look(images), azimuths, hidden)
+    def step(self, images: Tensor, cameras: Cameras, state: State) -> State:
+        """Take in one view of each object: encode it, and update the state."""
+        return self.update(self.encode(images, cameras), cameras, state)
 
-    def objective(self, features: Tensor, voxels: Tensor) -> Tensor | None:
+    def objective(self, state: State, voxels: Tensor) -> Tensor | None:
         """
         Return a loss of the network's own kind against voxels (B, R, R, R), or None.
 
@@ -76,8 +129,7 @@ class ReconstructionNetwork(nn.Module, ABC):
         """
         return None
 
-    def forward(self, images: Tensor, azimuths: Tensor,
-                hidden: Any | None = None) -> tuple[Reconstructed, Any]:
-        """Fold in one view of each object and decode."""
-        folded, hidden = self.fold(images, azimuths, hidden)
-        return Reconstructed(self.decode(folded.features), folded.latent), hidden
+    def forward(self, images: Tensor, cameras: Cameras, state: State) -> tuple[Tensor, State]:
+        """Take in one view of each object and decode: logits (B, R, R, R), and the next state."""
+        state = self.step(images, cameras, state)
+        return self.decode(state), state

@@ -1,20 +1,45 @@
 """The paper's reconstruction network: encoder and decoder, one view at a time."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
+import math
 
-from active_recon.config import NetworkConfig
+from active_recon.config import Config
+from active_recon.errors import ConfigError
 from active_recon.models.decoder import Decoder
-from active_recon.models.encoder import Encoder
-from active_recon.models.network import Folded, ReconstructionNetwork
+from active_recon.models.encoder import Encoder, IMAGE_SIZE
+from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.recurrent import LstmState
 from torch import Tensor
 
 
-class Hidden(NamedTuple):
-    """The memories of encoder and decoder after some views."""
+@dataclass(frozen=True)
+class Network2d3dConfig(Config):
+    """
+    Sizes of the 2D-3D-attention network; the paper states none of them.
 
-    encoder: LstmState
-    decoder: LstmState
+    `view_separation`, radians, is how far its goals stay from every view taken; the paper's is 0.
+    """
+
+    stem_channels: int = 32
+    block_channels: tuple[int, int, int] = (48, 96, 128)
+    recurrent_channels: int = 128
+    bottleneck_channels: int = 352
+    latent_channels: int = 24
+    volume_channels: int = 64
+    decoder_channels: tuple[int, int] = (64, 24)
+    glimpse_channels: int = 128
+    view_separation: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that make no network."""
+        sizes = [size for name, value in self.to_dict().items() if name.endswith('channels')
+                 for size in (value if isinstance(value, tuple) else (value,))]
+        if min(sizes) < 1:
+            raise ConfigError('Network2d3dConfig: expected channels of 1 or more, got '
+                              f'{min(sizes)}')
+        if not 0 <= self.view_separation <= math.pi:
+            raise ConfigError('Network2d3dConfig: expected a view_separation from 0 to pi, got '
+                              f'{self.view_separation}')
 
 
 class Network2d3d(ReconstructionNetwork):
@@ -22,8 +47,11 @@ class Network2d3d(ReconstructionNetwork):
     The 2D-3D network of figure 2; with the attentive model beside it, 2D-3D-attention.
 
     "Object Reconstruction Based on Attentive Recurrent Network from Single and Multiple Images",
-    sections 3.1 and 3.2. It predicts in the object's own frame and does not look at the azimuth.
+    sections 3.1 and 3.2. It predicts in the object's own frame and does not look at the camera.
+    Its state is the memories of encoder and decoder, and A_t as `latent`.
     """
+
+    image_size, resolution, needs_front = IMAGE_SIZE, 32, True
 
     def __init__(self, encoder: Encoder, decoder: Decoder) -> None:
         super().__init__()
@@ -31,25 +59,36 @@ class Network2d3d(ReconstructionNetwork):
         self.decoder = decoder
 
     @classmethod
-    def from_config(cls, config: NetworkConfig) -> 'Network2d3d':
+    def from_config(cls, config: Network2d3dConfig) -> 'Network2d3d':
         """Build the network of a configuration, with fresh weights."""
         return cls(
             Encoder(config.stem_channels, config.block_channels, config.recurrent_channels,
                     config.bottleneck_channels, config.latent_channels),
             Decoder(config.latent_channels, config.volume_channels, config.decoder_channels))
 
-    def look(self, images: Tensor) -> Tensor:
+    def initial_state(self, batch: int) -> State:
+        """Return empty memories."""
+        encoder = self.encoder.memory.initial_state(batch)
+        decoder = self.decoder.memory.initial_state(batch)
+        return {'encoder_hidden': encoder.hidden, 'encoder_memory': encoder.memory,
+                'decoder_hidden': decoder.hidden, 'decoder_memory': decoder.memory,
+                'latent': encoder.hidden.new_zeros(batch, *self.encoder.latent_shape)}
+
+    def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
         """Return the images' features, (B, F, 4, 4)."""
-        return self.encoder.look(images)
+        return self.encoder.encode(images)
 
-    def remember(self, seen: Tensor, azimuths: Tensor,
-                 hidden: Hidden | None = None) -> tuple[Folded, Hidden]:
-        """Take in images' features; those of what is known are the decoder's memory."""
-        latent, encoder = self.encoder.remember(seen, hidden and hidden.encoder)
-        decoder = self.decoder.remember(latent, hidden and hidden.decoder)
-        return Folded(latent, decoder.hidden), Hidden(encoder, decoder)
+    def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
+        """Take in images' features; what is decoded is the decoder's memory."""
+        latent, encoder = self.encoder.update(
+            encoded, LstmState(state['encoder_hidden'], state['encoder_memory']))
+        decoder = self.decoder.update(
+            latent, LstmState(state['decoder_hidden'], state['decoder_memory']))
+        return {'encoder_hidden': encoder.hidden, 'encoder_memory': encoder.memory,
+                'decoder_hidden': decoder.hidden, 'decoder_memory': decoder.memory,
+                'latent': latent}
 
-    def decode(self, features: Tensor) -> Tensor:
+    def decode(self, state: State) -> Tensor:
         """Return the occupancy's logits, (B, 32, 32, 32)."""
-        logits: Tensor = self.decoder(features)
+        logits: Tensor = self.decoder(state['decoder_hidden'])
         return logits

@@ -9,6 +9,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.encoder import group_norm
 from active_recon.models.mean_code import ImageEncoder, MeanCodeNetwork
+from active_recon.models.network import State
 from active_recon.models.octree import (
     all_cells,
     at,
@@ -164,29 +165,30 @@ class Ogn(MeanCodeNetwork):
             logits = self.classify[index + 1](features)
             yield Level(cells, features, logits)
 
-    def decode(self, features: Tensor) -> Tensor:
+    def decode(self, state: State) -> Tensor:
         """Return log-odds of filled against empty where a cell's division ended, (B, R, R, R)."""
+        codes = state['latent'].flatten(1)
         levels = ((level.cells, (level.logits[:, FILLED] - level.logits[:, EMPTY]).float())
-                  for level in self.levels(features))
-        return expand(levels, len(features), self.resolution)
+                  for level in self.levels(codes))
+        return expand(levels, len(codes), self.resolution)
 
-    def objective(self, features: Tensor, voxels: Tensor) -> Tensor:
+    def objective(self, state: State, voxels: Tensor) -> Tensor:
         """
-        Return the sum of the levels' cross entropies of codes (B, D) against (B, R, R, R).
+        Return the sum of the levels' cross entropies of the mean codes against (B, R, R, R).
 
         Raises ConfigError on voxels of another resolution.
         """
         if voxels.shape[-1] != self.resolution:
             raise ConfigError(f'expected voxels of {self.resolution} cells a side for this size '
                               f'of the network, got {voxels.shape[-1]}; choose another size')
-        truth = states_of(voxels)
+        truth, codes = states_of(voxels), state['latent'].flatten(1)
         return torch.stack([
-            functional.cross_entropy(level.logits.float(), at(state, level.cells))
-            for level, state in zip(self.levels(features, truth), truth, strict=False)]).sum()
+            functional.cross_entropy(level.logits.float(), at(known, level.cells))
+            for level, known in zip(self.levels(codes, truth), truth, strict=False)]).sum()
 
 
 @torch.no_grad()
-def octree_report(network: Ogn, features: Tensor) -> dict[str, dict[int, float]]:
+def octree_report(network: Ogn, codes: Tensor) -> dict[str, dict[int, float]]:
     """
     Return what the octrees of codes (B, D) hold per object, by the cells a side of each level.
 
@@ -195,7 +197,7 @@ def octree_report(network: Ogn, features: Tensor) -> dict[str, dict[int, float]]
     """
     report: dict[str, dict[int, float]] = {
         'cells': {}, 'dense_cells': {}, 'bytes': {}, 'dense_bytes': {}}
-    levels = [len(level.cells) / len(features) for level in network.levels(features)]
+    levels = [len(level.cells) / len(codes) for level in network.levels(codes)]
     for index, channels in enumerate(network.level_channels):
         side = COARSEST * 2 ** index
         size = _FLOAT_BYTES * channels

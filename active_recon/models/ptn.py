@@ -6,7 +6,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.encoder import group_norm
 from active_recon.models.mean_code import ImageEncoder, MeanCodeNetwork
-from active_recon.models.network import start_empty
+from active_recon.models.network import start_empty, State
 from torch import nn, Tensor
 
 _COARSEST = 3  # cells a side of the decoder's first volume
@@ -51,6 +51,8 @@ class PerspectiveTransformerNet(MeanCodeNetwork):
     their codes is decoded here. Layers are normalised, as in the paper's network here.
     """
 
+    resolution = 32
+
     def __init__(self, encoder: ImageEncoder, code_channels: int,
                  volume_channels: tuple[int, int, int]) -> None:
         super().__init__(encoder)
@@ -70,7 +72,7 @@ class PerspectiveTransformerNet(MeanCodeNetwork):
         return cls(ImageEncoder(config.image_channels, config.code_channels),
                    config.code_channels[-1], config.volume_channels)
 
-    def decode(self, features: Tensor) -> Tensor:
-        """Return the occupancy's logits, (B, 32, 32, 32), of mean codes (B, D)."""
-        logits: Tensor = self.decoder(features)[:, 0]
+    def decode(self, state: State) -> Tensor:
+        """Return the occupancy's logits, (B, 32, 32, 32), of the mean codes."""
+        logits: Tensor = self.decoder(state['latent'].flatten(1))[:, 0]
         return logits

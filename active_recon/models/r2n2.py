@@ -6,8 +6,8 @@ from itertools import pairwise
 from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.doubling import DoublingConv3d
-from active_recon.models.encoder import group_norm, LATENT_GRID
-from active_recon.models.network import Folded, ReconstructionNetwork, start_empty
+from active_recon.models.encoder import group_norm, IMAGE_SIZE, LATENT_GRID
+from active_recon.models.network import Cameras, ReconstructionNetwork, start_empty, State
 from torch import nn, Tensor
 
 _DOUBLINGS = 3  # from the memory's 4 cells a side to 32
@@ -86,9 +86,10 @@ class ConvGRUCell(nn.Module):
         self.gates = nn.Conv3d(hidden_channels, 2 * hidden_channels, 3, padding=1, bias=False)
         self.proposal = nn.Conv3d(hidden_channels, hidden_channels, 3, padding=1, bias=False)
 
-    def initial_state(self, code: Tensor) -> Tensor:
-        """Return the memory before any view: zeros."""
-        return code.new_zeros(len(code), self.hidden_channels, *(LATENT_GRID,) * 3)
+    def initial_state(self, batch: int) -> Tensor:
+        """Return the memory of so many objects before any view: zeros."""
+        return self.from_code.weight.new_zeros(
+            batch, self.hidden_channels, *(LATENT_GRID,) * 3)
 
     def forward(self, code: Tensor, hidden: Tensor) -> Tensor:
         """Return the next memory."""
@@ -111,6 +112,8 @@ class R2n2(ReconstructionNetwork):
     encoder's), and every convolution but the last is normalised, as in the paper's network here:
     what is compared is then the architecture.
     """
+
+    image_size, resolution, needs_front = IMAGE_SIZE, 32, True
 
     def __init__(self, encoder_channels: tuple[int, ...], code_channels: int,
                  hidden_channels: int, decoder_channels: tuple[int, ...]) -> None:
@@ -139,19 +142,25 @@ class R2n2(ReconstructionNetwork):
         return cls(config.encoder_channels, config.code_channels, config.hidden_channels,
                    config.decoder_channels)
 
-    def look(self, images: Tensor) -> Tensor:
+    def initial_state(self, batch: int) -> State:
+        """Return an empty memory, (B, H, 4, 4, 4); the latent is the same as (B, 4 H, 4, 4)."""
+        return _state(self.memory.initial_state(batch))
+
+    def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
         """Return the images' codes, (B, D)."""
         codes: Tensor = self.encoder(2 * images - 1)
         return codes
 
-    def remember(self, seen: Tensor, azimuths: Tensor,
-                 hidden: Tensor | None = None) -> tuple[Folded, Tensor]:
-        """Take in images' codes; hidden and features are the memory, (B, H, 4, 4, 4)."""
-        known: Tensor = self.memory(
-            seen, self.memory.initial_state(seen) if hidden is None else hidden)
-        return Folded(known.reshape(len(known), -1, LATENT_GRID, LATENT_GRID), known), known
+    def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
+        """Take in images' codes."""
+        return _state(self.memory(encoded, state['memory'].to(encoded.dtype)))
 
-    def decode(self, features: Tensor) -> Tensor:
+    def decode(self, state: State) -> Tensor:
         """Return the occupancy's logits, (B, 32, 32, 32), of the memory."""
-        logits: Tensor = self.decoder(features)[:, 0]
+        logits: Tensor = self.decoder(state['memory'])[:, 0]
         return logits
+
+
+def _state(memory: Tensor) -> State:
+    return {'memory': memory,
+            'latent': memory.reshape(len(memory), -1, LATENT_GRID, LATENT_GRID)}

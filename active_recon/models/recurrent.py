@@ -42,10 +42,9 @@ class ConvLSTMCell(nn.Module):
             assert self.gates.bias is not None
             self.gates.bias[:hidden_channels].fill_(1.0)
 
-    def initial_state(self, features: Tensor) -> LstmState:
-        """Return the memory before any view, on the device and dtype of the features."""
-        batch, _, *grid = features.shape
-        empty = features.new_zeros(batch, self.hidden_channels, *grid)
+    def initial_state(self, batch: int) -> LstmState:
+        """Return the memory of so many objects before any view, on the cell's device."""
+        empty = self.peepholes.new_zeros(batch, *self.peepholes.shape[1:])
         return LstmState(empty, empty)
 
     def forward(self, features: Tensor, state: LstmState) -> LstmState:

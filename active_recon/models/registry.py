@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from active_recon.config import Config, LossConfig, NetworkConfig
+from active_recon.config import Config, LossConfig
 from active_recon.errors import ConfigError
+from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
-from active_recon.models.network_2d3d import Network2d3d
+from active_recon.models.network_2d3d import Network2d3d, Network2d3dConfig
 from active_recon.models.ogn import Ogn, OgnConfig
 from active_recon.models.ogn import SIZES as SIZES_OGN
 from active_recon.models.ptn import PerspectiveTransformerNet, PtnConfig
@@ -18,9 +19,7 @@ from active_recon.models.shape_basis import fit_shapes, ShapeBasis, ShapeBasisCo
 from active_recon.models.shape_basis import SIZES as SIZES_SHAPE_BASIS
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
-
-DEFAULT_MODEL = '2d3d-attention'
+from torch import nn, Tensor
 
 
 @dataclass(frozen=True)
@@ -28,22 +27,22 @@ class NetworkEntry:
     """
     How a network is built, in which sizes, and from which losses it learns.
 
-    `small` is what two CPU cores train within an hour. `attentive`: a view policy's model is
-    trained beside it. `fit` stands for training where a network is fitted in one go, to voxels
-    (N, R, R, R) and categories (N,).
+    `small` is what two CPU cores train within an hour. `policy` builds the model of the view
+    policy that is trained beside it, if it has one. `fit` stands for training where a network is
+    fitted in one go, to voxels (N, R, R, R) and categories (N,).
     """
 
     config: type[Config]
     build: Callable[[Any], ReconstructionNetwork]
     sizes: Mapping[str, Config]
     loss: LossConfig = LossConfig()
-    attentive: bool = False
+    policy: Callable[[Any], nn.Module] | None = None
     fit: Callable[[Any, Tensor, NDArray[np.str_]], None] | None = None
 
 
 _SIZES_2D3D = {
-    'small': NetworkConfig(),
-    'published': NetworkConfig(
+    'small': Network2d3dConfig(),
+    'published': Network2d3dConfig(
         stem_channels=64, block_channels=(128, 256, 256), recurrent_channels=256,
         bottleneck_channels=1024, latent_channels=64, volume_channels=128,
         decoder_channels=(128, 64), glimpse_channels=256),
@@ -51,8 +50,9 @@ _SIZES_2D3D = {
 
 NETWORKS: Mapping[str, NetworkEntry] = {
     '2d3d-attention': NetworkEntry(
-        NetworkConfig, Network2d3d.from_config, _SIZES_2D3D, attentive=True),
-    '2d3d': NetworkEntry(NetworkConfig, Network2d3d.from_config, _SIZES_2D3D),
+        Network2d3dConfig, Network2d3d.from_config, _SIZES_2D3D,
+        policy=AttentionModel.from_config),
+    '2d3d': NetworkEntry(Network2d3dConfig, Network2d3d.from_config, _SIZES_2D3D),
     'r2n2': NetworkEntry(R2n2Config, R2n2.from_config, SIZES_R2N2,
                          LossConfig(volume_weight=1, silhouette_weight=0, volume_loss='bce')),
     'ptn': NetworkEntry(PtnConfig, PerspectiveTransformerNet.from_config, SIZES_PTN,

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from functools import cache
 import math
-from typing import NamedTuple
 
 from active_recon.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.config import Config
 from active_recon.errors import ConfigError, DataError
-from active_recon.models.network import Folded, ReconstructionNetwork
+from active_recon.models.encoder import IMAGE_SIZE
+from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.silhouettes import frustum, project, project_all
 import numpy as np
 from numpy.typing import NDArray
@@ -45,19 +45,6 @@ class ShapeBasisConfig(Config):
 SIZES = {'small': ShapeBasisConfig(), 'published': ShapeBasisConfig()}
 
 
-class SeenOutlines(NamedTuple):
-    """
-    The views of B objects so far, T of them.
-
-    Silhouettes (B, T, 32, 32) in [0, 1], azimuths (B, T), and how far each category's mean
-    silhouettes are from them, squared differences summed, (B, categories).
-    """
-
-    outlines: Tensor
-    azimuths: Tensor
-    apart: Tensor
-
-
 class ShapeBasis(ReconstructionNetwork):
     """
     A mean shape and a deformation basis for each category, deformed until silhouettes agree.
@@ -72,6 +59,8 @@ class ShapeBasis(ReconstructionNetwork):
     Features are (B, 1 + modes): the category's index and the coefficients, whose prior is normal.
     The latent is the coefficients as (B, modes, 1, 1).
     """
+
+    image_size, resolution, needs_front = IMAGE_SIZE, 32, True
 
     def __init__(self, categories: tuple[str, ...], modes: int) -> None:
         super().__init__()
@@ -89,26 +78,37 @@ class ShapeBasis(ReconstructionNetwork):
         """Build the model of a configuration, without any shapes yet."""
         return cls(config.categories, config.modes)
 
-    def look(self, images: Tensor) -> Tensor:
+    def initial_state(self, batch: int) -> State:
+        """
+        Return the state of B objects without a view.
+
+        Of T views, the silhouettes (B, T, 32, 32) in [0, 1] and azimuths (B, T); how far each
+        category's mean silhouettes are from them, squared differences summed, (B, categories).
+        """
+        pixels, modes = self.outlines.shape[2:], self.modes.shape[1]
+        return {'outlines': self.means.new_zeros(batch, 0, *pixels),
+                'azimuths': self.means.new_zeros(batch, 0),
+                'apart': self.means.new_zeros(batch, len(self.categories)),
+                'features': self.means.new_zeros(batch, 1 + modes),
+                'latent': self.means.new_zeros(batch, modes, 1, 1)}
+
+    def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
         """Return the images' silhouettes, (B, 32, 32)."""
         return outlines_of(images)
 
-    def remember(self, seen: Tensor, azimuths: Tensor,
-                 hidden: SeenOutlines | None = None) -> tuple[Folded, SeenOutlines]:
+    def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
         """Take in silhouettes, seen from 30 degrees up, and fit to all so far."""
+        azimuths = cameras.azimuths
         nearest = (azimuths / TURN * VIEW_COUNT).round().long() % VIEW_COUNT
-        here = seen[:, None]
+        here = encoded[:, None]
         apart = (self.outlines[:, nearest].transpose(0, 1) - here).square().sum((2, 3))
-        if hidden is None:
-            known = SeenOutlines(here, azimuths[:, None], apart)
-        else:
-            known = SeenOutlines(torch.cat([hidden.outlines, here], dim=1),
-                                 torch.cat([hidden.azimuths, azimuths[:, None]], dim=1),
-                                 hidden.apart + apart)
-        category = known.apart.argmin(dim=1)
-        coefficients = self.fitted(category, known.outlines, known.azimuths)
+        known = {'outlines': torch.cat([state['outlines'], here], dim=1),
+                 'azimuths': torch.cat([state['azimuths'], azimuths[:, None]], dim=1),
+                 'apart': state['apart'] + apart}
+        category = known['apart'].argmin(dim=1)
+        coefficients = self.fitted(category, known['outlines'], known['azimuths'])
         features = torch.cat([category[:, None].to(coefficients), coefficients], dim=1)
-        return Folded(coefficients[:, :, None, None], features), known
+        return known | {'features': features, 'latent': coefficients[:, :, None, None]}
 
     def fitted(self, category: Tensor, outlines: Tensor, azimuths: Tensor) -> Tensor:
         """Return the likeliest coefficients (B, modes) of objects of categories (B,)."""
@@ -129,8 +129,9 @@ class ShapeBasis(ReconstructionNetwork):
                 optimizer.step()
             return coefficients.detach()
 
-    def decode(self, features: Tensor) -> Tensor:
+    def decode(self, state: State) -> Tensor:
         """Return the occupancy's logits, (B, 32, 32, 32), of categories and coefficients."""
+        features = state['features']
         category = features[:, 0].long()
         return _log_odds(self.means[category], self.modes[category], features[:, 1:])
 

@@ -27,8 +27,8 @@ class CameraWatch:
         """Note a message of a stream of `StreamWatch`, whether or not it can be used."""
         self._streams.heard(stream, stamp, time.monotonic())
 
-    def stands(self, camera: Camera, stamp: int, goal: float | None) -> None:
-        """Note where the camera is, and the azimuth of its open goal in radians."""
+    def stands(self, camera: Camera, stamp: int, goal: Camera | None) -> None:
+        """Note where the camera is, and the camera of its open goal."""
         self._motion.heard(camera, stamp, goal)
 
     def tell(self) -> None:

@@ -32,8 +32,9 @@ class DemoWatch(LoopWatch):
     """
     What has been seen of the loop so far.
 
-    `views` grows as the loop goes on; `azimuth` is where the camera is, `goal` where it shall go
-    (radians, None before they are known); `done` is the reason for the end, '' before it.
+    `views` grows as the loop goes on; `azimuth` is where the camera is (radians), `goal` the
+    camera of the next view (None before they are known); `truth` gives the object's true cells at
+    so many a side; `done` is the reason for the end, '' before it.
     """
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor,
@@ -41,7 +42,7 @@ class DemoWatch(LoopWatch):
         super().__init__(node, executor)
         self.views: list[SeenView] = []
         self.azimuth: float | None = None
-        self.goal: float | None = None
+        self.goal: Camera | None = None
         self.done = ''
         self._truth = truth
         self._images: dict[int, NDArray[np.uint8]] = {}
@@ -101,10 +102,6 @@ class DemoWatch(LoopWatch):
 
 @contextmanager
 def watching(truth: Callable[[int], NDArray[np.bool_]]) -> Iterator[DemoWatch]:
-    """
-    Join the domain that the environment names.
-
-    `truth` returns the object's true cells, (X, Y, Z), for so many a side.
-    """
+    """Join the domain that the environment names, `truth` as DemoWatch has it."""
     with joined_domain('_demo') as (node, executor):
         yield DemoWatch(node, executor, truth)

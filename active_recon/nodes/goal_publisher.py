@@ -2,6 +2,7 @@
 
 import math
 
+from active_recon.cameras import Camera
 from active_recon.nodes.qos import LATCHED
 from active_recon.planner import Goal
 from geometry_msgs.msg import PoseStamped
@@ -16,18 +17,16 @@ class GoalPublisher:
     """
     Publishes `next_view`, `next_azimuth` and `azimuth_scores`; at most one goal is open.
 
-    A goal is a camera that looks at the object from its azimuth, at `elevation` (radians) and
-    `distance` (metres), in the object's frame.
+    A goal is a camera in the object's frame, and for a turntable its azimuth.
     """
 
-    def __init__(self, node: Node, frame: str, elevation: float, distance: float) -> None:
+    def __init__(self, node: Node, frame: str) -> None:
         self._node = node
         self._frame = frame
-        self._place = elevation, distance
         self._last_stamp = 0
         self._asked: tuple[PoseStamped, JointState] | None = None
         self._since = 0
-        self.azimuth: float | None = None
+        self.camera: Camera | None = None
         self._next_view_pub = node.create_publisher(PoseStamped, 'next_view', LATCHED)
         self._next_azimuth_pub = node.create_publisher(JointState, 'next_azimuth', LATCHED)
         self._scores_pub = node.create_publisher(PointCloud2, 'azimuth_scores', LATCHED)
@@ -35,21 +34,20 @@ class GoalPublisher:
     @property
     def waited(self) -> float:
         """Seconds for which the goal is open, by the node's clock; NaN where none is."""
-        if self.azimuth is None:
+        if self.camera is None:
             return math.nan
         return (self._node.get_clock().now().nanoseconds - self._since) / 1e9
 
     def ask(self, goal: Goal) -> None:
         """Publish a goal under a stamp of its own, its identity."""
-        self.azimuth = goal.azimuth
+        self.camera = goal.camera
         self._since = self._node.get_clock().now().nanoseconds
         # A paused clock would give two goals one identity
         self._last_stamp = max(self._since, self._last_stamp + 1)
         header = Header(stamp=stamp_from_nanoseconds(self._last_stamp), frame_id=self._frame)
-        self._asked = (view_goal_to_msg(goal.azimuth, *self._place, header),
-                       azimuth_goal_to_msg(goal.azimuth, header))
-        self._scores_pub.publish(
-            scores_to_msg(goal.candidates, goal.scores, *self._place, header))
+        self._asked = (view_goal_to_msg(goal.camera, header),
+                       azimuth_goal_to_msg(goal.camera.azimuth, header))
+        self._scores_pub.publish(scores_to_msg(goal.candidates, goal.scores, header))
         self.repeat()
 
     def repeat(self) -> None:
@@ -65,4 +63,4 @@ class GoalPublisher:
 
     def close(self) -> None:
         """Send the goal no more."""
-        self._asked = self.azimuth = None
+        self._asked = self.camera = None

@@ -9,15 +9,17 @@ from active_recon.cameras import Camera
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.life_cycle import ManagedNode
 from active_recon.nodes.qos import LATCHED
+from active_recon.voxels import VoxelGrid
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.entropy import entropy_from_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
 from msg_tools.stamps import nanoseconds_from_stamp
+from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
 from numpy.typing import NDArray
-from sensor_msgs.msg import Image, JointState
+from sensor_msgs.msg import Image, JointState, PointCloud2
 
 FIND_VIEWS_S = 0.5
 """What is latched comes so soon after its publishers were found."""
@@ -25,12 +27,17 @@ FIND_VIEWS_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class HeardView:
-    """A view: its stamp in nanoseconds, A_t (C, h, w), the azimuth in radians, the entropy."""
+    """
+    A view: its stamp in nanoseconds, A_t (C, h, w), the camera, the entropy.
+
+    With the probabilities where they are heard for the policy.
+    """
 
     stamp: int
     latent: NDArray[np.float32]
-    azimuth: float
+    camera: Camera
     entropy: float
+    volume: VoxelGrid | None = None
 
 
 class HeardViews:
@@ -46,16 +53,26 @@ class HeardViews:
         self._node = node
         self._diagnostics = diagnostics
         self._take = take
-        self._joiner = StampJoiner(('latent', 'azimuth', 'entropy'))
+        self._parts = ['latent', 'camera', 'entropy']
+        self._joiner = StampJoiner(self._parts)
         self._begin = 0
         self._matched_at: float | None = None
         self.last: HeardView | None = None
         self._heard = [node.create_subscription(kind, topic, self._on(name, read), LATCHED)
                        for kind, topic, name, read in (
             (Image, 'latent', 'latent', latent_from_msg),
-            (PoseStamped, 'view', 'azimuth',
-             lambda msg: Camera(pose_from_msg(msg, frame)).azimuth),
+            (PoseStamped, 'view', 'camera', lambda msg: Camera(pose_from_msg(msg, frame))),
             (JointState, 'entropy', 'entropy', entropy_from_msg))]
+
+    def hear_volume(self, object_size: float) -> None:
+        """Join the probabilities too, of a cube of so many metres, for the policy."""
+        if 'volume' in self._parts:
+            return
+        self._parts.append('volume')
+        self._joiner = StampJoiner(self._parts)
+        self._heard.append(self._node.create_subscription(
+            PointCloud2, 'probabilities',
+            self._on('volume', lambda msg: voxel_grid_from_msg(msg, object_size)), LATCHED))
 
     def begin(self, stamp: int) -> None:
         """Leave out what is stamped before an episode's begin, nanoseconds."""

@@ -6,15 +6,8 @@ from pathlib import Path
 import time
 import uuid
 
-from active_recon.cameras import (
-    Camera,
-    CANONICAL_DISTANCE,
-    CANONICAL_ELEVATION,
-    CANONICAL_INTRINSICS,
-    ELEVATION_TOLERANCE,
-    orbit_camera,
-)
-from active_recon.errors import ConfigError, DataError, MessageError
+from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.errors import DataError, MessageError
 from active_recon.nodes.after_hearing import AfterHearing
 from active_recon.nodes.camera_images import CameraImages
 from active_recon.nodes.camera_watch import CameraWatch
@@ -40,12 +33,14 @@ from msg_tools.images import image_to_msg, latent_to_msg, mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 from msg_tools.views import UnreadView, ViewJoiner
 from msg_tools.voxels import voxel_grid_to_msg
-import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
-import torch
 
+FACTS = {'weights_sha256': 'the hash of the weights',
+         'config_sha256': "the hash of the network's sizes", 'runtime': 'what runs the network',
+         'needs_front': "whether the network needs the object's front"}
+"""What the node tells of its network as parameters, and what they mean."""
 
 class ReconstructorNode(ManagedNode):
     """Fold the views that the gate lets through into the reconstruction and publish it."""
@@ -79,7 +74,8 @@ class ReconstructorNode(ManagedNode):
         self._entropy_pub = self.create_publisher(JointState, 'entropy', LATCHED)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED)
         self._diagnostics.measure('images', 'poses', 'views')
-        self._diagnostics.tell('Weights SHA-256', self._reconstructor.weights_hash)
+        for fact, name in (('weights_sha256', 'Weights SHA-256'), ('runtime', 'Runtime')):
+            self._diagnostics.tell(name, self._reconstructor.provenance.get(fact, ''))
         self.create_service(Trigger, 'start_episode', self._on_start)
         self.create_service(Trigger, 'save_mesh', self._on_save)
 
@@ -103,20 +99,14 @@ class ReconstructorNode(ManagedNode):
 
     def _load(self, settings: ReconstructorSettings) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
-        # One by default: with more, the slowest of the loop's busy cores holds up every view.
-        torch.set_num_threads(settings.threads)
-        if settings.device == 'cuda' and not torch.cuda.is_available():
-            raise ConfigError('parameter device: expected a device that torch can use, got cuda, '
-                              'but this torch finds none; use cpu')
+        # One thread by default: with more, the slowest of the loop's busy cores is waited for
         reconstructor = Reconstructor.load(
             Path(settings.weights) if settings.weights else None, settings.device,
-            settings.object_size, settings.object_yaw, _given(settings.threshold))
-        tell(self, 'weights_sha256', reconstructor.weights_hash, 'the hash of the weights')
-        tell(self, 'config_sha256', reconstructor.config_hash, "the hash of the network's sizes")
-        lens = CANONICAL_INTRINSICS
-        blank = np.zeros((lens.height, lens.width, 3), np.uint8)
-        distance = CANONICAL_DISTANCE * reconstructor.object_size
-        reconstructor.add_view(blank, orbit_camera(0.0, distance=distance))
+            settings.object_size, settings.object_yaw, _given(settings.threshold),
+            settings.threads)
+        for fact, meaning in FACTS.items():
+            tell(self, fact, reconstructor.provenance.get(fact, ''), meaning)
+        reconstructor.warm_up()
         return reconstructor
 
     def _change(self, settings: ReconstructorSettings) -> Commit | None:
@@ -248,7 +238,7 @@ class ReconstructorNode(ManagedNode):
 
     def _warn_of(self, camera: Camera) -> None:
         away = camera.elevation - CANONICAL_ELEVATION
-        if abs(away) > ELEVATION_TOLERANCE:
+        if self._reconstructor.spec.needs_front and abs(away) > ELEVATION_TOLERANCE:
             self._diagnostics.warn('elevation', (
                 'expected views from an elevation of 30 degrees, as the network was trained with, '
                 f'got {math.degrees(camera.elevation):.1f}; the reconstruction will be worse'))

@@ -22,7 +22,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
 
-MADE_IT = ('weights_sha256', 'config_sha256', 'policy', 'seed', 'object')
+MADE_IT = ('weights_sha256', 'config_sha256', 'runtime', 'needs_front', 'policy', 'seed', 'object')
 """The parameters of the loop's nodes that say what made the bag."""
 WATCH_EVERY_S = 0.1
 FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second

@@ -2,8 +2,14 @@
 
 import math
 from pathlib import Path
+import time
 
-from active_recon.cameras import Camera, CANONICAL_DISTANCE
+from active_recon.cameras import (
+    Camera,
+    CANONICAL_DISTANCE,
+    CANONICAL_ELEVATION,
+    orbit_camera,
+)
 from active_recon.errors import ActiveReconError
 from active_recon.nodes.clock import AHEAD_S, STEADY
 from active_recon.nodes.goal_publisher import GoalPublisher
@@ -14,7 +20,7 @@ from active_recon.nodes.qos import HEARD, LATCHED
 from active_recon.nodes.run import one_line
 from active_recon.nodes.settings.view_planner import ViewPlannerSettings
 from active_recon.planner import Decision, Goal, Planner
-from active_recon.policies import load_policy, Policy
+from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
@@ -25,8 +31,9 @@ from std_srvs.srv import Trigger
 
 REPEAT_S = 1.0
 """So often a goal whose view has not come is sent again."""
-MADE_OF = {'random': ('seed',), 'uniform': ('max_views',)}
-"""The parameters that a policy is made of, and that may change while the node runs."""
+FIND_CAMERA_S = 1.0
+"""So long after an episode was heard, nobody who publishes the camera's pose is waited for."""
+_STEEPEST = 1.5  # rad, of a first view
 
 
 class ViewPlannerNode(ManagedNode):
@@ -43,10 +50,7 @@ class ViewPlannerNode(ManagedNode):
         self._frame = settings.object_frame
         self._policy = self._load(settings)
         self._planner = self._planner_of(settings, self._policy)
-        self._goals = GoalPublisher(
-            self, self._frame, settings.elevation,
-            CANONICAL_DISTANCE * settings.object_size if math.isnan(settings.distance)
-            else settings.distance)
+        self._goals = GoalPublisher(self, self._frame)
         self._done_pub = self.create_publisher(Header, 'done', LATCHED)
         self._diagnostics.measure('views', 'goals')
         self.create_service(Trigger, 'plan', self._on_plan)
@@ -59,23 +63,25 @@ class ViewPlannerNode(ManagedNode):
         self._forget()
         self.create_subscription(PoseStamped, 'camera/pose', self._on_camera, HEARD)
         self._views = HeardViews(self, self._frame, self._diagnostics, self._decide)
+        if self._planner.wants_volume:
+            self._views.hear_volume(self._settings.now.object_size)
         self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
         self.create_timer(0.1, self._ask_first, clock=STEADY)
         self.create_timer(0.1, self._give_up_late, clock=STEADY)
         self.create_timer(REPEAT_S, self._goals.repeat, clock=STEADY)
 
     def _load(self, settings: ViewPlannerSettings) -> Policy:
-        if settings.policy == 'attention':  # only this one needs torch, and the time to load it
-            import torch
-            torch.set_num_threads(settings.threads)
-        return load_policy(
-            settings.policy, Path(settings.weights) if settings.weights else None,
-            np.random.default_rng(settings.seed), settings.max_views)
+        return load_policy(settings.policy, PolicyOptions(
+            np.random.default_rng(settings.seed), settings.max_views,
+            Path(settings.weights) if settings.weights else None, threads=settings.threads))
 
     def _planner_of(self, settings: ViewPlannerSettings, policy: Policy) -> Planner:
         return Planner(
             policy, settings.max_views, settings.entropy_tolerance, settings.object_yaw,
-            settings.limits(), settings.motion_weight)
+            settings.limits(), settings.motion_weight,
+            None if math.isnan(settings.elevation) else settings.elevation,
+            CANONICAL_DISTANCE * settings.object_size if math.isnan(settings.distance)
+            else settings.distance)
 
     def _change(self, settings: ViewPlannerSettings) -> Commit | None:
         """Return what puts settings into effect that changed while the node runs."""
@@ -83,15 +89,19 @@ class ViewPlannerNode(ManagedNode):
             return None
         before = self._settings.now
         is_same = all(getattr(before, name) == getattr(settings, name)
-                      for name in ('policy', *MADE_OF.get(settings.policy, ())))
+                      for name in ('policy', *POLICIES[settings.policy].parameters))
         policy = self._policy if is_same else self._load(settings)
         planner = self._planner_of(settings, policy)
         planner.go_on_from(self._planner)
 
         def commit() -> None:
             self._policy, self._planner = policy, planner
-            asked = self._goals.azimuth if self.is_active else None
-            if asked is not None and not settings.limits().allows(asked):
+            if not self.is_active:
+                return
+            if planner.wants_volume:
+                self._views.hear_volume(settings.object_size)
+            asked = self._goals.camera
+            if asked is not None and not settings.limits().allows(asked.azimuth):
                 self._follow(planner.next_goal(), self.get_clock().now().nanoseconds)
 
         return commit
@@ -100,7 +110,7 @@ class ViewPlannerNode(ManagedNode):
         """Begin with no camera, no goal and no view."""
         self._planner.reset()
         self._goals.close()
-        self._camera_azimuth = math.nan
+        self._camera: Camera | None = None
         self._started = False
         self._done = False
 
@@ -111,7 +121,7 @@ class ViewPlannerNode(ManagedNode):
                 return
             self._forget()
             self._views.begin(episode.begin)
-            self._episode = episode
+            self._episode, self._heard_at = episode, time.monotonic()
             self._diagnostics.count('episodes')
             self._diagnostics.tell('Episode', episode.id)
             self._tell_done(episode.begin, '')
@@ -129,14 +139,14 @@ class ViewPlannerNode(ManagedNode):
             self._episode = None
             self._views.forget()
             self._forget()
-        elif self._goals.azimuth is not None:
+        elif self._goals.camera is not None:
             self._ask(self._planner.plan())  # under a stamp of the new time
 
     def _on_camera(self, msg: PoseStamped) -> None:
         with self._diagnostics.refusing():
-            pose = pose_from_msg(msg, self._frame)
+            camera = Camera(pose_from_msg(msg, self._frame))
             if self._episode and nanoseconds_from_stamp(msg.header.stamp) >= self._episode.begin:
-                self._camera_azimuth = Camera(pose).azimuth
+                self._camera = camera
         self._ask_first()
 
     def _ask_first(self) -> None:
@@ -145,15 +155,29 @@ class ViewPlannerNode(ManagedNode):
             return
         if self._episode.begin < self._begun_at and not self._views.would_be_here():
             return  # an episode older than this node may have views already
-        start = self._settings.now.start_azimuth
-        azimuth = self._camera_azimuth if math.isnan(start) else start
-        if not math.isnan(azimuth):
-            self._ask(self._planner.first_goal(azimuth))
+        first = self._first_camera()
+        if first is not None:
+            self._ask(self._planner.first_goal(first))
+
+    def _first_camera(self) -> Camera | None:
+        """Return where the first view is to be taken, None while that is not known yet."""
+        settings = self._settings.now
+        if math.isnan(settings.start_azimuth):
+            return self._camera
+        elevation = settings.elevation
+        if math.isnan(elevation) and self._camera is not None:
+            elevation = min(max(self._camera.elevation, -_STEEPEST), _STEEPEST)
+        if math.isnan(elevation):  # it is the camera's, where there is one
+            if (time.monotonic() - self._heard_at < FIND_CAMERA_S
+                    or self.count_publishers('camera/pose')):
+                return None
+            elevation = CANONICAL_ELEVATION
+        return orbit_camera(settings.start_azimuth, elevation)
 
     def _decide(self, view: HeardView) -> None:
         if self._episode is None:
             return
-        decision = self._planner.add_view(view.latent, view.azimuth, view.entropy)
+        decision = self._planner.add_view(view.latent, view.camera, view.entropy, view.volume)
         self._started = True
         self._diagnostics.count('views')
         self._follow(decision, view.stamp)
@@ -183,16 +207,15 @@ class ViewPlannerNode(ManagedNode):
 
     def _give_up_late(self) -> None:
         """Ask for the next best goal where one has been open for too long."""
-        timeout, failed = self._settings.now.goal_timeout, self._goals.azimuth
+        timeout, failed = self._settings.now.goal_timeout, self._goals.camera
         if timeout == 0 or failed is None or not self._goals.waited > timeout:
             return
-        camera = None if math.isnan(self._camera_azimuth) else self._camera_azimuth
-        decision = self._planner.give_up(failed, camera)
+        decision = self._planner.give_up(failed, self._camera)
         instead = ('nothing that can be reached is left' if decision.goal is None else
-                   f'the next best is {math.degrees(decision.goal.azimuth):.1f} degrees')
+                   f'the next best is {math.degrees(decision.goal.camera.azimuth):.1f} degrees')
         self._diagnostics.warn('goal_timeout', (
-            f'expected a view from {math.degrees(failed):.1f} degrees within {timeout:g} s, got '
-            f'none: left out for this episode, {instead}'))
+            f'expected a view from {math.degrees(failed.azimuth):.1f} degrees within '
+            f'{timeout:g} s, got none: left out for this episode, {instead}'))
         self._follow(decision, self.get_clock().now().nanoseconds)
 
     def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -210,7 +233,7 @@ class ViewPlannerNode(ManagedNode):
             self._tell_done(self._episode.begin, '')
         self._ask(goal)
         response.success = True
-        response.message = f'{goal.azimuth:.6f}'
+        response.message = f'{goal.camera.azimuth:.6f}'
         return response
 
     def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

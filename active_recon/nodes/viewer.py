@@ -123,8 +123,9 @@ class ViewerNode(ReadOnlySaysWhy, QosWarnings):
         self._observer.set_goal(nanoseconds_from_stamp(msg.header.stamp), self._camera(msg))
 
     def _on_scores(self, msg: PointCloud2) -> None:
+        _, azimuths, scores = scores_from_msg(msg)
         self._observer.set_scores(
-            nanoseconds_from_stamp(msg.header.stamp), Scores(*scores_from_msg(msg)))
+            nanoseconds_from_stamp(msg.header.stamp), Scores(azimuths, scores))
 
     def _on_done(self, msg: Header) -> None:
         self._observer.set_done(*done_from_msg(msg))

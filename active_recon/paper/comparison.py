@@ -15,9 +15,10 @@ from active_recon.evaluation.baselines import (
 from active_recon.evaluation.measure import iou_by_yaw
 from active_recon.evaluation.metrics import episodes, THRESHOLDS
 from active_recon.evaluation.statistics import Interval, Values
+from active_recon.models.network import Cameras
 from active_recon.models.ogn import octree_report, Ogn
 from active_recon.models.registry import network_entry
-from active_recon.models.weights import find_weights, load_weights, read_card, weights_hash
+from active_recon.models.weights import load_weights
 from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.measured import measure, Measured
 from active_recon.paper.results import Claim, Column, Table
@@ -29,6 +30,7 @@ from active_recon.paper.systems import (
     views_seen,
 )
 from active_recon.voxels import RESOLUTION
+from active_recon.weights_files import find_weights, read_card, weights_hash
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
@@ -157,10 +159,10 @@ def _million_operations(study: Study, row: Compared) -> float | None:
     bundle = load_weights(row.weights)
     if network_entry(bundle.model).fit is not None:
         return None
-    images, azimuths = _first_views(study.read(study.objects('test', resolution=row.resolution)),
+    images, cameras = _first_views(study.read(study.objects('test', resolution=row.resolution)),
                                     1)
     with torch.no_grad(), FlopCounterMode(display=False) as counter:
-        bundle.reconstruction(images, azimuths)
+        bundle.reconstruction(images, cameras, bundle.reconstruction.initial_state(len(images)))
     return float(counter.get_total_flops() / 2e6)
 
 
@@ -172,10 +174,10 @@ def octree_table(study: Study, rows: list[Compared]) -> Table | None:
     row = max(trees, key=lambda tree: tree.resolution)
     network = load_weights(row.weights).reconstruction
     assert isinstance(network, Ogn)
-    images, azimuths = _first_views(study.read(study.objects('test', resolution=row.resolution)),
+    images, cameras = _first_views(study.read(study.objects('test', resolution=row.resolution)),
                                     64)
     with torch.no_grad():
-        report = octree_report(network, network.fold(images, azimuths)[0].features)
+        report = octree_report(network, network.encode(images, cameras))
     sides = list(report['cells'])
     headings = {'cells': 'cells', 'dense_cells': 'cells, dense', 'bytes': 'kB of features',
                 'dense_bytes': 'kB of features, dense'}
@@ -188,7 +190,7 @@ def octree_table(study: Study, rows: list[Compared]) -> Table | None:
          for key, heading in headings.items()], digits=0)
 
 
-def _first_views(views: ViewSet, count: int) -> tuple[torch.Tensor, torch.Tensor]:
+def _first_views(views: ViewSet, count: int) -> tuple[torch.Tensor, Cameras]:
     items = torch.arange(min(count, len(views)))
     first = torch.zeros_like(items)
-    return views.white(items, first), views.azimuths[items, first]
+    return views.white(items, first), views.cameras(items, first)

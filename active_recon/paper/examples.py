@@ -21,7 +21,7 @@ from active_recon.paper.study import Study
 from active_recon.paper.systems import have_systems, R2N2, SHAPE_BASIS, TWO_STAGE
 from active_recon.paper.table5 import sets as unseen_sets
 from active_recon.paper.writing import provenance
-from active_recon.policies import load_policy
+from active_recon.policies import load_policy, PolicyOptions
 from active_recon.voxel_boxes import height_range, voxel_picture
 from active_recon.voxels import iou, VoxelGrid
 import numpy as np
@@ -103,8 +103,10 @@ def _single_view(bundle: Bundle, views: ViewSet) -> tuple[list[NDArray[np.bool_]
     for low in range(0, len(views), _BATCH):
         items = torch.arange(low, min(low + _BATCH, len(views)))
         first = torch.zeros_like(items)
-        seen, _ = bundle.reconstruction(views.white(items, first), views.azimuths[items, first])
-        predicted += list((seen.logits.sigmoid() > bundle.threshold).numpy())
+        logits, _ = bundle.reconstruction(
+            views.white(items, first), views.cameras(items, first),
+            bundle.reconstruction.initial_state(len(items)))
+        predicted += list((logits.sigmoid() > bundle.threshold).numpy())
     return predicted, np.asarray(iou(np.stack(predicted), views.voxels.numpy()), np.float64)
 
 
@@ -184,9 +186,9 @@ def _steps(study: Study, weights: Path, policy: str, views: ViewSet,
     """Return an episode of each object, from the start that the tables begin with."""
     every, starts = episodes(views, study.starts, study.seed)
     first = starts[[int((every == item).nonzero()[0]) for item in items]]
-    return list(roll_out(load_weights(weights).reconstruction, load_policy(
-        policy, weights, np.random.default_rng(study.seed), study.views), views,
-        torch.tensor(items), first, study.views))
+    options = PolicyOptions(np.random.default_rng(study.seed), study.views, weights)
+    return list(roll_out(load_weights(weights).reconstruction, load_policy(policy, options),
+                         views, torch.tensor(items), first, study.views))
 
 
 def _occupied(steps: Sequence[Step], row: int, weights: Path) -> NDArray[np.bool_]:

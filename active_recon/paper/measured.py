@@ -14,7 +14,9 @@ from active_recon.evaluation.trial import read_arrays, Trial, write_arrays
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights
 from active_recon.paper.study import Objects, Study
-from active_recon.policies.base import Choice
+from active_recon.policies import Choice, Observation
+from active_recon.policies.geometric import BlindPolicy
+from active_recon.runtimes import State
 from active_recon.silhouettes import frustum, project_all
 import numpy as np
 from numpy.typing import NDArray
@@ -74,23 +76,23 @@ def _run(study: Study, weights: Path, policy: str,
     trial = Trial(bundle.reconstruction, bundle.threshold, study.read(objects), study.starts,
                   study.views, study.seed, cache=study.models / 'measured')
     models = [bundle.attention] if bundle.attention is not None else []
-    [contender] = contenders([policy], models, study.views, seeds=1, seed=study.seed)
+    [contender] = contenders([policy], models, study.views, seeds=1, seed=study.seed,
+                             model=bundle.model)
     title = f'{weights.parent.name}, {policy}, {objects.root.name}'
     with study.progress(title, len(trial.objects)) as advance:
         return trial, contender.key, trial.run(contender, lambda done: advance(done, ''))
 
 
-class Retaken:
+class Retaken(BlindPolicy):
     """A policy that takes known azimuths (B, T) again."""
 
     def __init__(self, azimuths: Values) -> None:
         self._azimuths = azimuths
 
-    def choose(self, latent: NDArray[np.float32], taken: Values,
-               state: None = None) -> tuple[Choice, None]:
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """Go where the known episode went next; see Policy."""
-        goals = self._azimuths[:, taken.shape[1]]
-        return Choice(goals, np.zeros((len(goals), len(AZIMUTHS)), np.float32)), None
+        goals = self._azimuths[:, seen.taken.shape[1]]
+        return Choice(np.zeros(seen.candidates.shape[:2], np.float32), goals), state
 
 
 @torch.inference_mode()

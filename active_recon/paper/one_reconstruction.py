@@ -29,33 +29,30 @@ def main(root: str, category: str, name: str, weights: str, threads: str, views:
         seconds[step] = time.perf_counter() - start
 
     with timed('loading models'):
-        from active_recon.canonical import canonical_image
+        from active_recon.canonical import network_image
         from active_recon.datasets.layout import ObjectFolder
-        from active_recon.models.runtime import Runtime, TorchRuntime
-        from active_recon.models.weights import load_weights
         from active_recon.rendering import composite
+        from active_recon.runtimes import load_runtime
         from active_recon.voxels import VoxelGrid, write_binvox, write_mesh
-        import torch
-        torch.set_num_threads(int(threads))
-        bundle = load_weights(Path(weights))
-        runtime: Runtime = TorchRuntime(bundle.reconstruction)
+        runtime = load_runtime(Path(weights), threads=int(threads))
     with timed('pre-processing data'):
         folder = ObjectFolder(Path(root), category, name)
         camera = folder.cameras()[0]
-        image = canonical_image(composite(folder.image(0), 255), camera)
+        shown = network_image(composite(folder.image(0), 255), camera, runtime.spec)
     state = runtime.initial_state()
     with timed('making prediction'):
-        occupancy, _, state = runtime.step(image, camera.azimuth, state)
+        occupancy, _, state = runtime.step(*shown, state)
     with timed('preserving outputs'):
         grid = VoxelGrid(occupancy)
-        write_binvox(grid, Path(out) / 'model.binvox', bundle.threshold)
-        if grid.occupied(bundle.threshold).any():
-            write_mesh(grid.mesh(bundle.threshold), Path(out) / 'model.ply')
+        write_binvox(grid, Path(out) / 'model.binvox', runtime.threshold)
+        if grid.occupied(runtime.threshold).any():
+            write_mesh(grid.mesh(runtime.threshold), Path(out) / 'model.ply')
     predictions = [seconds['making prediction']]
     for index in range(1, int(views)):
-        more = canonical_image(composite(folder.image(index), 255), folder.cameras()[index])
+        more = network_image(composite(folder.image(index), 255), folder.cameras()[index],
+                             runtime.spec)
         with timed('again'):
-            _, _, state = runtime.step(more, folder.cameras()[index].azimuth, state)
+            _, _, state = runtime.step(*more, state)
         predictions.append(seconds.pop('again'))
     sys.stdout.write(json.dumps({'steps': seconds, 'predictions': predictions}))
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.config import LossConfig, RewardConfig
-from active_recon.evaluation.policy_study import policy_study
+from active_recon.evaluation.policy_study import blind_names, policy_study
 from active_recon.evaluation.statistics import Interval
 from active_recon.evaluation.trial import Trial
-from active_recon.models.weights import load_weights, read_card, weights_hash
+from active_recon.models.weights import load_weights
 from active_recon.paper.claims import all_larger, headroom, larger
 from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
 from active_recon.paper.results import Cell, Claim, Column, Result, Table
@@ -24,9 +24,9 @@ from active_recon.paper.systems import (
 from active_recon.paper.writing import provenance
 from active_recon.training.loop import TrainingConfig
 from active_recon.training.plan import Plan
+from active_recon.weights_files import read_card, weights_hash
 
 _OWN = 'attention'
-_BLIND = ('random', 'uniform', 'farthest')
 
 
 def weights(study: Study) -> list[Path]:
@@ -123,7 +123,7 @@ def _tables(found: Mapping[str, Any]) -> list[Table]:
     tables.append(Table('What a policy gains, and what it costs', 'policy', names, [
         *(Column(f'area above {other}',
                  [_cell(policies[name]['auc_above'].get(other)) for name in names])
-          for other in _BLIND),
+          for other in blind_names()),
         Column('share of the gap to the oracle',
                [_cell(policies[name].get('gap_closed')) for name in names]),
         _column(policies, 'rotation, rad', 'rotation'),

@@ -2,17 +2,14 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN
+from active_recon.cameras import azimuth_difference, pose_azimuths, TURN
 from active_recon.errors import ViewError
-from active_recon.models.attention import AttentionModel
-from active_recon.models.encoder import LATENT_GRID
-from active_recon.policies.base import are_apart, Choice, distance_to_taken, kept_apart
+from active_recon.policies.base import Choice, Observation
+from active_recon.runtimes import PolicyRuntime, State
 import numpy as np
 from numpy.typing import NDArray
-import torch
-from torch import Tensor
 
-_State = tuple[Tensor, Tensor]
+_ROUNDING = 1e-3  # rad, of the azimuths that were rendered
 
 
 class AttentionPolicy:
@@ -20,36 +17,67 @@ class AttentionPolicy:
     The mean of pi(u_t | theta; s_t), kept apart from the views taken; its state is the LSTM's.
 
     The paper's goes wherever the mean is, and so to the same view twice in half of its episodes:
-    what the network has learned to see is what it goes back to. The model says how far apart.
+    what the network has learned to see is what it goes back to. The model says how far apart. It
+    knows cameras by their azimuth alone.
     """
 
-    def __init__(self, model: AttentionModel, sigma: float = 0.35) -> None:
-        self._model = model
+    wants_volume = False
+
+    def __init__(self, runtime: PolicyRuntime, sigma: float = 0.35) -> None:
+        self._runtime = runtime
         self._sigma = sigma
-        self._device = next(model.parameters()).device
-        self._latent_shape = (model.where.out_features, LATENT_GRID, LATENT_GRID)
+        self._latent_shape = tuple(runtime.facts['latent_shape'])
+        self._separation = float(runtime.facts['view_separation'])
 
-    @torch.inference_mode()
-    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
-               state: _State | None = None) -> tuple[Choice, _State]:
+    def initial_state(self, batch: int) -> State:
+        """Return the memory before any view."""
+        return self._runtime.initial_state(batch)
+
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """
-        Take the mean, or what is nearest to it and far enough from the views taken.
+        Take the mean, or the candidate nearest to it that is far enough from the views taken.
 
-        An azimuth's worth is its log density, up to a constant; what is too near to a view is
+        A candidate's score is its log density, up to a constant; what is too near to a view is
         worth less than anything else, and the less the nearer.
         Raises ViewError where the latents are those of another model.
         """
-        if latent.shape[1:] != self._latent_shape:
+        if seen.latent.shape[1:] != self._latent_shape:
             raise ViewError(f'expected a latent of the shape {self._latent_shape}, as the policy '
-                            f'was trained on, got {latent.shape[1:]}', 'latent')
-        azimuth = torch.as_tensor(taken[:, -1], dtype=torch.float32, device=self._device)
-        seen = torch.tensor(latent, device=self._device)
-        proposal, state = self._model(seen, azimuth, state)
-        mean = proposal.mean_azimuth.cpu().numpy().astype(np.float64) % TURN
-        away = azimuth_difference(AZIMUTHS[None], mean[:, None]) / self._sigma
-        separation = self._model.view_separation
-        lack = separation - distance_to_taken(taken)
-        worth = np.where(are_apart(taken, separation), -away ** 2 / 2,
-                         -(math.pi / self._sigma) ** 2 / 2 - lack / self._sigma)
-        goal = kept_apart(mean, taken, separation)
-        return Choice(goal, worth.astype(np.float32)), state
+                            f'was trained on, got {seen.latent.shape[1:]}', 'latent')
+        taken, candidates = pose_azimuths(seen.taken), pose_azimuths(seen.candidates)
+        proposal, state = self._runtime.step(
+            {'latent': seen.latent, 'azimuth': taken[:, -1].astype(np.float32)}, state)
+        mean = proposal['mean_azimuth'].astype(np.float64) % TURN
+        away = azimuth_difference(candidates, mean[:, None]) / self._sigma
+        gaps = gaps_to_taken(candidates, taken)
+        scores = np.where(gaps > self._separation - _ROUNDING, -away ** 2 / 2,
+                          -(math.pi / self._sigma) ** 2 / 2
+                          - (self._separation - gaps) / self._sigma)
+        far_enough = np.abs(azimuth_difference(taken, mean[:, None])).min(axis=1)
+        return Choice(scores.astype(np.float32),
+                      np.where(far_enough >= self._separation, mean, np.nan)), state
+
+
+def kept_apart(wanted: NDArray[np.float64], taken: NDArray[np.float64],
+               candidates: NDArray[np.float64], separation: float) -> NDArray[np.float64]:
+    """
+    Return azimuths (B,) at least `separation` from all taken (B, t), and near those wanted (B,).
+
+    Those wanted, where they are far enough; else the nearest of the candidates (B, K) that is;
+    where none is, the farthest from what was taken. All in radians.
+    """
+    far_enough = np.abs(azimuth_difference(taken, wanted[:, None])).min(axis=1) >= separation
+    away = np.abs(azimuth_difference(candidates, wanted[:, None]))
+    gaps = gaps_to_taken(candidates, taken)
+    # All that are too near come after all that are not, which are at most half a turn away
+    rank = np.where(gaps > separation - _ROUNDING, -away, gaps - TURN)
+    best = np.take_along_axis(candidates, rank.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return np.where(far_enough, wanted, best)
+
+
+def gaps_to_taken(candidates: NDArray[np.float64],
+                  taken: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far azimuths (B, K) are from the nearest taken (B, t), (B, K), radians."""
+    gaps = np.abs(azimuth_difference(candidates[:, :, None], taken[:, None, :]))
+    nearest: NDArray[np.float64] = gaps.min(axis=2)
+    return nearest

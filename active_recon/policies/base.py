@@ -1,60 +1,78 @@
-"""What every view policy is: what was seen in, what every azimuth is worth out."""
+"""What every view policy is: what was seen in, what every candidate is worth out."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN
+from active_recon.cameras import direction_distance, pose_directions
+from active_recon.runtimes import State
 import numpy as np
 from numpy.typing import NDArray
 
-_ROUNDING = 1e-3  # rad, of the azimuths that were rendered
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """
+    What B episodes have come to after a view, and where they may look next.
+
+    - latent: (B, C, h, w), the network's after that view
+    - taken: (B, t, 4, 4), the poses of the cameras of all views so far, the last one's last
+    - candidates: (B, K, 4, 4), poses of cameras; one set for all where B is 1 there
+    - occupancy: (B, R, R, R), the published probabilities, for policies of `wants_volume`
+
+    Poses are object from optical frame, in the frame in which the network predicts.
+    """
+
+    latent: NDArray[np.float32]
+    taken: NDArray[np.float64]
+    candidates: NDArray[np.float64]
+    occupancy: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """Where to look next, for B episodes: azimuths (B,) and the worth of all 24, (B, 24)."""
+    """
+    Where to look next, for B episodes.
 
-    azimuth: NDArray[np.float64]
+    - scores: (B, K), what each candidate is worth; more is better
+    - azimuth: (B,), radians, where the policy would look if it were not bound to the candidates,
+      NaN where it would not; None: nowhere
+    """
+
     scores: NDArray[np.float32]
+    azimuth: NDArray[np.float64] | None = None
 
 
 class Policy(Protocol):
-    """Chooses the next azimuth; its state is handed back to be passed in again."""
+    """
+    Scores the candidates for the next view; its state is handed back to be passed in again.
 
-    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
-               state: Any = None) -> tuple[Choice, Any]:
-        """
-        Choose after a view, for B episodes at once.
+    `wants_volume`: whether it looks at the observation's occupancy.
+    """
 
-        - latent: (B, C, h, w), A_t after that view
-        - taken: (B, t), the azimuths of all views so far, radians, the last one's last
-        - state: what the last call handed back; None before the first
-        """
+    @property
+    def wants_volume(self) -> bool: ...
+
+    def initial_state(self, batch: int) -> State:
+        """Return the state of so many episodes before any view."""
+        ...
+
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
+        """Choose after a view, for B episodes at once."""
         ...
 
 
-def kept_apart(wanted: NDArray[np.float64], taken: NDArray[np.float64],
-               separation: float) -> NDArray[np.float64]:
-    """
-    Return azimuths (B,) at least `separation` from all taken (B, t), and near those wanted (B,).
-
-    Those wanted, where they are far enough; else the nearest of the 24 that is; where none is, the
-    farthest from what was taken. All in radians.
-    """
-    far_enough = np.abs(azimuth_difference(taken, wanted[:, None])).min(axis=1) >= separation
-    away = np.abs(azimuth_difference(AZIMUTHS[None], wanted[:, None]))
-    # All that are too near come after all that are not, which are at most half a turn away
-    rank = np.where(are_apart(taken, separation), -away, distance_to_taken(taken) - TURN)
-    return np.where(far_enough, wanted, AZIMUTHS[rank.argmax(axis=1)])
-
-
-def are_apart(taken: NDArray[np.float64], separation: float) -> NDArray[np.bool_]:
-    """Return which of the 24 azimuths are `separation` from all taken, (B, t) to (B, 24)."""
-    return distance_to_taken(taken) > separation - _ROUNDING
-
-
-def distance_to_taken(taken: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far each of the 24 azimuths is from the nearest taken, (B, t) to (B, 24)."""
-    gaps = np.abs(azimuth_difference(AZIMUTHS[None, :, None], taken[:, None, :]))
+def distance_to_taken(seen: Observation) -> NDArray[np.float64]:
+    """Return how far each candidate is from the nearest view taken, (B, K), radians."""
+    gaps = direction_distance(pose_directions(seen.candidates)[:, :, None],
+                              pose_directions(seen.taken)[:, None])
     nearest: NDArray[np.float64] = gaps.min(axis=2)
     return nearest
+
+
+def is_fresh(seen: Observation) -> NDArray[np.bool_]:
+    """Return which candidates are nearest to no view taken, (B, K)."""
+    gaps = direction_distance(pose_directions(seen.candidates)[:, :, None],
+                              pose_directions(seen.taken)[:, None])
+    fresh = np.ones(gaps.shape[:2], np.bool_)
+    np.put_along_axis(fresh, gaps.argmin(axis=1), False, axis=1)
+    return fresh

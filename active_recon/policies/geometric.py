@@ -1,46 +1,55 @@
 """The policies that look at no image: random, uniform, farthest."""
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, TURN, VIEW_COUNT
-from active_recon.policies.base import Choice, distance_to_taken
+from active_recon.cameras import direction_distance, pose_azimuths, pose_directions, TURN
+from active_recon.policies.base import Choice, distance_to_taken, is_fresh, Observation
+from active_recon.runtimes import State
 import numpy as np
-from numpy.typing import NDArray
 
 
-class RandomPolicy:
-    """Any azimuth not yet taken, all alike; any at all once every one was taken."""
+class BlindPolicy:
+    """A policy without a state, which looks at cameras alone."""
+
+    wants_volume = False
+
+    def initial_state(self, batch: int) -> State:
+        """Return no state."""
+        return {}
+
+
+class RandomPolicy(BlindPolicy):
+    """Any candidate not yet taken, all alike; any at all once every one was taken."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
 
-    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
-               state: None = None) -> tuple[Choice, None]:
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """Draw; see Policy."""
-        scores = self._rng.random((len(taken), VIEW_COUNT), dtype=np.float32)
-        fresh = distance_to_taken(taken) > TURN / VIEW_COUNT / 2
-        scores = np.where(fresh, scores, scores - 1)
-        return Choice(AZIMUTHS[scores.argmax(axis=1)], scores), None
+        fresh = is_fresh(seen)
+        scores = self._rng.random(fresh.shape, dtype=np.float32)
+        return Choice(np.where(fresh, scores, scores - 1)), state
 
 
-class UniformPolicy:
-    """An equidistant sweep from the first view, for a given number of views."""
+class UniformPolicy(BlindPolicy):
+    """An equidistant sweep from the first view around +z, for a given number of views."""
 
     def __init__(self, views: int) -> None:
         self._step = TURN / max(views, 1)
 
-    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
-               state: None = None) -> tuple[Choice, None]:
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """Go one step on from the sweep's start, however roughly it was followed."""
-        target = (taken[:, 0] + taken.shape[1] * self._step) % TURN
-        scores = -np.abs(azimuth_difference(AZIMUTHS[None], target[:, None]))
-        return Choice(target, scores.astype(np.float32)), None
+        first, count = seen.taken[:, 0], seen.taken.shape[1]
+        target = (pose_azimuths(first) + count * self._step) % TURN
+        height = pose_directions(first)[:, 2]
+        across = np.sqrt(np.maximum(1 - height ** 2, 0))
+        wanted = np.stack([across * np.cos(target), across * np.sin(target), height], axis=-1)
+        away = direction_distance(pose_directions(seen.candidates), wanted[:, None])
+        return Choice((-away).astype(np.float32), target), state
 
 
-class FarthestPolicy:
-    """The azimuth with the largest distance to the nearest view taken."""
+class FarthestPolicy(BlindPolicy):
+    """The candidate with the largest distance to the nearest view taken."""
 
-    def choose(self, latent: NDArray[np.float32], taken: NDArray[np.float64],
-               state: None = None) -> tuple[Choice, None]:
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """Take the first of the farthest."""
-        # Rounding settles ties the same way, whatever the precision of the azimuths
-        scores = distance_to_taken(taken).round(4).astype(np.float32)
-        return Choice(AZIMUTHS[scores.argmax(axis=1)], scores), None
+        # Rounding settles ties the same way, whatever the precision of the poses
+        return Choice(distance_to_taken(seen).round(4).astype(np.float32)), state

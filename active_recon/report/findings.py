@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import math
 
 from active_recon.bags.parameters import node_parameters
-from active_recon.cameras import azimuth_difference, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, view_distance
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import degrees, Subject
 from active_recon.view_gate import GOAL_TOLERANCE
@@ -105,13 +105,15 @@ def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
     parameters = node_parameters(subject.run, 'reconstructor')
     tolerance = parameters.get('goal_tolerance', GOAL_TOLERANCE)
     for number, (view, goal) in enumerate(zip(subject.views, subject.goals, strict=True), 1):
-        away = goal and abs(float(azimuth_difference(view.camera.azimuth, goal.azimuth)))
-        if away and away > tolerance:
+        away = 0.0 if goal is None else view_distance(view.camera, goal.camera)
+        if away > tolerance:
             yield 'warning', (f'View {number} was taken {math.degrees(away):.0f}° away from its '
                               'goal.')
 
 
 def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:
+    if subject.run.provenance.get('needs_front') == 'false':
+        return  # such a network takes any camera
     off = [(number, view.camera.elevation) for number, view in enumerate(subject.views, 1)
            if abs(view.camera.elevation - CANONICAL_ELEVATION) > ELEVATION_TOLERANCE]
     if off:

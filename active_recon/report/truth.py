@@ -5,17 +5,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from active_recon.bags.parameters import node_parameters
+from active_recon.bags.recorded_object import seen_again
 from active_recon.bags.run import RecordedEpisode, RecordedRun
 from active_recon.errors import ConfigError
 from active_recon.meshes import load_mesh
 from active_recon.objects import find_object, shipped_objects
 from active_recon.report.subject import shown_grid
 from active_recon.voxelise import voxelise
-from active_recon.voxels import read_binvox, turned, VoxelGrid
+from active_recon.voxels import read_binvox, RESOLUTION, turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # it brings torch, for which most reports need not wait
+if TYPE_CHECKING:
     from active_recon.reconstructor import Reconstructor
 
 
@@ -53,8 +54,9 @@ def known_truth(run: RecordedRun) -> NDArray[np.bool_] | None:
 
 def with_reconstruction(run: RecordedRun, reconstructor: 'Reconstructor') -> RecordedRun:
     """Return the run with the shapes that its images give where the bag holds none."""
-    return replace(run, episodes=[_reconstructed(episode, reconstructor)
-                                  for episode in run.episodes])
+    told = {'needs_front': reconstructor.provenance['needs_front']}
+    return replace(run, provenance={**run.provenance, **told},
+                   episodes=[_reconstructed(episode, reconstructor) for episode in run.episodes])
 
 
 def lacks_reconstruction(run: RecordedRun) -> bool:
@@ -63,15 +65,14 @@ def lacks_reconstruction(run: RecordedRun) -> bool:
 
 
 def _reconstructed(episode: RecordedEpisode, reconstructor: 'Reconstructor') -> RecordedEpisode:
-    reconstructor.reset()
     views = []
-    for view in episode.views:
-        grid = reconstructor.add_view(view.image, view.camera).grid
-        views.append(replace(view, reconstruction=grid, entropy=grid.entropy(),
+    for step in seen_again(episode.views, reconstructor):
+        grid = step.known.grid
+        views.append(replace(step.view, reconstruction=grid, entropy=grid.entropy(),
                              occupied=grid.above(reconstructor.threshold)))
     return replace(episode, views=views)
 
 
 def _resolution(run: RecordedRun) -> int:
     return next((grid.occupancy.shape[0] for episode in run.episodes for view in episode.views
-                 if (grid := shown_grid(view)) is not None), 32)
+                 if (grid := shown_grid(view)) is not None), RESOLUTION)

@@ -37,7 +37,8 @@ def turntable_map(subject: Subject) -> Figure:
         own = [*_from_above(view, subject.threshold), *_decision(subject.goals[index])]
         data += [{**trace, 'meta': {'of': index}} for trace in own]
     data += _path(azimuths)
-    data += [_goal(goal.azimuth, 8, '--quiet') for goal in subject.goals if goal is not None]
+    data += [_goal(goal.camera.azimuth, 8, '--quiet')
+             for goal in subject.goals if goal is not None]
     data += [_camera(number, azimuth, azimuths[:number - 1])
              for number, azimuth in enumerate(azimuths, 1)]
     return {
@@ -98,11 +99,11 @@ def _decision(goal: RecordedGoal | None) -> list[dict[str, Any]]:
     """Return the goal amid a petal for each candidate azimuth, the longer the better its score."""
     if goal is None:
         return []
-    chosen = _goal(goal.azimuth, 15, '--goal')
+    chosen = _goal(goal.camera.azimuth, 15, '--goal')
     if goal.candidates is None or goal.scores is None:
         return [chosen]
-    finite = np.isfinite(goal.scores) & np.isfinite(goal.candidates)
-    azimuths, scores = goal.candidates[finite], goal.scores[finite].astype(np.float64)
+    finite = np.isfinite(goal.scores) & np.isfinite(goal.candidates.azimuths)
+    azimuths, scores = goal.candidates.azimuths[finite], goal.scores[finite].astype(np.float64)
     if not len(scores):
         return [chosen]
     shares = (scores - scores.min()) / (np.ptp(scores) or 1.0)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from active_recon.datasets.views import on_background, ViewSet
+from active_recon.models.network import Cameras
 from active_recon.training.variation import vary
 import numpy as np
 import torch
@@ -14,14 +15,13 @@ class Batch:
     """
     B objects and T views of each.
 
-    - images: (T, B, 3, 64, 64) in [0, 1]
-    - azimuths: (T, B) radians
+    - images: (T, B, 3, S, S) in [0, 1], and their cameras, (T, B, ...)
     - voxels: (B, R, R, R) in {0, 1} float32, R as in the set
     - objects: (B,) indices into the set
     """
 
     images: Tensor
-    azimuths: Tensor
+    cameras: Cameras
     voxels: Tensor
     objects: Tensor
 
@@ -31,7 +31,7 @@ def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
     """
     Draw objects with different random views of each, varied as a camera would vary them.
 
-    Half of the sequences are mirrored in the object's plane y = 0, voxels and azimuths with the
+    Half of the sequences are mirrored in the object's plane y = 0, voxels and cameras with the
     images. Not `varied`, the same views of the same objects stand on plain white.
     """
     objects = torch.from_numpy(rng.integers(len(views), size=size))
@@ -40,12 +40,30 @@ def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
     mirrored = torch.from_numpy(rng.random(size) < 0.5)
     images = views.images[objects, chosen]
     images[:, mirrored] = images[:, mirrored].flip(-2)
+    cameras = views.cameras(objects, chosen)
+    cameras = Cameras(*(torch.where(mirrored[:, None, None], other, own)
+                        for own, other in zip(cameras, mirror(cameras, images.shape[2]),
+                                              strict=True)))
     if varied:
-        pictures = vary(images, views, rng)
+        pictures, moved = vary(images, cameras.intrinsics, views, rng)
+        cameras = Cameras(cameras.poses, moved)
     else:
         flat = on_background(images.flatten(0, 1), torch.ones(length * size, 3))
         pictures = flat.reshape(length, size, *flat.shape[1:])
-    azimuths = views.azimuths[objects, chosen]
     voxels = views.voxels[objects].float()
     voxels[mirrored] = voxels[mirrored].flip(2)
-    return Batch(pictures, torch.where(mirrored, -azimuths, azimuths), voxels, objects)
+    return Batch(pictures, cameras, voxels, objects)
+
+
+def mirror(cameras: Cameras, image_size: int) -> Cameras:
+    """
+    Return the cameras (..., 4, 4) that see the object mirrored in y = 0 as the images mirrored.
+
+    The plane turns the pose's left into its right; flipping the image's columns, of S pixels,
+    makes it a rotation again.
+    """
+    plane = torch.diag(torch.tensor([1.0, -1, 1, 1], dtype=cameras.poses.dtype))
+    flip = torch.diag(torch.tensor([-1.0, 1, 1, 1], dtype=cameras.poses.dtype))
+    intrinsics = cameras.intrinsics.clone()
+    intrinsics[..., 0, 2] = image_size - intrinsics[..., 0, 2]
+    return Cameras(plane @ cameras.poses @ flip, intrinsics)

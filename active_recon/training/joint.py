@@ -6,7 +6,7 @@ from active_recon.cameras import AZIMUTHS
 from active_recon.config import LossConfig, RewardConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.models.attention import AttentionModel
-from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.training.loop import (
     Draw,
     Measured,
@@ -47,17 +47,20 @@ class JointLearner(nn.Module):
         objects, device = objects.cpu(), next(self.attention.parameters()).device
         scene = int(rng.integers(2 ** 32))
 
-        def show(objects: Tensor, chosen: Tensor) -> Tensor:
+        def show(objects: Tensor, chosen: Tensor) -> tuple[Tensor, Cameras]:
             # Views come one by one: the same generator for each keeps the scene as it is
-            images = self._views.images[objects, chosen]
-            return vary(images[None], self._views, np.random.default_rng(scene))[0]
+            images, cameras = self._views.images[objects, chosen], self._views.cameras(
+                objects, chosen)
+            pictures, intrinsics = vary(images[None], cameras.intrinsics[None], self._views,
+                                        np.random.default_rng(scene))
+            return pictures[0], Cameras(cameras.poses, intrinsics[0])
 
         episode = run_episodes(
             self.reconstruction.network, self.attention, self._views, objects, starts.cpu(),
             self._length, _THRESHOLD, self._rewards, rng, show if self._varied else None)
         seen_from = torch.from_numpy(rng.integers(len(AZIMUTHS), size=len(objects))).to(device)
         losses = self.reconstruction.losses(
-            episode.features[rng.integers(self._length)],
+            episode.states[rng.integers(self._length)],
             self._views.voxels[objects].float().to(device), seen_from)
         chosen = policy_losses(episode, self._rewards.episodes_alike)
         return losses | chosen | {'loss': losses['loss'] + chosen['loss']}

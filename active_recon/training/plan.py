@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from active_recon.config import Config, LossConfig, NetworkConfig, RewardConfig
+from active_recon.config import Config, LossConfig, RewardConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
 from active_recon.evaluation.validation import best_threshold, policy_auc, reconstruction_iou
-from active_recon.models.attention import AttentionModel
 from active_recon.models.registry import network_config, network_entry
 from active_recon.models.weights import Bundle
+from active_recon.policies import learned_policy
+from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.training.joint import train_jointly
 from active_recon.training.loop import Measured, Run, TrainingConfig
 from active_recon.training.policy_gradient import train_policy
@@ -49,8 +50,7 @@ class Plan:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained together."""
-        attentive = network_entry(self.model).attentive
-        if not attentive and (self.joint or self.policy):
+        if network_entry(self.model).policy is None and (self.joint or self.policy):
             raise ConfigError(f'{self.model}: expected a model with an attentive part for a view '
                               'policy; leave the policy out, or train 2d3d-attention')
         if self.joint and self.policy:
@@ -62,10 +62,13 @@ class Plan:
     def config(self) -> Config:
         """Return the sizes of the network, and how far apart the views of its policy stay."""
         config = self.begun.config if self.begun else network_config(self.model, self.size)
-        if self.view_separation is None or not (
-                isinstance(config, NetworkConfig) and (self.policy or self.joint)):
+        if self.view_separation is None or not (self.policy or self.joint):
             return config
-        return replace(config, view_separation=self.view_separation)
+        if not hasattr(config, 'view_separation'):
+            raise ConfigError(f'{self.model}: its policy keeps no separation of views; leave '
+                              '--view-separation-deg out')
+        return type(config).from_dict(
+            {**config.to_dict(), 'view_separation': self.view_separation})
 
 
 def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
@@ -81,8 +84,7 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
     network = plan.begun.reconstruction if plan.begun else entry.build(config)
     frozen = plan.begun is not None and plan.frozen
     network.requires_grad_(not frozen)
-    attention = AttentionModel.from_config(config) if isinstance(
-        config, NetworkConfig) and (plan.joint or plan.policy) else None
+    attention: Any = entry.policy(config) if entry.policy and (plan.joint or plan.policy) else None
 
     def run(stage: str, report: Report) -> Run:
         path = out / f'{stage}.safetensors'
@@ -106,7 +108,8 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
         with reporting('policy', plan.policy.steps) as report:
             train_policy(network, attention, training, threshold, plan.policy, plan.rewards,
                          run('policy', report),
-                         lambda model: policy_auc(network, model, validation, threshold))
+                         lambda model: policy_auc(network, learned_policy(
+                             plan.model, TorchPolicyRuntime(model)), validation, threshold))
     return Bundle(network.cpu(), attention and attention.cpu(), config, threshold,
                   _card(plan, training), plan.model)
 

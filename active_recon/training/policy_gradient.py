@@ -7,12 +7,13 @@ import math
 from active_recon.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.config import RewardConfig
 from active_recon.datasets.views import ViewSet
+from active_recon.environment import run_episode, TimeStep
 from active_recon.errors import ConfigError
-from active_recon.evaluation.rollouts import nearest_views
+from active_recon.evaluation.rollouts import nearest_views, RenderedObjects, Seen
 from active_recon.models.attention import AttentionModel
-from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.weights import state_hash
-from active_recon.policies.base import kept_apart
+from active_recon.policies.attention import kept_apart
 from active_recon.silhouettes import frustum, project_all
 from active_recon.training.loop import (
     Draw,
@@ -55,8 +56,8 @@ class Episode:
     """
     What T - 1 choices of B episodes brought, (T - 1, B) each.
 
-    `azimuth` are the means that the policy proposed, radians; `features` what the network knew
-    after each of the T views, (B, ...), for who learns from it.
+    `azimuth` are the means that the policy proposed, radians; `states` the network's after
+    each of the T views, for who learns from them.
     """
 
     log_probability: Tensor
@@ -65,7 +66,7 @@ class Episode:
     reward_2d: Tensor
     reward_distance: Tensor
     azimuth: Tensor
-    features: list[Tensor]
+    states: list[State]
 
     @property
     def reward(self) -> Tensor:
@@ -76,7 +77,8 @@ class Episode:
 def run_episodes(
     network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet, objects: Tensor,
     starts: Tensor, length: int, threshold: float, config: RewardConfig,
-    rng: np.random.Generator, show: Callable[[Tensor, Tensor], Tensor] | None = None,
+    rng: np.random.Generator,
+    show: Callable[[Tensor, Tensor], tuple[Tensor, Cameras]] | None = None,
 ) -> Episode:
     """
     Run an episode for each object (B,), sampling every azimuth from the policy.
@@ -84,38 +86,26 @@ def run_episodes(
     The sample is kept as far from the views taken as the policy says, the nearest rendered view is
     taken, and log pi is that of the sample before both. The first view was not chosen and earns
     nothing. r_2D compares silhouettes from two random cameras. The network's gradients are kept
-    where it has any; the policy's do not reach into it. `show` makes images (B, 3, 64, 64) of
-    objects and views (B,); by default they stand on white.
+    where it has any; the policy's do not reach into it. `show` makes images (B, 3, S, S) and their
+    cameras of objects and views (B,); by default they stand on white.
     """
     device = next(attention.parameters()).device
-    show = show or views.white
-    truth, azimuths = views.voxels[objects].to(device), views.azimuths[objects]
-    rows = torch.arange(len(objects))
+    truth = views.voxels[objects].to(device)
     cameras = [orbit_camera(azimuth)
                for azimuth in rng.choice(AZIMUTHS, _SILHOUETTES, replace=False)]
     frusta = frustum(cameras).to(device)
     true_outlines = project_all(truth.float(), frusta) > 0.5  # (B, cameras, S, S)
-    chosen, hidden, state = starts, None, None
-    taken = torch.empty(len(objects), 0)
-    quality: list[tuple[Tensor, Tensor]] = []
-    features: list[Tensor] = []
-    steps: dict[str, list[Tensor]] = {
-        'log': [], 'baseline': [], 'distance': [], 'azimuth': []}
-    for t in range(length):
-        at = azimuths[rows, chosen]
-        taken = torch.column_stack([taken, at])
-        folded, hidden = network.fold(
-            show(objects, chosen).to(device), at.to(device), hidden)
-        features.append(folded.features)
-        with torch.no_grad():
-            occupied = network.decode(folded.features).sigmoid() > threshold
-            outlines = project_all(occupied.float(), frusta) > 0.5
-            quality.append((iou(occupied, truth),
-                            iou(outlines, true_outlines, (-2, -1)).mean(dim=1)))
-        if t + 1 == length:
-            break
+    every = views.azimuths[objects]
+    own = RenderedObjects(_Shown(network, views, show, device), objects)
+    memory = attention.initial_state(len(objects))
+    steps: dict[str, list[Tensor]] = {'log': [], 'baseline': [], 'distance': [], 'azimuth': []}
+
+    def choose(step: TimeStep[Tensor, Seen]) -> Tensor:
+        nonlocal memory
+        taken = every.gather(1, step.known.chosen)
         with torch.autocast(device.type, enabled=False):
-            proposal, state = attention(folded.latent.detach().float(), at.to(device), state)
+            proposal, memory = attention(step.known.state['latent'].detach().float(),
+                                         taken[:, -1].to(device), memory)
         mean = proposal.mean_azimuth
         noise = torch.from_numpy(rng.normal(0, config.policy_sigma, len(objects)))
         sample = (mean.detach() + noise.float().to(device))
@@ -123,14 +113,47 @@ def run_episodes(
         steps['baseline'].append(proposal.baseline)
         steps['azimuth'].append(mean.detach())
         goal = kept_apart(sample.double().cpu().numpy(), taken.double().numpy(),
-                          attention.view_separation)
-        chosen = nearest_views(azimuths.numpy(), goal)
-        steps['distance'].append(distance_reward(azimuths[rows, chosen], taken, config))
+                          every.double().numpy(), attention.view_separation)
+        chosen = nearest_views(every.numpy(), goal)
+        steps['distance'].append(distance_reward(
+            every.gather(1, chosen[:, None])[:, 0], taken, config))
+        return chosen
+
+    quality: list[tuple[Tensor, Tensor]] = []
+    states: list[State] = []
+    for step in run_episode(own, starts, choose, length):
+        states.append(step.known.state)
+        with torch.no_grad():
+            occupied = network.decode(step.known.state).sigmoid() > threshold
+            outlines = project_all(occupied.float(), frusta) > 0.5
+            quality.append((iou(occupied, truth),
+                            iou(outlines, true_outlines, (-2, -1)).mean(dim=1)))
     volumes, silhouettes = (torch.stack(part) for part in zip(*quality, strict=True))
     return Episode(
         torch.stack(steps['log']), torch.stack(steps['baseline']), volumes.diff(dim=0),
         silhouettes.diff(dim=0), torch.stack(steps['distance']).to(device),
-        torch.stack(steps['azimuth']), features)
+        torch.stack(steps['azimuth']), states)
+
+
+class _Shown:
+    """Shows a network views of a set as a training wants them shown, with gradients."""
+
+    def __init__(self, network: ReconstructionNetwork, views: ViewSet,
+                 show: Callable[[Tensor, Tensor], tuple[Tensor, Cameras]] | None,
+                 device: torch.device) -> None:
+        self.views = views
+        self._network, self._device = network, device
+        self._show = show or (lambda objects, chosen: (
+            views.white(objects, chosen), views.cameras(objects, chosen)))
+
+    def initial_state(self, batch: int) -> State:
+        """Return the network's state before any view."""
+        return self._network.initial_state(batch)
+
+    def update(self, objects: Tensor, chosen: Tensor, state: State) -> State:
+        """Take in views (B,) of objects (B,)."""
+        images, cameras = self._show(objects, chosen)
+        return self._network.step(images.to(self._device), cameras.to(self._device), state)
 
 
 def policy_losses(episode: Episode, alike: int = 1) -> dict[str, Tensor]:

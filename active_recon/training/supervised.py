@@ -1,12 +1,11 @@
 """The first stage: a reconstruction network under section 3.2's losses, on random views."""
 
 from collections.abc import Callable
-from typing import Any
 
 from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet
-from active_recon.models.network import ReconstructionNetwork
+from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.silhouettes import frustum
 from active_recon.training.batches import draw_batch
 from active_recon.training.loop import (
@@ -28,7 +27,7 @@ class ReconstructionLearner(nn.Module):
     A sequence of views to the losses after one of them.
 
     The loss after one random view of a sequence is an unbiased estimate of the mean over its
-    views, at a fraction of the price: decoding costs more than folding in.
+    views, at a fraction of the price: decoding costs more than updating.
     """
 
     def __init__(self, network: ReconstructionNetwork, loss: LossConfig) -> None:
@@ -39,26 +38,27 @@ class ReconstructionLearner(nn.Module):
         self.register_buffer(
             '_frusta', frustum([orbit_camera(azimuth) for azimuth in AZIMUTHS]), persistent=False)
 
-    def forward(self, images: Tensor, azimuths: Tensor, voxels: Tensor,
+    def forward(self, images: Tensor, cameras: Cameras, voxels: Tensor,
                 seen_from: Tensor) -> dict[str, Tensor]:
         """
-        Fold in images (T, B, 3, 64, 64) from azimuths (T, B); compare with voxels after the last.
+        Take in images (T, B, 3, S, S) of cameras (T, B, ...); compare with voxels after the last.
 
         `seen_from`, (B,), are the cameras out of 24 whose silhouettes are compared.
         """
-        hidden: Any = None
-        seen = self.network.look(images.flatten(0, 1))
-        seen = seen.reshape(*images.shape[:2], *seen.shape[1:])
-        for view, azimuth in zip(seen, azimuths, strict=True):
-            folded, hidden = self.network.remember(view, azimuth, hidden)
-        return self.losses(folded.features, voxels, seen_from)
+        every = Cameras(*(part.flatten(0, 1) for part in cameras))
+        encoded = self.network.encode(images.flatten(0, 1), every)
+        encoded = encoded.reshape(*images.shape[:2], *encoded.shape[1:])
+        state = self.network.initial_state(len(voxels))
+        for number, view in enumerate(encoded):
+            state = self.network.update(view, cameras.rows(number), state)
+        return self.losses(state, voxels, seen_from)
 
-    def losses(self, features: Tensor, voxels: Tensor, seen_from: Tensor) -> dict[str, Tensor]:
-        """Return the losses of what is known, (B, ...): the sum is `loss`."""
-        own = self.network.objective(features, voxels)
+    def losses(self, state: State, voxels: Tensor, seen_from: Tensor) -> dict[str, Tensor]:
+        """Return the losses of a state: the sum is `loss`."""
+        own = self.network.objective(state, voxels)
         if own is not None:
             return {'loss': own}
-        logits = self.network.decode(features)
+        logits = self.network.decode(state)
         with torch.autocast(logits.device.type, enabled=False):
             total, parts = reconstruction_loss(logits.float(), voxels, self._frusta[seen_from],
                                                self._loss)
@@ -99,7 +99,7 @@ def train_reconstruction(
         own = np.random.default_rng([config.seed, step, run.fabric.global_rank])
         batch = draw_batch(views, size, length, own, config.varied)
         seen_from = torch.from_numpy(own.integers(len(AZIMUTHS), size=size))
-        return Draw((batch.images, batch.azimuths, batch.voxels, seen_from), batch.objects)
+        return Draw((batch.images, batch.cameras, batch.voxels, seen_from), batch.objects)
 
     train_steps(run, ReconstructionLearner(network, loss), network, config,
                 {'training': config.to_dict(), 'loss': loss.to_dict()}, views, draw,

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun
-from active_recon.cameras import CANONICAL_DISTANCE, CANONICAL_ELEVATION, orbit_camera
 from active_recon.errors import DataError
 from active_recon.viewer.page import Page
 from active_recon.viewer.state import (
@@ -34,18 +33,17 @@ def _episode_states(episode: RecordedEpisode) -> Iterator[LoopState]:
             None if view.occupied is None else own_threshold(view.occupied))
         end = view.stamp
         if view.goal is not None:
-            _set_goal(observer, view.goal.followed, 1.0 if grid is None else grid.size)
+            _set_goal(observer, view.goal.followed)
             end = view.goal.followed.stamp + 1
         if view is episode.views[-1]:
             observer.set_done(end, episode.done)
         yield observer.state
 
 
-def _set_goal(observer: Observer, goal: RecordedGoal, size: float) -> None:
-    observer.set_goal(goal.stamp, orbit_camera(
-        goal.azimuth, CANONICAL_ELEVATION, CANONICAL_DISTANCE * size))
+def _set_goal(observer: Observer, goal: RecordedGoal) -> None:
+    observer.set_goal(goal.stamp, goal.camera)
     if goal.candidates is not None and goal.scores is not None:
-        observer.set_scores(goal.stamp, Scores(goal.candidates, goal.scores))
+        observer.set_scores(goal.stamp, Scores(goal.candidates.azimuths, goal.scores))
 
 
 class Playback:

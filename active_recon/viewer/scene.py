@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from active_recon.cameras import azimuth_difference, Camera
+from active_recon.cameras import Camera, view_distance
 from active_recon.view_colors import Color, view_color
 from active_recon.viewer.state import LoopState, Scores, TakenView
 from active_recon.voxels import VoxelGrid
@@ -172,8 +172,7 @@ class Scene:
 
 def _together(view: TakenView, others: tuple[TakenView, ...]) -> int:
     """Return how many of the others stand where a view does."""
-    apart = azimuth_difference([other.camera.azimuth for other in others], view.camera.azimuth)
-    return int((np.abs(apart) < math.radians(7)).sum())
+    return sum(view_distance(other.camera, view.camera) < math.radians(7) for other in others)
 
 
 def shown_cells(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:

@@ -1,6 +1,12 @@
 """The page in a real browser, with no ROS: what it draws, and its slider and buttons."""
 
-from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
+from active_recon.bags.run import (
+    Candidates,
+    RecordedEpisode,
+    RecordedGoal,
+    RecordedRun,
+    RecordedView,
+)
 from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.errors import ConfigError, DataError
 from active_recon.viewer.page import Page
@@ -176,10 +182,12 @@ def recorded_run(path, episodes):
 
 def recorded_episode(name, count):
     scores = np.arange(24, dtype=np.float32)
+    ring = Candidates.of([orbit_camera(azimuth) for azimuth in AZIMUTHS])
     views = [RecordedView(
         100 * number, picture(number), orbit_camera(1.3 * number), ball(0.1 + 0.1 * number),
         None, None, 1000.0 / number,
-        RecordedGoal(2.0, 100 * number + 1, AZIMUTHS, scores, 0) if number < count else None, {})
+        RecordedGoal(orbit_camera(2.0), 100 * number + 1, ring, scores, 0)
+        if number < count else None, {})
         for number in range(1, count + 1)]
     return RecordedEpisode(name, 0, None, views, 'max_views')
 

@@ -280,13 +280,14 @@ class FakeReconstructor:
         self._publishers['episode'].publish(episode_to_msg(Episode(name, begin)))
 
     def show(self, latent: np.ndarray, azimuth: float, stamp: int | None = None,
-             parts: Sequence[str] = ('entropy', 'latent', 'view')) -> int:
+             parts: Sequence[str] = ('entropy', 'latent', 'view'),
+             elevation: float = CANONICAL_ELEVATION) -> int:
         """Publish a view's parts; return their stamp."""
         stamp = self.bench.now() if stamp is None else stamp
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
         messages = {'entropy': entropy_to_msg(_ENTROPY, header),
                     'latent': latent_to_msg(latent, header),
-                    'view': pose_to_msg(orbit_camera(azimuth).pose, header)}
+                    'view': pose_to_msg(orbit_camera(azimuth, elevation).pose, header)}
         for part in parts:
             self._publishers[part].publish(messages[part])
         return stamp

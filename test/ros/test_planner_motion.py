@@ -36,7 +36,7 @@ def fake(shared_fake, request):
 
 
 def azimuth(goal):
-    return view_goal_from_msg(goal)
+    return view_goal_from_msg(goal).azimuth
 
 
 def count(fake, key):

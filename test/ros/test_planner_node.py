@@ -3,22 +3,24 @@
 import math
 import signal
 
-from active_recon.cameras import azimuth_difference
-from active_recon.models.weights import load_weights
+from active_recon.cameras import azimuth_difference, orbit_camera
+from active_recon.runtimes import load_policy_runtime
 from conftest import FakeReconstructor, LATCHED
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import pose_to_msg
 from msg_tools.goals import scores_from_msg, view_goal_from_msg
-from msg_tools.stamps import nanoseconds_from_stamp
+from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Header
 
 pytestmark = pytest.mark.ros
 
 
 @pytest.fixture(scope='module')
 def latent():
-    config = load_weights().config
-    return np.zeros((config.latent_channels * 4, 4, 4), np.float32)
+    return np.zeros(load_policy_runtime().facts['latent_shape'], np.float32)
 
 
 def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent):
@@ -28,8 +30,8 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
     begin = bench.now()
     fake.begin('first')
     first = fake.wait_goal(begin)
-    assert view_goal_from_msg(first) == pytest.approx(2.0)
-    azimuths, values = scores_from_msg(bench.until(lambda: scores and scores[-1], 'scores'))
+    assert view_goal_from_msg(first).azimuth == pytest.approx(2.0)
+    _, azimuths, values = scores_from_msg(bench.until(lambda: scores and scores[-1], 'scores'))
     assert abs(azimuth_difference(azimuths[values.argmax()], 2.0)) <= math.radians(7.5)
 
     fake.show(latent[:3], 2.0)
@@ -43,7 +45,7 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
 
     taken = fake.show(latent, 2.0)
     second = fake.wait_goal(taken)
-    end = fake.show(latent, view_goal_from_msg(second))
+    end = fake.show(latent, view_goal_from_msg(second).azimuth)
     done = bench.until(lambda: fake.done and fake.done[-1].frame_id and fake.done[-1], 'the end')
     assert (done.frame_id, nanoseconds_from_stamp(done.stamp)) == ('max_views', end)
     before = bench.now()
@@ -60,7 +62,8 @@ def test_a_goal_is_repeated_under_its_stamp_until_its_view_comes(start_node, ben
     bench.until(lambda: len(azimuths) >= 2, 'the goal again')
     assert len({nanoseconds_from_stamp(msg.header.stamp) for msg in azimuths}) == 1
     taken = fake.show(latent, 1.0)
-    assert view_goal_from_msg(fake.wait_goal(taken)) == pytest.approx(1.0 + math.pi, abs=0.14)
+    second = view_goal_from_msg(fake.wait_goal(taken))
+    assert second.azimuth == pytest.approx(1.0 + math.pi, abs=0.14)
 
 
 def test_a_planner_that_comes_late_goes_on_from_the_latched_view(start_node, bench, latent):
@@ -74,8 +77,9 @@ def test_a_planner_that_comes_late_goes_on_from_the_latched_view(start_node, ben
     fake.goals.clear()
     after = bench.now()
     start_node('view_planner', policy='farthest', start_azimuth=1.0)
-    assert view_goal_from_msg(fake.wait_goal(after)) == pytest.approx(1.0 + math.pi, abs=0.14)
-    assert all(view_goal_from_msg(msg) != pytest.approx(1.0) for msg in fake.goals)
+    second = view_goal_from_msg(fake.wait_goal(after))
+    assert second.azimuth == pytest.approx(1.0 + math.pi, abs=0.14)
+    assert all(view_goal_from_msg(msg).azimuth != pytest.approx(1.0) for msg in fake.goals)
 
 
 def test_a_planner_that_comes_late_waits_until_it_could_hear_every_part_of_a_view(
@@ -88,5 +92,34 @@ def test_a_planner_that_comes_late_waits_until_it_could_hear_every_part_of_a_vie
     assert not bench.within(1.5, lambda: fake.goals)
     fake.publish_on('entropy', heard=False)
     fake.show(latent, 1.0, stamp, parts=('entropy',))
-    goal = view_goal_from_msg(fake.wait_goal(stamp))
+    goal = view_goal_from_msg(fake.wait_goal(stamp)).azimuth
     assert abs(azimuth_difference(goal, 1.0)) == pytest.approx(math.pi, abs=0.14)
+
+
+@pytest.mark.parametrize(('parameters', 'first', 'elevation'), [
+    ({}, 1.0, math.pi / 4), ({'start_azimuth': 2.0}, 2.0, math.pi / 4),
+    ({'elevation': 0.2}, 1.0, 0.2), ({'start_azimuth': 2.0, 'elevation': 0.2}, 2.0, 0.2)])
+def test_goals_stand_at_the_camera_s_elevation_unless_another_is_given(
+        start_node, bench, latent, parameters, first, elevation):
+    start_node('view_planner', policy='farthest', distance=0.7, **parameters)
+    fake = FakeReconstructor(bench)
+    poses = bench.advertise(PoseStamped, 'camera/pose')
+    scores = bench.hear(PointCloud2, 'azimuth_scores', LATCHED)
+    begin = bench.now()
+    fake.begin('only', begin)
+    camera = orbit_camera(1.0, math.pi / 4)
+
+    def asked():
+        stamp = stamp_from_nanoseconds(bench.now())
+        poses.publish(pose_to_msg(camera.pose, Header(stamp=stamp, frame_id='object')))
+        return fake.goals
+
+    goals = [view_goal_from_msg(bench.until(asked, 'the first goal')[-1])]
+    assert goals[0].azimuth == pytest.approx(first)
+    taken = fake.show(latent, goals[0].azimuth, elevation=math.pi / 4)
+    goals.append(view_goal_from_msg(fake.wait_goal(taken)))
+    assert goals[1].azimuth == pytest.approx(first + math.pi, abs=0.14)
+    for goal in goals:
+        assert (goal.elevation, goal.distance) == pytest.approx((elevation, 0.7))
+    positions, _, _ = scores_from_msg(scores[-1])
+    np.testing.assert_allclose(positions[:, 2], 0.7 * math.sin(elevation), atol=1e-6)

@@ -2,7 +2,7 @@
 
 import re
 
-from active_recon.models.weights import SHIPPED
+from active_recon.weights_files import SHIPPED
 import numpy as np
 import pytest
 from safetensors.numpy import save_file
@@ -46,7 +46,8 @@ def truncated_weights(folder):
 
 def weights_of_another_model(folder):
     path = folder / 'other.safetensors'
-    save_file({'layer': np.zeros(3, np.float32)}, path, {'model': 'other'})
+    save_file({'layer': np.zeros(3, np.float32)}, path, {
+        'model': 'other', 'config': '{}', 'threshold': '0.5'})
     return path
 
 

@@ -120,7 +120,7 @@ def test_the_loop_goes_round_with_the_driver_and_a_camera_that_only_streams(
     goals = {nanoseconds_from_stamp(msg.header.stamp): azimuth_goal_from_msg(msg) for msg in asked}
     assert len(goals) == VIEWS
     for (_, goal), view in zip(sorted(goals.items()), views, strict=True):
-        assert abs(azimuth_difference(view_goal_from_msg(view), goal)) <= 0.14
+        assert abs(azimuth_difference(view_goal_from_msg(view).azimuth, goal)) <= 0.14
     # What a view says is where the table stood at its stamp
     stamps = [nanoseconds_from_stamp(msg.header.stamp) for msg in joints]
     for view in views:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 import math
 
-from active_recon.cameras import CANONICAL_ELEVATION, TURN
+from active_recon.cameras import TURN
 from active_recon.motion import MotionLimits
 from active_recon.nodes.parameters import parameter
 from active_recon.nodes.settings.shared import (
@@ -20,7 +20,7 @@ class ViewPlannerSettings(FrontSettings, CubeSettings, NetworkSettings, ManagedS
     """What the view planner is told."""
 
     policy: str = parameter(
-        'attention', 'how the next view is chosen', choices=POLICIES, changeable=True)
+        'attention', 'how the next view is chosen', choices=tuple(POLICIES), changeable=True)
     seed: int = parameter(0, 'of the policy random', low=0, high=2**32 - 1, changeable=True)
     max_views: int = parameter(
         5, 'views after which an episode is done', low=1, high=1000, changeable=True)
@@ -46,7 +46,7 @@ class ViewPlannerSettings(FrontSettings, CubeSettings, NetworkSettings, ManagedS
         math.nan, 'of the first view, rad; nan for where the camera is',
         low=-2 * math.pi, high=2 * math.pi)
     elevation: float = parameter(
-        CANONICAL_ELEVATION, "of the goals' cameras, rad", low=-1.5, high=1.5)
+        math.nan, "of the goals' cameras, rad; nan for that of the camera", low=-1.5, high=1.5)
     distance: float = parameter(
         math.nan, "of the goals' cameras, m; nan for 2.1 object_size", low=0.001, high=10000.0)
 

@@ -1,0 +1,17 @@
+"""The option that names a policy: one of the registry."""
+
+from typing import Any
+
+from active_recon.policies import POLICIES
+import typer
+
+
+def _one_of_them(name: str | None) -> str | None:
+    if name is not None and name not in POLICIES:
+        raise typer.BadParameter(f'{name!r} is not one of {", ".join(map(repr, POLICIES))}.')
+    return name
+
+
+def policy_option(meaning: str) -> Any:
+    """Return the option of a policy's name, whose help says what it means and lists them all."""
+    return typer.Option(callback=_one_of_them, metavar=f'[{"|".join(POLICIES)}]', help=meaning)

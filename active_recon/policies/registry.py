@@ -1,0 +1,86 @@
+"""All view policies by their names, and what each is made of."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from active_recon.errors import ConfigError, WeightsError
+from active_recon.policies.attention import AttentionPolicy
+from active_recon.policies.base import Policy
+from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+from active_recon.runtimes import load_policy_runtime, PolicyRuntime
+from active_recon.weights_files import read_metadata, SHIPPED
+import numpy as np
+
+
+@dataclass(frozen=True)
+class PolicyOptions:
+    """
+    What policies are made of.
+
+    `views` of an episode; `weights` None: those that ship; `device` and `threads` of what runs a
+    learned policy, see `load_runtime`.
+    """
+
+    rng: np.random.Generator = field(default_factory=np.random.default_rng)
+    views: int = 5
+    weights: Path | None = None
+    runtime: str = 'torch'
+    device: str = 'cpu'
+    threads: int | None = None
+
+
+@dataclass(frozen=True)
+class PolicyEntry:
+    """
+    How a policy is made.
+
+    - parameters: those of the planner that it depends on, beside its name: a change of one of
+      them makes it anew; one of `seed` draws, one of `weights` is learned
+    """
+
+    make: Callable[[PolicyOptions], Policy]
+    parameters: tuple[str, ...] = ()
+
+    @property
+    def is_learned(self) -> bool:
+        """Whether it comes with the weights of a network."""
+        return 'weights' in self.parameters
+
+    @property
+    def draws(self) -> bool:
+        """Whether it differs from seed to seed."""
+        return 'seed' in self.parameters
+
+
+LEARNED: dict[str, Callable[[PolicyRuntime], Policy]] = {'2d3d-attention': AttentionPolicy}
+"""What makes a policy of the model that was trained beside a network, by the network's name."""
+
+
+def learned_policy(model: str, runtime: PolicyRuntime) -> Policy:
+    """Return the policy of a network's name; WeightsError where it brings none."""
+    if model not in LEARNED:
+        raise WeightsError(f'{model}: expected a network with a view policy of its own, out of '
+                           f'{", ".join(LEARNED)}; choose another policy')
+    return LEARNED[model](runtime)
+
+
+def _attention(options: PolicyOptions) -> Policy:
+    model = read_metadata(options.weights or SHIPPED).model
+    return learned_policy(model, load_policy_runtime(
+        options.weights, options.runtime, options.device, options.threads))
+
+
+POLICIES: dict[str, PolicyEntry] = {
+    'attention': PolicyEntry(_attention, ('weights',)),
+    'random': PolicyEntry(lambda options: RandomPolicy(options.rng), ('seed',)),
+    'uniform': PolicyEntry(lambda options: UniformPolicy(options.views), ('max_views',)),
+    'farthest': PolicyEntry(lambda options: FarthestPolicy()),
+}
+
+
+def load_policy(name: str, options: PolicyOptions | None = None) -> Policy:
+    """Return a policy by its name; raises ConfigError and WeightsError."""
+    if name not in POLICIES:
+        raise ConfigError(f'policy: expected one of {", ".join(POLICIES)}, got {name!r}')
+    return POLICIES[name].make(options or PolicyOptions())

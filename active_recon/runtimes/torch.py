@@ -1,0 +1,135 @@
+"""Networks in torch, on the device where their weights lie."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast
+
+from active_recon.cameras import Camera, orbit_camera
+from active_recon.canonical import network_image
+from active_recon.errors import ConfigError, WeightsError
+from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.models.weights import Bundle, load_weights
+from active_recon.runtimes.base import State
+from active_recon.weights_files import config_hash, weights_hash
+import numpy as np
+from numpy.typing import NDArray
+import torch
+from torch import nn, Tensor
+
+
+class TorchRuntime:
+    """A reconstruction network in torch; see Runtime."""
+
+    def __init__(self, network: ReconstructionNetwork, threshold: float = 0.5,
+                 threads: int | None = None,
+                 provenance: Mapping[str, str] | None = None) -> None:
+        self._network = network.eval()
+        self._threads = threads
+        self.spec = network.spec
+        self.threshold = threshold
+        self.provenance = {**(provenance or {}), **_provenance(network.device, threads)}
+
+    @torch.inference_mode()
+    def initial_state(self) -> State:
+        """Return the state before any view."""
+        return _arrays(self._network.initial_state(1))
+
+    @torch.inference_mode()
+    def step(self, image: NDArray[np.uint8], camera: Camera,
+             state: State) -> tuple[NDArray[np.float32], NDArray[np.float32], State]:
+        """Take in an image; see Runtime."""
+        device = self._network.device
+        with _computing_with(self._threads):
+            batch = torch.from_numpy(image).to(device).permute(2, 0, 1)[None].float() / 255
+            logits, known = self._network(
+                batch, Cameras.of([camera]).to(device), _tensors(state, device))
+            after = _arrays(known)
+            return logits[0].sigmoid().cpu().numpy(), after['latent'][0], after
+
+    def warm_up(self) -> None:
+        """Run once, so that the first view is as fast as the others."""
+        camera = orbit_camera(0.0)
+        blank = np.zeros((camera.intrinsics.height, camera.intrinsics.width, 3), np.uint8)
+        self.step(*network_image(blank, camera, self.spec), self.initial_state())
+
+
+class TorchPolicyRuntime:
+    """The model of a learned view policy in torch; see PolicyRuntime."""
+
+    def __init__(self, model: nn.Module, threads: int | None = None) -> None:
+        self._model: Any = model.eval()
+        self._threads = threads
+        self._device = next(model.parameters()).device
+        self.facts = cast(Mapping[str, Any], model.facts)
+
+    @torch.inference_mode()
+    def initial_state(self, batch: int) -> State:
+        """Return the state before any view."""
+        return _arrays(self._model.initial_state(batch))
+
+    @torch.inference_mode()
+    def step(self, inputs: Mapping[str, NDArray[np.float32]],
+             state: State) -> tuple[Mapping[str, NDArray[np.float32]], State]:
+        """Return the model's outputs after a view, and the next state."""
+        with _computing_with(self._threads):
+            outputs, known = self._model(
+                **_tensors(inputs, self._device), state=_tensors(state, self._device))
+            return _arrays(outputs._asdict()), _arrays(known)
+
+
+def load_network(weights: Path | None, device: str, threads: int | None) -> TorchRuntime:
+    """Return the network of a weights file; see `load_runtime`."""
+    bundle = _load(weights, device)
+    return TorchRuntime(bundle.reconstruction, bundle.threshold, threads, {
+        'weights_sha256': weights_hash(weights), 'config_sha256': config_hash(bundle.config)})
+
+
+def load_policy(weights: Path | None, device: str, threads: int | None) -> TorchPolicyRuntime:
+    """Return the policy of a weights file; raises WeightsError where it has none."""
+    model = _load(weights, device).attention
+    if model is None:
+        raise WeightsError(f'{weights}: expected weights with a view policy in them, as '
+                           '`active-recon train --model 2d3d-attention` makes; there is none')
+    return TorchPolicyRuntime(model, threads)
+
+
+def _load(weights: Path | None, device: str) -> Bundle:
+    if device == 'cuda' and not torch.cuda.is_available():
+        raise ConfigError('parameter device: expected a device that torch can use, got cuda, but '
+                          'this torch finds none; use cpu')
+    return load_weights(weights, device)
+
+
+def _provenance(device: torch.device, threads: int | None) -> dict[str, str]:
+    count = torch.get_num_threads() if threads is None else threads
+    return {'runtime': f'torch {torch.__version__}, float32, {device.type}, {count} threads'}
+
+
+def _tensors(arrays: State, device: torch.device) -> dict[str, Tensor]:
+    # What was read from a message cannot be written to, which torch does not like
+    return {name: torch.from_numpy(np.require(array, requirements=('C', 'W'))).to(device)
+            for name, array in arrays.items()}
+
+
+def _arrays(tensors: Mapping[str, Tensor]) -> dict[str, NDArray[np.float32]]:
+    return {name: tensor.cpu().numpy() for name, tensor in tensors.items()}
+
+
+@contextmanager
+def _computing_with(threads: int | None) -> Iterator[None]:
+    """
+    Let torch compute with so many threads: sums that are shared out otherwise round otherwise.
+
+    Nothing else has to be fixed. The networks' operations on a CPU all add in the same order
+    every time, and torch's switch for deterministic algorithms takes seconds to import.
+    """
+    before = torch.get_num_threads()
+    if threads is None or threads == before:
+        yield
+        return
+    torch.set_num_threads(threads)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
