@@ -5,7 +5,7 @@ from typing import Any, Self
 
 from active_recon.errors import ConfigError
 
-VOLUME_LOSSES = ('mse', 'bce', 'dice', 'mse+dice')
+VOLUME_LOSSES = ('mse', 'bce', 'dice', 'mse+dice', 'bce+dice')
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class LossConfig(Config):
 
     volume_weight: float = 0.4
     silhouette_weight: float = 0.6
-    volume_loss: str = 'mse'  # mse (the paper), bce, dice, mse+dice
+    volume_loss: str = 'mse'  # mse (the paper), bce, dice, mse+dice, bce+dice
 
     def __post_init__(self) -> None:
         """Refuse weights that train nothing."""

@@ -11,11 +11,12 @@ TOLERATED_OUTSIDE = 0.02
 _ALONG = np.linspace(-0.5, 0.5, 9)  # of an edge: a lens bends it
 
 
-def require_in_image(camera: Camera, object_size: float) -> None:
+def require_in_image(camera: Camera, object_size: float,
+                     tolerated: float = TOLERATED_OUTSIDE) -> None:
     """
-    Raise ViewError where the object is wholly or partly out of the camera's image.
+    Raise ViewError where more of the object than is tolerated is out of the camera's image.
 
-    `object_size` is the side of the object's cube, metres.
+    `object_size` is the side of the object's cube, metres; `tolerated` a share of its silhouette.
     """
     _, depth = camera.project(_EDGES * object_size)
     if depth.max() <= 0:
@@ -28,7 +29,7 @@ def require_in_image(camera: Camera, object_size: float) -> None:
             f'it, got one at {camera.distance:.3g} m that stands in it or beside it; move it back '
             'or set object_size', 'out_of_image')
     outside = share_outside(camera, object_size)
-    if outside > TOLERATED_OUTSIDE:
+    if outside > tolerated:
         raise ViewError(
             f"expected the object's cube of {object_size:g} m in the image, got "
             f'{100 * outside:.0f} % of it outside; move the camera back, turn it to the object, '

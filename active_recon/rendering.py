@@ -32,11 +32,13 @@ class Renderer:
         self._normals = np.asarray(mesh.face_normals, np.float32)
         self._colors = _face_colors(mesh)
 
-    def render(self, camera: Camera, samples: int = 2) -> NDArray[np.uint8]:
+    def render(self, camera: Camera, samples: int = 2,
+               light: NDArray[np.float64] | None = None) -> NDArray[np.uint8]:
         """
         Return what the camera sees, (height, width, 4) uint8 RGBA, transparent where empty.
 
         `samples` x `samples` rays are cast in each pixel: 1 is fastest, 2 smooths the edges.
+        `light`, (3,), points towards the light in the optical frame; None: over the shoulder.
         """
         lens = camera.intrinsics
         left, top, right, bottom = self._bounds(camera)
@@ -49,7 +51,8 @@ class Renderer:
         origins = np.broadcast_to(camera.position.astype(np.float32), (height * width, 3))
         hit = self._scene.run(np.ascontiguousarray(origins), rays.reshape(-1, 3))
         # The last row of the table is what a ray that hits nothing (-1) sees.
-        seen = np.take(self._shaded(camera), hit, axis=0, mode='wrap').reshape(height, width, 4)
+        shaded = self._shaded(camera, _LIGHT if light is None else light)
+        seen = np.take(shaded, hit, axis=0, mode='wrap').reshape(height, width, 4)
         if samples > 1:
             seen = _averaged(seen, (right - left, bottom - top))
         image[top:bottom, left:right] = seen
@@ -66,10 +69,10 @@ class Renderer:
         right, bottom = np.ceil(pixels.max(axis=0)).astype(int)
         return left, top, min(right, lens.width), min(bottom, lens.height)
 
-    def _shaded(self, camera: Camera) -> NDArray[np.uint8]:
-        """Return each face's RGBA under the camera's light, (faces + 1, 4), the last empty."""
-        light = (camera.pose[:3, :3] @ _LIGHT).astype(np.float32)
-        brightness = _AMBIENT + _DIFFUSE * np.abs(self._normals @ light)
+    def _shaded(self, camera: Camera, light: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Return each face's RGBA under a light, (faces + 1, 4), the last empty."""
+        towards = (camera.pose[:3, :3] @ light).astype(np.float32)
+        brightness = _AMBIENT + _DIFFUSE * np.abs(self._normals @ towards)
         shaded = np.zeros((len(brightness) + 1, 4), np.uint8)
         np.minimum(self._colors * brightness[:, None], 255, out=shaded[:-1, :3], casting='unsafe')
         shaded[:-1, 3] = 255

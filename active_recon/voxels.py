@@ -243,6 +243,18 @@ def read_binvox(path: Path) -> VoxelGrid:
         raise DataError(f'{path}: expected a whole binvox file, got: {error}') from error
 
 
+def binvox_side(path: Path) -> float:
+    """Return the side of a binvox file's grid; raises DataError where its header tells none."""
+    try:
+        with path.open('rb') as file:
+            header = file.read(1024).partition(b'\ndata\n')[0]
+        side = [float(line.split()[1]) for line in header.split(b'\n')
+                if line.startswith(b'scale')][0]
+        return VoxelGrid(np.zeros((1, 1, 1), np.float32), side).size
+    except (OSError, ValueError, IndexError) as error:
+        raise DataError(f'{path}: expected a binvox file with a scale, got: {error}') from error
+
+
 def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
     """Write the occupied cells as binvox, the way `read_binvox` reads them."""
     cells = grid.occupied(threshold)[:, ::-1, :].reshape(-1).astype(np.uint8)

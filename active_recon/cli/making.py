@@ -9,6 +9,7 @@ from active_recon.errors import ConfigError, DataError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.datasets.drawn_cameras import Viewing
     from active_recon.datasets.making import Job
 
 Workers = Annotated[int, typer.Option(min=1, help='Processes; default: one for each core.')]
@@ -17,6 +18,13 @@ Samples = Annotated[int, typer.Option(
 
 Fine = Annotated[bool, typer.Option(
     '--fine', help='Voxelise with 64 cells a side too; what is there gets just these.')]
+Cameras = Annotated[str, typer.Option(
+    help="'turntable' (24 azimuths, elevation 30 degrees) or 'any': drawn for each object, "
+         'elevation -10 to 85 degrees, any distance and lens, images of 160 pixels.')]
+Views = Annotated[int, typer.Option(
+    min=1, max=99, help="Views of each object, where its cameras are drawn ('any').")]
+Turned = Annotated[bool, typer.Option(
+    '--turned', help='Every other object stands at any yaw, not with its front at +x.')]
 
 dataset = typer.Typer(help='Datasets that nothing needs to be downloaded for.',
                       no_args_is_help=True)
@@ -38,34 +46,40 @@ def render(
     split: Annotated[str | None, typer.Option(
         help='Of a manifest: only the rows of this split.')] = None,
     explicit_licence: Annotated[bool, typer.Option(
-        help='Of a manifest: only rows whose licence is explicit for the models.')] = False,
+        help='Of a manifest: only rows whose licence is explicit for the models and CC0, CC-BY or '
+             'public domain.')] = False,
     samples: Samples = 2,
     fine: Fine = False,
+    cameras: Cameras = 'turntable',
+    views: Views = 12,
+    turned: Turned = False,
     workers: Workers = _CORES,
 ) -> None:
     """
-    Render meshes from 24 azimuths and voxelise them, into R2N2's layout.
+    Render meshes from their cameras and voxelise them, into R2N2's layout.
 
     Any format that trimesh reads will do. A run that was broken off goes on where it stopped: what
     is there is not made again. What could not be read is listed at the end, with the reason.
     """
+    from active_recon.datasets.drawn_cameras import Viewing
     from active_recon.datasets.making import mesh_jobs
-    from active_recon.datasets.manifest import EXPLICIT, manifest_jobs, read_manifest
+    from active_recon.datasets.manifest import manifest_jobs, read_manifest
 
+    viewing = Viewing(cameras, views, turned)
     if meshes.suffix == '.csv':
         if up or front:
             raise ConfigError('expected neither --up nor --front with a manifest, which tells '
                               'them for each model')
         rows = [row for row in read_manifest(meshes)
                 if split in (None, row.split)
-                and (not explicit_licence or row.licence_evidence == EXPLICIT)]
+                and (row.is_open or not explicit_licence)]
         jobs = manifest_jobs(rows, out)
     elif split or explicit_licence:
         raise ConfigError('expected a manifest (CSV) with --split or --explicit-licence, '
                           f'got {meshes}')
     else:
         jobs = mesh_jobs(meshes, out, up, front)
-    _make('rendering', jobs, samples, workers, fine)
+    _make('rendering', jobs, samples, workers, fine, viewing)
 
 
 @dataset.command()
@@ -83,6 +97,9 @@ def build(
         help='Only these categories (may be given several times).')] = None,
     samples: Samples = 2,
     fine: Fine = False,
+    cameras: Cameras = 'turntable',
+    views: Views = 12,
+    turned: Turned = False,
     workers: Workers = _CORES,
 ) -> None:
     """
@@ -93,6 +110,7 @@ def build(
     The hash of the generators' code is written beside. A run that was broken off goes on where it
     stopped.
     """
+    from active_recon.datasets.drawn_cameras import Viewing
     from active_recon.datasets.making import shape_jobs
     from active_recon.shapes import ALL_CATEGORIES, generators_hash, UNSEEN_CATEGORIES
 
@@ -108,17 +126,18 @@ def build(
                         f'there was made by others ({made_by}); choose another folder')
     out.mkdir(parents=True, exist_ok=True)
     made_by.write_text(code + '\n')
-    _make('making', jobs, samples, workers, fine)
+    _make('making', jobs, samples, workers, fine, Viewing(cameras, views, turned))
 
 
-def _make(title: str, jobs: 'list[Job]', samples: int, workers: int, fine: bool) -> None:
+def _make(title: str, jobs: 'list[Job]', samples: int, workers: int, fine: bool,
+          viewing: 'Viewing') -> None:
     from active_recon.datasets.making import make_dataset
 
     if not jobs:
         raise DataError('expected objects to make; what was asked for leaves none')
     refused = []
     with progress_bar(title, len(jobs)) as advance:
-        for outcome in make_dataset(jobs, samples, workers, fine):
+        for outcome in make_dataset(jobs, samples, workers, fine, viewing):
             if outcome.refusal:
                 refused.append(outcome)
             advance(1, f'{len(refused)} refused' if refused else '')

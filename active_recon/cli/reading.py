@@ -17,12 +17,13 @@ Split = Annotated[str | None, typer.Option(
 
 
 def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
-                 split: str | None = None, part: str = '') -> 'ViewSet':
+                 split: str | None = None, part: str = '', at_once: bool = True) -> 'ViewSet':
     """
     Read the objects of some datasets into memory, in the sizes that a network asks for.
 
-    With a `split`, only those of its `part` (train, val or test). A single root may be PASCAL3D+'s
-    folder, whose photographs are objects of one view each.
+    Not `at_once`, images of any cameras are read when they are first shown. With a `split`, only
+    those of its `part` (train, val or test). A single root may be PASCAL3D+'s folder, whose
+    photographs are objects of one view each.
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.splits import list_split
@@ -36,7 +37,8 @@ def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
         folders += found
         missing += lacking
     with progress_bar(f'reading {title}', len(folders)) as advance:
-        views = read_views(folders, lambda: advance(1, ''), spec.resolution, spec.image_size)
+        views = read_views(folders, lambda: advance(1, ''), spec.resolution, spec.image_size,
+                           framed=not spec.needs_front, at_once=at_once)
     _tell_left_out(title, len(views), missing, views.unreadable)
     return views
 

@@ -26,7 +26,7 @@ def train(
         help='Run folder: checkpoints, TensorBoard log, weights.')] = Path('runs/default'),
     model: Annotated[str, typer.Option(
         help='A network of the registry: 2d3d-attention, 2d3d, r2n2, ptn, ptn-combined, ogn, '
-             'shape-basis.')] = '2d3d-attention',
+             'shape-basis, lifting, carving.')] = '2d3d-attention',
     size: Annotated[str, typer.Option(
         help="'small' (two CPU cores within an hour), 'published' (its paper's own); of ogn "
              "also 'small-64' and 'published-64'.")] = 'small',
@@ -56,10 +56,17 @@ def train(
     short_share: Annotated[float, typer.Option(
         help='Share of the steps, from the first on, with sequences of two views at most.')] = 0.5,
     volume_loss: Annotated[str | None, typer.Option(
-        help="mse (the paper), bce, dice, mse+dice; default: the network's own.")] = None,
+        help="mse (the paper), bce, dice, mse+dice, bce+dice; default: the network's own."
+        )] = None,
     volume_weight: Annotated[float | None, typer.Option(
         help="lambda_V of section 3.2; default: the network's own.")] = None,
     silhouette_weight: Annotated[float | None, typer.Option(help='lambda_S, the same.')] = None,
+    warm_up: Annotated[int, typer.Option(
+        min=1, help='Steps in which the learning rate rises to its peak.')] = 200,
+    checkpoint_every: Annotated[int, typer.Option(
+        min=1, help='Steps of the reconstruction between two checkpoints.')] = 200,
+    validate_every: Annotated[int, typer.Option(
+        min=1, help='Steps of the reconstruction between two measurements on validation.')] = 500,
     varied: Annotated[bool, typer.Option(
         help="Varied backgrounds, light, shift and scale; --no-varied is the paper's plain "
              'white.')] = True,
@@ -105,7 +112,7 @@ def train(
         entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
         volume_loss or entry.loss.volume_loss)
     first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, varied,
-                           short_share)
+                           short_share, warm_up, checkpoint_every, validate_every)
     second = TrainingConfig(
         max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed, bf16,
         varied=False, warm_up=20, checkpoint_every=50, validate_every=250)
@@ -124,7 +131,7 @@ def train(
     fabric = make_fabric(bf16, devices, nodes)
     fabric.launch()
     asked = entry.build(plan.config).spec
-    training = read_objects(data, 'training data', asked, split_file, 'train')
+    training = read_objects(data, 'training data', asked, split_file, 'train', at_once=False)
     held_out = read_objects([validation], 'validation data', asked, split_file, 'val')
     bundle = train_plan(plan, training, held_out, out,
                         lambda stage, count: _reporting(stage, count, out), fabric, resume)

@@ -4,27 +4,33 @@ R2N2's layout on disk, read and written: one reader for real ShapeNet and for wh
     <root>/ShapeNetRendering/<category>/<id>/rendering/NN.png  RGBA, 137 x 137
                                                       /rendering_metadata.txt
                                                       /renderings.txt
+                                                      /cameras.json, for other cameras than these
     <root>/ShapeNetVox32/<category>/<id>/model.binvox
     <root>/ShapeNetVox64/<category>/<id>/model.binvox, where finer ones were asked for
 
 A row of the metadata holds azimuth, elevation and in-plane rotation in degrees, distance, and a
 field of view that is not to be used. Its azimuth runs clockwise, so it is negated, and its
-distance counts in units of 1.75 sides of the grid.
+distance counts in units of 1.75 sides of the grid. It knows one lens and no roll: any other
+cameras stand in `cameras.json` instead, each with its pose, 4 x 4 object from optical frame, and
+its lens in pixels; where it is, it is what is read.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import json
 import math
 from pathlib import Path
 
-from active_recon.cameras import Camera, orbit_camera
+from active_recon.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.errors import DataError, ViewError
-from active_recon.voxels import read_binvox, RESOLUTION, VoxelGrid, write_binvox
+from active_recon.voxels import binvox_side, read_binvox, RESOLUTION, VoxelGrid, write_binvox
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 RENDERING, VOXELS = 'ShapeNetRendering', 'ShapeNetVox'
+_CAMERAS = 'cameras.json'
+_LENS = ('fx', 'fy', 'cx', 'cy', 'width', 'height')
 _DISTANCE_UNIT = 1.75
 _FIELD_OF_VIEW_COLUMN = 25.0  # what R2N2 writes; it is not the lens's
 
@@ -48,6 +54,9 @@ class ObjectFolder:
 
     def cameras(self) -> list[Camera]:
         """Return the camera of every image; positions count in metres, the grid as in the file."""
+        written = self.images_folder / _CAMERAS
+        if written.is_file():
+            return _read_cameras(written)
         path = self.images_folder / 'rendering_metadata.txt'
         try:
             rows = np.array([line.split() for line in path.read_text().splitlines()], np.float64)
@@ -83,6 +92,10 @@ class ObjectFolder:
                             f'got {grid.occupancy.shape}')
         return grid
 
+    def grid_side(self, resolution: int = RESOLUTION) -> float:
+        """Return the side of the true voxels' grid, from their file's header alone."""
+        return binvox_side(self.voxels_path(resolution))
+
     @property
     def complete(self) -> bool:
         """Whether the object was written to its end: its voxels come last."""
@@ -113,9 +126,37 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
         azimuth_deg = math.degrees(-camera.azimuth) % 360
         rows.append(f'{azimuth_deg:.9g} {math.degrees(camera.elevation):.9g} 0 '
                     f'{camera.distance / _DISTANCE_UNIT:.9g} {_FIELD_OF_VIEW_COLUMN:g}')
-    (folder.images_folder / 'rendering_metadata.txt').write_text('\n'.join(rows) + '\n')
+    if all(map(_is_r2n2, cameras)):
+        (folder.images_folder / 'rendering_metadata.txt').write_text('\n'.join(rows) + '\n')
+    else:
+        _write_cameras(folder.images_folder / _CAMERAS, cameras)
     (folder.images_folder / 'renderings.txt').write_text('\n'.join(names) + '\n')
     write_voxels(folder, grid)
+
+
+def _is_r2n2(camera: Camera) -> bool:
+    """Return whether a row of the metadata says all there is to say of a camera."""
+    if camera.intrinsics != CANONICAL_INTRINSICS or abs(camera.elevation) > math.pi / 2 - 1e-6:
+        return False
+    upright = orbit_camera(camera.azimuth, camera.elevation, camera.distance)
+    return bool(np.allclose(upright.pose, camera.pose, rtol=0, atol=1e-6))
+
+
+def _write_cameras(path: Path, cameras: Sequence[Camera]) -> None:
+    path.write_text(json.dumps([{
+        'pose': camera.pose.tolist(),
+        **{name: getattr(camera.intrinsics, name) for name in _LENS}} for camera in cameras]))
+
+
+def _read_cameras(path: Path) -> list[Camera]:
+    try:
+        return [Camera(np.array(row['pose'], np.float64),
+                       Intrinsics(float(row['fx']), float(row['fy']), float(row['cx']),
+                                  float(row['cy']), int(row['width']), int(row['height'])))
+                for row in json.loads(path.read_text())]
+    except (OSError, ValueError, KeyError, TypeError, ViewError) as error:
+        raise DataError(f'{path}: expected a list of cameras, each with pose, '
+                        f'{", ".join(_LENS)}, got: {error}') from error
 
 
 def write_voxels(folder: ObjectFolder, grid: VoxelGrid) -> None:

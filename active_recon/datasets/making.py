@@ -1,4 +1,4 @@
-"""Meshes to a dataset: every object rendered from 24 azimuths and voxelised, on all cores."""
+"""Meshes to a dataset: every object rendered from its cameras and voxelised, on all cores."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -9,7 +9,7 @@ import math
 import multiprocessing
 from pathlib import Path
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.datasets.drawn_cameras import TURNTABLE, Viewing
 from active_recon.datasets.layout import ObjectFolder, write_object, write_voxels
 from active_recon.errors import ActiveReconError, DataError
 from active_recon.meshes import file_rotation, fit_to_grid, load_mesh
@@ -90,15 +90,19 @@ def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
                 partial(make_shape, category, seed)) for seed in seeds]
 
 
-def make_object(job: Job, samples: int, fine: bool = False) -> Outcome:
+def make_object(job: Job, samples: int, fine: bool = False,
+                viewing: Viewing = TURNTABLE) -> Outcome:
     """Render and voxelise one object, `fine` also at 64 cells a side; what is there stays."""
     lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
     if job.folder.complete and not lacks_fine:
         return Outcome(job.folder)
     try:
         mesh = job.make_mesh()
+        yaw = viewing.yaw(_name(job.folder))
+        if yaw:
+            mesh = yawed(mesh, yaw)
         if not job.folder.complete:
-            _render(job.folder, mesh, samples)
+            _render(job.folder, mesh, samples, viewing)
         if lacks_fine:
             write_voxels(job.folder, voxelise(mesh, FINE_RESOLUTION))
     except (ActiveReconError, OSError) as error:
@@ -106,17 +110,22 @@ def make_object(job: Job, samples: int, fine: bool = False) -> Outcome:
     return Outcome(job.folder)
 
 
-def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int) -> None:
+def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int, viewing: Viewing) -> None:
     renderer = Renderer(mesh)
-    cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
-    images = [renderer.render(camera, samples) for camera in cameras]
+    cameras, lights = viewing.of(_name(folder))
+    images = [renderer.render(camera, samples, light)
+              for camera, light in zip(cameras, lights, strict=True)]
     if not np.any(images):
         raise DataError('expected a surface, but none of it is seen from any azimuth')
     write_object(folder, images, cameras, voxelise(mesh))
 
 
-def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1,
-                 fine: bool = False) -> Iterator[Outcome]:
+def _name(folder: ObjectFolder) -> str:
+    return f'{folder.category}/{folder.name}'
+
+
+def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool = False,
+                 viewing: Viewing = TURNTABLE) -> Iterator[Outcome]:
     """
     Make all objects, yielding what became of each as it is done.
 
@@ -127,10 +136,10 @@ def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1,
             raise DataError(f'expected each object once, but {count} would become '
                             f'{folder.category}/{folder.name}; rename their files')
     if workers == 1:
-        yield from (make_object(job, samples, fine) for job in jobs)
+        yield from (make_object(job, samples, fine, viewing) for job in jobs)
         return
     # spawn, because a fork of a process that has threads (torch, embree, ROS) may hang
     with ProcessPoolExecutor(workers, multiprocessing.get_context('spawn')) as pool:
-        futures = [pool.submit(make_object, job, samples, fine) for job in jobs]
+        futures = [pool.submit(make_object, job, samples, fine, viewing) for job in jobs]
         for future in as_completed(futures):
             yield future.result()

@@ -19,6 +19,8 @@ _COLUMNS = {'category', 'file', 'split', 'source', 'licence', 'licence_evidence'
 _HEX = re.compile('[0-9a-f]+')
 EXPLICIT = 'explicit for the models'
 """The evidence of a licence that lets a model be trained on."""
+_OPEN = re.compile(r'CC0\b|CC-BY(-[0-9]|$)|public[ -]domain', re.IGNORECASE)
+"""Licences that ask for no more than a name; CC-BY-SA asks for more."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,11 @@ class ModelRow:
         """The axis of the front in a y-up file: 'z', 'x', or None where it is unknown."""
         sign_and_axis = self.front_axis[:2].upper()
         return {'+Z': 'z', '+X': 'x'}.get(sign_and_axis)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether weights that ship may be trained on it: CC0, CC-BY or public domain, said so."""
+        return self.licence_evidence == EXPLICIT and bool(_OPEN.match(self.licence))
 
 
 def read_manifest(path: Path) -> list[ModelRow]:

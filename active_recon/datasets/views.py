@@ -4,8 +4,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from active_recon.cameras import Camera, VIEW_COUNT
+from active_recon.datasets.framed import FramedViews, OnDemand, read_cameras, weighted
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.errors import DataError
@@ -28,6 +30,7 @@ class ViewSet:
     - intrinsics: (N, V, 3, 3) float64, K in pixels of these images
     - voxels: (N, R, R, R) bool
     - folders: where each came from; unreadable: what was left out, and why
+    - seen: (N, V, S, S) bool, which pixels the cameras' own images have; None: all of them
     """
 
     images: Tensor
@@ -36,6 +39,7 @@ class ViewSet:
     voxels: Tensor
     folders: tuple[ObjectFolder, ...]
     unreadable: tuple[str, ...] = ()
+    seen: Tensor | None = None
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -67,8 +71,13 @@ class ViewSet:
                          for folder in self.folders])
 
     def white(self, objects: Tensor, views: Tensor) -> Tensor:
-        """Return views (B,) of objects (B,) on white, (B, 3, S, S) float32 in [0, 1]."""
-        return on_background(self.images[objects, views], torch.ones(len(objects), 3))
+        """
+        Return views (B,) of objects (B,) on white, (B, 3, S, S) float32 in [0, 1].
+
+        Where not all pixels were seen, which were is a fourth channel.
+        """
+        pictures = on_background(self.images[objects, views], torch.ones(len(objects), 3))
+        return pictures if self.seen is None else with_seen(pictures, self.seen[objects, views])
 
 
 def on_background(images: Tensor, colors: Tensor) -> Tensor:
@@ -77,13 +86,25 @@ def on_background(images: Tensor, colors: Tensor) -> Tensor:
     return planes[:, :3] + (1 - planes[:, 3:]) * colors[:, :, None, None].to(planes.device)
 
 
+def with_seen(pictures: Tensor, seen: Tensor) -> Tensor:
+    """Return pictures (..., 3, S, S) with which pixels were seen as a fourth channel."""
+    return torch.cat([pictures * seen[..., None, :, :], seen[..., None, :, :].to(pictures)], -3)
+
+
 def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = lambda: None,
-               resolution: int = RESOLUTION, image_size: int = 64) -> ViewSet:
+               resolution: int = RESOLUTION, image_size: int = 64,
+               framed: bool = False, at_once: bool = True) -> ViewSet:
     """
     Read objects, with voxels and images of the sizes that a network asks for.
 
-    What cannot be read is left out and listed. Raises DataError if none can.
+    `framed`, the images are what a network gets that needs no front: any camera's, around the
+    object's cube, as many of each object as there are of all; else they are the turntable's 24.
+    What cannot be read is left out and listed. Raises DataError if none can. Framed images that
+    are not read `at_once` are read when a batch first shows them; then those that cannot be read
+    raise DataError.
     """
+    if framed:
+        return _read_framed(folders, progress, resolution, image_size, at_once)
     count = len(folders)
     # Filled in place: gathered and then stacked, a large set would take its memory twice
     images = np.empty((count, VIEW_COUNT, image_size, image_size, 4), np.uint8)
@@ -102,6 +123,14 @@ def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = l
         finally:
             progress()
 
+    kept, unreadable = _read_all(read, count)
+    return ViewSet(torch.from_numpy(images[kept]), torch.from_numpy(poses[kept]),
+                   torch.from_numpy(intrinsics[kept]), torch.from_numpy(voxels[kept]),
+                   tuple(np.array(folders, object)[kept]), unreadable)
+
+
+def _read_all(read: Callable[[int], str], count: int) -> tuple[slice | list[int], tuple[str, ...]]:
+    """Read so many objects; return which could be, and what was said of the others."""
     with ThreadPoolExecutor() as pool:
         refusals = list(pool.map(read, range(count)))
     good = [index for index in range(count) if not refusals[index]]
@@ -109,10 +138,39 @@ def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = l
     if not good:
         raise DataError('expected objects in the dataset, none can be read'
                         + ''.join(f'\n  {refusal}' for refusal in unreadable[:5]))
-    kept = slice(None) if len(good) == count else good
-    return ViewSet(torch.from_numpy(images[kept]), torch.from_numpy(poses[kept]),
-                   torch.from_numpy(intrinsics[kept]), torch.from_numpy(voxels[kept]),
-                   tuple(folders[index] for index in good), unreadable)
+    return slice(None) if len(good) == count else good, unreadable
+
+
+def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], resolution: int,
+                 image_size: int, at_once: bool) -> ViewSet:
+    """Read what any cameras saw; see `read_views`."""
+    folders, shown, lacking = read_cameras(folders)
+    if not folders:
+        raise DataError('expected objects in the dataset, none can be read'
+                        + ''.join(f'\n  {refusal}' for refusal in lacking[:5]))
+    views = FramedViews(folders, shown, resolution, image_size)
+    poses, intrinsics = torch.from_numpy(views.poses), torch.from_numpy(views.intrinsics)
+    if not at_once:
+        on_demand: Any = [OnDemand(views.images, views.read_images),
+                          OnDemand(views.voxels, views.read_voxels),
+                          OnDemand(views.seen, views.read_images)]
+        return ViewSet(on_demand[0], poses, intrinsics, on_demand[1], tuple(folders), lacking,
+                       on_demand[2])
+
+    def read(index: int) -> str:
+        try:
+            views.read_voxels(index)
+            views.read_images(index, range(views.images.shape[1]))
+            return ''
+        except DataError as error:
+            return str(error)
+        finally:
+            progress()
+
+    kept, unreadable = _read_all(read, len(folders))
+    return ViewSet(torch.from_numpy(views.images[kept]), poses[kept], intrinsics[kept],
+                   torch.from_numpy(views.voxels[kept]), tuple(np.array(folders, object)[kept]),
+                   lacking + unreadable, torch.from_numpy(views.seen[kept]))
 
 
 def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
@@ -133,7 +191,5 @@ def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
 
 def _premultiplied(rgba: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     """Return the image in pixels of a size, (S, S, 4), its colours multiplied by alpha."""
-    weighted = rgba.astype(np.float32)
-    weighted[..., :3] *= weighted[..., 3:] / 255
-    small = cv2.resize(weighted, (size, size), interpolation=cv2.INTER_AREA)
+    small = cv2.resize(weighted(rgba), (size, size), interpolation=cv2.INTER_AREA)
     return np.asarray(np.rint(small), np.uint8)

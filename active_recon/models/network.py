@@ -71,7 +71,8 @@ class ReconstructionNetwork(nn.Module, ABC):
     """
     The interface of all networks of the registry; the state is passed in and handed back.
 
-    - images: (B, 3, S, S) in [0, 1], S the `image_size`; their cameras: (B, ...)
+    - images: (B, 3, S, S) in [0, 1], S the `image_size`; their cameras: (B, ...). One that needs
+      no front also takes a fourth channel: 1 where the camera's image has that pixel, else 0
     - state: (B, ...) named tensors; `initial_state` gives the first, `update` the next one
 
     Encoding an image, updating the state and decoding it are apart: training decodes after one

@@ -7,6 +7,10 @@ from typing import Any
 from active_recon.config import Config, LossConfig
 from active_recon.errors import ConfigError
 from active_recon.models.attention import AttentionModel
+from active_recon.models.carving import carve_nothing, Carving, CarvingConfig
+from active_recon.models.carving import SIZES as SIZES_CARVING
+from active_recon.models.lifting import Lifting, LiftingConfig
+from active_recon.models.lifting import SIZES as SIZES_LIFTING
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.network_2d3d import Network2d3d, Network2d3dConfig
 from active_recon.models.ogn import Ogn, OgnConfig
@@ -62,6 +66,11 @@ NETWORKS: Mapping[str, NetworkEntry] = {
     'ogn': NetworkEntry(OgnConfig, Ogn.from_config, SIZES_OGN),  # learns from its own objective
     'shape-basis': NetworkEntry(ShapeBasisConfig, ShapeBasis.from_config, SIZES_SHAPE_BASIS,
                                 fit=fit_shapes),
+    'lifting': NetworkEntry(LiftingConfig, Lifting.from_config, SIZES_LIFTING,
+                            LossConfig(volume_weight=1, silhouette_weight=0,
+                                       volume_loss='bce+dice')),
+    'carving': NetworkEntry(CarvingConfig, Carving.from_config, SIZES_CARVING,
+                            fit=carve_nothing),
 }
 
 

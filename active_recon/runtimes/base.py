@@ -49,6 +49,8 @@ class Runtime(Protocol):
         """
         Take in an image (S, S, 3) uint8 RGB of the spec's size, and its camera.
 
+        Where a network needs no front, a fourth channel may tell what was seen (255) and what not.
+
         The camera's distance counts in sides of the grid, its azimuth from the object's front
         where the spec needs one. Returns the occupancy (R, R, R) in [0, 1], the latent (C, h, w),
         and the next state.

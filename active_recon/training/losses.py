@@ -17,12 +17,13 @@ def volume_loss(logits: Tensor, voxels: Tensor, kind: str) -> Tensor:
     if kind == 'bce':
         return functional.binary_cross_entropy_with_logits(logits, voxels)
     occupancy = logits.sigmoid()
-    squared = functional.mse_loss(occupancy, voxels)
     if kind == 'mse':
-        return squared
+        return functional.mse_loss(occupancy, voxels)
     shared = 2 * (occupancy * voxels).sum((1, 2, 3)) + 1
     dice = (1 - shared / (occupancy.sum((1, 2, 3)) + voxels.sum((1, 2, 3)) + 1)).mean()
-    return dice if kind == 'dice' else squared + dice / 2
+    if kind == 'dice':
+        return dice
+    return volume_loss(logits, voxels, kind.removesuffix('+dice')) + dice / 2
 
 
 def silhouette_loss(logits: Tensor, voxels: Tensor, frusta: Tensor) -> Tensor:

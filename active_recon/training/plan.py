@@ -10,11 +10,13 @@ from active_recon.config import Config, LossConfig, RewardConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
 from active_recon.evaluation.validation import best_threshold, policy_auc, reconstruction_iou
+from active_recon.models.lifting import Lifting
 from active_recon.models.registry import network_config, network_entry
 from active_recon.models.weights import Bundle
 from active_recon.policies import learned_policy
 from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.training.joint import train_jointly
+from active_recon.training.lifting import train_lifting
 from active_recon.training.loop import Measured, Run, TrainingConfig
 from active_recon.training.policy_gradient import train_policy
 from active_recon.training.supervised import train_reconstruction
@@ -97,6 +99,11 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
                           lambda model, _: reconstruction_iou(model, validation))
     elif entry.fit is not None:
         entry.fit(network, training.voxels, training.categories)
+    elif isinstance(network, Lifting) and not frozen:
+        with reporting('reconstruction', plan.reconstruction.steps) as report:
+            train_lifting(network, training, plan.reconstruction, plan.loss,
+                          run('reconstruction', report),
+                          lambda model: reconstruction_iou(model, validation))
     elif not frozen:
         with reporting('reconstruction', plan.reconstruction.steps) as report:
             train_reconstruction(network, training, plan.reconstruction, plan.loss,

@@ -28,7 +28,7 @@ def vary(images: Tensor, intrinsics: Tensor, views: ViewSet,
     """
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
-    planes[:, :, :3] = _recolored(planes, rng)
+    planes[:, :, :3] = recolored(planes, rng)
     kinds = draw_kinds(size, rng)
     away = torch.from_numpy(np.flatnonzero(kinds != 'white'))
     if len(away):
@@ -44,7 +44,7 @@ def vary(images: Tensor, intrinsics: Tensor, views: ViewSet,
             behind[:, rows] = draw(views, length, len(rows), rng).expand(
                 length, -1, -1, side, side)
     pictures = behind.mul_(1 - planes[:, :, 3:]).add_(planes[:, :, :3])
-    pictures[:, away] *= _light(len(away), side, rng)
+    pictures[:, away] *= light(len(away), side, rng)
     return pictures.clamp_(0, 1), intrinsics
 
 
@@ -76,7 +76,7 @@ def moved(planes: Tensor, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
     return functional.grid_sample(planes, grid, align_corners=False), torch.from_numpy(motion)
 
 
-def _recolored(planes: Tensor, rng: np.random.Generator) -> Tensor:
+def recolored(planes: Tensor, rng: np.random.Generator) -> Tensor:
     """Return the colours of planes (T, B, 4, S, S) under a gain and a saturation of each b."""
     size = planes.shape[1]
     gains = rng.uniform(0.75, 1.25, (size, 1)) * rng.uniform(0.85, 1.15, (size, 3))
@@ -87,7 +87,7 @@ def _recolored(planes: Tensor, rng: np.random.Generator) -> Tensor:
     return torch.minimum(colors.clamp_(min=0).view_as(planes[:, :, :3]), planes[:, :, 3:])
 
 
-def _light(count: int, side: int, rng: np.random.Generator) -> Tensor:
+def light(count: int, side: int, rng: np.random.Generator) -> Tensor:
     """Return a coloured light that falls off across the image, (count, 3, S, S) about 1."""
     across = _across(side)
     gains = _tensor(rng.uniform(0.8, 1.2, (count, 3, 1, 1)))

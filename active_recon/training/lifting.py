@@ -1,0 +1,138 @@
+"""Training of networks that lift: any cameras, any yaw, and the silhouettes beside the voxels."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from active_recon.config import LossConfig
+from active_recon.datasets.views import ViewSet, with_seen
+from active_recon.models.lifting import Lifting
+from active_recon.models.lifting_encoder import Maps
+from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.training.appearance import misplaced, pictured
+from active_recon.training.batches import mirror
+from active_recon.training.loop import (
+    Draw,
+    Measured,
+    Run,
+    share_of_batch,
+    train_steps,
+    TrainingConfig,
+)
+from active_recon.training.losses import volume_loss
+from active_recon.training.supervised import longest_sequence
+import numpy as np
+import torch
+from torch import nn, Tensor
+from torch.nn import functional
+
+FOREGROUND_WEIGHT, ROUGH_WEIGHT = 0.5, 0.3
+"""Of the silhouettes' loss, and of that of the rougher logits, beside the volume's."""
+
+
+@dataclass(frozen=True, eq=False)
+class PosedBatch:
+    """
+    B objects and T views of each.
+
+    - images: (T, B, 4, S, S) in [0, 1], RGB and which pixels there are; cameras (T, B, ...)
+    - alpha: (T, B, S, S) in [0, 1], the object's share of each pixel
+    - voxels: (B, R, R, R) in {0, 1} float32
+    - objects: (B,) indices into the set
+    """
+
+    images: Tensor
+    cameras: Cameras
+    alpha: Tensor
+    voxels: Tensor
+    objects: Tensor
+
+
+def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
+                     varied: bool = True) -> PosedBatch:
+    """
+    Draw objects with different random views of each, turned by quarters and mirrored at random.
+
+    `varied`, they look as cameras would see them, and their poses are a little off.
+    """
+    objects = torch.from_numpy(rng.integers(len(views), size=size))
+    order = rng.random((size, views.images.shape[1])).argsort(axis=1)
+    chosen = torch.from_numpy(order[:, :length].T.copy())  # (T, B)
+    mirrored = torch.from_numpy(rng.random(size) < 0.5)
+    quarters = rng.integers(4, size=size)
+    images = views.images[objects, chosen]
+    seen = (torch.ones(images.shape[:-1], dtype=torch.bool) if views.seen is None
+            else views.seen[objects, chosen])
+    images[:, mirrored] = images[:, mirrored].flip(-2)
+    seen[:, mirrored] = seen[:, mirrored].flip(-1)
+    cameras = views.cameras(objects, chosen)
+    cameras = Cameras(*(torch.where(mirrored[:, None, None], other, own) for own, other
+                        in zip(cameras, mirror(cameras, images.shape[2]), strict=True)))
+    cameras = cameras.turned(torch.from_numpy(quarters * np.pi / 2).expand(length, size))
+    voxels = views.voxels[objects].float()
+    voxels[mirrored] = voxels[mirrored].flip(2)
+    for row, quarter in enumerate(quarters):
+        voxels[row] = turned_by_quarters(voxels[row], int(quarter))
+    alpha = images[..., 3].float() / 255
+    if varied:
+        return PosedBatch(pictured(images, seen, views, rng), misplaced(cameras, rng), alpha,
+                          voxels, objects)
+    planes = images.permute(0, 1, 4, 2, 3).float() / 255
+    return PosedBatch(with_seen(planes[:, :, :3] + 1 - planes[:, :, 3:], seen), cameras, alpha,
+                      voxels, objects)
+
+
+def turned_by_quarters(voxels: Tensor, quarters: int) -> Tensor:
+    """Return voxels (X, Y, Z) turned counter-clockwise about +z by quarters of a turn."""
+    return torch.rot90(voxels, quarters, (0, 1))
+
+
+class LiftingLearner(nn.Module):
+    """A sequence of views to the losses after the last of them."""
+
+    def __init__(self, network: Lifting, loss: LossConfig) -> None:
+        super().__init__()
+        self.network = network
+        self._kind = loss.volume_loss
+
+    def forward(self, images: Tensor, cameras: Cameras, alpha: Tensor,
+                voxels: Tensor) -> dict[str, Tensor]:
+        """Take in images (T, B, 4, S, S) of cameras (T, B, ...); compare with voxels and alpha."""
+        maps = self.network.maps(images.flatten(0, 1))
+        state = self.network.initial_state(len(voxels))
+        each = [part.reshape(*images.shape[:2], *part.shape[1:]) for part in maps]
+        for number in range(len(images)):
+            state = self.network.look_up(Maps(*(part[number] for part in each)),
+                                         cameras.rows(number), state)
+        logits, rough = self.network.logits(state)
+        with torch.autocast(logits.device.type, enabled=False):
+            volume = volume_loss(logits.float(), voxels, self._kind)
+            rougher = volume_loss(rough.float(), functional.max_pool3d(voxels[:, None], 2)[:, 0],
+                                  self._kind)
+            silhouette = self._silhouette_loss(maps.foreground.float(), alpha.flatten(0, 1),
+                                               images[:, :, 3].flatten(0, 1))
+        total = volume + ROUGH_WEIGHT * rougher + FOREGROUND_WEIGHT * silhouette
+        return {'loss': total, 'volume': volume.detach(), 'silhouette': silhouette.detach()}
+
+    @staticmethod
+    def _silhouette_loss(logits: Tensor, alpha: Tensor, seen: Tensor) -> Tensor:
+        each = functional.binary_cross_entropy_with_logits(logits[:, 0], alpha, reduction='none')
+        return (each * seen).sum() / seen.sum().clamp(min=1)
+
+
+def train_lifting(
+    network: Lifting, views: ViewSet, config: TrainingConfig, loss: LossConfig, run: Run,
+    validate: Callable[[ReconstructionNetwork], Measured],
+) -> None:
+    """Train a network in place on random views of random objects; see `train_steps`."""
+    size = share_of_batch(config, run.fabric)
+
+    def draw(step: int) -> Draw:
+        shared = np.random.default_rng([config.seed, step])
+        length = int(shared.integers(1, longest_sequence(step, config) + 1))
+        own = np.random.default_rng([config.seed, step, run.fabric.global_rank])
+        batch = draw_posed_batch(views, size, length, own, config.varied)
+        return Draw((batch.images, batch.cameras, batch.alpha, batch.voxels), batch.objects)
+
+    train_steps(run, LiftingLearner(network, loss), network, config,
+                {'training': config.to_dict(), 'loss': loss.to_dict()}, views, draw,
+                lambda: validate(network), weight_decay=0.01)

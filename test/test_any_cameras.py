@@ -1,0 +1,211 @@
+"""Views of any cameras: drawn, written, read and framed as the robot frames them."""
+
+from active_recon.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.canonical import framed_image, framed_layers, framing_camera
+from active_recon.datasets.drawn_cameras import draw_camera, filling_distance, TURNTABLE, Viewing
+from active_recon.datasets.layout import list_objects, ObjectFolder, write_object
+from active_recon.datasets.making import make_dataset, shape_jobs
+from active_recon.datasets.views import read_views
+from active_recon.errors import ConfigError, DataError, ViewError
+from active_recon.framing import share_outside
+from active_recon.rendering import composite, Renderer
+from active_recon.shapes import make_shape
+from active_recon.voxels import binvox_side, VoxelGrid
+import cv2
+import numpy as np
+import pytest
+import torch
+
+DRAWN = [draw_camera(rng) for rng in [np.random.default_rng(0)] for _ in range(300)]
+ANY = Viewing('any', 4, turned=True)
+
+
+@pytest.fixture(scope='module')
+def made(tmp_path_factory):
+    """Return a folder of four chairs seen by any four cameras each."""
+    out = tmp_path_factory.mktemp('any')
+    jobs = shape_jobs('chair', range(4), out)
+    assert not [each.refusal for each in make_dataset(jobs, 1, fine=True, viewing=ANY)
+                if each.refusal]
+    return out
+
+
+@pytest.fixture(scope='module')
+def views(made):
+    return read_views(list_objects(made), resolution=64, image_size=128, framed=True)
+
+
+def test_drawn_cameras_stand_in_their_ranges():
+    elevations = np.degrees([camera.elevation for camera in DRAWN])
+    assert -10 <= elevations.min() < -5 and 75 < elevations.max() <= 85
+    focal = [camera.intrinsics.fx / camera.intrinsics.width for camera in DRAWN]
+    assert 0.8 <= min(focal) < 0.85 and 2.8 < max(focal) <= 3
+    assert min(camera.distance for camera in DRAWN) > 1
+    middles = np.array([camera.project(np.zeros((1, 3)))[0][0] for camera in DRAWN]) / 160
+    assert 0.35 < middles.min() < 0.42 and 0.58 < middles.max() < 0.65
+    outside = np.array([share_outside(camera, 1.0) for camera in DRAWN])
+    assert 0.02 < (outside > 0.02).mean() < 0.4
+    assert outside.max() < 0.3
+
+
+def test_the_cube_fills_the_share_of_the_image_that_was_asked_for():
+    towards = orbit_camera(0.3, 0.4, 1.0)
+    distance = filling_distance(towards, 1.5, 0.7)
+    camera = Camera(towards.scaled(distance).pose, Intrinsics(150, 150, 50, 50, 100, 100))
+    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
+    assert np.abs(camera.project(corners)[0] - 50).max() == pytest.approx(35, abs=0.01)
+
+
+def test_an_object_s_cameras_are_those_of_its_name():
+    (first, lights), (again, _), (other, _) = (ANY.of(name) for name in ('a', 'a', 'b'))
+    np.testing.assert_array_equal([camera.pose for camera in first],
+                                  [camera.pose for camera in again])
+    assert not np.allclose(first[0].pose, other[0].pose)
+    assert np.linalg.norm(lights[0]) == pytest.approx(1)
+    assert len(TURNTABLE.of('a')[0]) == 24
+
+
+def test_every_other_object_stands_turned_where_that_is_asked_for():
+    yaws = [ANY.yaw(str(number)) for number in range(200)]
+    assert 60 < sum(yaw != 0 for yaw in yaws) < 140
+    assert {Viewing('any', 4).yaw(str(number)) for number in range(20)} == {0.0}
+
+
+def test_a_viewing_that_is_none_is_refused():
+    for wrong in (('dome', 3), ('any', 0)):
+        with pytest.raises(ConfigError, match='expected one of turntable, any'):
+            Viewing(*wrong)
+
+
+def test_any_cameras_come_back_as_they_were_written(tmp_path):
+    folder = ObjectFolder(tmp_path, 'chair', 'one')
+    images = np.zeros((3, 160, 160, 4), np.uint8)
+    write_object(folder, images, DRAWN[:3], VoxelGrid(np.ones((32, 32, 32), np.float32), 2.0))
+    assert not (folder.images_folder / 'rendering_metadata.txt').exists()
+    for read, written in zip(folder.cameras(), DRAWN, strict=False):
+        np.testing.assert_allclose(read.pose, written.pose, atol=1e-12)
+        assert read.intrinsics == written.intrinsics
+    assert folder.grid_side() == 2.0
+
+
+@pytest.mark.parametrize('text', ['[{}]', '{', '[{"pose": [[1]]}]', '3'])
+def test_cameras_that_are_none_are_refused_by_their_path(text, made, tmp_path):
+    path = tmp_path / 'ShapeNetRendering' / 'a' / 'b' / 'rendering' / 'cameras.json'
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    with pytest.raises(DataError, match='cameras.json: expected a list of cameras'):
+        ObjectFolder(tmp_path, 'a', 'b').cameras()
+
+
+def test_a_binvox_file_without_a_side_is_refused(tmp_path):
+    path = tmp_path / 'model.binvox'
+    path.write_bytes(b'#binvox 1\ndim 2 2 2\ndata\n')
+    with pytest.raises(DataError, match='with a scale'):
+        binvox_side(path)
+
+
+@pytest.mark.parametrize('number', range(4))
+def test_training_frames_an_image_as_the_robot_does(number):
+    """But for what lies beyond the image, which the robot's repeats."""
+    renderer = Renderer(make_shape('chair', 3))
+    inside = [camera for camera in DRAWN if share_outside(camera, 1.0) == 0]
+    camera = inside[number]
+    rgba = renderer.render(camera)
+    robot, robot_camera = framed_image(composite(rgba, 0), camera, 1.0, 128)
+    layers = composite(rgba, 0)
+    trained, seen, target = framed_layers(layers, camera, 1.0, 128)
+    np.testing.assert_array_equal(target.pose, robot_camera.pose)
+    assert target.intrinsics == robot_camera.intrinsics
+    inner = cv2.erode(seen.astype(np.uint8), np.ones((3, 3))) > 0
+    apart = np.abs(trained.astype(int) - robot)[inner]
+    assert apart.max() <= 8 and apart.mean() < 0.1  # OpenCV's maps count in 1/32 of a pixel
+
+
+def test_a_framed_image_stands_upright():
+    camera = orbit_camera(0.3, 0.2, 2.5, Intrinsics(150, 150, 80, 80, 160, 160))
+    _, _, target = framed_layers(np.zeros((160, 160, 4), np.uint8), camera, 1.0, 128)
+    np.testing.assert_allclose(target.pose, camera.pose, atol=1e-12)
+
+
+def test_where_the_image_ends_nothing_is_seen():
+    camera = orbit_camera(0.0, 0.0, 2.5, Intrinsics(150, 150, 30, 80, 160, 160))
+    layers = np.full((160, 160, 4), 255, np.uint8)
+    framed, seen, target = framed_layers(layers, camera, 1.0, 128)
+    left_end = target.intrinsics.cx - 30 / 150 * target.intrinsics.fx
+    np.testing.assert_array_equal(seen.any(axis=0), np.arange(128) + 0.5 > left_end)
+    assert not framed[:, 0].any() and (framed[20:108, 100] == 255).all()
+
+
+def test_the_robot_is_told_where_its_image_ends():
+    camera = orbit_camera(0.0, 0.0, 2.5, Intrinsics(150, 150, 30, 80, 160, 160))
+    image = np.full((160, 160, 3), 200, np.uint8)
+    framed, target = framed_image(image, camera, 1.0, 128)
+    layers, seen, _ = framed_layers(image, camera, 1.0, 128)
+    assert framed.shape == (128, 128, 4)
+    np.testing.assert_array_equal(framed[..., 3] > 0, seen)
+    assert not framed[~seen].any() and (framed[seen] >= 200).all()
+    whole, _ = framed_image(image, orbit_camera(0.0, 0.0, 3.5, Intrinsics(
+        150, 150, 80, 80, 160, 160)), 1.0, 128)
+    assert whole.shape == (128, 128, 3)
+
+
+def test_a_cube_that_is_hardly_in_the_image_is_refused():
+    camera = orbit_camera(0.0, 0.0, 2.5, Intrinsics(150, 150, -38, 80, 160, 160))
+    with pytest.raises(ViewError, match='% of it outside'):
+        framed_image(np.zeros((160, 160, 3), np.uint8), camera, 1.0, 128)
+
+
+def test_framed_views_are_what_the_cameras_saw(views, made):
+    assert views.images.shape == (4, 4, 128, 128, 4)
+    assert views.seen.shape == (4, 4, 128, 128)
+    assert views.voxels.shape == (4, 64, 64, 64)
+    for item, folder in enumerate(views.folders):
+        for view, camera in enumerate(folder.cameras()):
+            target = framing_camera(camera, 1.0, 128)
+            np.testing.assert_allclose(views.poses[item, view], target.pose)
+            np.testing.assert_allclose(views.intrinsics[item, view], target.intrinsics.matrix)
+            cells = (np.argwhere(views.voxels[item].numpy()) + 0.5) / 64 - 0.5
+            column, row = np.floor(target.project(cells)[0]).astype(int).T
+            there = (column >= 0) & (column < 128) & (row >= 0) & (row < 128)
+            column, row = column[there], row[there]
+            seen = views.seen[item, view].numpy()[row, column]
+            alpha = views.images[item, view, ..., 3].numpy()
+            assert (cv2.dilate(alpha, np.ones((5, 5)))[row, column] > 0)[seen].mean() > 0.98
+
+
+def test_views_that_are_read_when_shown_are_the_same(views, made):
+    lazy = read_views(list_objects(made), resolution=64, image_size=128, framed=True,
+                      at_once=False)
+    objects, chosen = torch.tensor([2, 0, 2]), torch.tensor([[1, 3, 0], [2, 2, 2]])
+    assert lazy.image_size == 128 and lazy.resolution == 64 and len(lazy) == 4
+    torch.testing.assert_close(lazy.images[objects, chosen], views.images[objects, chosen])
+    torch.testing.assert_close(lazy.seen[objects, chosen], views.seen[objects, chosen])
+    torch.testing.assert_close(lazy.voxels[objects], views.voxels[objects])
+    torch.testing.assert_close(lazy.poses, views.poses)
+    torch.testing.assert_close(lazy.white(objects, chosen[0]), views.white(objects, chosen[0]))
+
+
+def test_as_many_views_are_read_as_every_object_has(made, tmp_path):
+    jobs = shape_jobs('lamp', range(1), tmp_path)
+    list(make_dataset(jobs, 1, fine=True, viewing=Viewing('any', 3)))
+    mixed = read_views([*list_objects(made), *list_objects(tmp_path)], resolution=64,
+                       image_size=128, framed=True)
+    assert mixed.images.shape[:2] == (5, 3)
+
+
+def test_the_turntable_s_views_are_framed_too(tmp_path):
+    list(make_dataset(shape_jobs('lamp', range(2), tmp_path), 1))
+    views = read_views(list_objects(tmp_path), image_size=128, framed=True)
+    assert views.images.shape == (2, 24, 128, 128, 4)
+    assert views.images[..., 3].any(-1).any(-1).all()
+    white = views.white(torch.tensor([0]), torch.tensor([5]))
+    assert white.shape == (1, 4, 128, 128)
+
+
+def test_objects_that_cannot_be_read_are_listed(made, tmp_path):
+    (tmp_path / 'ShapeNetRendering' / 'a' / 'b' / 'rendering').mkdir(parents=True)
+    views = read_views([*list_objects(made), *list_objects(tmp_path)], resolution=64,
+                       image_size=128, framed=True)
+    assert len(views) == 4 and len(views.unreadable) == 1
+    with pytest.raises(DataError, match='none can be read'):
+        read_views(list_objects(tmp_path), framed=True)

@@ -1,0 +1,189 @@
+"""What the lifting network promises, whatever it has learned."""
+
+from dataclasses import replace
+import math
+
+from active_recon.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.errors import ConfigError
+from active_recon.models.lifted import (
+    cell_centers,
+    gathered,
+    no_views,
+    projected,
+    projection,
+    sampled,
+    statistics,
+)
+from active_recon.models.lifting import Lifting, LiftingConfig
+from active_recon.models.lifting_decoder import folded, unfolded
+from active_recon.models.lifting_encoder import Maps
+from active_recon.models.network import Cameras
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+TINY = LiftingConfig(encoder_channels=(4, 4, 8, 8), pyramid_channels=8, coarse_hidden=8,
+                     coarse_channels=4, fine_channels=2, volume_channels=(8, 8, 8),
+                     head_channels=4)
+LENS = Intrinsics(140, 140, 64, 64, 128, 128)
+
+
+@pytest.fixture
+def lifting():
+    torch.manual_seed(0)
+    return Lifting.from_config(TINY).eval()
+
+
+def cameras_at(*places):
+    """Return cameras at azimuths, elevations (degrees) and distances, (N, ...)."""
+    return Cameras.of([orbit_camera(math.radians(azimuth), math.radians(elevation), distance,
+                                    LENS) for azimuth, elevation, distance in places])
+
+
+def some_images(count, seed=0):
+    return torch.rand(count, 3, 128, 128, generator=torch.Generator().manual_seed(seed))
+
+
+VIEWS = cameras_at((10, 30, 2.1), (130, -5, 2.5), (250, 70, 1.9))
+
+
+def after(lifting, images, cameras, order):
+    """Return the state of one object after some of the views."""
+    state = lifting.initial_state(1)
+    for view in order:
+        state = lifting.step(images[view:view + 1], cameras.rows(slice(view, view + 1)), state)
+    return state
+
+
+@torch.inference_mode()
+def test_any_order_of_the_views_gives_the_same_occupancy(lifting):
+    images = some_images(3)
+    there, back = (lifting.decode(after(lifting, images, VIEWS, order)).sigmoid()
+                   for order in ((0, 1, 2), (2, 0, 1)))
+    assert_close(there, back, rtol=0, atol=1e-5)
+
+
+@torch.inference_mode()
+def test_an_object_s_occupancy_does_not_depend_on_its_batch(lifting):
+    images = some_images(3)
+    together, _ = lifting(images, VIEWS, lifting.initial_state(3))
+    for row in range(3):
+        alone = lifting.decode(after(lifting, images, VIEWS, [row]))
+        assert_close(together[row:row + 1], alone, rtol=1e-4, atol=1e-4)
+
+
+@torch.inference_mode()
+def test_the_state_is_of_one_size_and_zero_before_the_first_view(lifting):
+    images, before = some_images(3), lifting.initial_state(1)
+    assert not any(part.any() for part in before.values())
+    known = after(lifting, images, VIEWS, (0, 1, 2, 0, 1))
+    assert {name: (part.shape, part.dtype) for name, part in known.items()} == {
+        name: (part.shape, part.dtype) for name, part in before.items()}
+
+
+@torch.inference_mode()
+def test_what_a_camera_does_not_see_it_says_nothing_of(lifting):
+    away = Camera(orbit_camera(0.0, 0.3, 2.1).pose @ np.diag([-1.0, 1, -1, 1]), LENS)
+    aside = Camera(orbit_camera(0.0, 0.3, 2.1).pose, replace(LENS, cx=-2000.0))
+    for camera in (away, aside):
+        state = lifting.step(some_images(1), Cameras.of([camera]), lifting.initial_state(1))
+        assert not any(part.any() for part in state.values())
+
+
+@torch.inference_mode()
+def test_what_the_image_does_not_hold_says_nothing(lifting):
+    unseen = torch.cat([some_images(1), torch.zeros(1, 1, 128, 128)], dim=1)
+    state = lifting.step(unseen, VIEWS.rows(slice(0, 1)), lifting.initial_state(1))
+    assert not any(part.any() for part in state.values())
+
+
+@torch.inference_mode()
+def test_an_image_without_a_fourth_channel_was_seen_whole(lifting):
+    images = some_images(1)
+    whole = torch.cat([images, torch.ones(1, 1, 128, 128)], dim=1)
+    camera = VIEWS.rows(slice(0, 1))
+    assert_close(lifting.encode(whole, camera), lifting.encode(images, camera))
+
+
+@torch.inference_mode()
+def test_cells_look_up_the_same_where_frame_and_cameras_turn_by_a_quarter(lifting):
+    images = some_images(3)
+    maps = lifting.maps(images)
+    turned = VIEWS.turned(torch.full((3,), math.pi / 2))
+    here = lifting.look_up(maps, VIEWS, lifting.initial_state(3))
+    there = lifting.look_up(maps, turned, lifting.initial_state(3))
+    for name in ('fine_sum', 'fine_count', 'hull'):
+        assert_close(torch.rot90(here[name], 1, (2, 3)), there[name], rtol=0, atol=1e-3)
+
+
+def test_points_are_projected_as_the_camera_projects_them():
+    camera = orbit_camera(0.4, -0.1, 1.7, Intrinsics(150, 140, 60, 70, 128, 128))
+    where, depth = projected(projection(Cameras.of([camera]), 128), cell_centers(8))
+    pixels, depths = camera.project(cell_centers(8).numpy())
+    np.testing.assert_allclose((where[0].numpy() + 1) * 64, pixels, atol=1e-3)
+    np.testing.assert_allclose(depth[0].numpy(), depths, atol=1e-5)
+
+
+def test_a_map_is_sampled_at_the_centres_of_its_pixels():
+    maps = torch.arange(16.0).reshape(1, 1, 4, 4)
+    centers = torch.tensor([[[-0.75, -0.75], [0.75, -0.75], [-0.25, 0.75]]])
+    assert_close(sampled(maps, centers)[0, 0], torch.tensor([0.0, 3.0, 13.0]))
+
+
+def test_what_views_agree_on_are_their_mean_spread_and_extremes():
+    known = no_views(1, 1, 1, torch.device('cpu'))
+    for value, weight in ((3.0, 1.0), (7.0, 0.0), (-1.0, 1.0)):
+        known = gathered(known, torch.full((1, 1, 1), value), torch.full((1, 1, 1), weight))
+    mean, spread, most, least, share = statistics(known).flatten().tolist()
+    assert (mean, most, least, share) == (1, 3, -1, 0.5)
+    assert spread == pytest.approx((4 + 0.01) ** 0.5)
+
+
+def test_folded_cells_unfold_into_the_same_places():
+    cells = torch.rand(2, 3, 8, 8, 8)
+    assert_close(unfolded(folded(cells)), cells)
+    assert folded(cells)[1, 8 + 5, 1, 2, 3] == cells[1, 1, 3, 4, 7]  # 5 is x and z
+
+
+@torch.inference_mode()
+def test_a_cell_beyond_a_silhouette_is_emptier_by_the_hull_alone(lifting):
+    for part in (lifting.decoder.to_64, lifting.decoder.to_32):
+        torch.nn.init.zeros_(part.weight)
+        torch.nn.init.zeros_(part.bias)
+    maps = lifting.maps(some_images(1))
+    only_left = torch.full((1, 1, 128, 128), 6.0)
+    only_left[..., 64:] = -6.0
+    front = cameras_at((0, 0, 2.1))
+    state = lifting.look_up(Maps(maps.coarse, maps.fine, maps.seen, only_left), front,
+                            lifting.initial_state(1))
+    logits = lifting.decode(state)[0]
+    # Seen from +x, the image's left is -y
+    assert (logits[:, 40:].amax() < -2) and (logits[:, :24].amin() > -0.1)
+
+
+def test_gradients_reach_every_weight(lifting):
+    images = some_images(2)
+    state = lifting.initial_state(2)
+    maps = lifting.maps(images)
+    for cameras in (VIEWS.rows(slice(0, 2)), VIEWS.rows(slice(1, 3))):
+        state = lifting.look_up(maps, cameras, state)
+    logits, rough = lifting.logits(state)
+    (logits.square().mean() + rough.square().mean() + maps.foreground.mean()).backward()
+    lacking = [name for name, weight in lifting.named_parameters()
+               if weight.grad is None or not weight.grad.any()]
+    assert lacking == []
+
+
+@torch.inference_mode()
+def test_half_precision_changes_little(lifting):
+    images = some_images(1)
+    exact = lifting.decode(after(lifting, images, VIEWS, [0])).sigmoid()
+    with torch.autocast('cpu', torch.bfloat16):
+        half = lifting.decode(after(lifting, images, VIEWS, [0])).sigmoid()
+    assert (exact - half).abs().mean() < 0.02
+
+
+def test_sizes_that_make_no_network_are_refused():
+    with pytest.raises(ConfigError, match='channels of 1 or more'):
+        LiftingConfig(head_channels=0)

@@ -1,0 +1,136 @@
+"""Batches in which images, cameras and voxels agree however they are turned, and what learns."""
+
+from contextlib import nullcontext
+
+from active_recon.config import LossConfig
+from active_recon.datasets.drawn_cameras import Viewing
+from active_recon.datasets.layout import list_objects
+from active_recon.datasets.making import make_dataset, shape_jobs
+from active_recon.datasets.views import read_views
+from active_recon.models.carving import Carving
+from active_recon.models.lifting import Lifting, LiftingConfig
+from active_recon.models.network import Cameras
+from active_recon.training.appearance import misplaced, pictured
+from active_recon.training.lifting import (
+    draw_posed_batch,
+    LiftingLearner,
+    train_lifting,
+    turned_by_quarters,
+)
+from active_recon.training.loop import make_fabric, Run, TrainingConfig
+from active_recon.voxels import iou
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+TINY = LiftingConfig(encoder_channels=(8, 8, 8, 8), pyramid_channels=8, coarse_hidden=8,
+                     coarse_channels=4, fine_channels=2, volume_channels=(8, 8, 8),
+                     head_channels=4)
+LOSS = LossConfig(1, 0, 'bce+dice')
+
+
+@pytest.fixture(scope='module')
+def seen_anyhow(tmp_path_factory):
+    """Return four chairs at any yaw, each seen by eight cameras of any kind."""
+    out = tmp_path_factory.mktemp('any')
+    list(make_dataset(shape_jobs('chair', range(4), out), 1, fine=True,
+                      viewing=Viewing('any', 8, turned=True)))
+    return read_views(list_objects(out), resolution=64, image_size=128, framed=True)
+
+
+def carved(batch):
+    """Return what the true silhouettes of a batch leave, (B, 64, 64, 64) bool."""
+    network = Carving(0)
+    state = network.initial_state(len(batch.voxels))
+    for alpha, image, number in zip(batch.alpha, batch.images, range(len(batch.images)),
+                                    strict=True):
+        shown = torch.cat([alpha[:, None].expand(-1, 3, -1, -1) * image[:, 3:], image[:, 3:]], 1)
+        state = network.step(shown, batch.cameras.rows(number), state)
+    return network.decode(state) > 0
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_mirrored_and_turned_batches_still_agree_with_their_voxels(seen_anyhow, seed):
+    batch = draw_posed_batch(seen_anyhow, 6, 5, np.random.default_rng(seed), varied=False)
+    left, truth = carved(batch), batch.voxels > 0
+    assert ((left & truth).sum((1, 2, 3)) > 0.85 * truth.sum((1, 2, 3))).all()
+    astray = carved(type(batch)(batch.images, batch.cameras.turned(torch.full((5, 6), 0.8)),
+                                batch.alpha, batch.voxels, batch.objects))
+    better = iou(left, truth) - iou(astray, truth)
+    assert better.min() > 0 and better.mean() > 0.08
+
+
+def test_voxels_turn_counter_clockwise():
+    voxels = torch.zeros(4, 4, 2)
+    voxels[3, 1, 0] = 1  # towards +x
+    assert turned_by_quarters(voxels, 1)[2, 3, 0] == 1  # towards +y
+
+
+def test_the_same_seed_draws_the_same_batch(seen_anyhow):
+    first, again, other = (draw_posed_batch(seen_anyhow, 2, 2, np.random.default_rng(seed))
+                           for seed in (1, 1, 2))
+    assert_close(first.images, again.images)
+    assert_close(first.cameras.poses, again.cameras.poses)
+    assert not torch.equal(first.images, other.images)
+
+
+def test_pictures_are_in_range_and_lose_only_what_they_say(seen_anyhow):
+    objects, chosen = torch.arange(4).expand(3, 4), torch.arange(3)[:, None].expand(3, 4)
+    seen = seen_anyhow.seen[objects, chosen]
+    pictures = pictured(seen_anyhow.images[objects, chosen], seen, seen_anyhow,
+                        np.random.default_rng(0))
+    assert pictures.shape == (3, 4, 4, 128, 128)
+    assert pictures.min() >= 0 and pictures.max() <= 1
+    assert not (pictures[:, :, 3] > seen).any()
+    assert not pictures[:, :, :3][(pictures[:, :, 3:] == 0).expand(-1, -1, 3, -1, -1)].any()
+
+
+def test_poses_are_off_by_a_degree_and_a_hundredth_at_most(seen_anyhow):
+    objects, chosen = torch.arange(4).repeat(5), torch.arange(20) % 8
+    cameras = seen_anyhow.cameras(objects, chosen)
+    cameras = Cameras(*(part[None] for part in cameras))
+    off = misplaced(cameras, np.random.default_rng(0))
+    turn = cameras.poses[..., :3, :3].transpose(-1, -2) @ off.poses[..., :3, :3]
+    angles = torch.rad2deg(((turn.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2).clamp(-1, 1).acos())
+    assert 0.3 < angles.max() <= 1.0001
+    assert 0.2 < (angles < 1e-4).double().mean() < 0.8  # half of them stay where they are
+    moved = (off.poses - cameras.poses)[..., :3, 3].norm(dim=-1)
+    assert 0 < (moved / cameras.poses[..., :3, 3].norm(dim=-1)).max() <= 0.01 + 1e-9
+
+
+def learned_from(seen_anyhow, path, steps, until=None, resume=False):
+    torch.manual_seed(0)
+    network = Lifting.from_config(TINY)
+    config = TrainingConfig(steps, 2, 3e-3, 2, bfloat16=False, warm_up=1, checkpoint_every=2,
+                            validate_every=100)
+    train_lifting(network, seen_anyhow, config, LOSS,
+                  Run(make_fabric(False), path, lambda step, measured: None, resume, until),
+                  lambda model: {})
+    return network
+
+
+def test_a_training_that_was_cut_off_goes_on_as_if_it_was_not(seen_anyhow, tmp_path):
+    whole = learned_from(seen_anyhow, tmp_path / 'whole.safetensors', 4)
+    learned_from(seen_anyhow, tmp_path / 'cut.safetensors', 4, until=2)
+    resumed = learned_from(seen_anyhow, tmp_path / 'cut.safetensors', 4, resume=True)
+    for name, weight in whole.state_dict().items():
+        assert_close(resumed.state_dict()[name], weight, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize('bfloat16', [False, True])
+def test_the_losses_fall(seen_anyhow, bfloat16):
+    torch.manual_seed(0)
+    learner = LiftingLearner(Lifting.from_config(TINY), LOSS)
+    optimizer = torch.optim.AdamW(learner.parameters(), 5e-3)
+    batch = draw_posed_batch(seen_anyhow, 2, 2, np.random.default_rng(0), varied=False)
+    heard = []
+    for _ in range(12):
+        with torch.autocast('cpu', torch.bfloat16) if bfloat16 else nullcontext():
+            losses = learner(batch.images, batch.cameras, batch.alpha, batch.voxels)
+        optimizer.zero_grad()
+        losses['loss'].backward()
+        optimizer.step()
+        heard.append({name: value.item() for name, value in losses.items()})
+    assert heard[-1]['loss'] < 0.9 * heard[0]['loss']
+    assert heard[-1]['silhouette'] < heard[0]['silhouette']
