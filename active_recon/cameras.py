@@ -64,12 +64,6 @@ class Intrinsics:
         """K of the paper's section 3.2, (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
 
-    @classmethod
-    def from_matrix(cls, matrix: NDArray[np.float64], width: int, height: int) -> 'Intrinsics':
-        """Return the pinhole of a matrix K, (3, 3), on an image of a size in pixels."""
-        return cls(float(matrix[0, 0]), float(matrix[1, 1]), float(matrix[0, 2]),
-                   float(matrix[1, 2]), width, height)
-
     def resized(self, width: int, height: int) -> 'Intrinsics':
         """Return the same lens seen on an image of another size."""
         across, down = width / self.width, height / self.height

@@ -63,16 +63,19 @@ class Policy(Protocol):
 
 def distance_to_taken(seen: Observation) -> NDArray[np.float64]:
     """Return how far each candidate is from the nearest view taken, (B, K), radians."""
-    gaps = direction_distance(pose_directions(seen.candidates)[:, :, None],
-                              pose_directions(seen.taken)[:, None])
-    nearest: NDArray[np.float64] = gaps.min(axis=2)
+    nearest: NDArray[np.float64] = _gaps(seen).min(axis=2)
     return nearest
 
 
 def is_fresh(seen: Observation) -> NDArray[np.bool_]:
     """Return which candidates are nearest to no view taken, (B, K)."""
-    gaps = direction_distance(pose_directions(seen.candidates)[:, :, None],
-                              pose_directions(seen.taken)[:, None])
+    gaps = _gaps(seen)
     fresh = np.ones(gaps.shape[:2], np.bool_)
     np.put_along_axis(fresh, gaps.argmin(axis=1), False, axis=1)
     return fresh
+
+
+def _gaps(seen: Observation) -> NDArray[np.float64]:
+    """Return how far each candidate is from each view taken, (B, K, t), radians."""
+    return direction_distance(pose_directions(seen.candidates)[:, :, None],
+                              pose_directions(seen.taken)[:, None])

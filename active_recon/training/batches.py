@@ -40,10 +40,7 @@ def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
     mirrored = torch.from_numpy(rng.random(size) < 0.5)
     images = views.images[objects, chosen]
     images[:, mirrored] = images[:, mirrored].flip(-2)
-    cameras = views.cameras(objects, chosen)
-    cameras = Cameras(*(torch.where(mirrored[:, None, None], other, own)
-                        for own, other in zip(cameras, mirror(cameras, images.shape[2]),
-                                              strict=True)))
+    cameras = mirror_some(views.cameras(objects, chosen), mirrored, images.shape[2])
     if varied:
         pictures, moved = vary(images, cameras.intrinsics, views, rng)
         cameras = Cameras(cameras.poses, moved)
@@ -53,6 +50,12 @@ def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
     voxels = views.voxels[objects].float()
     voxels[mirrored] = voxels[mirrored].flip(2)
     return Batch(pictures, cameras, voxels, objects)
+
+
+def mirror_some(cameras: Cameras, mirrored: Tensor, image_size: int) -> Cameras:
+    """Return cameras (T, B, ...), those of some sequences, (B,) bool, mirrored; see `mirror`."""
+    return Cameras(*(torch.where(mirrored[:, None, None], other, own) for own, other
+                     in zip(cameras, mirror(cameras, image_size), strict=True)))
 
 
 def mirror(cameras: Cameras, image_size: int) -> Cameras:

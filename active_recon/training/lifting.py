@@ -9,7 +9,7 @@ from active_recon.models.lifting import Lifting
 from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.training.appearance import misplaced, pictured
-from active_recon.training.batches import mirror
+from active_recon.training.batches import mirror_some
 from active_recon.training.loop import (
     Draw,
     Measured,
@@ -19,7 +19,7 @@ from active_recon.training.loop import (
     TrainingConfig,
 )
 from active_recon.training.losses import volume_loss
-from active_recon.training.supervised import longest_sequence
+from active_recon.training.supervised import drawn_length
 import numpy as np
 import torch
 from torch import nn, Tensor
@@ -64,9 +64,7 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
             else views.seen[objects, chosen])
     images[:, mirrored] = images[:, mirrored].flip(-2)
     seen[:, mirrored] = seen[:, mirrored].flip(-1)
-    cameras = views.cameras(objects, chosen)
-    cameras = Cameras(*(torch.where(mirrored[:, None, None], other, own) for own, other
-                        in zip(cameras, mirror(cameras, images.shape[2]), strict=True)))
+    cameras = mirror_some(views.cameras(objects, chosen), mirrored, images.shape[2])
     cameras = cameras.turned(torch.from_numpy(quarters * np.pi / 2).expand(length, size))
     voxels = views.voxels[objects].float()
     voxels[mirrored] = voxels[mirrored].flip(2)
@@ -127,9 +125,7 @@ def train_lifting(
     size = share_of_batch(config, run.fabric)
 
     def draw(step: int) -> Draw:
-        shared = np.random.default_rng([config.seed, step])
-        length = int(shared.integers(1, longest_sequence(step, config) + 1))
-        own = np.random.default_rng([config.seed, step, run.fabric.global_rank])
+        length, own = drawn_length(step, config, run.fabric.global_rank)
         batch = draw_posed_batch(views, size, length, own, config.varied)
         return Draw((batch.images, batch.cameras, batch.alpha, batch.voxels), batch.objects)
 

@@ -75,6 +75,18 @@ def longest_sequence(step: int, config: TrainingConfig) -> int:
     return min(2, config.max_views) if short else config.max_views
 
 
+def drawn_length(step: int, config: TrainingConfig,
+                 rank: int) -> tuple[int, np.random.Generator]:
+    """
+    Return how many views the sequences of a step have, and what its other draws come from.
+
+    The length is the same for every process; the generator is that of the process of a rank.
+    """
+    shared = np.random.default_rng([config.seed, step])
+    length = int(shared.integers(1, longest_sequence(step, config) + 1))
+    return length, np.random.default_rng([config.seed, step, rank])
+
+
 def steps_for(samples: int, batch_size: int, max_views: int, short_share: float = 0.5) -> int:
     """Return the steps in which a training sees about so many views."""
     return max(1, round(samples / (batch_size * mean_length(max_views, short_share))))
@@ -94,9 +106,7 @@ def train_reconstruction(
     size = share_of_batch(config, run.fabric)
 
     def draw(step: int) -> Draw:
-        shared = np.random.default_rng([config.seed, step])
-        length = int(shared.integers(1, longest_sequence(step, config) + 1))
-        own = np.random.default_rng([config.seed, step, run.fabric.global_rank])
+        length, own = drawn_length(step, config, run.fabric.global_rank)
         batch = draw_batch(views, size, length, own, config.varied)
         seen_from = torch.from_numpy(own.integers(len(AZIMUTHS), size=size))
         return Draw((batch.images, batch.cameras, batch.voxels, seen_from), batch.objects)
