@@ -68,7 +68,7 @@ setup(
     extras_require={
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'test': [
-            'mcap-ros2-support>=0.5.5', 'pymcap-cli>=0.30', 'pytest>=8', 'rosless>=0.5',
-            'selenium>=4.20', 'setuptools>=70.1'],
+            'mcap-ros2-support>=0.5.5', 'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',
+            'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

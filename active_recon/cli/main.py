@@ -13,6 +13,7 @@ from active_recon.cli.record_sweep import record_sweep
 from active_recon.cli.replay import replay
 from active_recon.cli.report import report
 from active_recon.cli.sheet import sheet
+from active_recon.cli.study import study
 from active_recon.cli.train import train
 from active_recon.cli.up import up
 from active_recon.cli.view import view
@@ -23,7 +24,7 @@ app = typer.Typer(
     help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 for command in (demo, up, calibrate, view, report, replay, play, record_sweep, render, train,
-                evaluate, paper, sheet):
+                evaluate, study, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

@@ -1,0 +1,171 @@
+"""`active-recon study`: what networks are worth on posed views, beside each other."""
+
+from collections.abc import Mapping
+import json
+from pathlib import Path
+import shlex
+import sys
+from typing import Annotated, Any
+
+from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
+import typer
+
+_SHIPPED = ('lifting', 'carving', '2d3d-attention')
+
+
+def study(
+    data: Annotated[list[Path] | None, typer.Argument(
+        help="Folders of objects in R2N2's layout, each measured by itself; such as "
+             '`active-recon render` and `dataset build` make, or R2N2 itself.')] = None,
+    models: Annotated[str | None, typer.Option(
+        help='Networks, separated by commas: models that ship, .safetensors files, or NAME=FILE. '
+             'How far the first is ahead of each other is told, object by object. Default: '
+             f'{",".join(_SHIPPED)}, as far as they ship.')] = None,
+    photos: Annotated[Path | None, typer.Option(
+        help="A folder of calibrated photographs in Middlebury's format: *_par.txt with the "
+             'cameras, README.txt with the two corners of the box; masks/ with an image for each '
+             'where the background is not black. They are held against the hull of all '
+             'silhouettes.')] = None,
+    box: Annotated[str | None, typer.Option(
+        help="The photographed object's least and greatest x, y, z, six numbers in quotes, where "
+             'the folder does not tell them.')] = None,
+    up: Annotated[str, typer.Option(
+        help="The axis of the photographs' frame that points up: x, y, z, or with a sign.")] = 'y',
+    counts: Annotated[str, typer.Option(
+        help='Numbers of views after which the reconstruction is measured.')] = '1,2,3,5,8,12,24',
+    surfaces: Annotated[str, typer.Option(
+        help="Those of them after which meshes are compared with the truth's: F-scores, Chamfer "
+             "distance, normals. '' for none.")] = '1,5',
+    validation: Annotated[Path | None, typer.Option(
+        help='Folder of other objects, on which thresholds and temperatures are chosen; default: '
+             "the threshold of each model's card, and no temperature.")] = None,
+    training: Annotated[list[Path] | None, typer.Option(
+        help='Training folders: adds the nearest training image, an answer that knows nothing of '
+             'detail (may be given several times).')] = None,
+    objects: Annotated[int | None, typer.Option(
+        min=2, help='At most so many objects of a folder, drawn; default: all.')] = None,
+    category: Annotated[str | None, typer.Option(
+        help="Objects of these categories alone, as a pattern: 'thing_*', or '!thing_*' for all "
+             'others.')] = None,
+    disturbed_views: Annotated[int, typer.Option(
+        min=0, help='Views of what is disturbed: frames at 24 yaws, poses off by 2 degrees, a '
+                    'third of the cube outside one image, one band of elevations alone. 0 leaves '
+                    'that out.')] = 5,
+    disturbed_objects: Annotated[int, typer.Option(
+        min=1, help='Objects of which views are disturbed, at most.')] = 48,
+    out: Annotated[Path, typer.Option(
+        help='Folder where study.json, study.md and a PNG for each set go.')] = Path('study'),
+    seed: Annotated[int, typer.Option(help='Draws objects, views and disturbances.')] = 0,
+    bf16: Annotated[bool, typer.Option(
+        help='Half precision where it is safe: half the time.')] = True,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+) -> None:
+    """
+    Measure networks on the same posed views, by number of views, with 95 % intervals.
+
+    IoU at 64 and 32 cells after random and evenly spread views; meshes, thin parts, calibration
+    near the surface, and what a threshold for each object gains; what is lost where views are
+    disturbed; and real photographs. Networks without a front (lifting, carving) take any
+    cameras; those of the paper join in on turntables.
+
+    For example:
+
+      active-recon study data/val --models lifting,carving --out build/val
+
+      active-recon study --photos photos/dino_sparse_ring --models new=runs/weights.safetensors
+    """
+    from active_recon.datasets.layout import list_objects
+    from active_recon.evaluation.posed.entrants import load_entrants
+    from active_recon.evaluation.posed.measuring import Plan
+    from active_recon.evaluation.posed.retrieval import read_library
+    from active_recon.evaluation.posed.study import choose_on, Extent, study_set
+    import torch
+
+    if not data and photos is None:
+        raise ConfigError('study: expected folders of objects, or --photos with a folder of '
+                          'photographs, got neither')
+    torch.set_num_threads(threads)
+    plan = Plan(_numbers('counts', counts), _numbers('surfaces', surfaces), seed, bf16)
+    extent = Extent(category, objects, disturbed_views, disturbed_objects)
+    entrants = load_entrants(models or _those_that_ship())
+    if validation is not None:
+        if any(validation.resolve() == each.resolve() for each in data or []):
+            raise ConfigError(f'validation: expected other objects than those measured, got '
+                              f'{validation} for both')
+        entrants = choose_on(validation, entrants, plan, Extent(most=objects), progress_bar)
+    library = None
+    if training and data:
+        folders = [folder for root in training for folder in list_objects(root)]
+        with progress_bar('reading training images', len(folders)) as advance:
+            library = read_library(folders, lambda done: advance(done, ''))
+    result: dict[str, Any] = {'command': shlex.join(['active-recon', *sys.argv[1:]]),
+                              'sets': []}
+    for folder in data or []:
+        result['sets'].append(study_set(folder, entrants, plan, extent, library, progress_bar))
+        _write(result, out)  # what is done is kept, should a later folder fail
+    if photos is not None:
+        result['photographs'] = _photographs(photos, box, up, entrants)
+    _write(result, out)
+    for name in sorted(path.name for path in out.glob('study*')):
+        typer.echo(f'wrote {out / name}')
+
+
+def _those_that_ship() -> str:
+    from active_recon.weights_files import FOLDER
+
+    return ','.join(name for name in _SHIPPED if (FOLDER / f'{name}.safetensors').is_file())
+
+
+def _numbers(option: str, text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in text.split(',') if part.strip())
+    except ValueError as error:
+        raise ConfigError(f'{option}: expected whole numbers, separated by commas, got '
+                          f'{text!r}') from error
+
+
+def _photographs(folder: Path, box: str | None, up: str, entrants: list[Any]) -> dict[str, Any]:
+    from active_recon.datasets.middlebury import read_photographs
+    from active_recon.evaluation.posed.photographs import BACKGROUNDS, photograph_figures
+
+    try:
+        corners = None if box is None else [float(part) for part in box.replace(',', ' ').split()]
+    except ValueError as error:
+        raise ConfigError(f'box: expected six numbers, got {box!r}') from error
+    photographs = read_photographs(folder, corners, up)
+    with progress_bar('photographs', len(entrants) * len(BACKGROUNDS)) as advance:
+        return photograph_figures(photographs, entrants, advance=lambda done: advance(done, ''))
+
+
+def _write(result: Mapping[str, Any], out: Path) -> None:
+    from active_recon.evaluation.posed.summary import markdown
+
+    out.mkdir(parents=True, exist_ok=True)
+    (out / 'study.json').write_text(json.dumps(result, indent=1) + '\n')
+    (out / 'study.md').write_text(markdown(result))
+    for number, figures in enumerate(result['sets']):
+        _draw(figures, out / f'study-{number}-{Path(figures["data"]).name}.png')
+
+
+def _draw(figures: Mapping[str, Any], path: Path) -> None:
+    """Draw IoU over the number of views, at 64 and 32 cells, random and even, with bands."""
+    from active_recon.evaluation.statistics import Interval
+    from active_recon.paper.plotting import canvas, curves, drawn
+    import cv2
+
+    with canvas(11, 7, columns=2, rows=2) as (figure, grid):
+        for row, kind in enumerate(('random', 'even')):
+            for axes, side in zip(grid[row], (64, 32), strict=True):
+                lines = {model: [Interval(each['mean'], each['low'], each['high'])
+                                 for each in own[kind][f'iou_{side}'] if each is not None]
+                         for model, own in figures['models'].items()
+                         if f'iou_{side}' in own.get(kind, {})}
+                if lines:
+                    curves(axes, figures['counts'], lines, f'{kind} views',
+                           f'IoU at {side} cells')
+                else:
+                    axes.set_visible(False)
+        figure.suptitle(f'{Path(figures["data"]).name}: {figures["objects"]} objects')
+        picture = drawn(figure)
+    cv2.imwrite(str(path), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))

@@ -1,0 +1,148 @@
+"""
+Calibrated photographs in Middlebury's format: images, cameras and a box, in one folder.
+
+    *_par.txt    the number of images, then a line each: name, K, R and t, row by row; R and t are
+                 the frame's in the camera, whose pixels count from the first one's centre
+    README.txt   two lines `(x y z)`: the corners of the object's box
+    masks/       optional: an image for each, under its name, bright where the object is; without
+                 them, what is not black is taken for the object
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+from active_recon.cameras import Camera, Intrinsics
+from active_recon.errors import ConfigError, DataError, ViewError
+from active_recon.meshes import upright
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+MARGIN = 1.09  # the cube's side over the box's longest
+_NUMBERS = 21  # K, R, t
+_DARK = 0.19  # what is no brighter is background
+_GROWN, _SHRUNK = 10, 7  # pixels by which a mask is dilated, then eroded: dark spots close
+_CORNER = re.compile(r'^\s*\(\s*(\S+)\s+(\S+)\s+(\S+)\s*\)\s*$', re.MULTILINE)
+_FRONTS = {'x': 'y', 'y': 'x', 'z': 'x'}
+
+
+@dataclass(frozen=True, eq=False)
+class PosedPhotographs:
+    """
+    V photographs of one object, whose cube has the side 1 in its frame.
+
+    - images: (H, W, 3) uint8 RGB each; masks: (H, W) bool each, where the object is
+    """
+
+    folder: Path
+    names: tuple[str, ...]
+    images: tuple[NDArray[np.uint8], ...]
+    masks: tuple[NDArray[np.bool_], ...]
+    cameras: tuple[Camera, ...]
+
+    def __len__(self) -> int:
+        """Return the number of photographs."""
+        return len(self.images)
+
+
+def read_photographs(folder: Path, box: Sequence[float] | None = None,
+                     up: str = 'y') -> PosedPhotographs:
+    """
+    Read photographs in Middlebury's format.
+
+    `box` holds the object's least and greatest x, y, z in the cameras' frame, None reads them from
+    README.txt; `up` is that frame's axis that points up. Raises DataError where a file is missing
+    or says something else, ConfigError on a box that is none.
+    """
+    files = sorted(folder.glob('*_par.txt'))
+    if len(files) != 1:
+        raise DataError(f'{folder}: expected one file *_par.txt with the cameras, found '
+                        f'{len(files)}')
+    least, greatest = _box(folder, box)
+    side = MARGIN * float((greatest - least).max())
+    turn = upright(up, _FRONTS.get(up.lstrip('+-'), 'x'))
+    names, images, masks, cameras = [], [], [], []
+    for number, line in enumerate(files[0].read_text().splitlines()[1:], start=2):
+        if not line.strip():
+            continue
+        name, numbers = _fields(files[0], number, line)
+        images.append(_image(folder / name))
+        masks.append(_mask(folder / 'masks' / name, images[-1]))
+        names.append(name)
+        try:
+            cameras.append(_camera(numbers, turn, (least + greatest) / 2, side,
+                                   images[-1].shape))
+        except ViewError as error:
+            raise DataError(f'{files[0]}, line {number}: {error}') from error
+    if not images:
+        raise DataError(f'{files[0]}: expected a line for each image, got none')
+    return PosedPhotographs(folder, tuple(names), tuple(images), tuple(masks), tuple(cameras))
+
+
+def _box(folder: Path, box: Sequence[float] | None) -> NDArray[np.float64]:
+    """Return the least and the greatest corner, (2, 3)."""
+    if box is None:
+        told = [found for path in sorted(folder.glob('README*'))
+                for found in _CORNER.findall(path.read_text(errors='replace'))]
+        if len(told) != 2:
+            raise DataError(f"{folder}: expected the corners of the object's box as two lines "
+                            f'(x y z) in README.txt, found {len(told)}; give them by --box')
+        box = [float(number) for corner in told for number in corner]
+    corners = np.array(box, np.float64)
+    if corners.size != 6 or not np.isfinite(corners).all() or (
+            corners[:3] >= corners[3:]).any():
+        raise ConfigError('box: expected the least x, y, z and then the greatest, six numbers, '
+                          f'got {" ".join(map(str, box))}')
+    return corners.reshape(2, 3)
+
+
+def _fields(path: Path, number: int, line: str) -> tuple[str, NDArray[np.float64]]:
+    name, *rest = line.split()
+    try:
+        numbers = np.array(rest, np.float64)
+    except ValueError:
+        numbers = np.empty(0)
+    if numbers.size != _NUMBERS or not np.isfinite(numbers).all():
+        raise DataError(f'{path}, line {number}: expected a name and {_NUMBERS} numbers (K, R, '
+                        f't), got {line[:60]!r}')
+    return name, numbers
+
+
+def _camera(numbers: NDArray[np.float64], turn: NDArray[np.float64],
+            centre: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Camera:
+    lens, rotation, moved = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3), numbers[18:]
+    if abs(lens[0, 1]) > 1e-3 * lens[0, 0] or min(lens[0, 0], lens[1, 1]) <= 0:
+        raise ViewError('expected focal lengths above 0 and no skew, got the lens '
+                        f'{lens.tolist()}')
+    left, _, right = np.linalg.svd(rotation)
+    if not np.allclose(left @ right, rotation, atol=1e-3):
+        raise ViewError(f'expected a rotation, got {rotation.tolist()}')
+    rotation = left @ right  # to the last bit, which files round off
+    pose = np.eye(4)
+    pose[:3, :3] = turn @ rotation.T
+    pose[:3, 3] = turn @ (-rotation.T @ moved - centre) / side
+    return Camera(pose, Intrinsics(lens[0, 0], lens[1, 1], lens[0, 2] + 0.5, lens[1, 2] + 0.5,
+                                   shape[1], shape[0]))
+
+
+def _image(path: Path) -> NDArray[np.uint8]:
+    bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if bgr is None:
+        found = 'no whole image' if path.is_file() else 'no file'
+        raise DataError(f'{path}: expected a photograph, found {found}')
+    return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)
+
+
+def _mask(path: Path, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    if path.is_file():
+        mask = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if mask is None or mask.shape != image.shape[:2]:
+            raise DataError(f'{path}: expected a mask of {image.shape[1]} x {image.shape[0]} '
+                            f'pixels, got {None if mask is None else mask.shape[::-1]}')
+        return np.asarray(mask > 127)
+    bright = (image.max(axis=2) > _DARK * 255).astype(np.uint8)
+    grown, shrunk = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2)
+                     for reach in (_GROWN, _SHRUNK))
+    return np.asarray(cv2.erode(cv2.dilate(bright, grown), shrunk) > 0)

@@ -1,0 +1,73 @@
+"""Whether occupancies are the probabilities that they look like, where that can be missed."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.optimize import minimize_scalar
+
+Cells = NDArray[np.bool_]
+BINS = 15
+REACH = 2  # cells
+_COLDEST, _HOTTEST = 0.05, 20.0
+
+
+def near_surface(truth: Cells, reach: int = REACH) -> Cells:
+    """
+    Return the cells within `reach` cells of the boundary of a shape, (X, Y, Z).
+
+    Far from it everything is surely full or empty, which would flatter any calibration. What lies
+    beyond the cube is empty.
+    """
+    return np.asarray(binary_dilation(truth, iterations=reach)
+                      & ~binary_erosion(truth, iterations=reach))
+
+
+def brier(occupancy: NDArray[np.floating], truth: Cells) -> float:
+    """Return the mean squared error of occupancies (N,) against the truth (N,), in [0, 1]."""
+    return float(np.square(occupancy - truth).mean())
+
+
+def reliability(occupancy: NDArray[np.floating], truth: Cells,
+                bins: int = BINS) -> NDArray[np.float64]:
+    """
+    Return a reliability diagram of occupancies (N,) in [0, 1], (3, bins).
+
+    For each of equally wide bins: how many cells it has, the sum of their occupancies, and how
+    many of them are full. Diagrams of several objects add up.
+    """
+    place = np.minimum((occupancy * bins).astype(np.intp), bins - 1)
+    return np.stack([np.bincount(place, weights, bins).astype(np.float64)
+                     for weights in (None, occupancy, truth)])
+
+
+def calibration_error(diagram: NDArray[np.float64]) -> float:
+    """Return the expected calibration error of a diagram (3, bins): 0 is perfect, 1 the worst."""
+    count, told, full = diagram
+    return float(np.abs(told - full).sum() / count.sum()) if count.any() else 0.0
+
+
+def fit_temperatures(logits_by_count: Mapping[int, NDArray[np.floating]],
+                     truth: Cells) -> dict[int, float]:
+    """
+    Return for each number of views the temperature that makes logits most likely.
+
+    Takes the logits of the same cells (N,) after each number of views, and their truth (N,); what
+    divides the logits is the temperature: above 1 where they are too sure. It minimises the
+    negative log-likelihood, which has one minimum.
+    """
+    return {count: _temperature(np.asarray(logits, np.float64), truth)
+            for count, logits in logits_by_count.items()}
+
+
+def negative_log_likelihood(logits: NDArray[np.floating], truth: Cells) -> float:
+    """Return the mean negative log-likelihood of the truth (N,) under logits (N,), in nats."""
+    return float(np.logaddexp(0, np.where(truth, -logits, logits)).mean())
+
+
+def _temperature(logits: NDArray[np.float64], truth: Cells) -> float:
+    found = minimize_scalar(
+        lambda log: negative_log_likelihood(logits * np.exp(-log), truth),
+        bounds=(np.log(_COLDEST), np.log(_HOTTEST)), method='bounded', options={'xatol': 1e-4})
+    return float(np.exp(found.x))

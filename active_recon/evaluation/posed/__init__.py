@@ -1,0 +1,1 @@
+"""What networks are worth that take posed views: on sets of objects, disturbed, on photographs."""

@@ -1,0 +1,100 @@
+"""Thresholds and temperatures, chosen on validation objects and never on those measured."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from active_recon.evaluation.calibration import fit_temperatures
+from active_recon.evaluation.metrics import THRESHOLDS
+from active_recon.evaluation.posed.entrants import Entrant
+from active_recon.evaluation.posed.measuring import logits_of, orders_of, Plan, targets_of
+from active_recon.evaluation.posed.scene import Scene
+from active_recon.evaluation.posed.scoring import iou_scores, Target
+from active_recon.evaluation.rollouts import batches
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logit
+
+_BATCH = 4
+_CELLS = 2000  # of each object, near its surface and anywhere
+
+
+@dataclass(eq=False)
+class _Cells:
+    """Some cells of every object: logits by number of views, and the truth."""
+
+    logits: dict[int, list[NDArray[np.float32]]]
+    truth: list[NDArray[np.bool_]]
+
+    def temperatures(self) -> dict[int, float]:
+        """Return the temperatures that make these cells most likely."""
+        if not all(self.logits.values()):
+            return {}
+        return fit_temperatures({count: np.concatenate(parts)
+                                 for count, parts in self.logits.items()},
+                                np.concatenate(self.truth))
+
+
+@dataclass(eq=False)
+class _Heard:
+    """What validation objects tell of an entrant: IoU at thresholds, and some cells."""
+
+    iou: dict[int, NDArray[np.float64]]  # by cells a side, a sum over objects and counts
+    near: _Cells
+    anywhere: _Cells
+
+
+def choose(scene: Scene, entrants: Sequence[Entrant], plan: Plan, told: str,
+           advance: Callable[[int], None] = lambda done: None) -> list[Entrant]:
+    """
+    Return the entrants with the thresholds and temperatures that are best on validation objects.
+
+    Thresholds have the highest mean IoU over all counts of random views; temperatures make the
+    cells near the surface, or anywhere, most likely. An entrant that the objects cannot be shown
+    to stays as it is. `told` says what it was chosen on.
+    """
+    return [_chosen(scene, entrant, plan, told, advance)
+            if scene.shown_to(entrant.network) is not None else entrant for entrant in entrants]
+
+
+def _chosen(scene: Scene, entrant: Entrant, plan: Plan, told: str,
+            advance: Callable[[int], None]) -> Entrant:
+    counts, orders = plan.within(scene.view_count), orders_of(scene, plan)['random']
+    sides = [side for side in entrant.sides if side in scene.truths]
+    heard = _Heard({side: np.zeros(len(THRESHOLDS)) for side in sides},
+                   _Cells({count: [] for count in counts}, []),
+                   _Cells({count: [] for count in counts}, []))
+    for rows in batches(len(scene), _BATCH):
+        targets = targets_of(scene, rows, surface=False)
+        cells = [_some_cells(truth, plan.seed + row)
+                 for row, truth in zip(rows.tolist(), targets, strict=True)]
+        for truth, own in zip(targets, cells, strict=True):
+            for kind, some in zip((heard.near, heard.anywhere), own, strict=True):
+                kind.truth.append(truth.cells[truth.finest].ravel()[some])
+        steps = logits_of(scene, entrant, rows, orders, plan.bfloat16)
+        for count, logits in zip(counts, steps, strict=True):
+            for one, truth, own in zip(logits, targets, cells, strict=True):
+                _hear(heard, count, one, truth, own, tuple(sides))
+        advance(len(rows))
+    thresholds = dict(entrant.thresholds) | {
+        side: float(THRESHOLDS[total.argmax()]) for side, total in heard.iou.items()}
+    return replace(entrant, thresholds=thresholds, temperatures=heard.near.temperatures(),
+                   grid_temperatures=heard.anywhere.temperatures(), chosen_on=told)
+
+
+def _hear(heard: _Heard, count: int, logits: NDArray[np.float32], truth: Target,
+          cells: tuple[NDArray[np.int64], NDArray[np.int64]], sides: tuple[int, ...]) -> None:
+    for place, threshold in enumerate(THRESHOLDS):
+        at = dict.fromkeys(sides, float(logit(threshold)))
+        for name, value in iou_scores(logits, truth, sides, at, '').items():
+            heard.iou[int(name.strip('_'))][place] += value
+    if len(logits) == truth.finest:
+        for kind, some in zip((heard.near, heard.anywhere), cells, strict=True):
+            kind.logits[count].append(logits.ravel()[some])
+
+
+def _some_cells(truth: Target, seed: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return some cells near a shape's surface and some anywhere, by places in the flat grid."""
+    rng, near = np.random.default_rng(seed), np.flatnonzero(truth.near)
+    if len(near) > _CELLS:
+        near = rng.choice(near, _CELLS, replace=False)
+    return near, rng.integers(truth.near.size, size=_CELLS)

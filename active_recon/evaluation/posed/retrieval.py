@@ -1,0 +1,76 @@
+"""The nearest training image of posed views: an answer that knows nothing of an image's detail."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.views import read_views
+from active_recon.evaluation.baselines import thumbnails
+from active_recon.evaluation.posed.scene import IMAGE_SIZE, Scene
+from active_recon.evaluation.posed.scoring import Scores
+from active_recon.voxels import iou, RESOLUTION, turned
+import numpy as np
+from numpy.typing import NDArray
+
+_AT_ONCE = 64  # objects in memory
+
+
+@dataclass(frozen=True, eq=False)
+class Library:
+    """
+    What there is to answer with.
+
+    - images: thumbnails of all views of all objects, (M, 1024)
+    - azimuths: of their cameras, radians, (M,); owners: whose they are, (M,)
+    """
+
+    folders: Sequence[ObjectFolder]
+    images: NDArray[np.float32]
+    azimuths: NDArray[np.float64]
+    owners: NDArray[np.int64]
+
+    def nearest(self, asked: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Return the rows of the images that are nearest to thumbnails (E, 1024), (E,)."""
+        norms = np.square(self.images).sum(axis=1)
+        return np.asarray((norms - 2 * asked @ self.images.T).argmin(axis=1))
+
+
+def read_library(folders: Sequence[ObjectFolder],
+                 advance: Callable[[int], None] = lambda done: None) -> Library:
+    """Read objects, framed as networks get them, and keep their thumbnails alone."""
+    kept: list[ObjectFolder] = []
+    images, azimuths, owners = [], [], []
+    for low in range(0, len(folders), _AT_ONCE):
+        views = read_views(folders[low:low + _AT_ONCE], lambda: advance(1), RESOLUTION, IMAGE_SIZE,
+                           framed=True)
+        small = thumbnails(views)
+        images.append(small.reshape(-1, small.shape[-1]))
+        azimuths.append(views.azimuths.double().numpy().ravel())
+        owners.append(len(kept) + np.repeat(np.arange(len(views)), small.shape[1]))
+        kept += views.folders
+    return Library(kept, np.concatenate(images), np.concatenate(azimuths), np.concatenate(owners))
+
+
+def nearest_image_scores(library: Library, scene: Scene,
+                         chosen: NDArray[np.int64]) -> list[Scores]:
+    """
+    Return the IoU of each object with the shape whose image is nearest to one of its views (N,).
+
+    Frames have any yaw, so that the shape is turned until its camera stands where the object's
+    does; how high the camera stands is not made up for.
+    """
+    rows = np.arange(len(scene))
+    nearest = library.nearest(thumbnails(scene.views)[rows, chosen])
+    azimuths = scene.views.azimuths.double().numpy()[rows, chosen]
+    found = []
+    for row, place in enumerate(nearest):
+        folder = library.folders[library.owners[place]]
+        yaw = float(azimuths[row] - library.azimuths[place])
+        scores = {}
+        for side, truth in scene.truths.items():
+            if not folder.voxels_path(side).is_file():
+                continue
+            shape = turned(folder.voxels(side).occupancy, 0.0 if abs(yaw) < 1e-6 else yaw)
+            scores[f'iou_{side}'] = float(iou(shape > 0.5, truth[row].numpy()))
+        found.append(scores)
+    return found

@@ -1,0 +1,195 @@
+"""What is lost where views are not as they should be: each figure beside that of clean views."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+import math
+from typing import NamedTuple
+
+from active_recon.cameras import pose_directions, TURN
+from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.posed.entrants import Entrant
+from active_recon.evaluation.posed.measuring import orders_of, Plan, targets_of
+from active_recon.evaluation.posed.scene import Scene
+from active_recon.evaluation.posed.scoring import iou_scores, pooled, Scores, Target
+from active_recon.evaluation.posed.walking import some_objects, walk
+from active_recon.evaluation.rollouts import batches, Observer
+from active_recon.models.lifted import cell_centers, projected, projection
+from active_recon.models.network import Cameras
+from active_recon.voxels import turned
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.special import expit
+import torch
+
+YAWS = 24
+POSE_ERROR = math.radians(2)
+CUT_SHARE = 1 / 3
+BANDS_DEG = ((0, 15), (15, 30), (30, 45), (45, 60), (60, 75))
+_BATCH = 4
+
+
+class Found(NamedTuple):
+    """IoU of one object under one disturbance, and without it, by cells a side."""
+
+    name: str
+    row: int
+    disturbed: Scores
+    clean: Scores
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A few objects: as their set shows them, their truths, and the views (B, c) they get."""
+
+    views: ViewSet
+    targets: Sequence[Target]
+    order: NDArray[np.int64]
+
+
+def disturbances(scene: Scene, entrant: Entrant, plan: Plan, count: int, most: int,
+                 advance: Callable[[int], None] = lambda done: None) -> Iterator[Found]:
+    """
+    Yield what becomes of an entrant's IoU after `count` random views, on at most so many objects.
+
+    - `yaw NNN`: the frame turned by as many degrees, the images as they are; the reconstruction
+      is turned back to the truth, since interpolating the truth's cells would lose four times as
+      much as interpolating probabilities. What turned out of the cube is not counted
+    - `poses off by 2 degrees`: each about the object's centre, about an axis of its own
+    - `a third of the cube cut`: of the first view's image, at one of its sides
+    - `elevation A to B`: one view, or three, from there, beside as many from anywhere
+    """
+    shown = scene.shown_to(entrant.network)
+    if shown is None:
+        return
+    orders = orders_of(scene, replace(plan, counts=(min(count, scene.view_count),)))['random'][0]
+    for rows in batches(min(most, len(scene)), _BATCH):
+        block = Block(some_objects(shown, rows), targets_of(scene, rows, surface=False),
+                      orders[rows.numpy()])
+        for kind in (_turned, _off, _cut, _bands):
+            for found in kind(block, entrant, plan):
+                yield found._replace(row=int(rows[found.row]))
+        advance(len(rows))
+
+
+def _turned(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
+    observer = Observer(entrant.network, block.views, plan.bfloat16)
+    clean: list[Scores] = []
+    for step in range(YAWS):
+        scores = list(_iou(block, entrant, observer, block.order, step * TURN / YAWS))
+        clean = clean or scores
+        for row, (own, of_clean) in enumerate(zip(scores, clean, strict=True)):
+            yield Found(f'yaw {round(step * 360 / YAWS):03d}', row, own, of_clean)
+
+
+def _off(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
+    views = replace(block.views, poses=poses_off(block.views, POSE_ERROR, plan.seed))
+    yield from _beside_clean('poses off by 2 degrees', block, views, entrant, plan)
+
+
+def _cut(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
+    views = cut_views(block.views, block.order[:, 0], CUT_SHARE, plan.seed)
+    yield from _beside_clean('a third of the cube cut', block, views, entrant, plan)
+
+
+def _bands(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
+    """Compare what views from one band of elevations show with what any views do."""
+    elevations = np.degrees(np.arcsin(pose_directions(block.views.poses.numpy())[..., 2]))
+    if np.ptp(elevations) < BANDS_DEG[0][1]:
+        return  # all from one
+    observer = Observer(entrant.network, block.views, plan.bfloat16)
+    rng = np.random.default_rng(plan.seed)
+    count = elevations.shape[1]
+    any_order = rng.permuted(np.tile(np.arange(count), (len(elevations), 1)), axis=1)
+    for views in (1, 3):
+        if views > count:
+            continue
+        clean = list(_iou(block, entrant, observer, any_order[:, :views]))
+        for low, high in BANDS_DEG:
+            within = (elevations >= low) & (elevations < high)
+            own = [order[within[row][order]][:views] for row, order in enumerate(any_order)]
+            rows = [row for row, order in enumerate(own) if len(order) == views]
+            if not rows:
+                continue
+            # All objects are shown something, so that the batch stays as it is
+            order = np.stack([mine if len(mine) == views else any_order[row, :views]
+                              for row, mine in enumerate(own)])
+            scores = list(_iou(block, entrant, observer, order))
+            for row in rows:
+                yield Found(f'elevation {low} to {high}, {views} view{"s" * (views > 1)}', row,
+                            scores[row], clean[row])
+
+
+def poses_off(views: ViewSet, angle: float, seed: int = 0) -> torch.Tensor:
+    """Return the poses of a set, each turned by an angle about the centre, (N, V, 4, 4)."""
+    shape = views.poses.shape[:2]
+    axes = np.random.default_rng([seed, 1]).normal(size=(*shape, 3))
+    axes *= angle / np.linalg.norm(axes, axis=-1, keepdims=True)
+    turns = np.tile(np.eye(4), (*shape, 1, 1))
+    turns[..., :3, :3] = Rotation.from_rotvec(axes.reshape(-1, 3)).as_matrix().reshape(
+        *shape, 3, 3)
+    return torch.from_numpy(turns) @ views.poses
+
+
+def cut_views(views: ViewSet, chosen: NDArray[np.int64], share: float, seed: int = 0) -> ViewSet:
+    """
+    Return a set in which one view of each object (N,) lacks a share of the object's cube.
+
+    The image ends at one of its four sides, drawn: as many of the cube's cells project beyond.
+    """
+    images = views.images.clone()
+    seen = torch.ones(images.shape[:4], dtype=torch.bool) if views.seen is None else (
+        views.seen.clone())
+    rng, size = np.random.default_rng([seed, 2]), views.image_size
+    across = torch.arange(size) + 0.5
+    for row, view in enumerate(chosen.tolist()):
+        one = Cameras(views.poses[row, view][None], views.intrinsics[row, view][None])
+        where, _ = projected(projection(one, size), cell_centers(16))
+        axis, sign = int(rng.integers(2)), 1 - 2 * int(rng.integers(2))
+        end = sign * float(torch.quantile(sign * where[0, :, axis], 1 - share))
+        kept = sign * (across / size * 2 - 1) <= sign * end
+        keep = kept[None, :].expand(size, size) if axis == 0 else kept[:, None].expand(size, size)
+        seen[row, view] &= keep
+        images[row, view] *= keep[..., None]
+    return replace(views, images=images, seen=seen)
+
+
+def turned_back(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:
+    """
+    Return occupancies (R, R, R) of a frame that was turned by a yaw, in the frame before.
+
+    Cells are interpolated linearly, but for quarter turns. What the turned cube did not hold is
+    NaN.
+    """
+    quarters = yaw / (TURN / 4)
+    if abs(quarters - round(quarters)) < 1e-9:
+        return np.rot90(occupancy, -round(quarters))
+    across = (np.arange(len(occupancy)) + 0.5) / len(occupancy) - 0.5
+    x, y = across[:, None], across
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    held = (np.abs(cosine * x - sine * y) <= 0.5) & (np.abs(sine * x + cosine * y) <= 0.5)
+    return np.where(held[..., None], turned(occupancy, -yaw), np.float32(np.nan))
+
+
+def _beside_clean(name: str, block: Block, views: ViewSet, entrant: Entrant,
+                  plan: Plan) -> Iterator[Found]:
+    disturbed, clean = (
+        _iou(block, entrant, Observer(entrant.network, shown, plan.bfloat16), block.order)
+        for shown in (views, block.views))
+    for row, (own, of_clean) in enumerate(zip(disturbed, clean, strict=True)):
+        yield Found(name, row, own, of_clean)
+
+
+def _iou(block: Block, entrant: Entrant, observer: Observer, order: NDArray[np.int64],
+         yaw: float = 0.0) -> Iterator[Scores]:
+    """Yield the IoU of every object after its order's views (B, c), the frame turned by a yaw."""
+    objects = torch.arange(len(order))
+    yaws = torch.full((len(order),), yaw) if yaw else None
+    logits = next(walk(observer, objects, [order], yaws)).cpu().numpy()
+    for one, truth in zip(logits, block.targets, strict=True):
+        occupancy = turned_back(expit(one), yaw)
+        # A coarse cell that is partly unknown is NaN too: the larger of NaN and a number
+        unknown = {side: np.isnan(pooled(occupancy, side)) for side in entrant.sides}
+        known = replace(truth, cells={side: cells & ~unknown.get(side, np.False_)
+                                      for side, cells in truth.cells.items()})
+        yield iou_scores(occupancy, known, entrant.sides, entrant.thresholds)

@@ -1,0 +1,99 @@
+"""A set of objects to measure on: posed views, the truth in cells of two sizes, and the front."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.views import read_views, ViewSet
+from active_recon.errors import ConfigError, DataError
+from active_recon.evaluation.posed.walking import on_turntable
+from active_recon.models.network import ReconstructionNetwork
+from active_recon.reporting import Reporting, silent
+from active_recon.voxels import FINE_RESOLUTION, RESOLUTION
+import numpy as np
+import torch
+from torch import Tensor
+
+IMAGE_SIZE = 128
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """
+    N objects with V posed views each.
+
+    - views: the framed images, as networks get them that need no front
+    - truths: (N, R, R, R) bool by R, cells a side
+    - turntable: the same views as the paper's networks get them, by their images' size; none where
+      the objects do not stand as these expect it
+    """
+
+    views: ViewSet
+    truths: Mapping[int, Tensor]
+    turntable: Mapping[int, ViewSet]
+
+    def __len__(self) -> int:
+        """Return the number of objects."""
+        return len(self.views)
+
+    @property
+    def view_count(self) -> int:
+        """V, views of each object."""
+        return self.views.images.shape[1]
+
+    def shown_to(self, network: ReconstructionNetwork) -> ViewSet | None:
+        """Return the views as a network gets them; None where it has no use for them."""
+        if network.needs_front:
+            return self.turntable.get(network.image_size)
+        return self.views if network.image_size == self.views.image_size else None
+
+
+def chosen_folders(folders: Sequence[ObjectFolder], category: str | None = None,
+                   most: int | None = None, seed: int = 0) -> list[ObjectFolder]:
+    """
+    Return the objects of a category, a pattern such as `thing_*` (all but those: `!thing_*`).
+
+    At most so many, drawn by the seed. Raises ConfigError where none is left.
+    """
+    wanted = category or '*'
+    but = wanted.startswith('!')
+    kept = [folder for folder in folders
+            if fnmatchcase(folder.category, wanted.removeprefix('!')) != but]
+    if not kept:
+        found = ', '.join(sorted({folder.category for folder in folders})[:8])
+        raise ConfigError(f'category: expected a pattern that some objects match, such as '
+                          f'thing_*, got {wanted!r}; there are {found}')
+    if most is not None and most < len(kept):
+        rows = np.random.default_rng(seed).choice(len(kept), most, replace=False)
+        kept = [kept[row] for row in sorted(rows)]
+    return kept
+
+
+def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[ReconstructionNetwork],
+               title: str = 'objects', reporting: Reporting = silent) -> Scene:
+    """
+    Read objects as the networks ask for them.
+
+    Where no object has voxels of 64 cells a side, only 32 are measured. Raises DataError where no
+    object can be read.
+    """
+    fine = any(folder.voxels_path(FINE_RESOLUTION).is_file() for folder in folders)
+    with reporting(f'reading {title}', len(folders)) as advance:
+        views = read_views(folders, lambda: advance(1, ''),
+                           FINE_RESOLUTION if fine else RESOLUTION, IMAGE_SIZE, framed=True)
+    truths = {views.resolution: views.voxels}
+    if fine:
+        truths[RESOLUTION] = torch.from_numpy(np.stack(
+            [folder.voxels(RESOLUTION).occupied(0.5) for folder in views.folders]))
+    sizes = {network.image_size for network in networks if network.needs_front}
+    turntable: dict[int, ViewSet] = {}
+    if on_turntable(views):
+        for size in sorted(sizes):
+            with reporting(f'reading {title} for the front', len(views)) as advance:
+                shown = read_views(views.folders, lambda: advance(1, ''), RESOLUTION, size)
+            if shown.folders != views.folders:
+                raise DataError(f'expected the same objects at {size} pixels, but some cannot be '
+                                f'read: {"; ".join(shown.unreadable[:3])}')
+            turntable[size] = shown
+    return Scene(views, truths, turntable)

@@ -1,0 +1,114 @@
+"""One occupancy against one object's truth: all that is said of it, by names."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+from active_recon.evaluation.calibration import brier, near_surface, reliability
+from active_recon.evaluation.posed.entrants import Entrant
+from active_recon.evaluation.surfaces import (
+    recall,
+    SampledSurface,
+    surface_scores,
+    thin_cells,
+    voxel_surface,
+)
+from active_recon.occupancy_threshold import best_threshold
+from active_recon.voxels import iou
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+Scores = dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """
+    One object's truth.
+
+    - cells: (R, R, R) bool by R, cells a side
+    - near: the cells of the finest near its surface; thin: those of its thin parts
+    - surface: of the finest, or None where surfaces are not measured
+    """
+
+    cells: Mapping[int, NDArray[np.bool_]]
+    near: NDArray[np.bool_]
+    thin: NDArray[np.bool_]
+    surface: SampledSurface | None
+
+    @property
+    def finest(self) -> int:
+        """Cells a side of the finest truth."""
+        return max(self.cells)
+
+
+def target(cells: Mapping[int, NDArray[np.bool_]], surface: bool = True) -> Target:
+    """Return an object's truth, ready to be compared with."""
+    finest = cells[max(cells)]
+    return Target(cells, near_surface(finest), thin_cells(finest),
+                  voxel_surface(finest, 0.5) if surface else None)
+
+
+def pooled(values: NDArray[np.floating], side: int) -> NDArray[np.floating]:
+    """
+    Return values (R, R, R) in fewer cells, halved and halved again: the largest of 2 x 2 x 2.
+
+    A coarse cell is occupied where any of its cells is, as the truth's voxels are.
+    """
+    while len(values) > side:
+        for axis in range(3):
+            pairs = np.moveaxis(values, axis, 0)
+            values = np.moveaxis(np.maximum(pairs[::2], pairs[1::2]), 0, axis)
+    return values
+
+
+def iou_scores(values: NDArray[np.floating], truth: Target, sides: tuple[int, ...],
+               thresholds: Mapping[int, float], name: str = 'iou') -> Scores:
+    """Return the IoU of values (R, R, R) above thresholds, by `<name>_<cells a side>`."""
+    return {f'{name}_{side}': float(iou(pooled(values, side) > thresholds[side],
+                                        truth.cells[side]))
+            for side in sides if side in truth.cells}
+
+
+def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: int,
+           surfaces: bool) -> tuple[Scores, dict[str, NDArray[np.float64]]]:
+    """
+    Return what is said of logits (R, R, R) after `count` views, and reliability diagrams.
+
+    - `iou_*`: at the entrant's threshold; `own_iou_*`: at the object's own, and `expected_iou`:
+      what it expects there
+    - `brier` and the diagram `calibration_error`, near the surface, and `thin_recall`: where the
+      truth is as fine as the logits
+    - with `tempered_` before the name: of logits under the entrant's temperatures, if it has any;
+      thresholds of objects under those fitted to cells anywhere
+    - those of `SurfaceScores`, where `surfaces` are asked for
+    """
+    scores = _own_scores(expit(logits), truth, entrant, '')
+    diagrams: dict[str, NDArray[np.float64]] = {}
+    if entrant.grid_temperatures:
+        cooled = logits / np.float32(entrant.grid_temperatures.get(count, 1.0))
+        scores |= _own_scores(expit(cooled), truth, entrant, 'tempered_')
+    if len(logits) == truth.finest:
+        near, full = logits[truth.near], truth.cells[truth.finest][truth.near]
+        kinds = {'': 1.0}
+        if entrant.temperatures:
+            kinds['tempered_'] = entrant.temperatures.get(count, 1.0)
+        for prefix, temperature in kinds.items():
+            occupancy = expit(near / np.float32(temperature))
+            scores[f'{prefix}brier'] = brier(occupancy, full)
+            diagrams[f'{prefix}calibration_error'] = reliability(occupancy, full)
+    scores |= iou_scores(expit(logits), truth, entrant.sides, entrant.thresholds)
+    threshold = entrant.thresholds[max(entrant.sides)]
+    if len(logits) == truth.finest:
+        scores['thin_recall'] = recall(expit(logits) > threshold, truth.thin)
+    if surfaces and truth.surface is not None:
+        scores |= asdict(surface_scores(voxel_surface(expit(logits), threshold), truth.surface))
+    return scores, diagrams
+
+
+def _own_scores(occupancy: NDArray[np.float32], truth: Target, entrant: Entrant,
+                prefix: str) -> Scores:
+    """Return what is said of probabilities (R, R, R) at the threshold that they ask for."""
+    own, expected = best_threshold(occupancy)
+    return {f'{prefix}expected_iou': expected, **iou_scores(
+        occupancy, truth, entrant.sides, dict.fromkeys(entrant.sides, own), f'{prefix}own_iou')}

@@ -1,0 +1,96 @@
+"""Views of objects in an order: which come when, and what is known after some of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from active_recon.cameras import (
+    CANONICAL_ELEVATION,
+    ELEVATION_TOLERANCE,
+    pose_directions,
+    TURN,
+    VIEW_COUNT,
+)
+from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.rollouts import Observer
+import numpy as np
+from numpy.typing import NDArray
+import torch
+from torch import Tensor
+
+_EVEN = 1e-3  # radians
+
+Order = NDArray[np.int64]
+"""Views (N, c) of N objects, in the order in which they are shown."""
+
+
+def random_orders(objects: int, views: int, seed: int = 0) -> Order:
+    """Return all views of every object, each object's in an order of its own, (N, V)."""
+    return np.stack([np.random.default_rng([seed, item]).permutation(views)
+                     for item in range(objects)])
+
+
+def on_turntable(views: ViewSet) -> bool:
+    """
+    Return whether all objects are seen as the paper's networks expect it.
+
+    That is from 24 azimuths, from about 30 degrees up.
+    """
+    directions = pose_directions(views.poses.numpy())
+    apart = np.abs(np.arcsin(directions[..., 2].clip(-1, 1)) - CANONICAL_ELEVATION)
+    return directions.shape[1] == VIEW_COUNT and bool(
+        (apart < ELEVATION_TOLERANCE + _EVEN).all())
+
+
+def even_orders(directions: NDArray[np.float64], count: int, first: NDArray[np.int64]) -> Order:
+    """
+    Return `count` views of each object that are spread evenly, beginning with `first` (N,).
+
+    Takes the directions to the cameras, (N, V, 3). Where they are V even steps around the object,
+    views are as many steps apart as they can be; elsewhere each next view is the one farthest from
+    all before it.
+    """
+    objects, views = directions.shape[:2]
+    azimuths = np.arctan2(directions[..., 1], directions[..., 0])
+    steps = np.diff(azimuths, axis=1, append=azimuths[:, :1]) % TURN
+    if np.abs(steps - TURN / views).max(initial=0) < _EVEN:
+        steps_apart = np.round(np.arange(count) * views / count).astype(np.int64)
+        return np.asarray((first[:, None] + steps_apart) % views)
+    rows, order = np.arange(objects), first[:, None]
+    cosines = np.einsum('nvi,nwi->nvw', directions, directions)
+    nearest = cosines[rows, first]
+    for _ in range(count - 1):
+        nearest[rows, order[:, -1]] = np.inf  # taken
+        order = np.column_stack([order, nearest.argmin(axis=1)])
+        taken = np.isinf(nearest)
+        nearest = np.where(taken, np.inf, np.maximum(nearest, cosines[rows, order[:, -1]]))
+    return order
+
+
+@torch.inference_mode()
+def walk(observer: Observer, objects: Tensor, orders: Sequence[Order],
+         yaws: Tensor | None = None) -> Iterator[Tensor]:
+    """
+    Yield the logits (B, R, R, R) of objects (B,) after the views (B, c) of each order.
+
+    An order that begins with the one before goes on from where that ended. By `yaws` (B,) the
+    cameras are turned.
+    """
+    done: Order = np.empty((len(objects), 0), np.int64)
+    state = observer.initial_state(len(objects))
+    for order in orders:
+        if order.shape[1] < done.shape[1] or (order[:, :done.shape[1]] != done).any():
+            done = done[:, :0]
+            state = observer.initial_state(len(objects))
+        for view in order.T[done.shape[1]:]:
+            state = observer.update(objects, torch.from_numpy(view), state, yaws)
+        done = order
+        yield observer.decode(state)
+
+
+def some_objects(views: ViewSet, rows: Tensor) -> ViewSet:
+    """Return the objects (B,) of a set as a set of their own."""
+    return replace(
+        views, images=views.images[rows], poses=views.poses[rows],
+        intrinsics=views.intrinsics[rows], voxels=views.voxels[rows],
+        folders=tuple(views.folders[row] for row in rows.tolist()),
+        seen=None if views.seen is None else views.seen[rows])

@@ -1,0 +1,72 @@
+"""`active-recon study`, from the command line to the files that it writes."""
+
+import json
+
+from active_recon.cli.main import main
+from active_recon.datasets.drawn_cameras import Viewing
+from active_recon.datasets.making import make_dataset, shape_jobs
+import cv2
+import pytest
+import torch
+
+
+@pytest.fixture(autouse=True)
+def as_many_threads_as_before():
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope='module')
+def made(tmp_path_factory):
+    """Return a folder of two lamps seen by any three cameras each."""
+    out = tmp_path_factory.mktemp('lamps')
+    list(make_dataset(shape_jobs('lamp', range(2), out), 1, fine=True, viewing=Viewing('any', 3)))
+    return out
+
+
+def command(monkeypatch, *arguments):
+    """Run `active-recon study`; return its exit code."""
+    monkeypatch.setattr('sys.argv', ['active-recon', 'study', *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code or 0
+
+
+def refusal(monkeypatch, capsys, *arguments):
+    capsys.readouterr()
+    assert command(monkeypatch, *arguments) == 2
+    line = capsys.readouterr().err
+    assert line.startswith('active-recon: ') and line.count('\n') == 1
+    return line
+
+
+def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, monkeypatch):
+    assert command(monkeypatch, made, dataset, '--models', 'carving,2d3d-attention', '--counts',
+                   '1,3', '--surfaces', '', '--disturbed-views', 0, '--training', made,
+                   '--threads', 1, '--out', tmp_path) == 0
+    result = json.loads((tmp_path / 'study.json').read_text())
+    assert "--surfaces ''" in result['command']
+    posed, turntable = result['sets']
+    assert list(posed['models']) == ['carving']
+    assert list(turntable['models']) == ['carving', '2d3d-attention']
+    assert len(posed['models']['carving']['random']['iou_64']) == 2
+    assert posed['baselines']['nearest training image']['iou_64']['mean'] == 1
+    assert '2d3d-attention is left out' in (tmp_path / 'study.md').read_text()
+    pictures = sorted(tmp_path.glob('study-*.png'))
+    assert len(pictures) == 2 and all(cv2.imread(str(path)) is not None for path in pictures)
+
+
+def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypatch, capsys):
+    def refused(*arguments):
+        return refusal(monkeypatch, capsys, *arguments, '--out', tmp_path)
+
+    assert 'got neither' in refused()
+    assert 'whole numbers' in refused(made, '--counts', '1,two')
+    assert 'got none' in refused(made, '--models', ',')
+    assert 'expected other objects than those measured' in refused(
+        made, '--models', 'carving', '--validation', made)
+    assert "R2N2's layout" in refused(tmp_path, '--models', 'carving')
+    assert '_par.txt' in refused('--photos', tmp_path, '--models', 'carving')
+    assert 'box: expected six numbers' in refused(
+        '--photos', tmp_path, '--box', '1 a', '--models', 'carving')
