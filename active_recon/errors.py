@@ -10,8 +10,8 @@ The one error tree: everything the package refuses, it refuses with one of these
     │   └── MessageError  the same, found while reading a ROS message
     └── RecordingError    a recording that cannot be begun or continued
 
-Every message says what was expected, what came, and where it helps what to do. `kind` is a short
-stable word, under which the nodes count refusals in their diagnostics.
+A message begins with what is wrong, then says what was expected and, where it helps, what to do.
+`kind` is a short stable word, under which the nodes count refusals in their diagnostics.
 """
 
 

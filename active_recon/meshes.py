@@ -1,4 +1,4 @@
-"""Meshes from files, brought into the object frame: z up, front +x, centred, longest side 1."""
+"""Meshes from files, brought into the object frame: z up, front +x; as they are, or fitted."""
 
 from pathlib import Path
 
@@ -16,12 +16,11 @@ def upright(up: str, front: str) -> NDArray[np.float64]:
     """Return the rotation, (3, 3), that turns axis `up` to +z and axis `front` to +x."""
     for option, axis in (('up', up), ('front', front)):
         if axis not in _AXES:
-            raise ConfigError(f'{option}: expected one of x, y, z with an optional sign, '
-                              f'got {axis!r}')
+            raise ConfigError(f'{option}: {axis!r} is no axis: expected x, y or z, with or '
+                              'without a sign')
     z, x = _AXES[up], _AXES[front]
     if z @ x:
-        raise ConfigError(f'expected up and front to be different axes, got {up} and {front}; '
-                          'name both')
+        raise ConfigError(f'up and front are one axis, {up} and {front}: name both')
     return np.array([x, np.cross(z, x), z])
 
 
@@ -40,8 +39,13 @@ def fit_to_grid(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def load_mesh(path: Path, up: str | None = None, front: str | None = None) -> trimesh.Trimesh:
+    """Read a mesh as `read_mesh` does, and fit it to the grid."""
+    return fit_to_grid(read_mesh(path, up, front))
+
+
+def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> trimesh.Trimesh:
     """
-    Read any mesh that trimesh reads and fit it to the grid, z up and front +x.
+    Read any mesh that trimesh reads, z up and front +x, as large and where it is in its file.
 
     `up` and `front` name the file's axes (for example 'y' and '-z'); glTF and GLB are y up with
     the front at +z by their standard, other formats are taken as z up with the front at +x.
@@ -49,18 +53,18 @@ def load_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
     """
     rotation = file_rotation(path, up, front)
     if not path.is_file():
-        raise MeshError(f'{path}: expected a mesh file, but there is no such file')
+        raise MeshError(f'{path}: no such mesh file')
     try:
         mesh = trimesh.load(path, force='mesh', process=False)
     except Exception as error:  # trimesh's readers raise whatever their parser raised
-        raise MeshError(f'{path}: expected a mesh that trimesh reads, but it failed with '
-                        f'{type(error).__name__}: {error}') from error
+        raise MeshError(f'{path}: no mesh that can be read: {type(error).__name__}: '
+                        f'{error}') from error
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise MeshError(f'{path}: expected a mesh with faces, got none')
+        raise MeshError(f'{path}: a mesh without faces')
     if not np.isfinite(mesh.vertices).all() or not mesh.extents.max() > 0 or not mesh.area > 0:
         raise MeshError(f'{path}: expected faces with finite corners and an area, got extents '
                         f'{mesh.extents}')
     transform = np.eye(4)
     transform[:3, :3] = rotation
     mesh.apply_transform(transform)
-    return fit_to_grid(mesh)
+    return mesh

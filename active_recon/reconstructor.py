@@ -10,6 +10,7 @@ from active_recon.canonical import network_image, NetworkSpec
 from active_recon.errors import ConfigError
 from active_recon.runtimes import load_runtime, Runtime
 from active_recon.voxels import turned, VoxelGrid
+from active_recon.weights_files import find_weights
 import numpy as np
 from numpy.typing import NDArray
 
@@ -94,3 +95,13 @@ class Reconstructor:
             shown, seen_by.turned(-self._yaw).scaled(1 / self.object_size), self._state)
         self._view_count += 1
         return Reconstruction(VoxelGrid(turned(occupancy, self._yaw), self.object_size), latent)
+
+
+def load(model: str | Path | None = None, object_size: float = 1.0,
+         threads: int | None = None) -> Reconstructor:
+    """
+    Return a reconstructor of a model that ships, by its name, or of a weights file.
+
+    None is the default's; `object_size` the side of the voxel grid, metres. Raises WeightsError.
+    """
+    return Reconstructor.load(find_weights(model), object_size=object_size, threads=threads)

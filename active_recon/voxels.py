@@ -205,7 +205,7 @@ def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
     """Write a mesh as PLY, OBJ or STL, by the file's suffix."""
     suffix = path.suffix.lower().lstrip('.')
     if suffix not in MESH_FORMATS:
-        raise ConfigError(f'{path}: expected a suffix out of {", ".join(MESH_FORMATS)}')
+        raise ConfigError(f'{path}: no mesh has that suffix: expected {", ".join(MESH_FORMATS)}')
     path.parent.mkdir(parents=True, exist_ok=True)
     mesh.export(path)
 
@@ -237,10 +237,10 @@ def read_binvox(path: Path) -> VoxelGrid:
     except OSError as error:
         raise DataError(f'{path}: cannot be read: {error.strerror}') from error
     except KeyError as error:
-        raise DataError(f'{path}: expected a whole binvox file, its header lacks '
+        raise DataError(f'{path}: no whole binvox file: its header lacks '
                         f'{error.args[0].decode()}') from error
     except (ValueError, IndexError, DataError) as error:
-        raise DataError(f'{path}: expected a whole binvox file, got: {error}') from error
+        raise DataError(f'{path}: no whole binvox file: {error}') from error
 
 
 def binvox_side(path: Path) -> float:

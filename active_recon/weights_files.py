@@ -27,16 +27,14 @@ class WeightsMetadata:
 def read_metadata(path: Path) -> WeightsMetadata:
     """Return what a weights file says of itself; raises WeightsError where it is not whole."""
     if not path.is_file():
-        raise WeightsError(f'{path}: expected a weights file (.safetensors), but there is no '
-                           'such file')
+        raise WeightsError(f'{path}: no such file: expected weights (.safetensors)')
     try:
         with safe_open(path, framework='np') as stored:
             metadata = stored.metadata() or {}
     except (SafetensorError, OSError) as error:
-        raise WeightsError(f'{path}: expected a whole safetensors file, got: {error}') from error
+        raise WeightsError(f'{path}: no whole safetensors file: {error}') from error
     if 'model' not in metadata:
-        raise WeightsError(f'{path}: expected weights of one of the networks, got a file that '
-                           'names no model')
+        raise WeightsError(f'{path}: names no model: expected weights of one of the networks')
     try:
         return WeightsMetadata(metadata['model'], json.loads(metadata['config']),
                                float(metadata['threshold']))
@@ -58,8 +56,8 @@ def find_weights(model: str | Path | None = None) -> Path:
     shipped = FOLDER / f'{model}.safetensors'
     if not shipped.is_file():
         names = ', '.join(sorted(file.stem for file in FOLDER.glob('*.safetensors')))
-        raise WeightsError(f'expected a weights file (.safetensors) or a model whose weights '
-                           f'ship ({names}), got {model}; `active-recon train` makes weights')
+        raise WeightsError(f'{model}: neither a weights file (.safetensors) nor a model whose '
+                           f'weights ship ({names}); `active-recon train` makes weights')
     return shipped
 
 

@@ -61,7 +61,8 @@ def refusal(path, match):
 def test_what_is_no_bag_is_refused(tmp_path, content):
     for name in ('bag.mcap', 'bag.db3', 'bag'):
         (tmp_path / name).write_bytes(content)
-        refusal(tmp_path / name, 'expected ')
+        refusal(tmp_path / name,
+                'no bag of rosbag2|no MCAP|its end is missing|cannot be understood')
 
 
 def test_a_file_cut_off_anywhere_is_refused_and_the_repair_named(bag, tmp_path):
@@ -114,7 +115,7 @@ def test_a_chunk_that_unpacks_to_gigabytes_takes_none(tmp_path, claim):
     record = struct.pack('<BQ', Opcode.CHUNK, len(chunk) + len(packed)) + chunk + packed
     at = first_record(content, Opcode.SCHEMA)
     (tmp_path / 'bag.mcap').write_bytes(content[:at] + record + content[at:])
-    assert peak(tmp_path / 'bag.mcap', 'expected (a chunk|chunks)') < 2.5 * 2**27
+    assert peak(tmp_path / 'bag.mcap', 'a chunk (of|that claims)') < 2.5 * 2**27
 
 
 def bomb(size):
@@ -132,7 +133,7 @@ def test_a_packed_message_that_unpacks_to_much_more_takes_no_memory(tmp_path, mo
     with rosbag2:
         connection = rosbag2.add_connection('/camera/image_raw', IMAGE, typestore=STORE)
         rosbag2.write(connection, BEGIN, bytes(1 << 26))
-    assert peak(tmp_path / 'run', 'expected messages of at most .* that unpacks to more') < 2**24
+    assert peak(tmp_path / 'run', 'a message of .* that unpacks to more') < 2**24
 
 
 @pytest.mark.parametrize('storage', list(StoragePlugin))
@@ -142,7 +143,7 @@ def test_a_packed_file_that_unpacks_to_gigabytes_fills_no_disk(bag, tmp_path, mo
     copy = copied(bag, tmp_path / 'copy', storage, CompressionMode.FILE)
     (packed,) = copy.glob('*.zstd')
     packed.write_bytes(bomb(1 << 28))
-    assert peak(copy, 'expected a file that unpacks to at most') < 2**24
+    assert peak(copy, 'unpacks to more than') < 2**24
 
 
 @pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
@@ -153,7 +154,7 @@ def test_what_is_told_to_be_packed_and_is_not_is_refused(bag, tmp_path, storage,
     description.write_text(description.read_text().replace(
         "compression_mode: ''", f'compression_mode: {mode.name}'))
     assert mode.name in description.read_text()
-    refusal(copy, 'packed by zstd, got other bytes')
+    refusal(copy, 'not packed by zstd')
 
 
 @pytest.mark.parametrize('compression', list(CompressionType))
@@ -166,7 +167,7 @@ def test_a_definition_that_is_not_ros_own_is_refused(tmp_path):
     def lying(name):
         return definition(name).replace('uint32 height', 'uint64 height')
 
-    refusal(mcap(tmp_path / 'bag.mcap', lying), 'to be defined as in ROS, got other fields')
+    refusal(mcap(tmp_path / 'bag.mcap', lying), 'defined otherwise than in ROS')
 
 
 def test_bytes_of_another_type_than_the_schemas_are_refused(tmp_path):
@@ -180,22 +181,22 @@ def test_bytes_of_another_type_than_the_schemas_are_refused(tmp_path):
             channel = writer.register_channel(topic, 'cdr', schema)
             writer.add_message(channel, BEGIN, serialize_message(RUN.messages[0][2]), BEGIN)
         writer.finish()
-    refusal(lying, 'expected the bytes of a geometry_msgs/msg/PoseStamped')
+    refusal(lying, 'bytes that are no geometry_msgs/msg/PoseStamped')
 
 
 def test_a_bag_without_images_is_refused(tmp_path):
-    refusal(write_bag(tmp_path / 'run', joints()), 'expected images on a topic of type')
+    refusal(write_bag(tmp_path / 'run', joints()), 'no camera images on any topic')
 
 
 def test_images_without_an_azimuth_are_refused(tmp_path):
-    refusal(write_bag(tmp_path / 'run', images()), "expected the camera's poses or azimuths on")
+    refusal(write_bag(tmp_path / 'run', images()), 'no camera poses or azimuths on any topic')
 
 
 def test_images_whose_poses_are_of_another_time_are_refused(tmp_path):
     later = LoopRun(begin=BEGIN + 10**12)
     entries = [*images(topic='/camera/image_raw'), *(
         entry for entry in later.messages if entry[1] in ('/camera/pose', '/camera/camera_info'))]
-    refusal(write_bag(tmp_path / 'run', entries), 'expected images with an azimuth each.*pose')
+    refusal(write_bag(tmp_path / 'run', entries), 'no image has an azimuth: .*pose')
 
 
 def test_times_that_run_backwards_are_refused(tmp_path):
@@ -214,13 +215,13 @@ def test_a_view_whose_image_was_lost_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(('text', 'match'), [
-    ('{', 'expected YAML'), ('[1, 2]', 'expected a mapping, got list'),
-    ('a: 1', "expected rosbag2's description"),
-    ('a: &a [x, x]\nb: [*a, *a]', 'expected YAML, got: an alias'),
+    ('{', 'no YAML'), ('[1, 2]', 'a list where a mapping was expected'),
+    ('a: 1', "another description than rosbag2's"),
+    ('a: &a [x, x]\nb: [*a, *a]', 'no YAML: an alias'),
     ('rosbag2_bagfile_information: {storage_identifier: mcap, relative_file_paths: [x.mcap]}',
-     'it is missing'),
+     'x.mcap: missing'),
     ('rosbag2_bagfile_information: {storage_identifier: sqlite4, relative_file_paths: []}',
-     'expected a storage of mcap or sqlite3')])
+     "a storage 'sqlite4'")])
 def test_a_folder_whose_description_is_none_is_refused(tmp_path, text, match):
     (tmp_path / 'run').mkdir()
     (tmp_path / 'run' / 'metadata.yaml').write_text(text)
@@ -231,7 +232,7 @@ def test_a_damaged_database_is_refused(bag, tmp_path):
     copy = copied(bag, tmp_path / 'copy', StoragePlugin.SQLITE3)
     content = (copy / 'copy.db3').read_bytes()
     (copy / 'copy.db3').write_bytes(content[:len(content) // 2])
-    refusal(copy, 'expected a bag of rosbag2')
+    refusal(copy, 'no bag of rosbag2')
 
 
 def test_the_command_ends_with_one_line_and_exit_code_2(tmp_path, monkeypatch, capsys):

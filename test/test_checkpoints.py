@@ -1,11 +1,12 @@
 """Checkpoints: all or nothing on disk, and no other model's."""
 
+import os
+from pathlib import Path
 import pickletools
 
 from active_recon.errors import DataError
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network_2d3d import Network2d3d
-from active_recon.training import checkpoints
 from active_recon.training.checkpoints import Checkpoint, load_checkpoint, save_checkpoint
 import pytest
 from safetensors.torch import load_file
@@ -67,11 +68,12 @@ def test_the_optimizers_memory_is_part_of_it(trained, saved, tiny):
 def test_a_part_never_replaces_a_whole(trained, saved, monkeypatch):
     whole = saved.read_bytes()
 
-    def cut_off(tensors, path, metadata):
-        path.write_bytes(whole[:100])
+    def cut_off(path, data):
+        with path.open('wb') as file:
+            file.write(data[:100])
         raise OSError('No space left on device')
 
-    monkeypatch.setattr(checkpoints, 'save_file', cut_off)
+    monkeypatch.setattr(Path, 'write_bytes', cut_off)
     with pytest.raises(OSError, match='No space'):
         save_checkpoint(saved, *trained, Checkpoint(8, {}, []))
     assert saved.read_bytes() == whole
@@ -86,12 +88,12 @@ def test_nothing_but_the_checkpoint_is_left_behind(saved):
 def test_a_truncated_checkpoint_is_refused(trained, saved, share):
     raw = saved.read_bytes()
     saved.write_bytes(raw[:int(share * len(raw))])
-    with pytest.raises(DataError, match='expected a whole checkpoint of this model'):
+    with pytest.raises(DataError, match='no whole checkpoint of this model'):
         load_checkpoint(saved, *trained)
 
 
 def test_a_missing_checkpoint_and_another_models_are_refused(trained, saved, tiny):
-    with pytest.raises(DataError, match='nothing.*expected a whole checkpoint'):
+    with pytest.raises(DataError, match='nothing.*no whole checkpoint'):
         load_checkpoint(saved.with_name('nothing'), *trained)
     other = Network2d3d.from_config(tiny)
     with pytest.raises(DataError, match='(?s)checkpoint of this model.*Missing key'):
@@ -101,7 +103,7 @@ def test_a_missing_checkpoint_and_another_models_are_refused(trained, saved, tin
 def test_weights_without_a_checkpoints_word_are_refused(trained, saved):
     from safetensors.torch import save_file
     save_file(load_file(saved), saved)
-    with pytest.raises(DataError, match='expected a whole checkpoint'):
+    with pytest.raises(DataError, match='no whole checkpoint'):
         load_checkpoint(saved, *trained)
 
 
@@ -110,3 +112,12 @@ def test_nothing_in_it_is_a_pickle(saved):
     with pytest.raises(ValueError, match='.'):
         list(pickletools.genops(raw))
     assert int.from_bytes(raw[:8], 'little') < len(raw)
+
+
+def test_a_checkpoint_may_be_read_by_whom_the_user_lets_read_files(trained, tmp_path):
+    before = os.umask(0o027)
+    try:
+        save_checkpoint(tmp_path / 'run.safetensors', *trained, POINT)
+    finally:
+        os.umask(before)
+    assert (tmp_path / 'run.safetensors').stat().st_mode & 0o777 == 0o640

@@ -138,9 +138,10 @@ def test_the_board_to_print_comes_with_its_size(tmp_path):
 
 
 @pytest.mark.parametrize(('options', 'said'), [
-    ([], 'expected images of the board and --object-size, or --print-board'),
-    (['--print-board', 'b.png', '--squares', '7by5'], "COLUMNSxROWS, such as 7x5, got '7by5'"),
-    (['images', '--object-size', 1, '--step-deg', 15, '--angles-deg', 'a.csv'], 'expected one of'),
+    ([], 'no images of the board, or no --object-size'),
+    (['--print-board', 'b.png', '--squares', '7by5'], "'7by5' is not COLUMNSxROWS"),
+    (['images', '--object-size', 1, '--step-deg', 15, '--angles-deg', 'a.csv'],
+     'give one of them'),
     (['nowhere', '--object-size', 1], 'nowhere'),
 ])
 def test_options_that_do_not_go_together_are_refused(options, said, tmp_path, monkeypatch):

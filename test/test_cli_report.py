@@ -24,10 +24,10 @@ def bags(tmp_path, monkeypatch, run):
     """Return two folders that are read as the same run, and the topics that were asked for."""
     asked = []
 
-    def read_run(path, topics):
+    def read_run(path, topics, scene):
         if not path.is_dir():
             raise DataError(f'{path}: expected a bag')
-        asked.append(topics)
+        asked.append((topics, scene))
         return replace(run, path=path, parameters={})
 
     monkeypatch.setattr(reading, 'read_run', read_run)
@@ -77,7 +77,7 @@ def test_truth_is_for_all_bags_or_for_each(bags, tmp_path):
     one_for_all, each = ious(chair), ious(chair, car)
     assert one_for_all[0] == one_for_all[1] == each[0]
     assert each[1] != each[0]
-    with pytest.raises(ConfigError, match='one for all bags or one for each of 2'):
+    with pytest.raises(ConfigError, match='3 of them for 2 bags'):
         ious(chair, chair, chair)
 
 
@@ -85,14 +85,14 @@ def test_only_the_episode_that_is_asked_for_is_shown(bags, tmp_path, monkeypatch
     empty, first, second = replace(run.episodes[0], views=[]), run.episodes[0], replace(
         run.episodes[0], views=run.episodes[0].views[:1])
     several = replace(run, episodes=[empty, first, second])
-    monkeypatch.setattr(reading, 'read_run', lambda _path, _topics: several)
+    monkeypatch.setattr(reading, 'read_run', lambda _path, _topics, _scene: several)
     page = tmp_path / 'page.html'
     report(bags[0], '--out', page)
     assert len(drawn_in(page)['panels']) == 2  # those with views
     report(bags[0], '--out', page, '--episode', 3)
     [panel] = drawn_in(page)['panels']
     assert len(panel['scene']['grids']) == 1
-    with pytest.raises(DataError, match='expected an episode with views'):
+    with pytest.raises(DataError, match='no episode with views'):
         report(bags[0], '--out', page, '--episode', 1)
 
 
@@ -100,7 +100,7 @@ def test_bag_of_images_alone_gets_its_shapes_and_the_page_says_so(bags, tmp_path
                                                                   run):
     bare = changed(run, views=[replace(view, reconstruction=None, occupied=None, entropy=None)
                                for view in run.episodes[0].views])
-    monkeypatch.setattr(reading, 'read_run', lambda _path, _topics: bare)
+    monkeypatch.setattr(reading, 'read_run', lambda _path, _topics, _scene: bare)
     report(bags[0], '--out', tmp_path / 'page.html')
     assert 'holds no reconstruction' in (tmp_path / 'page.html').read_text()
     assert None not in drawn_in(tmp_path / 'page.html')['panels'][0]['scene']['grids']
@@ -109,7 +109,7 @@ def test_bag_of_images_alone_gets_its_shapes_and_the_page_says_so(bags, tmp_path
 def test_topics_of_others_are_handed_on(bags):
     report(bags[0], '--image', '/wrist/image', '--azimuth', '/table', '--joint', 'disc',
            '--turned-object')
-    [topics] = bags[2]
+    [(topics, _)] = bags[2]
     assert (topics.image, topics.azimuth, topics.joint, topics.turned_object) == (
         '/wrist/image', '/table', 'disc', True)
 

@@ -31,9 +31,8 @@ def refusal(monkeypatch, capsys, *arguments):
     """Run a command that is refused with exit code 2; return its one line."""
     capsys.readouterr()
     assert command(monkeypatch, *arguments) == 2
-    line = capsys.readouterr().err
+    *_, line = capsys.readouterr().err.splitlines()  # warnings may come before
     assert line.startswith('active-recon: ')
-    assert line.count('\n') == 1
     return line
 
 
@@ -57,7 +56,8 @@ def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, datase
     assert {path.name for path in run.iterdir()} == {
         'reconstruction.safetensors', 'policy.safetensors', 'tensorboard', 'weights.safetensors',
         'weights.json'}
-    assert list((run / 'tensorboard').glob('events.*'))
+    assert {path.parent.name for path in (run / 'tensorboard').rglob('events.*')} == {
+        'reconstruction', 'policy'}
     bundle = load_weights(run / 'weights.safetensors')
     card = json.loads((run / 'weights.json').read_text())
     assert card['threshold'] == bundle.threshold
@@ -76,7 +76,7 @@ def test_a_training_that_is_done_is_resumed_to_the_same_weights(run, dataset, mo
 
 def test_a_training_of_other_settings_is_not_resumed(run, dataset, monkeypatch, capsys):
     line = refusal(monkeypatch, capsys, *training(dataset, run, '--resume', '--seed', 3))
-    assert 'expected a checkpoint of the same settings' in line
+    assert 'made under other settings' in line
 
 
 def test_a_new_training_never_overwrites_the_checkpoints_of_another(
@@ -85,6 +85,35 @@ def test_a_new_training_never_overwrites_the_checkpoints_of_another(
     line = refusal(monkeypatch, capsys, *training(dataset, run))
     assert 'go on with --resume' in line
     assert (run / 'reconstruction.safetensors').read_bytes() == before
+
+
+def test_a_log_of_another_training_is_never_mixed_with_a_new_one(
+        dataset, tmp_path, monkeypatch, capsys):
+    log = tmp_path / 'tensorboard' / 'reconstruction' / 'events.out.tfevents.1.host'
+    log.parent.mkdir(parents=True)
+    log.touch()
+    assert 'holds another training (events.' in refusal(
+        monkeypatch, capsys, *training(dataset, tmp_path))
+
+
+def test_a_training_that_is_interrupted_says_where_and_how_to_go_on(
+        dataset, tmp_path, monkeypatch, capsys):
+    import os
+    import signal
+
+    from active_recon.cli.training_log import SummaryLog
+
+    monkeypatch.setattr(SummaryLog, 'show', lambda *told: os.kill(os.getpid(), signal.SIGINT))
+    asked = training(dataset, tmp_path, '--validate-every', 1, '--policy-steps', 0, '--steps', 3)
+    assert command(monkeypatch, *asked) == 130
+    assert 'stopped at step 2 of 3; continue with --resume' in capsys.readouterr().out
+    monkeypatch.undo()
+    assert command(monkeypatch, *asked, '--resume') == 0
+
+
+def test_validation_objects_that_are_trained_on_are_told(dataset, tmp_path, monkeypatch, capsys):
+    assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0)) == 0
+    assert '6 of 6 validation objects are trained on too' in capsys.readouterr().err
 
 
 def test_only_weights_with_a_policy_say_how_far_apart_its_views_stay(
@@ -112,7 +141,7 @@ def test_an_evaluation_measures_all_that_it_says(run, dataset, tmp_path, monkeyp
     assert command(
         monkeypatch, 'evaluate', dataset, '--model', run / 'weights.safetensors', '--views', 2,
         '--starts', 2, '--seeds', 2, '--training', dataset, '--validation', dataset, '--json', out,
-        '--threads', 1) == 0
+        '--threads', 1, '--yaw-study', '--latent-study') == 0
     found = json.loads(out.read_text())
     assert found['command'].startswith('active-recon evaluate ')
     assert found['weights'] == weights_hash(run / 'weights.safetensors')
@@ -171,10 +200,41 @@ def test_a_model_without_a_view_policy_is_measured_under_the_others(
     assert command(monkeypatch, *arguments, '--json', out) == 0
     found = json.loads(out.read_text())
     assert set(found['policies']) == {'random', 'uniform', 'farthest'}
-    assert 'blindness' not in found
-    assert set(found['yaw']) == {'0', '5', '15', '30', '90', '180'}
+    assert not {'blindness', 'yaw'} & found.keys()  # nobody asked for them
+    assert '--latent-study: needs' in refusal(monkeypatch, capsys, *arguments, '--latent-study')
     assert 'expected weights with a view policy' in refusal(
         monkeypatch, capsys, *arguments, '--policy', 'attention')
+
+
+def test_two_weights_files_are_compared_on_the_same_episodes(
+        run, dataset, tmp_path, monkeypatch, capsys):
+    import csv
+    import shutil
+
+    weights, copy = run / 'weights.safetensors', tmp_path / 'copy.safetensors'
+    shutil.copy(weights, copy)
+    out, rows = tmp_path / 'found.json', tmp_path / 'rows.csv'
+    arguments = ('evaluate', dataset, '--model', weights, '--views', 2, '--starts', 2, '--seeds',
+                 1, '--threads', 1)
+    assert command(monkeypatch, *arguments, '--against', copy, '--policy', 'random,farthest',
+                   '--paired', '--json', out, '--rows', rows) == 0
+    found = json.loads(out.read_text())
+    for figures in found['against']['above'].values():  # they are the same network
+        assert figures['auc'] == {'mean': 0, 'low': 0, 'high': 0}
+    random, farthest = (found['policies'][name]['auc']['mean'] for name in ('random', 'farthest'))
+    assert found['paired']['auc']['mean'] == pytest.approx(random - farthest)
+    told = capsys.readouterr().out
+    assert 'random above farthest: ' in told
+    with rows.open() as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == 2 * 2 * 12 * 2  # models, policies, episodes, views
+    first = [float(line['iou']) for line in lines
+             if line['model'] == str(weights) and line['policy'] == 'random'
+             and line['view'] == '1']
+    assert sum(first) / len(first) == pytest.approx(
+        found['policies']['random']['iou'][0]['mean'], abs=1e-5)
+    assert '--paired: 0 policies are named' in refusal(
+        monkeypatch, capsys, *arguments, '--paired')
 
 
 def test_an_object_that_cannot_be_read_is_listed(run, dataset, tmp_path, monkeypatch, capsys):
@@ -200,10 +260,11 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
     for arguments, words in [
         (('train', nothing, '--validation', dataset, '--out', tmp_path), "R2N2's layout"),
         (('evaluate', nothing, '--model', weights), "R2N2's layout"),
-        (('evaluate', dataset, '--model', nothing), 'expected a weights file'),
-        (('evaluate', dataset, '--model', '2d4d'), 'expected a weights file'),
-        (('evaluate', dataset, '--model', weights, '--policy', 'random,best'), "got 'best'"),
-        (('evaluate', dataset, '--model', weights, '--training', dataset), '--validation too'),
+        (('evaluate', dataset, '--model', nothing), 'no such file: expected weights'),
+        (('evaluate', dataset, '--model', '2d4d'), '2d4d: neither a weights file'),
+        (('evaluate', dataset, '--model', weights, '--policy', 'random,best'), "'best'"),
+        (('evaluate', dataset, '--model', weights, '--training', dataset),
+         '--training without --validation'),
     ]:
         assert words in refusal(monkeypatch, capsys, *arguments)
 
@@ -229,7 +290,7 @@ def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given(
     assert_close(after[name].float(), given[name].float(), rtol=2e-3, atol=1e-4)
     card = json.loads((out / 'weights.json').read_text())
     assert card['begun_with']['sha256'] == weights_hash(run / 'weights.safetensors')
-    assert 'got both' in refusal(monkeypatch, capsys, *training(
+    assert 'both --from and --begin-with' in refusal(monkeypatch, capsys, *training(
         dataset, tmp_path / 'none', '--begin-with', run / 'weights.safetensors', '--from',
         run / 'weights.safetensors'))
 

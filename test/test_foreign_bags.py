@@ -88,7 +88,7 @@ def test_a_pose_between_two_is_interpolated_within_the_gap(tmp_path):
     messages = [*images(), *cameras(late=PERIOD // 2)]
     found = views(tmp_path / 'run', messages)
     assert found[-1].camera.azimuth == pytest.approx(AZIMUTHS[-1])
-    with pytest.raises(DataError, match='expected images with an azimuth each.*within 0.01 s'):
+    with pytest.raises(DataError, match='no image has an azimuth: .*within 0.01 s'):
         views(tmp_path / 'short', messages, max_pose_gap=0.01)
 
 
@@ -101,15 +101,15 @@ def test_without_camera_info_a_pose_tells_its_azimuth_alone(tmp_path):
 
 def test_topics_of_one_kind_are_told_apart_by_name(tmp_path):
     folder = write_bag(tmp_path / 'run', images() + images('/cam/depth') + joints())
-    with pytest.raises(DataError, match='got /cam/color, /cam/depth; choose one with --image'):
+    with pytest.raises(DataError, match='/cam/color, /cam/depth: choose one with --image'):
         read_run(folder)
     (episode,) = read_run(folder, Topics(image='/cam/color')).episodes
     assert len(episode.views) == 3
-    with pytest.raises(DataError, match='expected images on /cam/none of type'):
+    with pytest.raises(DataError, match='no camera images on /cam/none: expected'):
         read_run(folder, Topics(image='/cam/none'))
 
 
 def test_a_camera_that_never_stands_still_gives_no_view(tmp_path):
     turning = [(time, '/angle', Float64(data=index / 5)) for index, (time, _) in enumerate(TIMES)]
-    with pytest.raises(DataError, match='expected a camera that stands still.*9 images'):
+    with pytest.raises(DataError, match='the camera never stands still in its 9 images'):
         views(tmp_path / 'run', images() + turning)

@@ -61,7 +61,7 @@ def test_bad_axes_and_folders_without_meshes_are_refused_before_the_work(tmp_pat
     with pytest.raises(DataError, match='expected meshes .*found none'):
         mesh_jobs(tmp_path, tmp_path, None, None)
     save(tmp_path, 'chair/a.obj')
-    with pytest.raises(ConfigError, match="up: expected one of .*'w'"):
+    with pytest.raises(ConfigError, match="up: 'w' is no axis"):
         mesh_jobs(tmp_path, tmp_path, 'w', None)
     with pytest.raises(ConfigError, match="category out of .*'castle'"):
         shape_jobs('castle', range(2), tmp_path)
@@ -118,7 +118,7 @@ def test_what_cannot_be_read_or_written_is_told_and_the_rest_is_made(tmp_path):
     refusals = {f'{outcome.folder.category}/{outcome.folder.name}': outcome.refusal
                 for outcome in outcomes}
     assert refusals.pop('chair/good') == ''
-    assert 'bad.ply: expected a mesh' in refusals.pop('chair/bad')
+    assert 'bad.ply: no mesh that can be read' in refusals.pop('chair/bad')
     assert 'Not a directory' in refusals.pop('car/good')
     assert not refusals
 

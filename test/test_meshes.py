@@ -62,9 +62,9 @@ def test_every_pair_of_axes_is_a_rotation_that_brings_them_to_z_and_x(up, front)
 
 
 @pytest.mark.parametrize(('up', 'front', 'message'), [
-    ('w', 'x', "up: expected one of x, y, z with an optional sign, got 'w'"),
-    ('z', '--x', "front: expected one of x, y, z with an optional sign, got '--x'"),
-    ('z', '-z', 'different axes, got z and -z')])
+    ('w', 'x', "up: 'w' is no axis"),
+    ('z', '--x', "front: '--x' is no axis"),
+    ('z', '-z', 'one axis, z and -z')])
 def test_axes_that_make_no_frame_are_refused(up, front, message):
     with pytest.raises(ConfigError, match=message):
         upright(up, front)
@@ -103,7 +103,7 @@ def test_the_parts_of_a_scene_are_one_mesh_and_keep_their_places(tmp_path):
 def test_what_holds_no_face_with_an_area_is_refused_with_its_path(name, content, tmp_path):
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(MeshError, match=f'{name}: expected .*'):
+    with pytest.raises(MeshError, match=f'{name}: (no mesh|a mesh without|expected faces)'):
         load_mesh(path)
 
 
@@ -112,11 +112,11 @@ def test_a_truncated_glb_is_refused(tmp_path):
     whole = (tmp_path / 'whole.glb').read_bytes()
     for share in (0.1, 0.5, 0.9):
         (tmp_path / 'cut.glb').write_bytes(whole[:int(len(whole) * share)])
-        with pytest.raises(MeshError, match='cut.glb: expected'):
+        with pytest.raises(MeshError, match='cut.glb: no mesh that can be read'):
             load_mesh(tmp_path / 'cut.glb')
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     for path in (tmp_path / 'none.ply', tmp_path):
-        with pytest.raises(MeshError, match='there is no such file'):
+        with pytest.raises(MeshError, match='no such mesh file'):
             load_mesh(path)

@@ -33,5 +33,5 @@ def test_all_objects_together_are_small():
 def test_a_path_is_taken_as_it_is_and_an_unknown_name_refused(tmp_path):
     (tmp_path / 'mug.stl').write_text('')
     assert find_object(str(tmp_path / 'mug.stl')) == tmp_path / 'mug.stl'
-    with pytest.raises(MeshError, match='teapot: expected one of bed, car, chair'):
+    with pytest.raises(MeshError, match='teapot: no such mesh file, and none of bed, car, chair'):
         find_object('teapot')

@@ -166,7 +166,7 @@ def test_the_command_makes_parts_systems_and_the_document(study, monkeypatch, ca
 
 def test_the_command_refuses_parts_that_there_are_not(study, monkeypatch, capsys):
     assert command(monkeypatch, study, 'table6') == 2
-    assert 'expected parts out of table1,' in capsys.readouterr().err
+    assert 'expected some of table1,' in capsys.readouterr().err
     assert command(monkeypatch, study, 'table1', '--device', 'tpu') == 2
     assert 'expected cpu, or cuda' in capsys.readouterr().err
 

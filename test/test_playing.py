@@ -61,7 +61,7 @@ def test_a_topic_that_the_bag_has_not_is_refused_with_those_it_has(bag):
 
 
 def test_what_is_no_whole_bag_is_refused(bag, tmp_path):
-    with pytest.raises(DataError, match='there is nothing'):
+    with pytest.raises(DataError, match='no bag there'):
         played_topics(tmp_path / 'nowhere', 1.0)
     bag.path.write_bytes(bag.path.read_bytes()[:-100])
     with pytest.raises(DataError, match='active-recon bag repair'):

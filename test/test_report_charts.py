@@ -15,7 +15,7 @@ from report_runs import changed, recorded_run
 @pytest.fixture(scope='module')
 def subject():
     run = recorded_run('chair', 'uniform', 3)
-    return Subject('A', run, run.episodes[0], known_truth(run))
+    return Subject('A', run, run.episodes[0], known_truth(run).cells)
 
 
 def in_plain_colors(value):

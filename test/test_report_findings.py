@@ -8,6 +8,7 @@ from active_recon.bags.run import RecordedGoal
 from active_recon.cameras import orbit_camera
 from active_recon.report.findings import findings
 from active_recon.report.subject import Subject
+from active_recon.report.words import key_words
 import pytest
 from report_runs import changed, recorded_run
 
@@ -45,6 +46,33 @@ def test_images_that_nobody_counted_are_told(run):
     assert 'About 7 images are missing' in gap and 'every 100 ms' in gap and '0.8 s' in gap
     [unheard] = said(replace(run, gaps=ImageGaps(0.1, unheard=9)))
     assert unheard.startswith('9 images that were recorded never reached')
+
+
+def test_one_is_told_as_one(run):
+    [warning] = said(counted(run, refused__no_pose=1))
+    assert warning.startswith('1 image was dropped: no camera pose arrived close enough to it')
+    [gap] = said(replace(run, gaps=ImageGaps(0.1, 1, 0.2)))
+    assert 'About 1 image is missing' in gap
+    [unheard] = said(replace(run, gaps=ImageGaps(0.1, unheard=1)))
+    assert unheard.startswith('1 image that was recorded')
+
+
+@pytest.mark.parametrize(('count', 'often'), [(1, 'once'), (2, 'twice'), (3, '3 times')])
+def test_what_nodes_warned_of_is_told_in_words(run, count, often):
+    [warning] = said(counted(run, warned__stalled=count))
+    assert warning == (f'The reconstructor warned {often} of a camera that stood still away from '
+                       'its goal.')
+    [unknown] = said(counted(run, warned__lost_marbles=count))
+    assert 'of lost marbles.' in unknown
+
+
+@pytest.mark.parametrize(('key', 'words'), [
+    ('refused/no_pose', 'refused: no pose'), ('warned/noisy_poses', 'warned of poses that jump'),
+    ('dropped/unheard', 'images lost on the way'), ('weights_sha256', 'weights (SHA-256)'),
+    ('dropped/new_kind', 'dropped: new kind'),
+    ('warned/qos/camera/image_raw', 'warned of QoS profiles that do not fit (camera/image_raw)')])
+def test_counters_and_records_have_words(key, words):
+    assert key_words(key) == words
 
 
 def test_refusal_of_a_kind_unknown_here_is_told_by_its_name(run):

@@ -4,21 +4,18 @@ from dataclasses import replace
 import math
 from pathlib import Path
 
+from active_recon.bags.rebuilt import lacks_reconstruction, with_reconstruction
 from active_recon.bags.run import RecordedRun
-from active_recon.errors import ConfigError, MeshError
+from active_recon.errors import ConfigError, DataError, MeshError
 from active_recon.objects import find_object
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.subject import Subject
-from active_recon.report.truth import (
-    known_truth,
-    lacks_reconstruction,
-    read_truth,
-    with_reconstruction,
-)
+from active_recon.report.truth import known_truth, TruthFile
 from active_recon.voxels import VoxelGrid, write_binvox
 import numpy as np
 import pytest
 from report_runs import changed, recorded_run
+import trimesh
 
 
 @pytest.fixture(scope='module')
@@ -30,9 +27,13 @@ def shown(run, mesh, up=''):
     return replace(run, parameters={'turntable_camera': {'mesh': mesh, 'up': up}})
 
 
+def cells_of(path, run, *placed, **size):
+    return TruthFile(Path(path), *placed).read(run, **size).cells
+
+
 def test_object_that_ships_is_known_wherever_it_was_installed(run):
     truth = known_truth(shown(run, '/elsewhere/active_recon/objects/chair.glb'))
-    assert (truth == read_truth(find_object('chair'), run)).all()
+    assert (truth.cells == cells_of(find_object('chair'), run, True)).all()
 
 
 @pytest.mark.parametrize(('mesh', 'up'), [
@@ -43,28 +44,65 @@ def test_truth_of_any_other_object_is_not_known(run, mesh, up):
 
 
 def test_mesh_and_its_binvox_are_the_same_truth(run, tmp_path):
-    cells = read_truth(find_object('chair'), run)
-    assert (read_truth(Path('chair'), run) == cells).all()
+    cells = cells_of('chair', run)
     write_binvox(VoxelGrid(cells.astype(np.float32)), tmp_path / 'chair.binvox')
-    assert (read_truth(tmp_path / 'chair.binvox', run) == cells).all()
+    assert (cells_of(tmp_path / 'chair.binvox', run) == cells).all()
 
 
-def test_truth_turns_with_the_front_of_the_object(run):
+def test_mesh_is_in_metres_and_where_it_stands(run, tmp_path):
+    box = trimesh.creation.box(bounds=[(0, 0, 0), (0.25, 0.25, 0.25)])
+    box.export(tmp_path / 'box.ply')
+    truth = TruthFile(tmp_path / 'box.ply').read(run)
+    expected = np.zeros((32, 32, 32), bool)
+    expected[16:24, 16:24, 16:24] = True
+    assert expected[truth.cells].mean() > 0.6  # and its surface's cells around it
+    assert (truth.cells | ~expected).all()
+    assert 'in metres and where it stands' in truth.placed
+    assert cells_of(tmp_path / 'box.ply', run, True).mean() > 0.9  # fitted, it fills the cube
+    small = cells_of(tmp_path / 'box.ply', run, object_size=0.5)
+    assert small[16:, 16:, 16:].mean() > 0.9 and not small[:15].any()
+
+
+def test_mesh_that_sticks_out_of_the_cube_is_cut_and_the_page_says_so(run, tmp_path):
+    trimesh.creation.box((2, 0.5, 0.5)).export(tmp_path / 'bar.ply')
+    truth = TruthFile(tmp_path / 'bar.ply').read(run)
+    assert truth.cells[:, 10:22, 10:22].all()
+    assert '% of its surface is outside of the cube' in truth.placed
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    box.apply_translation((5, 0, 0))
+    box.export(tmp_path / 'far.ply')
+    with pytest.raises(DataError, match='nothing of it is in the run.s cube.*--fit'):
+        TruthFile(tmp_path / 'far.ply').read(run)
+
+
+def test_axes_of_the_true_mesh_are_options(run, tmp_path):
+    box = trimesh.creation.box(bounds=[(0, 0, 0), (0.1, 0.1, 0.4)])
+    box.export(tmp_path / 'stick.ply')
+    lying = cells_of(tmp_path / 'stick.ply', run, False, 'y', 'z')
+    assert lying[20, 17, 17] and not lying[17, 17, 25]
+
+
+def test_truth_turns_with_the_front_of_the_object_where_it_is_fitted(run):
     turned = replace(run, parameters={'reconstructor': {'object_yaw': math.pi / 2}})
-    plain, quarter = (read_truth(find_object('chair'), each) for each in (run, turned))
+    plain, quarter = (cells_of('chair', each) for each in (run, turned))
     assert (quarter == np.rot90(plain, 1, (0, 1))).all()
 
 
 def test_truth_that_does_not_fit_is_refused(run, tmp_path):
     write_binvox(VoxelGrid(np.ones((16, 16, 16), np.float32)), tmp_path / 'small.binvox')
-    with pytest.raises(ConfigError, match='expected 32 cells a side'):
-        read_truth(tmp_path / 'small.binvox', run)
+    with pytest.raises(ConfigError, match='16 cells a side'):
+        cells_of(tmp_path / 'small.binvox', run)
+    write_binvox(VoxelGrid(np.ones((32, 32, 32), np.float32), 0.2), tmp_path / 'other.binvox')
+    with pytest.raises(ConfigError, match='a cube of 0.2 m'):
+        cells_of(tmp_path / 'other.binvox', run)
+    assert cells_of(tmp_path / 'other.binvox', run, True).all()
+    assert cells_of(tmp_path / 'other.binvox', run, object_size=0.2).all()
     with pytest.raises(MeshError):
-        read_truth(tmp_path / 'missing.glb', run)
+        cells_of(tmp_path / 'missing.glb', run)
 
 
 def test_iou_is_one_where_the_estimate_is_the_truth(run):
-    truth = known_truth(run)
+    truth = known_truth(run).cells
     views = [replace(run.episodes[0].views[0], occupied=VoxelGrid(truth.astype(np.float32)))]
     assert Subject('A', run, changed(run, views=views).episodes[0], truth).ious == [1.0]
     assert Subject('A', run, run.episodes[0]).ious == [None] * 3

@@ -22,7 +22,7 @@ def train(dataset, out, devices, steps, *more):
          '--model', '2d3d', *more],
         env=environment, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
-    events = EventAccumulator(str(out / 'tensorboard'))
+    events = EventAccumulator(str(out / 'tensorboard' / 'reconstruction'))
     events.Reload()
     return np.array([event.value for event in events.Scalars('reconstruction/loss')]), done
 

@@ -1,5 +1,7 @@
 """The first stage of training: it learns, repeats, goes on after a cut, says what went wrong."""
 
+import os
+import signal
 
 from active_recon.config import LossConfig
 from active_recon.errors import ConfigError
@@ -10,7 +12,9 @@ from active_recon.training.loop import (
     Run,
     TrainingConfig,
     TrainingDivergedError,
+    TrainingStoppedError,
 )
+from active_recon.training.pictures import progress_picture
 from active_recon.training.supervised import longest_sequence, steps_for, train_reconstruction
 import numpy as np
 import pytest
@@ -75,6 +79,24 @@ def test_a_training_cut_off_and_resumed_ends_in_the_very_same_weights(
     assert told == whole[1][3:]
 
 
+@pytest.mark.parametrize('asked', [signal.SIGINT, signal.SIGTERM])
+def test_a_training_that_is_asked_to_stop_saves_its_step_and_goes_on_from_there(
+        whole, views, tiny, tmp_path, asked):
+    path = tmp_path / 'run.safetensors'
+    told = []
+
+    def show(step):
+        told.append(step)
+        os.kill(os.getpid(), asked)
+
+    with pytest.raises(TrainingStoppedError, match='stopped at step 5 of 7; .*--resume'):
+        train(CONFIG, views, tiny, path, show=show)  # asked at the validation after step 4
+    assert told == [4]
+    resumed, told = train(CONFIG, views, tiny, path, seed=9, resume=True)
+    assert_same(resumed, whole[0])
+    assert told == whole[1][5:]
+
+
 def test_a_training_stopped_early_and_resumed_does_too(whole, views, tiny, tmp_path):
     path = tmp_path / 'run.safetensors'
     _, told = train(CONFIG, views, tiny, path, until=6)
@@ -98,7 +120,7 @@ def test_a_finished_training_that_is_resumed_does_nothing(whole, views, tiny, tm
 def test_a_checkpoint_of_other_settings_is_refused(views, tiny, tmp_path, config, loss):
     path = tmp_path / 'run.safetensors'
     train(CONFIG, views, tiny, path, until=3)
-    with pytest.raises(ConfigError, match='expected a checkpoint of the same settings.*got'):
+    with pytest.raises(ConfigError, match='made under other settings.*asked for'):
         train(config, views, tiny, path, loss=loss, resume=True)
 
 
@@ -161,3 +183,12 @@ def test_sequences_are_short_in_the_first_half_and_the_samples_are_counted_so():
     seen = sum(8 * (most + 1) / 2 for most in longest)
     assert steps_for(seen, 8, 5) == 1000
     assert longest_sequence(0, TrainingConfig(steps=9, max_views=1)) == 1
+
+
+def test_a_picture_shows_views_and_what_the_network_makes_of_them(network, views):
+    picture = progress_picture(network, views)
+    assert picture.shape == (4 * 128, 7 * 128, 3)
+    assert picture.dtype == np.uint8
+    truth = views.voxels[0].float().amax(1).T.flip(0).numpy()  # along y, upright
+    side = picture[:128, 4 * 128:5 * 128, 0]
+    assert np.array_equal(side[2::4, 2::4] > 0, truth > 0)

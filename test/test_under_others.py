@@ -78,7 +78,7 @@ def test_a_view_that_was_never_taken_is_refused_by_its_azimuth(sweep, loop):
 
 
 def test_an_episode_without_views_is_refused(sweep, loop):
-    with pytest.raises(DataError, match='without'):
+    with pytest.raises(DataError, match='no view in the episode'):
         explored(replace(sweep, views=[]), *loop, 0.14)
 
 

@@ -226,7 +226,7 @@ def test_a_written_mesh_is_read_by_other_software(suffix, tmp_path):
 
 
 def test_a_mesh_of_another_format_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match='expected a suffix out of ply, obj, stl'):
+    with pytest.raises(ConfigError, match='no mesh has that suffix: expected ply, obj, stl'):
         write_mesh(ball(0.3).mesh(0.5), tmp_path / 'ball.docx')
 
 
@@ -264,7 +264,7 @@ def binvox(data: bytes, dim: str = '2 2 2', scale: str = '1') -> bytes:
 def test_what_is_no_whole_binvox_is_refused_with_its_path(content, tmp_path):
     path = tmp_path / 'model.binvox'
     path.write_bytes(content)
-    with pytest.raises(DataError, match='model.binvox: expected a whole binvox file'):
+    with pytest.raises(DataError, match='model.binvox: no whole binvox file'):
         read_binvox(path)
 
 

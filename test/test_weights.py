@@ -90,7 +90,7 @@ def bundle_card():
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(WeightsError, match=r'nothing\.safetensors: expected a weights file .* no'):
+    with pytest.raises(WeightsError, match=r'nothing\.safetensors: no such file'):
         load_weights(tmp_path / 'nothing.safetensors')
 
 
@@ -98,19 +98,19 @@ def test_a_missing_file_is_refused(tmp_path):
 def test_a_truncated_file_is_refused(saved, share):
     raw = saved.read_bytes()
     saved.write_bytes(raw[:int(share * len(raw))])
-    with pytest.raises(WeightsError, match='expected a whole safetensors file'):
+    with pytest.raises(WeightsError, match='no whole safetensors file'):
         load_weights(saved)
 
 
 def test_a_pickle_is_refused_and_never_run(tmp_path):
     torch.save({'weights': torch.zeros(3)}, tmp_path / 'model.safetensors')
-    with pytest.raises(WeightsError, match='expected a whole safetensors file'):
+    with pytest.raises(WeightsError, match='no whole safetensors file'):
         load_weights(tmp_path / 'model.safetensors')
 
 
 @pytest.mark.parametrize(('model', 'said'), [
-    ('3d-r2n3', "expected one of 2d3d-attention, .*got '3d-r2n3'"),
-    (None, 'got a file that names no model')])
+    ('3d-r2n3', "'3d-r2n3': expected one of 2d3d-attention"),
+    (None, 'names no model')])
 def test_a_model_that_is_not_in_the_registry_is_refused(saved, tiny, model, said):
     rewritten(saved, tiny, model=model)
     with pytest.raises(WeightsError, match=said):
@@ -129,7 +129,7 @@ def test_weights_are_found_by_the_name_of_a_model_or_by_their_path(tmp_path):
     assert find_weights() == find_weights(DEFAULT_MODEL) == SHIPPED
     assert find_weights(tmp_path / 'a.safetensors') == tmp_path / 'a.safetensors'
     assert find_weights('runs/mine') == Path('runs/mine')
-    with pytest.raises(WeightsError, match=f'whose weights ship .*{DEFAULT_MODEL}.*got 2d4d'):
+    with pytest.raises(WeightsError, match=f'2d4d: neither.*{DEFAULT_MODEL}'):
         find_weights('2d4d')
 
 

@@ -13,8 +13,9 @@ from active_recon.bags.message_types import (
     read_message,
 )
 from active_recon.bags.raw import Bag
-from active_recon.bags.topics import CameraTopics, Topics
-from active_recon.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
+from active_recon.bags.scene import Scene
+from active_recon.bags.topics import CameraTopics, IMAGE_ROLE, INFO_ROLE, POSE_ROLE, Topics
+from active_recon.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics
 from active_recon.errors import DataError, MessageError
 from active_recon.reporting import Advance, Reporting, silent
 from msg_tools.camera_images import size_from_msg
@@ -25,32 +26,35 @@ from msg_tools.views import UnreadView, ViewJoiner
 import numpy as np
 from numpy.typing import NDArray
 
-IMAGE_ROLE, INFO_ROLE, POSE_ROLE = 'camera/image_raw', 'camera/camera_info', 'camera/pose'
-
 
 class CameraStream:
     """
     Reads the camera's topics of a bag.
 
-    Poses are interpolated and refused as in the node. Where a bag has azimuths alone, or no
-    camera info of a calibrated camera, the camera is the canonical one at that azimuth, and the
-    shorter side of its image what the canonical camera sees. Azimuths without stamps are joined
-    to the images on their receive times.
+    Poses are interpolated and refused as in the node. Where a bag has azimuths alone and the
+    scene tells no position, or where it has no camera info of a calibrated camera, the camera
+    stands at that azimuth as the scene says, and the shorter side of its image is what the
+    canonical camera sees. Azimuths without stamps are joined to the images on their receive
+    times. Raises ConfigError where the scene tells what the bag does.
+
+    `assumed` tells in words what neither bag nor scene does, once the views were read.
 
     `received` tells when what bears a stamp was received, by the topic's name in the loop,
     nanoseconds; `images` are the stamp and the receive time of each image read, wanted or not.
     """
 
-    def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics,
+    def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics, scene: Scene,
                  reporting: Reporting = silent) -> None:
         self._bag = bag
         self._camera = camera
         self._topics = topics
+        self._scene = scene
         self._reporting = reporting
         self._unstamped = False
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
         self.images: list[tuple[int, int]] = []
+        self.assumed: list[str] = []
         self.received: dict[str, dict[int, int]] = {
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
@@ -115,8 +119,7 @@ class CameraStream:
                     self._lenses.append((stamp, intrinsics_from_msg(msg)))
             except MessageError as error:
                 yield error
-        if azimuth.type_name != POSE:
-            self._lenses.clear()  # at a distance that nobody knows, a lens says nothing
+        self._place()
         self._unstamped = not any(stamp for stamp, _, _ in poses)
         self._poses = [(received if self._unstamped else stamp, self._placed(pose))
                        for stamp, received, pose in poses]
@@ -127,15 +130,26 @@ class CameraStream:
         kind = self._camera.azimuth.type_name
         if kind == POSE:
             return pose_from_msg(msg, self._topics.object_frame)
-        azimuth = (joint_position_from_msg(msg, self._topics.joint) if kind == JOINT_STATE
-                   else float(msg.data))
-        if not math.isfinite(azimuth):
-            raise MessageError(f'expected a finite azimuth, got {azimuth}', 'azimuth')
-        return orbit_camera(-azimuth if self._topics.turned_object else azimuth).pose
+        angle = (joint_position_from_msg(msg, self._topics.joint) if kind == JOINT_STATE
+                 else float(msg.data))
+        if not math.isfinite(angle):
+            raise MessageError(f'expected a finite azimuth, got {angle}', 'azimuth')
+        return self._scene.pose_at(angle, self._topics.turned_object)
+
+    def _place(self) -> None:
+        """Decide how much is known of where the camera stands, and refuse what is told twice."""
+        scene, azimuth = self._scene, self._camera.azimuth
+        has_poses, recorded = azimuth.type_name == POSE, bool(self._lenses)
+        if not has_poses and scene.camera_position is None:
+            self._lenses.clear()  # at a distance that nobody knows, a lens says nothing
+        scene.require_needed(azimuth.name, has_poses, has_poses and bool(self._lenses))
+        self.assumed = scene.assumed(self._camera.image.name, has_poses, recorded)
 
     def _placed(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the pose itself, or the canonical one at its azimuth where no lens is known."""
-        return pose if self._lenses else orbit_camera(Camera(pose).azimuth).pose
+        """Return the pose itself, or one at its azimuth where no lens is known."""
+        if self._lenses or self._scene.camera_position is not None:
+            return pose
+        return self._scene.orbit_pose(Camera(pose).azimuth)
 
     def _lens(self, time: int, height: int, width: int) -> Intrinsics:
         """Return the camera info of that time, or the last before it."""

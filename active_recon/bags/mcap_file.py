@@ -45,14 +45,14 @@ def mcap_records(path: Path, advance: Advance, name: Path | None = None) -> Iter
     except OSError as error:
         raise DataError(f'{name}: cannot be read: {error.strerror}') from error
     except Exception as error:  # the decoders raise whatever damaged bytes lead them to
-        raise DataError(f'{name}: expected a whole MCAP file, got records that cannot be '
-                        f'understood ({str(error) or type(error).__name__}); `active-recon bag '
+        raise DataError(f'{name}: damaged: it has records that cannot be understood '
+                        f'({str(error) or type(error).__name__}); `active-recon bag '
                         'repair` keeps the others', 'damaged') from error
 
 
 def _file_records(file: BinaryIO, size: int, advance: Advance) -> Iterator[McapRecord]:
     if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-        raise DataError('expected an MCAP file, got another beginning', 'no_mcap')
+        raise DataError('no MCAP file: it begins otherwise', 'no_mcap')
     for opcode, length in _heads(file, size):
         advance(_HEAD + length, '')
         if opcode == Opcode.FOOTER:
@@ -69,7 +69,7 @@ def _file_records(file: BinaryIO, size: int, advance: Advance) -> Iterator[McapR
                 yield from _chunk_records(record)
             else:
                 yield record
-    raise DataError('expected a whole MCAP file, but its end is missing; `active-recon bag '
+    raise DataError('its end is missing, as where a recorder was killed; `active-recon bag '
                     'repair` keeps all that is whole', 'truncated')
 
 
@@ -91,8 +91,8 @@ def _heads(stream: BinaryIO, end: int) -> Iterator[tuple[int, int]]:
         left = end - stream.tell()
         if len(head) < _HEAD or length > left:
             raise DataError(
-                f'expected a whole record at byte {following}, but it claims {length} bytes and '
-                f'{left} are left; `active-recon bag repair` keeps all that is whole',
+                f'cut off at byte {following}: a record there claims {length} bytes and {left} '
+                f'are left; `active-recon bag repair` keeps all that is whole',
                 'truncated')
         following = stream.tell() + length
         yield opcode, length
@@ -100,13 +100,13 @@ def _heads(stream: BinaryIO, end: int) -> Iterator[tuple[int, int]]:
 
 def _record(opcode: int, stream: BinaryIO, length: int) -> McapRecord:
     if length > MOST_BYTES:
-        raise DataError(f'expected records of at most {MOST_BYTES} bytes, got one of {length}',
+        raise DataError(f'a record of {length} bytes: expected at most {MOST_BYTES}',
                         'too_large')
     content = ReadDataStream(BytesIO(stream.read(length)))
     if opcode != Opcode.MESSAGE:
         return _READ[Opcode(opcode)](content)
     if length < 22:
-        raise DataError(f'expected a message of at least 22 bytes, got {length}', 'damaged')
+        raise DataError(f'a message of {length} bytes: expected at least 22', 'damaged')
     message: Message = Message.read(content, length)
     return message
 
@@ -114,8 +114,8 @@ def _record(opcode: int, stream: BinaryIO, length: int) -> McapRecord:
 def _unpacked(chunk: Chunk) -> bytes:
     size = chunk.uncompressed_size
     if size > MOST_BYTES:
-        raise DataError(f'expected chunks of at most {MOST_BYTES} bytes, got one that claims '
-                        f'{size}', 'too_large')
+        raise DataError(f'a chunk that claims {size} bytes: expected at most {MOST_BYTES}',
+                        'too_large')
     if chunk.compression == 'zstd':
         data = ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
     elif chunk.compression == 'lz4':
@@ -123,10 +123,10 @@ def _unpacked(chunk: Chunk) -> bytes:
     elif chunk.compression == '':
         data = chunk.data
     else:
-        raise DataError('expected chunks packed by zstd, lz4 or not at all, got '
-                        f'{chunk.compression!r}', 'compression')
+        raise DataError(f'a chunk packed by {chunk.compression!r}: expected zstd, lz4 or '
+                        'nothing', 'compression')
     if len(data) != size or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise DataError(f'expected a chunk of {size} bytes with its checksum, got {len(data)} '
-                        'bytes that are not as they were written; `active-recon bag repair` keeps '
+        raise DataError(f'a chunk of {size} bytes is not as it was written, {len(data)} bytes '
+                        'without its checksum; `active-recon bag repair` keeps '
                         'the others', 'damaged')
     return bytes(data)

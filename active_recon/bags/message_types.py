@@ -47,8 +47,8 @@ def read_message(message: RawMessage) -> Any:
         return content
     except Exception as error:  # the generated code raises whatever the bytes lead it to
         raise DataError(
-            f'{message.topic} at {message.received / 1e9:.3f} s: expected the bytes of a '
-            f'{message.type_name}, got {len(data)} bytes of something else ({error})',
+            f'{message.topic} at {message.received / 1e9:.3f} s: {len(data)} bytes that are no '
+            f'{message.type_name} ({error})',
             'message_bytes') from error
 
 
@@ -66,8 +66,8 @@ def require_standard(type_name: str, definition: bytes, path: Path) -> None:
         theirs = {name: fields for name, (_, fields) in types.items()}
         ours = {name: _standard().fielddefs[name][1] for name in theirs}
     except Exception as error:  # the parser raises whatever the text leads it to
-        raise DataError(f'{path}: expected a definition of {type_name}, got a text that cannot '
-                        'be read as one', 'definition') from error
+        raise DataError(f'{path}: its definition of {type_name} cannot be read',
+                        'definition') from error
     if theirs != ours:
-        raise DataError(f'{path}: expected {type_name} to be defined as in ROS, got other fields '
-                        'under that name', 'definition')
+        raise DataError(f'{path}: {type_name} is defined otherwise than in ROS, by other fields',
+                        'definition')

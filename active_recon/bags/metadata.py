@@ -135,9 +135,9 @@ def yaml_mapping(text: bytes, name: str) -> dict[str, Any]:
     try:
         value = yaml.load(text, _NoAliases)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise DataError(f'{name}: expected YAML, got: {" ".join(str(error).split())}') from error
+        raise DataError(f'{name}: no YAML: {" ".join(str(error).split())}') from error
     if not isinstance(value, dict):
-        raise DataError(f'{name}: expected a mapping, got {type(value).__name__}')
+        raise DataError(f'{name}: a {type(value).__name__} where a mapping was expected')
     return value
 
 

@@ -46,11 +46,11 @@ class StoredFiles:
             most = min(declared, MOST_BYTES) if declared >= 0 else MOST_BYTES
             unpacked = ZstdDecompressor().stream_reader(data).read(most + 1)
         except ZstdError as error:
-            raise DataError(f'expected a message packed by zstd, got other bytes ({error})',
+            raise DataError(f'a message that is not packed by zstd as it claims ({error})',
                             'damaged') from error
         if declared > most or len(unpacked) > most:
-            raise DataError(f'expected messages of at most {most} bytes, got one of {len(data)} '
-                            'that unpacks to more', 'too_large')
+            raise DataError(f'a message of {len(data)} bytes that unpacks to more than {most}',
+                            'too_large')
         return unpacked
 
 
@@ -64,11 +64,10 @@ def _unpacked_file(path: Path, folder: Path) -> Path:
             while piece := reader.read(_PIECE):
                 size += len(piece)
                 if size > most:
-                    raise DataError(f'{path}: expected a file that unpacks to at most {most} '
-                                    'bytes, got one of more', 'too_large')
+                    raise DataError(f'{path}: unpacks to more than {most} bytes', 'too_large')
                 out.write(piece)
     except ZstdError as error:
-        raise DataError(f'{path}: expected a file packed by zstd, got other bytes ({error})',
+        raise DataError(f'{path}: not packed by zstd as its name says ({error})',
                         'damaged') from error
     except OSError as error:
         raise DataError(f'{path}: cannot be unpacked: {error.strerror}') from error

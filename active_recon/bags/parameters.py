@@ -38,6 +38,6 @@ def _checked(path: Path, name: str, value: Any) -> Any:
     if not fits or low is not None and not low <= value <= high:
         expected = 'a list of numbers' if kind is list else kind.__name__
         within = '' if low is None else f' from {low} to {high}'
-        raise DataError(f'{path}: its parameter {name}: expected {expected}{within}, '
-                        f'got {value!r}')
+        raise DataError(f'{path}: its parameter {name} is {value!r}: expected '
+                        f'{expected}{within}')
     return value

@@ -18,7 +18,8 @@ def played_topics(bag: Path, rate: float, names: str = '',
     is not above 0 or the bag has no such topic, DataError where there is no whole bag.
     """
     if not 0 < rate < float('inf'):
-        raise ConfigError(f'expected a rate above 0, 1 being that of the recording, got {rate:g}')
+        raise ConfigError(f'--rate {rate:g}: expected a rate above 0, 1 being that of the '
+                          'recording')
     topics = {topic.name: Topic(topic.name, topic.type_name, topic.qos)
               for topic in open_bag(bag).summary(reporting).topics if topic.count}
     wanted = [f'/{name.strip().lstrip("/")}' for name in names.split(',') if name] or list(topics)

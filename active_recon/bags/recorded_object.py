@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from active_recon.bags.run import RecordedView
 from active_recon.environment import run_episode, TimeStep
+from active_recon.errors import ViewError
 from active_recon.reconstructor import Reconstruction, Reconstructor
 
 
@@ -18,8 +19,17 @@ class RecordedObject:
         self._reconstructor.reset()
 
     def step(self, view: RecordedView) -> Reconstruction:
-        """Fold a view in; raises ViewError on one that is none."""
-        return self._reconstructor.add_view(view.image, view.camera)
+        """Fold a view in; raises ViewError that says what may be told where it is none."""
+        try:
+            return self._reconstructor.add_view(view.image, view.camera)
+        except ViewError as error:
+            raise told_option(error) from error
+
+
+def told_option(error: ViewError) -> ViewError:
+    """Return the error with the option that a command has for it."""
+    hint = '; --object-size tells its side' if error.kind == 'out_of_image' else ''
+    return ViewError(f'{error}{hint}', error.kind)
 
 
 def seen_again(views: Sequence[RecordedView], reconstructor: Reconstructor

@@ -10,8 +10,9 @@ from typing import Any
 from active_recon.bags.camera_stream import CameraStream
 from active_recon.bags.loop_record import LoopRecord
 from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedView
+from active_recon.bags.scene import Scene
 from active_recon.cameras import azimuth_difference, Camera, OrbitCamera, view_distance
-from active_recon.errors import DataError, MessageError
+from active_recon.errors import DataError, MessageError, ViewError
 from active_recon.view_gate import ViewGate
 from msg_tools.episodes import Episode
 from msg_tools.views import View
@@ -19,13 +20,15 @@ from msg_tools.views import View
 _ROUNDING = 1e-9  # rad
 
 
-def recorded_episodes(stream: CameraStream, record: LoopRecord) -> list[RecordedEpisode]:
+def recorded_episodes(stream: CameraStream, record: LoopRecord,
+                      scene: Scene) -> list[RecordedEpisode]:
     """
     Return the episodes that the loop recorded, each with its views in the order it took them.
 
     What was recorded before any episode began is one without an id. Views from before the
-    recording, of which a latched message tells, are left out. Raises DataError where the image of
-    another view is missing or its camera is.
+    recording, of which a latched message tells, are left out. The background is taken away as the
+    scene says, where the loop did not. Raises DataError where the image of another view is
+    missing or its camera is, ViewError where the object is not found in an image.
     """
     stamps = sorted(record.parts['view'])
     views = _taken_views(stream, stamps)
@@ -36,12 +39,13 @@ def recorded_episodes(stream: CameraStream, record: LoopRecord) -> list[Recorded
     ends = [episode.begin for episode in begun[1:]] + [math.inf]
     return [replace(
         _episode(episode, [view for view in views if episode.begin <= view.stamp < end],
-                 end, stream, record),
+                 end, stream, record, scene),
         begun_before=any(episode.begin <= stamp < end for stamp in before))
         for episode, end in zip(begun, ends, strict=True)]
 
 
-def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, dict[str, int]]:
+def gated_views(stream: CameraStream, gate: ViewGate,
+                scene: Scene) -> tuple[RecordedEpisode, dict[str, int]]:
     """
     Return the views that the gate of the reconstructor's node lets through, as one episode.
 
@@ -58,19 +62,20 @@ def gated_views(stream: CameraStream, gate: ViewGate) -> tuple[RecordedEpisode, 
                 counters['images'] += 1
                 counters['images_unused'] += 1
                 continue
-            views.append(_view(view.read(), None, stream, None))
-        except MessageError as error:
+            views.append(_view(view.read(), None, stream, None, scene))
+        except ViewError as error:
             refusal = refusal or str(error)
             counters[f'refused/{error.kind}'] += 1
             continue
         counters['images'] += 1
         gate.took(view.camera)
     if not counters['images']:
-        raise DataError(f'expected images with an azimuth each, got none: '
-                        f'{refusal or "there is no image"}', 'no_views')
+        raise DataError(f'no image has an azimuth: {refusal or "there is no image"}', 'no_views')
+    if not views and refusal:
+        raise DataError(f'not one image became a view: {refusal}', 'no_views')
     if not views:
-        raise DataError(f'expected a camera that stands still for its views, got '
-                        f'{counters["images"]} images of one that never does', 'no_views')
+        raise DataError(f'the camera never stands still in its {counters["images"]} images: '
+                        'expected one that does for its views', 'no_views')
     counters['views'] = len(views)
     return RecordedEpisode('', views[0].stamp, None, views, ''), dict(counters)
 
@@ -87,14 +92,13 @@ def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
             refusal = refusal or str(error)
     for number, stamp in enumerate(stamps, 1):
         if stamp not in found and not (found and stream.begins_after(stamp)):
-            raise DataError(f'expected the image and the camera of view {number} '
-                            f'({stamp / 1e9:.3f} s), but they are missing: '
-                            f'{refusal or "the image was not recorded"}', 'no_image')
+            raise DataError(f'the image or the camera of view {number} ({stamp / 1e9:.3f} s) is '
+                            f'missing: {refusal or "the image was not recorded"}', 'no_image')
     return [found[stamp] for stamp in stamps if stamp in found]
 
 
 def _episode(episode: Episode, views: Sequence[View], end: float, stream: CameraStream,
-             record: LoopRecord) -> RecordedEpisode:
+             record: LoopRecord, scene: Scene) -> RecordedEpisode:
     """Return an episode, with each goal after the view that it was decided upon."""
     asked: dict[int, list[RecordedGoal]] = {}
     published = [record.published['view'][view.stamp] for view in views]
@@ -111,7 +115,8 @@ def _episode(episode: Episode, views: Sequence[View], end: float, stream: Camera
                if episode.begin <= stamp < end]
     return RecordedEpisode(
         episode.id, episode.begin, decided.get(0),
-        [_view(view, decided.get(number), stream, record) for number, view in enumerate(views, 1)],
+        [_view(view, decided.get(number), stream, record, scene)
+         for number, view in enumerate(views, 1)],
         max(reasons, default=(0, ''))[1])
 
 
@@ -135,7 +140,7 @@ def _with_azimuth(camera: Camera, azimuth: float) -> Camera:
 
 
 def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
-          record: LoopRecord | None) -> RecordedView:
+          record: LoopRecord | None, scene: Scene) -> RecordedView:
     parts = record.parts if record else {}
     received = {role: times[view.stamp]
                 for role, times in (stream.received | (record.received if record else {})).items()
@@ -144,7 +149,9 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
     def part(role: str) -> Any:
         return parts.get(role, {}).get(view.stamp)
 
-    cleared = part('view_image')  # where the background was taken away, the network saw this
-    return RecordedView(view.stamp, view.image if cleared is None else cleared, view.camera,
+    image = part('view_image')  # where the background was taken away, the network saw this
+    if image is None:
+        image = scene.cleared(view.image)
+    return RecordedView(view.stamp, image, view.camera,
                         part('probabilities'), part('occupancy'), part('latent'), part('entropy'),
                         goal, received, (part('done') or (0, ''))[1])

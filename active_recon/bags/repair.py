@@ -58,8 +58,8 @@ def repair_bag(bag: Path, advance: Callable[[str], None] = lambda name: None
             advance(each.path.name)
         return repairs, bag.is_dir() and _repair_metadata(bag, repairs)
     except OSError as error:
-        raise DataError(f'{bag}: expected to read the bag and to write a whole one beside it, '
-                        f'but: {error}; what was there is untouched', 'not_repaired') from error
+        raise DataError(f'{bag}: cannot be repaired: {error}; what was there is untouched',
+                        'not_repaired') from error
 
 
 def bag_files(bag: Path) -> list[Path]:
@@ -68,8 +68,8 @@ def bag_files(bag: Path) -> list[Path]:
         return [bag]
     files = mcap_files(bag)
     if not files:
-        raise DataError(f'{bag}: expected a bag, a folder of MCAP files or one of them, '
-                        'but there is none', 'no_bag')
+        raise DataError(f'{bag}: no bag there: expected a folder of MCAP files, or one of '
+                        'them', 'no_bag')
     return files
 
 
@@ -79,8 +79,8 @@ def _open_finished(path: Path) -> Salvage:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise DataError(f'{path}: expected a bag that nobody writes, but it is still being '
-                            'recorded; stop the recorder first', 'still_recorded') from error
+            raise DataError(f'{path}: still being recorded; stop the recorder first',
+                            'still_recorded') from error
     return Salvage(path)
 
 

@@ -67,7 +67,7 @@ class OtherBag:
             raise DataError(told if told.startswith(str(self._path)) else f'{self._path}: {told}',
                             error.kind) from error
         except Exception as error:  # the library raises whatever damaged bytes lead it to
-            raise DataError(f'{self._path}: expected a bag of rosbag2 (MCAP or sqlite3), got: '
+            raise DataError(f'{self._path}: no bag of rosbag2 (MCAP or sqlite3) that can be read: '
                             f'{" ".join(str(error).split())}') from error
 
 

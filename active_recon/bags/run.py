@@ -145,6 +145,7 @@ class RecordedRun:
     - parameters: by node; counters: the last of `/diagnostics`, by node
     - begin, end: receive times of the first and the last message, nanoseconds
     - gaps: what of the camera's images is missing
+    - assumed: in words, what neither the bag nor its reader was told
     """
 
     path: Path
@@ -156,3 +157,4 @@ class RecordedRun:
     begin: int
     end: int
     gaps: ImageGaps = ImageGaps()
+    assumed: Sequence[str] = ()

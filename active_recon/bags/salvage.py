@@ -45,7 +45,7 @@ class Salvage:
         with path.open('rb') as file:
             begins = file.read(len(MCAP0_MAGIC))
         if not MCAP0_MAGIC.startswith(begins):
-            raise DataError(f'{path}: expected an MCAP file, but it does not begin as one',
+            raise DataError(f'{path}: no MCAP file: it begins otherwise',
                             'no_mcap')
 
     def records(self) -> Iterator[McapRecord]:

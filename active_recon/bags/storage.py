@@ -17,7 +17,7 @@ _STORAGES = ('mcap', 'sqlite3')
 def open_bag(path: Path) -> Bag:
     """Return the bag in a file or a rosbag2 folder; DataError where there is none."""
     if not path.exists():
-        raise DataError(f'{path}: expected a bag, but there is nothing')
+        raise DataError(f'{path}: no bag there: there is no such file or folder')
     if not path.is_dir():
         alone = StoredFiles([path])
         return McapBag(path, alone) if _is_mcap(path) else OtherBag(path, alone)
@@ -26,8 +26,8 @@ def open_bag(path: Path) -> Bag:
         return McapBag(path, named) if storage == 'mcap' else OtherBag(path, named)
     files = mcap_files(path)
     if not files:
-        raise DataError(f'{path}: expected a folder with a bag, got neither a metadata.yaml nor '
-                        'an MCAP file')
+        raise DataError(f'{path}: no bag in this folder: it has neither a metadata.yaml nor an '
+                        'MCAP file')
     return McapBag(path, StoredFiles(files))
 
 
@@ -50,12 +50,12 @@ def _described(folder: Path) -> tuple[str, StoredFiles]:
     except OSError as error:
         raise DataError(f'{path}: cannot be read: {error.strerror}') from error
     except (KeyError, TypeError, AttributeError) as error:
-        raise DataError(f"{path}: expected rosbag2's description of a bag, got another "
-                        f'({error})') from error
+        raise DataError(f"{path}: another description than rosbag2's of a bag: it lacks "
+                        f'{error}') from error
     for file in files:
         if not file.is_file():
-            raise DataError(f'{file}: expected the file that {path.name} names, but it is missing')
+            raise DataError(f'{file}: missing, though {path.name} names it')
     if storage not in _STORAGES or packed not in PACKINGS:
-        raise DataError(f"{path}: expected a storage of {' or '.join(_STORAGES)}, packed by file, "
-                        f'by message or not at all, got {storage!r} and {packed!r}')
+        raise DataError(f'{path}: a storage {storage!r}, packed {packed!r}: expected '
+                        f"{' or '.join(_STORAGES)}, packed by file, by message or not at all")
     return storage, StoredFiles(files, packed)

@@ -104,7 +104,7 @@ def explored(episode: RecordedEpisode, reconstructor: Reconstructor, planner: Pl
     DataError that names the azimuth where no view was taken near a goal.
     """
     if not episode.views:
-        raise DataError('expected an episode with views to choose from, got one without',
+        raise DataError('no view in the episode, and so none to choose from',
                         'no_views')
     planner.reset()
     began = (min(episode.views, key=lambda view: view.stamp).camera

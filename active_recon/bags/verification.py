@@ -1,10 +1,10 @@
 """Whether a run replays to what was recorded."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from active_recon.bags.comparison import compare, Comparison
-from active_recon.bags.replay import replay, replay_hash
+from active_recon.bags.replay import replay, replay_hash, ReplayedEpisode
 from active_recon.bags.run import RecordedRun
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
@@ -13,15 +13,20 @@ from active_recon.reconstructor import Reconstructor
 @dataclass(frozen=True)
 class Verification:
     """
-    What came of a replay: the comparison, and the hash of every bit that was computed.
+    What came of a replay: its episodes, the comparison, the hash of every bit computed.
 
     `knows_policy`: whether the bag tells which policy chose, so that it was asked again.
     """
 
+    episodes: Sequence[ReplayedEpisode]
     comparison: Comparison
     hash: str
-    view_count: int
     knows_policy: bool
+
+    @property
+    def view_count(self) -> int:
+        """Of all episodes."""
+        return sum(len(episode.views) for episode in self.episodes)
 
 
 def verify(run: RecordedRun, reconstructor: Reconstructor, planner: Planner | None,
@@ -32,6 +37,5 @@ def verify(run: RecordedRun, reconstructor: Reconstructor, planner: Planner | No
     Raises ViewError on a view that is none.
     """
     episodes = replay(run, reconstructor, planner, advance)
-    return Verification(
-        compare(episodes, reconstructor.threshold), replay_hash(episodes),
-        sum(len(episode.views) for episode in episodes), planner is not None)
+    return Verification(episodes, compare(episodes, reconstructor.threshold),
+                        replay_hash(episodes), planner is not None)

@@ -23,8 +23,8 @@ def whole_bag(folder: Path) -> Iterator[BagWriter]:
     """
     folder = folder.absolute()
     if folder.exists():
-        raise RecordingError(f'expected to begin a new bag in {folder}, but it exists already: '
-                             'nothing is overwritten', 'bag_not_begun')
+        raise RecordingError(f'{folder} exists already, and nothing is overwritten: name another '
+                             'folder', 'bag_not_begun')
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f'.{folder.name}-', dir=folder.parent) as beside:
@@ -32,7 +32,7 @@ def whole_bag(folder: Path) -> Iterator[BagWriter]:
                 yield bag
             bag.folder.rename(folder)
     except OSError as error:
-        raise RecordingError(f'expected to write a new bag in {folder}, but: {error}',
+        raise RecordingError(f'{folder}: no bag can be written there: {error}',
                              'bag_not_begun') from error
 
 

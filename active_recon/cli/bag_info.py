@@ -4,37 +4,41 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, TYPE_CHECKING
 
-from active_recon.cli.bag_topics import with_topics
+from active_recon.cli.bag_options import with_bag_options
 from active_recon.cli.progress import bag_progress
 import typer
 
 if TYPE_CHECKING:
     from active_recon.bags.raw import BagSummary
     from active_recon.bags.run import RecordedEpisode, RecordedRun
+    from active_recon.bags.scene import Scene
     from active_recon.bags.topics import Topics
 
 
-@with_topics
+@with_bag_options
 def info(
     path: Annotated[Path, typer.Argument(
         metavar='BAG', help='A rosbag2 folder, or an MCAP or sqlite3 file.')],
     topics: 'Topics',
+    scene: 'Scene',
 ) -> None:
     """
     Say what is in a bag, and whether it can be replayed, or what is missing for that.
 
-    Other people's bags are read too: name the topics of the camera where they are not found.
+    Other people's bags are read too: name the topics of the camera where they are not found, and
+    tell what the bag does not.
 
     Example: active-recon bag info drive.db3 --image /cam/color --azimuth /table/joints
+    --object-size 0.16
     """
     from active_recon.bags.description import describe_bag
 
-    described = describe_bag(path, topics, bag_progress(path))
+    described = describe_bag(path, topics, scene, bag_progress(path))
     _tell_contents(path, described.summary)
-    if described.run is None:
+    if described.missing:
         typer.echo(f'cannot be replayed: {described.missing}')
-    else:
-        _tell_run(described.run)
+    if described.run is not None:
+        _tell_run(described.run, not described.missing)
 
 
 def _tell_contents(path: Path, summary: 'BagSummary') -> None:
@@ -49,9 +53,9 @@ def _tell_contents(path: Path, summary: 'BagSummary') -> None:
         typer.echo(f'  {topic.name:<{width}}  {topic.count:>6}  {topic.type_name}')
 
 
-def _tell_run(run: 'RecordedRun') -> None:
+def _tell_run(run: 'RecordedRun', replays: bool) -> None:
     chosen = 'that its gate would take' if 'bag' in run.counters else 'that the loop took'
-    typer.echo(f'can be replayed, with the views {chosen}:')
+    typer.echo(f'{"can be replayed, with " if replays else ""}the views {chosen}:')
     for number, episode in enumerate(run.episodes, 1):
         azimuths = ', '.join(f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
         end = f', done: {episode.done}' if episode.done else ''
@@ -59,6 +63,10 @@ def _tell_run(run: 'RecordedRun') -> None:
                    f'{end}')
         if missing := _not_recorded(episode):
             typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')
+    if run.assumed and (not replays or 'bag' in run.counters):
+        typer.echo('assumed, since the bag does not tell:')
+        for assumption in run.assumed:
+            typer.echo(f'  {assumption}')
 
 
 def _not_recorded(episode: 'RecordedEpisode') -> list[str]:

@@ -68,7 +68,7 @@ def calibrate(
                    'mm. Where they are not, give the side of a square by --square-mm.')
         return
     if not images or object_size is None:
-        raise ConfigError('calibrate: expected images of the board and --object-size, or '
+        raise ConfigError('no images of the board, or no --object-size: give both, or '
                           '--print-board')
 
     from active_recon.calibration.calibration import (
@@ -81,7 +81,7 @@ def calibrate(
     from active_recon.calibration.placement import Placement
 
     if sum(one is not None for one in (step_deg, angles_deg, poses)) > 1:
-        raise ConfigError('calibrate: expected one of --step-deg, --angles-deg and --poses')
+        raise ConfigError('several of --step-deg, --angles-deg and --poses: give one of them')
     paths = image_paths(images)
     names = [path.name for path in paths]
     placement = Placement(
@@ -111,5 +111,5 @@ def calibrate(
 def _squares(words: str) -> tuple[int, int]:
     columns, _, rows = words.lower().partition('x')
     if not (columns.isdecimal() and rows.isdecimal()):
-        raise ConfigError(f'--squares: expected COLUMNSxROWS, such as 7x5, got {words!r}')
+        raise ConfigError(f'--squares: {words!r} is not COLUMNSxROWS, such as 7x5')
     return int(columns), int(rows)

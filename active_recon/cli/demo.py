@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from active_recon.cli.policy_option import policy_option
-from active_recon.demo.interrupts import held_interrupts
+from active_recon.interrupts import held_interrupts
 import typer
 
 

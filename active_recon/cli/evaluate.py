@@ -1,7 +1,7 @@
 """`active-recon evaluate`: what a model and its policies are worth on held-out objects."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 import json
 from pathlib import Path
 import sys
@@ -14,7 +14,9 @@ from active_recon.policies import POLICIES
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.evaluation.policy_study import Runs
     from active_recon.evaluation.trial import Trial
+    from active_recon.models.weights import Bundle
 
 
 def evaluate(
@@ -28,6 +30,11 @@ def evaluate(
         help=f'Policies, separated by commas, out of {", ".join(POLICIES)}, oracle (sees the '
              'truth; ninety times the work). Default: all but the oracle, attention only where '
              'the model has it.')] = None,
+    against: Annotated[str | None, typer.Option(
+        help='Another model, measured on the same objects and starts: the difference is told with '
+             'its interval.')] = None,
+    paired: Annotated[bool, typer.Option(
+        '--paired', help='The same of the two policies that --policy names.')] = False,
     views: Annotated[int, typer.Option(min=1, max=24, help='Views of an episode.')] = 5,
     starts: Annotated[int, typer.Option(
         min=1, max=24, help='First views of each object; 24 are all.')] = 4,
@@ -41,6 +48,13 @@ def evaluate(
         help="Validation folder, on which the mean shape's threshold is chosen.")] = None,
     json_file: Annotated[Path | None, typer.Option(
         '--json', help='Where the figures go, with their intervals.')] = None,
+    rows: Annotated[Path | None, typer.Option(
+        help='Where one row (CSV) of each object, start and view goes.')] = None,
+    yaw_study: Annotated[bool, typer.Option(
+        '--yaw-study', help="Measure too where the object's front stands wrong.")] = False,
+    latent_study: Annotated[bool, typer.Option(
+        '--latent-study', help="Measure too what the attention policy loses by another object's "
+                               'latent.')] = False,
     cache: Annotated[Path | None, typer.Option(
         help='Folder in which episodes are kept: a run that was cut off goes on.')] = None,
     bf16: Annotated[bool, typer.Option(
@@ -51,72 +65,118 @@ def evaluate(
     """
     Measure IoU view by view for each policy, with 95 % intervals over objects, starts and seeds.
 
-    Also: the area under the IoU curve, both entropies, the rotation travelled, the IoU where the
-    object's front stands wrong, what the attention policy loses when it is shown another object's
-    latent, and with an oracle the share of the gap between random and it that a policy closes.
-    Objects that cannot be read are listed, never silently left out.
+    Also: the area under the IoU curve, both entropies, the rotation travelled, and with an oracle
+    the share of the gap between random and it that a policy closes. --against and --paired tell
+    whether one is better than another. Objects that cannot be read are listed, never silently left
+    out.
+
+    Example: active-recon evaluate data/test --model runs/new/weights.safetensors
+    --against runs/old/weights.safetensors --policy farthest --rows both.csv
     """
-    from active_recon.evaluation.measure import blindness, iou_by_yaw
-    from active_recon.evaluation.metrics import episodes
-    from active_recon.evaluation.policy_study import (
-        compare,
-        contender_names,
-        contenders,
-        run_all,
-    )
+    from active_recon.evaluation.paired import paired as between
+    from active_recon.evaluation.paired import require_same_episodes, write_rows
+    from active_recon.evaluation.policy_study import compare, contender_names, contenders, run_all
     from active_recon.evaluation.trial import Trial
     from active_recon.models.weights import load_weights
-    from active_recon.policies import learned_policy
-    from active_recon.runtimes.torch import TorchPolicyRuntime
     from active_recon.weights_files import find_weights, weights_hash
     import torch
 
     if training and validation is None:
-        raise ConfigError('--training: expected --validation too, on which the threshold of the '
-                          'mean shape is chosen')
+        raise ConfigError('--training without --validation, on which the threshold of the mean '
+                          'shape is chosen: give both')
+    named = policy.split(',') if policy else []
+    if paired and len(named) != 2:
+        raise ConfigError(f'--paired: {len(named)} policies are named: name two by --policy')
     torch.set_num_threads(threads)
-    weights = find_weights(model)
-    bundle = load_weights(weights)
-    network, threshold = bundle.reconstruction, bundle.threshold
-    attentions = [bundle.attention] if bundle.attention else []
-    names = policy.split(',') if policy else contender_names(
-        bool(attentions), oracle=False)
-    held_out = read_objects([data], 'objects', network.spec, split_file, 'test')
-    shown = held_out.azimuths.shape[1]
-    if max(views, starts) > shown:
-        typer.echo(f'objects of {shown} views: {min(views, shown)} views from '
-                   f'{min(starts, shown)} starts are measured', err=True)
-    views, starts = min(views, shown), min(starts, shown)
-    every = contenders(names, attentions, views, seeds, seed, bundle.model)
-    trial = Trial(network, threshold, held_out, starts, views, seed, bf16, cache)
+
+    def measure(weights: Path) -> _Measured:
+        bundle = load_weights(weights)
+        attentions = [bundle.attention] if bundle.attention else []
+        held_out = read_objects([data], 'objects', bundle.reconstruction.spec, split_file, 'test')
+        shown = held_out.azimuths.shape[1]
+        if max(views, starts) > shown:
+            typer.echo(f'objects of {shown} views: {min(views, shown)} views from '
+                       f'{min(starts, shown)} starts are measured', err=True)
+        count = min(views, shown)
+        every = contenders(named or contender_names(bool(attentions), oracle=False), attentions,
+                           count, seeds, seed, bundle.model)
+        trial = Trial(bundle.reconstruction, bundle.threshold, held_out, min(starts, shown),
+                      count, seed, bf16, cache)
+        return _Measured(weights, bundle, trial, run_all(trial, every, progress_bar))
+
+    own = measure(find_weights(model))
+    other = measure(find_weights(against)) if against else None
+    trial = own.trial
     result: dict[str, Any] = {
         'command': ' '.join(['active-recon', *sys.argv[1:]]),
-        'model': bundle.model, 'weights': weights_hash(weights), 'threshold': threshold,
-        'objects': len(held_out), 'episodes': len(trial.objects),
-        'unreadable': list(held_out.unreadable),
-        **compare(trial, run_all(trial, every, progress_bar))}
+        'model': own.bundle.model, 'weights': weights_hash(own.weights),
+        'threshold': trial.threshold, 'objects': len(trial.views), 'episodes': len(trial.objects),
+        'unreadable': list(trial.views.unreadable), **compare(trial, own.runs)}
     _tell_policies(result)
-    # Few starts are enough for what is no comparison of policies
-    objects, first = episodes(held_out, min(starts, 4), seed)
-    with progress_bar("the front's yaw", len(objects)) as advance:
-        result['yaw'] = iou_by_yaw(network, held_out, objects, first, threshold,
-                                   lambda done: advance(done, ''))
-    typer.echo("IoU by the front's yaw: " + ', '.join(
-        f'{yaw} deg {values["mean"]:.3f}' for yaw, values in result['yaw'].items()))
-    if bundle.attention and 'attention' in names and len(held_out) > 1 and views > 1:
-        with progress_bar("other objects' latents", 2 * len(objects)) as advance:
-            seeing = blindness(
-                network, learned_policy(bundle.model, TorchPolicyRuntime(bundle.attention)),
-                held_out, objects, first, threshold, views, lambda done: advance(done, ''))
-        result['blindness'] = asdict(seeing)
-        typer.echo(f'another object\'s latent: goals move by {seeing.goal_change_deg["mean"]:.1f} '
-                   f'deg, area under IoU falls by {_spread(seeing.auc_loss, 4)}')
+    if other is not None:
+        require_same_episodes(trial, other.trial)
+        result['against'] = {
+            'model': other.bundle.model, 'weights': weights_hash(other.weights),
+            'above': {name: between(runs, other.runs[name], trial.objects)
+                      for name, runs in own.runs.items() if name in other.runs}}
+        for name, figures in result['against']['above'].items():
+            typer.echo(f'{name}, above {against}: {_difference(figures)}')
+    if paired:
+        first, second = named
+        result['paired'] = between(own.runs[first], own.runs[second], trial.objects)
+        typer.echo(f'{first} above {second}: {_difference(result["paired"])}')
+    if rows:
+        models = {str(each.weights): (each.trial, each.runs) for each in (own, other) if each}
+        write_rows(rows, models)
+        typer.echo(f'wrote {rows}')
+    _studies(own, result, yaw_study, latent_study)
     if training and validation is not None:
         result['baselines'] = _baselines(training, validation, trial)
     if json_file:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps(result, indent=1) + '\n')
         typer.echo(f'wrote {json_file}')
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """A weights file, and the episodes of each policy under its network."""
+
+    weights: Path
+    bundle: 'Bundle'
+    trial: 'Trial'
+    runs: 'Runs'
+
+
+def _studies(own: _Measured, result: dict[str, Any], yaw: bool, latent: bool) -> None:
+    """Measure and tell what was asked for beside the policies."""
+    from active_recon.evaluation.measure import blindness, iou_by_yaw
+    from active_recon.evaluation.metrics import episodes
+    from active_recon.policies import learned_policy
+    from active_recon.runtimes.torch import TorchPolicyRuntime
+
+    trial, attention = own.trial, own.bundle.attention
+    # Few starts are enough for what is no comparison of policies
+    starts = len(trial.objects) // len(trial.views)
+    objects, first = episodes(trial.views, min(starts, 4), trial.identity['seed'])
+    if yaw:
+        with progress_bar("the front's yaw", len(objects)) as advance:
+            result['yaw'] = iou_by_yaw(trial.network, trial.views, objects, first,
+                                       trial.threshold, lambda done: advance(done, ''))
+        typer.echo("IoU by the front's yaw: " + ', '.join(
+            f'{angle} deg {values["mean"]:.3f}' for angle, values in result['yaw'].items()))
+    if latent and (attention is None or len(trial.views) < 2 or trial.count < 2):
+        raise ConfigError('--latent-study: needs a model with an attention policy, two objects '
+                          'and two views')
+    if latent and attention is not None:
+        with progress_bar("other objects' latents", 2 * len(objects)) as advance:
+            seeing = blindness(
+                trial.network, learned_policy(own.bundle.model, TorchPolicyRuntime(attention)),
+                trial.views, objects, first, trial.threshold, trial.count,
+                lambda done: advance(done, ''))
+        result['blindness'] = asdict(seeing)
+        typer.echo(f"another object's latent: goals move by {seeing.goal_change_deg['mean']:.1f} "
+                   f'deg, area under IoU falls by {_spread(seeing.auc_loss, 4)}')
 
 
 def _tell_policies(result: dict[str, Any]) -> None:
@@ -154,6 +214,11 @@ def _baselines(training: list[Path], validation: Path, trial: 'Trial') -> dict[s
     for name, values in result.items():
         typer.echo(f'{name:>14}: {_spread(values)}')
     return result | {'mean_shape_threshold': float(threshold)}
+
+
+def _difference(figures: dict[str, Any]) -> str:
+    after = '  '.join(_spread(values) for values in figures['iou'])
+    return f'{after}   area {_spread(figures["auc"], 4)}'
 
 
 def _spread(values: dict[str, float], digits: int = 3) -> str:

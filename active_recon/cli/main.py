@@ -1,7 +1,11 @@
 """The command `active-recon`; what a subcommand needs is imported when it runs."""
 
+from collections.abc import Callable
+import inspect
 import sys
+from typing import Annotated, Any
 
+from active_recon import __version__
 from active_recon.cli.bag import bag
 from active_recon.cli.calibrate import calibrate
 from active_recon.cli.demo import demo
@@ -21,13 +25,45 @@ from active_recon.errors import ActiveReconError
 import typer
 
 app = typer.Typer(
-    help='Active 3D reconstruction of an object from few camera views.',
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 for command in (demo, up, calibrate, view, report, replay, play, record_sweep, render, train,
                 evaluate, study, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')
+
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f'active-recon {__version__}')
+        raise typer.Exit
+
+
+@app.callback()
+def _any_command(
+    version: Annotated[bool, typer.Option(
+        '--version', callback=_tell_version, is_eager=True, help='Tell the version.')] = False,
+) -> None:
+    """Active 3D reconstruction of an object from few camera views."""
+
+
+def _flow(commands: typer.Typer) -> None:
+    """Leave it to the terminal where the lines of a help break, but not its paragraphs."""
+    for each in commands.registered_commands:
+        assert each.callback is not None
+        each.help = flowing(each.callback)
+    for group in commands.registered_groups:
+        assert group.typer_instance is not None
+        _flow(group.typer_instance)
+
+
+def flowing(command: Callable[..., Any]) -> str:
+    """Return a docstring with each of its paragraphs on one line."""
+    paragraphs = (inspect.getdoc(command) or '').split('\n\n')
+    return '\n\n'.join(' '.join(paragraph.split()) for paragraph in paragraphs)
+
+
+_flow(app)
 
 
 def main() -> None:

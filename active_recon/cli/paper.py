@@ -72,7 +72,8 @@ def paper(
 
     known = (*PARTS, DOCUMENT, SYSTEMS, ALL)
     if unknown := [part for part in parts if part not in known]:
-        raise ConfigError(f'expected parts out of {", ".join(known)}, got {", ".join(unknown)}')
+        raise ConfigError(f'no such parts: {", ".join(unknown)}; expected some of '
+                          f'{", ".join(known)}')
     if device != 'cpu' and not (device == 'cuda' and torch.cuda.is_available()):
         raise ConfigError(f'--device: expected cpu, or cuda where there is a card, got {device}')
     torch.set_num_threads(threads)

@@ -8,25 +8,29 @@ from pathlib import Path
 import time
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.bag_topics import with_topics
+from active_recon.cli.bag_options import with_bag_options
 from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
+from active_recon.cli.shape_files import ShapeFiles
 from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
     from active_recon.bags.run import RecordedRun
+    from active_recon.bags.scene import Scene
     from active_recon.bags.settings import Settings
     from active_recon.bags.topics import Topics
     from active_recon.bags.under_others import Others
     from active_recon.bags.verification import Verification
+    from active_recon.reconstructor import Reconstructor
 
 
-@with_topics
+@with_bag_options
 def replay(
     path: Annotated[Path, typer.Argument(
         metavar='BAG', help='A rosbag2 folder, or an MCAP or sqlite3 file.')],
     topics: 'Topics',
+    scene: 'Scene',
     model: Annotated[str | None, typer.Option(
         help='Another model: its name, or a weights file. The views stay those that were taken.',
     )] = None,
@@ -41,12 +45,11 @@ def replay(
     weights: Annotated[Path | None, typer.Option(
         help='The weights file that BAG was recorded with, where it does not ship any more.',
     )] = None,
-    object_size: Annotated[float | None, typer.Option(
-        min=0.001, max=1000.0, help='Side of the voxel grid, m; default: as recorded, else 1.',
-    )] = None,
-    object_yaw_deg: Annotated[float | None, typer.Option(
-        min=-360.0, max=360.0,
-        help="Azimuth of the object's front; default: as recorded, else 0.")] = None,
+    mesh: Annotated[Path | None, typer.Option(
+        help='Write the shape after the last view as PLY, OBJ or STL, metres; of several episodes '
+             'each, with its number.')] = None,
+    voxels: Annotated[Path | None, typer.Option(
+        help='The same as voxels: binvox, or npz with their probabilities.')] = None,
     threads: Annotated[int | None, typer.Option(
         min=1, help='CPU threads of the network; default: as many as the run had.')] = None,
 ) -> None:
@@ -61,7 +64,10 @@ def replay(
     Example: active-recon replay bags/2026-11-21_14-35-54
 
     Example: active-recon replay bags/sweep --policy farthest
+
+    Example: active-recon replay drive.db3 --object-size 0.16 --mesh mug.ply
     """
+    from active_recon.bags.comparison import NOTHING_RECORDED
     from active_recon.bags.reading import read_run
     from active_recon.bags.settings import recorded_settings
     from active_recon.bags.under_others import Others
@@ -70,28 +76,50 @@ def replay(
 
     others = Others(find_weights(model) if model else None, policy, threshold)
     if out and others == Others():
-        raise ConfigError('--out: expected with --model, --policy or --threshold, for a new bag; '
-                          'without them nothing is written')
+        raise ConfigError('--out without --model, --policy or --threshold: no bag is written '
+                          'where nothing is other')
+    files = ShapeFiles(mesh, voxels)
     began = time.monotonic()
-    run = read_run(path, topics, bag_progress(path))
+    run = read_run(path, topics, scene, bag_progress(path))
     reading_s = time.monotonic() - began
-    settings = recorded_settings(
-        run, others.weights or weights, others.weights is not None, {
-            'object_size': object_size,
-            'object_yaw': None if object_yaw_deg is None else math.radians(object_yaw_deg)})
+    settings = recorded_settings(run, others.weights or weights, others.weights is not None,
+                                 scene.given)
     settings = replace(settings, threads=threads or settings.threads)
     if others != Others():
-        _write_under(run, settings, others, out)
+        _write_under(run, settings, others, out, files)
         return
     reconstructor, planner = settings.load_reconstructor(), settings.load_planner()
     began = time.monotonic()
     with _bar('replaying', run) as advance:
         verified = verify(run, reconstructor, planner, lambda: advance(1, ''))
-    _tell(verified, run, reading_s + time.monotonic() - began)
+    took_s = reading_s + time.monotonic() - began
+    files.write([episode.views[-1].reconstruction.grid for episode in verified.episodes
+                 if episode.views], reconstructor.threshold)
+    if verified.comparison.verdict == NOTHING_RECORDED:
+        _tell_reconstructed(verified, run, reconstructor)
+    else:
+        _tell(verified, run, took_s)
+
+
+def _tell_reconstructed(verified: 'Verification', run: 'RecordedRun',
+                        reconstructor: 'Reconstructor') -> None:
+    """Say what came of a bag that has no record of the loop's to compare with."""
+    for assumption in run.assumed:
+        typer.echo(f'assumed: {assumption}')
+    for episode in verified.episodes:
+        if not episode.views:
+            continue
+        first, last = (view.reconstruction.grid for view in (episode.views[0], episode.views[-1]))
+        count = int(last.occupied(reconstructor.threshold).sum())
+        typer.echo(
+            f'reconstructed from {len(episode.views)} views: {count} of {last.occupancy.size} '
+            f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():.0f} to '
+            f'{last.entropy():.0f} nats; the bag has no record to compare with')
+    typer.echo(f'hash {verified.hash}')
 
 
 def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
-    from active_recon.bags.comparison import DIFFERENT, NOTHING_RECORDED
+    from active_recon.bags.comparison import DIFFERENT
 
     ran_s = (run.end - run.begin) / 1e9
     typer.echo(f'views: {verified.view_count}, read and replayed in {took_s:.2f} s, '
@@ -108,14 +136,13 @@ def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
         typer.echo('the bag does not tell which policy chose: goals and stop are not compared')
     typer.echo(f'hash {verified.hash}')
     verdict = verified.comparison.verdict
-    typer.echo({NOTHING_RECORDED: 'nothing was recorded that could be compared'}.get(
-        verdict, f'{verdict}: what was recorded and the replay'))
+    typer.echo(f'{verdict}: what was recorded and the replay')
     if verdict == DIFFERENT:
         raise typer.Exit(1)
 
 
 def _write_under(run: 'RecordedRun', settings: 'Settings', others: 'Others',
-                 out: Path | None) -> None:
+                 out: Path | None, files: ShapeFiles) -> None:
     from active_recon.bags.run_writing import write_run
     from active_recon.bags.under_others import beside, run_under
 
@@ -123,6 +150,10 @@ def _write_under(run: 'RecordedRun', settings: 'Settings', others: 'Others',
         other = run_under(run, settings, others, lambda: advance(1, ''))
     folder = out or beside(run.path, others)
     write_run(other, folder)
+    grids = [episode.views[-1].reconstruction for episode in other.episodes if episode.views]
+    threshold = settings.under(others.weights, threshold=others.threshold
+                               ).load_reconstructor().threshold
+    files.write([grid for grid in grids if grid is not None], threshold)
     for episode in other.episodes:
         entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)
         azimuths = ', '.join(

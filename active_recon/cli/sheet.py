@@ -53,7 +53,7 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
         objects = [load_mesh(path) for path in sorted(meshes.rglob('*'))
                    if path.suffix.lower() in MESH_SUFFIXES]
     if not objects:
-        raise DataError(f'{meshes}: expected mesh files, found none')
+        raise DataError(f'{meshes}: no mesh files there')
     return contact_sheet(objects, azimuth=math.radians(azimuth_deg))
 
 

@@ -1,18 +1,17 @@
 """`active-recon train`: the schemes and stages, with a progress bar, checkpoints and a log."""
 
-from collections.abc import Callable
 from dataclasses import replace
 import math
 from pathlib import Path
 import sys
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import read_objects, Split
 from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.datasets.views import ViewSet
     from active_recon.models.weights import Bundle
 
 
@@ -26,7 +25,8 @@ def train(
         help='Run folder: checkpoints, TensorBoard log, weights.')] = Path('runs/default'),
     model: Annotated[str, typer.Option(
         help='A network of the registry: 2d3d-attention, 2d3d, r2n2, ptn, ptn-combined, ogn, '
-             'shape-basis, lifting, carving.')] = '2d3d-attention',
+             'shape-basis, lifting, carving; one that an installed package offers; or one of '
+             'your own, as my_file.py:Net.')] = '2d3d-attention',
     size: Annotated[str, typer.Option(
         help="'small' (two CPU cores within an hour), 'published' (its paper's own); of ogn "
              "also 'small-64' and 'published-64'.")] = 'small',
@@ -85,27 +85,31 @@ def train(
 
     The reconstruction learns from random views under the weighted volume and silhouette losses;
     the policy then learns by policy gradient, with the reconstruction frozen, or both learn
-    together (--scheme joint). A training that was cut off goes on with --resume. The weights and
-    their card land in OUT/weights.safetensors.
+    together (--scheme joint). Ctrl-C saves a checkpoint; a training that was cut off goes on with
+    --resume. The weights and their card land in OUT/weights.safetensors.
     """
+    from active_recon.cli.training_log import SummaryLog
     from active_recon.config import LossConfig, RewardConfig
-    from active_recon.models.registry import network_entry
+    from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
     from active_recon.models.weights import save_weights
     from active_recon.shapes import generators_hash
-    from active_recon.training.loop import make_fabric, TrainingConfig
+    from active_recon.training.loop import make_fabric, TrainingConfig, TrainingStoppedError
     from active_recon.training.plan import Plan, train_plan
     from active_recon.weights_files import find_weights
     import torch
 
     if scheme not in ('two-stage', 'joint'):
-        raise ConfigError(f"--scheme: expected 'two-stage' or 'joint', got {scheme!r}")
-    stages = ('reconstruction', 'policy', 'joint')
-    if not resume and any((out / f'{stage}.safetensors').exists() for stage in stages):
-        raise ConfigError(f'{out}: expected a new run folder, but it holds checkpoints; go on '
-                          'with --resume, or name another folder by --out')
+        raise ConfigError(f"--scheme: {scheme!r} is neither 'two-stage' nor 'joint'")
+    begun_here = [*(out / f'{stage}.safetensors' for stage in ('reconstruction', 'policy', 'joint')
+                    if (out / f'{stage}.safetensors').exists()),
+                  *(out / 'tensorboard').rglob('events.*')]
+    if not resume and begun_here:
+        raise ConfigError(f'{out}: holds another training ({begun_here[0].name}); go on with '
+                          '--resume, or name another folder by --out')
     if begin_from and begin_with:
-        raise ConfigError('expected --from or --begin-with, got both')
+        raise ConfigError('both --from and --begin-with: give one of them')
     begun = begin_from or begin_with
+    own_file, model = model, named_network(model)
     entry = network_entry(model)
     loss = LossConfig(
         entry.loss.volume_weight if volume_weight is None else volume_weight,
@@ -133,8 +137,16 @@ def train(
     asked = entry.build(plan.config).spec
     training = read_objects(data, 'training data', asked, split_file, 'train', at_once=False)
     held_out = read_objects([validation], 'validation data', asked, split_file, 'val')
-    bundle = train_plan(plan, training, held_out, out,
-                        lambda stage, count: _reporting(stage, count, out), fabric, resume)
+    if fabric.is_global_zero:
+        _warn_of_shared_objects(training, held_out)
+    with SummaryLog(out / 'tensorboard', held_out) as log:
+        try:
+            bundle = train_plan(plan, training, held_out, out, log.reporting, fabric, resume,
+                                log.show)
+        except TrainingStoppedError as stopped:
+            if fabric.is_global_zero:
+                typer.echo(str(stopped))
+            raise typer.Exit(130) from None
     if fabric.is_global_zero:
         bundle.card.update(command=' '.join(['active-recon', *sys.argv[1:]]),
                            generators_sha256=generators_hash())
@@ -142,6 +154,8 @@ def train(
         save_weights(weights, bundle)
         typer.echo(f'threshold {bundle.threshold:.2f}, chosen on validation\n'
                    f'wrote {weights} and its card')
+        if own_file != model:
+            typer.echo(f'they load where {OWN_NETWORKS}={own_file} is set')
 
 
 def _begun(path: Path) -> 'Bundle':
@@ -151,33 +165,11 @@ def _begun(path: Path) -> 'Bundle':
     return replace(load_weights(path), card=read_card(path))
 
 
-class _reporting:  # noqa: N801  (a context manager that reads as one)
-    """A progress bar and a TensorBoard log over the steps of one stage."""
-
-    def __init__(self, stage: str, steps: int, out: Path) -> None:
-        from torch.utils.tensorboard import SummaryWriter
-        self._writer = SummaryWriter(out / 'tensorboard')
-        self._bar = progress_bar(stage, steps)
-        self._stage = stage
-
-    def __enter__(self) -> Callable[[int, dict[str, float]], None]:
-        advance = self._bar.__enter__()
-        done = 0
-        shown: dict[str, float] = {}
-
-        def report(step: int, measured: dict[str, float]) -> None:
-            nonlocal done
-            for name, value in measured.items():
-                self._writer.add_scalar(f'{self._stage}/{name}', value, step)
-                # Single batches are noisy: the bar shows a running mean
-                smooth = name in shown and not name.startswith('validation')
-                shown[name] = 0.98 * shown[name] + 0.02 * value if smooth else value
-            told = '  '.join(f'{name} {value:.4f}' for name, value in shown.items())
-            advance(step - done, told)
-            done = step
-
-        return report
-
-    def __exit__(self, *error: object) -> None:
-        self._writer.close()
-        self._bar.__exit__(None, None, None)
+def _warn_of_shared_objects(training: 'ViewSet', held_out: 'ViewSet') -> None:
+    """Say where validation objects are trained on, so that they choose and measure too well."""
+    trained = {folder.images_folder.resolve() for folder in training.folders}
+    shared = sum(folder.images_folder.resolve() in trained for folder in held_out.folders)
+    if shared:
+        typer.echo(f'warning: {shared} of {len(held_out)} validation objects are trained on too: '
+                   'the threshold and what is measured on them will look better than it is',
+                   err=True)

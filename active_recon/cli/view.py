@@ -7,17 +7,19 @@ import sys
 import time
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.bag_topics import with_topics
+from active_recon.cli.bag_options import with_bag_options
 from active_recon.viewer.address import DEFAULT_PORT, HIGHEST_PORT
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.bags.scene import Scene
     from active_recon.bags.topics import Topics
 
 
-@with_topics
+@with_bag_options
 def view(
     topics: 'Topics',
+    scene: 'Scene',
     bag: Annotated[Path | None, typer.Argument(
         help='A bag to step through; without one, the loop that runs on this ROS domain.')] = None,
     port: Annotated[int, typer.Option(
@@ -36,16 +38,20 @@ def view(
         # The node takes this process's place, and so hears its Ctrl-C
         os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.viewer',
                                   '--ros-args', '-p', f'port:={port}'])
-    _step_through(bag, topics, port)
+    _step_through(bag, topics, scene, port)
 
 
-def _step_through(bag: Path, topics: 'Topics', port: int) -> None:
+def _step_through(bag: Path, topics: 'Topics', scene: 'Scene', port: int) -> None:
     from active_recon.bags.reading import read_run
-    from active_recon.demo.interrupts import held_interrupts
+    from active_recon.bags.rebuilt import rebuilt
+    from active_recon.interrupts import held_interrupts
     from active_recon.viewer.page import UPDATES_PER_S
     from active_recon.viewer.playback import Playback
 
-    playback = Playback(read_run(bag, topics), port)
+    run, made_by = rebuilt(read_run(bag, topics, scene), scene)
+    if made_by:
+        typer.echo(f'the bag holds no shapes: those shown are from its images, by {made_by}')
+    playback = Playback(run, port)
     try:
         typer.echo(f'{bag} is shown at {playback.page.url} until Ctrl-C')
         with suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked:

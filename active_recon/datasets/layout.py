@@ -106,7 +106,7 @@ def list_objects(root: Path) -> list[ObjectFolder]:
     """Return the objects of a dataset that have images, sorted by category and name."""
     top = root / RENDERING
     if not top.is_dir():
-        raise DataError(f"{root}: expected a dataset in R2N2's layout, but it has no folder "
+        raise DataError(f"{root}: no dataset in R2N2's layout: it has no folder "
                         f'{RENDERING}; make one with `active-recon render` or `dataset build`')
     return [ObjectFolder(root, folder.parent.name, folder.name)
             for folder in sorted(top.glob('*/*')) if folder.is_dir()]

@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 import time
 
 from active_recon.cameras import wrap_azimuth
-from active_recon.demo.interrupts import held_interrupts
 from active_recon.demo.picture import run_picture
 from active_recon.demo.processes import NodeProcesses, private_environment
 from active_recon.demo.table import loop_table, turning
+from active_recon.interrupts import held_interrupts
 from active_recon.meshes import load_mesh
 from active_recon.nodes.demo_watch import DemoWatch, watching
 from active_recon.viewer.address import free_port, HOST, is_served

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 import time
 
-from active_recon.demo.interrupts import held_interrupts
 from active_recon.demo.processes import NodeProcesses
+from active_recon.interrupts import held_interrupts
 from active_recon.nodes.params_file import read_params_file
 
 _LOOK_EVERY_S = 0.1

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+import os
 from typing import Any
 
 from active_recon.config import Config, LossConfig
@@ -21,6 +22,13 @@ from active_recon.models.r2n2 import R2n2, R2n2Config
 from active_recon.models.r2n2 import SIZES as SIZES_R2N2
 from active_recon.models.shape_basis import fit_shapes, ShapeBasis, ShapeBasisConfig
 from active_recon.models.shape_basis import SIZES as SIZES_SHAPE_BASIS
+from active_recon.plugins import (
+    installed,
+    is_in_file,
+    load_from_file,
+    load_installed,
+    NETWORKS_GROUP,
+)
 import numpy as np
 from numpy.typing import NDArray
 from torch import nn, Tensor
@@ -74,16 +82,64 @@ NETWORKS: Mapping[str, NetworkEntry] = {
 }
 
 
+_OWN: dict[str, NetworkEntry] = {}
+OWN_NETWORKS = 'ACTIVE_RECON_NETWORKS'
+"""The environment variable that names networks in files, separated by commas."""
+
+
+def named_network(told: str) -> str:
+    """
+    Return the name under which a network is known: Net where `told` is my_file.py:Net.
+
+    Raises ConfigError where such a file has no network, or takes the name of another.
+    """
+    if not is_in_file(told):
+        return told
+    name = told.rpartition(':')[2]
+    if name in NETWORKS:
+        raise ConfigError(f'{told}: {name} is the name of a network of this package')
+    _OWN[name] = _own_entry(told, load_from_file(told))
+    return name
+
+
 def network_entry(name: str) -> NetworkEntry:
-    """Return a network's entry; raises ConfigError naming those there are."""
-    if name not in NETWORKS:
-        raise ConfigError(f'model: expected one of {", ".join(NETWORKS)}, got {name!r}')
-    return NETWORKS[name]
+    """
+    Return a network's entry: of the registry, of a file, or of an installed package.
+
+    Raises ConfigError naming those of the registry. No weights file can name a Python file: that
+    is left to who runs the command.
+    """
+    if name in NETWORKS:
+        return NETWORKS[name]
+    if name not in _OWN:
+        for told in filter(None, os.environ.get(OWN_NETWORKS, '').split(',')):
+            if told.rpartition(':')[2] == name:
+                named_network(told)
+    if name in _OWN:
+        return _OWN[name]
+    if name in installed(NETWORKS_GROUP):
+        return _own_entry(name, load_installed(NETWORKS_GROUP, name))
+    raise ConfigError(f'no network is called {name!r}: expected one of '
+                      f'{", ".join(NETWORKS)}, one that an installed package offers as '
+                      f'{NETWORKS_GROUP}, or one in a file that '
+                      f'{OWN_NETWORKS}=my_file.py:{name} names')
+
+
+def _own_entry(told: str, found: Any) -> NetworkEntry:
+    """Return an entry as it is, or that of a network whose class has its `Config`."""
+    if isinstance(found, NetworkEntry):
+        return found
+    config = getattr(found, 'Config', None)
+    if not (isinstance(found, type) and issubclass(found, ReconstructionNetwork)
+            and isinstance(config, type) and issubclass(config, Config)):
+        raise ConfigError(f'{told}: neither a NetworkEntry nor a ReconstructionNetwork with a '
+                          'Config of its own')
+    return NetworkEntry(config, found, {'small': config()}, getattr(found, 'loss', LossConfig()))
 
 
 def network_config(name: str, size: str) -> Config:
     """Return a network's configuration of a size; raises ConfigError naming those there are."""
     sizes = network_entry(name).sizes
     if size not in sizes:
-        raise ConfigError(f'size: expected one of {", ".join(sizes)} for {name}, got {size!r}')
+        raise ConfigError(f'{name} has no size {size!r}: expected one of {", ".join(sizes)}')
     return sizes[size]

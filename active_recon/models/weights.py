@@ -12,7 +12,7 @@ from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry
 from active_recon.weights_files import DEFAULT_MODEL, read_metadata, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
-from safetensors.torch import save_file
+from safetensors.torch import save
 import torch
 from torch import nn
 
@@ -36,9 +36,9 @@ def save_weights(path: Path, bundle: Bundle) -> None:
                for part, module in _parts(bundle).items()
                for name, tensor in module.state_dict().items()}
     config = json.dumps(bundle.config.to_dict())
-    save_file(tensors, path, {'model': bundle.model, 'config': config,
-                              'threshold': repr(bundle.threshold)})
-    path.chmod(0o644)  # safetensors writes for the owner alone
+    # Written here: safetensors itself writes for the owner alone
+    path.write_bytes(save(tensors, {'model': bundle.model, 'config': config,
+                                    'threshold': repr(bundle.threshold)}))
     card = {'model': bundle.model, 'config': bundle.config.to_dict(),
             'threshold': bundle.threshold,
             'sha256': weights_hash(path), **bundle.card}
@@ -58,7 +58,7 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
         with safe_open(path, framework='pt', device=device) as stored:
             tensors = {name: stored.get_tensor(name) for name in stored.keys()}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
-        raise WeightsError(f'{path}: expected a whole safetensors file, got: {error}') from error
+        raise WeightsError(f'{path}: no whole safetensors file: {error}') from error
     try:
         entry = network_entry(metadata.model)
         config = entry.config.from_dict(metadata.config)

@@ -47,7 +47,8 @@ def _parsed(path: Path) -> object:
     try:
         return yaml.safe_load(path.read_text())
     except (OSError, ValueError, yaml.YAMLError) as error:
-        raise ConfigError(f'{path}: expected a ROS parameters file in YAML: {error}') from error
+        raise ConfigError(f'{path}: no ROS parameters file in YAML: '
+                          f'{" ".join(str(error).split())}') from error
 
 
 def _mapping(path: Path, where: str, value: object) -> Mapping[Any, Any]:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 import faulthandler
 import signal
 
-from active_recon.errors import ActiveReconError
+from active_recon.errors import ActiveReconError, ConfigError
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -27,9 +27,9 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
     asked_to_stop: list[int] = []
     for request in (signal.SIGINT, signal.SIGTERM):
         signal.signal(request, lambda number, _frame: asked_to_stop.append(number))
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
+        _init(args)
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
@@ -45,6 +45,14 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _init(args: list[str] | None) -> None:
+    """Read the arguments; ConfigError where ROS cannot, as a parameters file that is no YAML."""
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise ConfigError(f'cannot start: {error}') from error
 
 
 def one_line(error: Exception) -> str:

@@ -22,6 +22,6 @@ def find_object(name_or_path: str) -> Path:
         return _FOLDER / f'{name_or_path}.glb'
     path = Path(name_or_path)
     if not path.is_file():
-        raise MeshError(f'{name_or_path}: expected one of {", ".join(shipped_objects())} or the '
-                        'path of a mesh file')
+        raise MeshError(f'{name_or_path}: no such mesh file, and none of '
+                        f'{", ".join(shipped_objects())}')
     return path.absolute()

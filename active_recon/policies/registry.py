@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from active_recon.errors import ConfigError, WeightsError
+from active_recon.plugins import installed, load_installed, POLICIES_GROUP
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Policy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
@@ -79,8 +80,21 @@ POLICIES: dict[str, PolicyEntry] = {
 }
 
 
+def _installed(name: str) -> Callable[[PolicyOptions], Policy]:
+    """Return what makes a policy of an installed package, imported when it is made."""
+    def make(options: PolicyOptions) -> Policy:
+        found = load_installed(POLICIES_GROUP, name)
+        made: Policy = found.make(options) if isinstance(found, PolicyEntry) else found()
+        return made
+    return make
+
+
+POLICIES |= {name: PolicyEntry(_installed(name), ('seed', 'max_views'))
+             for name in installed(POLICIES_GROUP) if name not in POLICIES}
+
+
 def load_policy(name: str, options: PolicyOptions | None = None) -> Policy:
     """Return a policy by its name; raises ConfigError and WeightsError."""
     if name not in POLICIES:
-        raise ConfigError(f'policy: expected one of {", ".join(POLICIES)}, got {name!r}')
+        raise ConfigError(f'no policy is called {name!r}: expected one of {", ".join(POLICIES)}')
     return POLICIES[name].make(options or PolicyOptions())

@@ -8,6 +8,7 @@ from active_recon.bags.parameters import node_parameters
 from active_recon.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, view_distance
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import degrees, Subject
+from active_recon.report.words import counted, refused, times, warned
 from active_recon.view_gate import GOAL_TOLERANCE
 
 _STOPPED = {
@@ -21,19 +22,6 @@ _STOPPED = {
     '': ('cut off', 'It never said that it was done: the recording ends, or a new episode '
                     'begins, in the middle.'),
 }
-_REFUSED = {
-    'no_pose': 'images were dropped: no camera pose arrived close enough to them in time '
-               '(late poses)',
-    'no_camera_info': 'images were dropped: the camera info of their stamp never came',
-    'camera_info': 'images were dropped: their camera info did not fit them',
-    'last_episode': 'images were dropped: they were older than the episode',
-    'duplicate': 'images were dropped: they came twice',
-    'out_of_order': 'images were dropped: they came in the wrong order',
-    'image_size': 'images were dropped: their size was not what was announced',
-    'encoding': 'images were dropped: their encoding is not known',
-}
-
-
 @dataclass(frozen=True)
 class Finding:
     """A sentence, and how much it matters: 'warning' or 'note'."""
@@ -78,27 +66,31 @@ def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
         for key, count in sorted(counts.items()):
             kind = key.removeprefix('refused/')
             if count > 0 and kind != key:
-                what = _REFUSED.get(kind, f'messages were refused ({kind})')
-                yield 'warning', f'{count} {what}, says the {name}.'
+                yield 'warning', f'{refused(kind, count)}, says the {name}.'
             elif count > 0 and key.startswith('warned/') and key != 'warned/elevation':
-                yield 'warning', (f'The {name} warned {count} times of '
-                                  f'{key.removeprefix("warned/")}.')
+                yield 'warning', (f'The {name} warned {times(count)} of '
+                                  f'{warned(key.removeprefix("warned/"))}.')
         if {'images', 'views', 'images_unused'} <= counts.keys():
-            yield 'note', (f'By the last count of the {name}, {counts["images"]} images came in. '
-                           f'{counts["views"]} became views; {counts["images_unused"]} showed the '
-                           'camera on its way or waiting, and were left out as they should be.')
+            yield 'note', (f'By the last count of the {name}, '
+                           f'{counted(counts["images"], "image")} came in. '
+                           f'{counted(counts["views"], "view")} came of them; '
+                           f'{counted(counts["images_unused"], "image")} showed the '
+                           'camera on its way or waiting: what is left out as it should be.')
 
 
 def _missing(subject: Subject) -> Iterator[tuple[str, str]]:
     """Yield what nobody counted, since it never came."""
     gaps = subject.run.gaps
     if gaps.missing and gaps.period_s:
-        yield 'warning', (f'About {gaps.missing} images are missing: the camera showed one every '
+        are = 'is' if gaps.missing == 1 else 'are'
+        yield 'warning', (f'About {counted(gaps.missing, "image")} {are} missing: the camera '
+                          'showed one every '
                           f'{1e3 * gaps.period_s:.0f} ms, but once none for '
                           f'{gaps.longest_s:.1f} s.')
     if gaps.unheard:
-        yield 'warning', (f'{gaps.unheard} images that were recorded never reached the '
-                          'reconstructor.')
+        were = 'was' if gaps.unheard == 1 else 'were'
+        yield 'warning', (f'{counted(gaps.unheard, "image")} that {were} recorded never reached '
+                          'the reconstructor.')
 
 
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
@@ -119,15 +111,20 @@ def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:
     if off:
         listed = ', '.join(f'{number} ({math.degrees(elevation):.0f}°)'
                            for number, elevation in off)
+        views = 'view' if len(off) == 1 else 'views'
         yield 'warning', (
             f'The camera stood at another elevation than the {degrees(CANONICAL_ELEVATION)}° that '
-            f'the network was trained with, in view {listed}: the shape will be worse.')
+            f'the network was trained with, in {views} {listed}: the shape will be worse.')
 
 
 def _estimate(subject: Subject) -> Iterator[tuple[str, str]]:
     if subject.computed:
         yield 'note', ('The bag holds no reconstruction. The shapes shown here were computed from '
                        f'its images for this page, by {subject.computed}.')
+    for assumption in subject.run.assumed if subject.computed else ():
+        yield 'note', f'Assumed, since the bag does not tell: {assumption}.'
+    if subject.placed:
+        yield 'note', subject.placed
     known = [entropy for entropy in subject.entropies if entropy is not None]
     if len(known) > 1 and known[-1] > known[0]:
         yield 'note', 'After the last view the estimate was less certain than after the first.'

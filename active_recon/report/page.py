@@ -17,6 +17,7 @@ from active_recon.report.scene import scene
 from active_recon.report.stages import median, STAGES, timings
 from active_recon.report.subject import degrees, Subject
 from active_recon.report.turntable_map import turntable_map
+from active_recon.report.words import key_words
 from jinja2 import Environment, PackageLoader, StrictUndefined
 import plotly
 
@@ -33,11 +34,11 @@ def report_page(subjects: Sequence[Subject]) -> str:
     Raises DataError where there is none, ConfigError where there are more than a browser draws.
     """
     if not subjects:
-        raise DataError('expected an episode with views to report on, got none: no image of these '
+        raise DataError('no episode with views to report on: no image of these '
                         'bags became a view')
     if len(subjects) > MOST_SUBJECTS:
-        raise ConfigError(f'expected at most {MOST_SUBJECTS} episodes on one page, got '
-                          f'{len(subjects)}: name fewer bags, or one episode of each')
+        raise ConfigError(f'{len(subjects)} episodes are too many for one page, which has at most '
+                          f'{MOST_SUBJECTS}: name fewer bags, or one episode of each')
     panels = [_panel(subject) for subject in subjects]
     several = len(subjects) > 1
     known_truth = any(subject.truth is not None for subject in subjects)
@@ -48,7 +49,7 @@ def report_page(subjects: Sequence[Subject]) -> str:
     environment = Environment(
         loader=PackageLoader('active_recon.report', 'templates'), autoescape=True,
         trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
-    environment.filters |= {'number': _number, 'degrees': degrees}
+    environment.filters |= {'number': _number, 'degrees': degrees, 'words': key_words}
     return environment.get_template('page.html').render(
         panels=panels, several=several, known_truth=known_truth, stages=STAGES,
         drawn=_packed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),

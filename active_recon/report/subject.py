@@ -16,8 +16,9 @@ class Subject:
     """
     One episode that has views, under a letter of its own on the page.
 
-    `truth` holds the object's true cells, (X, Y, Z), where they are known. `computed` says that
-    the bag held no reconstruction and that this was made up for, by which weights.
+    `truth` holds the object's true cells, (X, Y, Z), where they are known, and `placed` says how
+    they were. `computed` says that the bag held no reconstruction and that this was made up for,
+    by which weights.
     """
 
     letter: str
@@ -25,6 +26,7 @@ class Subject:
     episode: RecordedEpisode
     truth: NDArray[np.bool_] | None = None
     computed: str = ''
+    placed: str = ''
 
     @property
     def views(self) -> Sequence[RecordedView]:

@@ -1,47 +1,94 @@
-"""The true shape of a recorded object, and the shape where a bag holds none."""
+"""The true shape of a recorded object, where it stood."""
 
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from active_recon.bags.parameters import node_parameters
-from active_recon.bags.recorded_object import seen_again
-from active_recon.bags.run import RecordedEpisode, RecordedRun
-from active_recon.errors import ConfigError
-from active_recon.meshes import load_mesh
+from active_recon.bags.run import RecordedRun
+from active_recon.errors import ConfigError, DataError
+from active_recon.meshes import fit_to_grid, load_mesh, read_mesh
 from active_recon.objects import find_object, shipped_objects
 from active_recon.report.subject import shown_grid
 from active_recon.voxelise import voxelise
 from active_recon.voxels import read_binvox, RESOLUTION, turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
+import trimesh
 
-if TYPE_CHECKING:
-    from active_recon.reconstructor import Reconstructor
+_SAME_SIDE = 0.01  # of a binvox and of the run's cube, as a share
+_SAMPLES = 10_000  # of a surface
 
 
-def read_truth(path: Path, run: RecordedRun) -> NDArray[np.bool_]:
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The true cells, (X, Y, Z), and how they were placed, in a sentence."""
+
+    cells: NDArray[np.bool_]
+    placed: str
+
+
+@dataclass(frozen=True)
+class TruthFile:
     """
-    Return the true cells of a run's object, (X, Y, Z), from a mesh or a binvox file.
+    A mesh, a binvox file, or the name of an object that ships.
 
-    The name of an object that ships is a mesh too. The cells stand as the run's object stood, by
-    the reconstructor's `object_yaw`. Raises MeshError,
-    DataError, and ConfigError where a binvox has another number of cells than the run.
+    A mesh is in metres and where it stands in the object's frame; with `fit`, and where the
+    object ships, it is centred and scaled so that its longest side is the cube's, and turned by
+    the run's `object_yaw`. `up` and `front` name the mesh's axes, None: those of its format.
     """
-    resolution = _resolution(run)
-    if path.suffix.lower() == '.binvox':
-        grid = read_binvox(path)
-    else:
-        grid = voxelise(load_mesh(find_object(str(path))), resolution)
-    side = grid.occupancy.shape[0]
-    if side != resolution:
-        raise ConfigError(f'{path}: expected {resolution} cells a side, as {run.path.name} has, '
-                          f'got {side}')
-    yaw = node_parameters(run, 'reconstructor').get('object_yaw', 0.0)
-    return VoxelGrid(turned(grid.occupancy, yaw)).occupied(0.5)
+
+    path: Path
+    fit: bool = False
+    up: str | None = None
+    front: str | None = None
+
+    def read(self, run: RecordedRun, object_size: float | None = None) -> Truth:
+        """
+        Return the true cells of a run's object; `object_size` metres where the run tells none.
+
+        Raises MeshError, DataError where nothing of it is in the run's cube, and ConfigError where
+        a binvox has other cells than the run.
+        """
+        size = object_size or _object_size(run)
+        if self.path.suffix.lower() == '.binvox':
+            return self._of_binvox(run, size)
+        ships = str(self.path) in shipped_objects()
+        file = find_object(str(self.path))
+        if self.fit or ships:
+            cells = _fitted(load_mesh(file, self.up, self.front), run)
+            return Truth(cells, f'The true shape is {file.name}, centred, and scaled so that its '
+                                "longest side is the cube's.")
+        mesh = read_mesh(file, self.up, self.front)
+        low, high = (np.round(bound, 3).tolist() for bound in mesh.bounds)
+        mesh.apply_transform(np.diag([1 / size, 1 / size, 1 / size, 1]))
+        inside = _share_inside(mesh)
+        if inside == 0:
+            raise DataError(
+                f"{self.path}: nothing of it is in the run's cube of {size:g} m about the "
+                f'origin: it reaches from {low} to {high} m. A mesh is taken in metres '
+                'and where it stands; --fit centres and scales it, --object-size tells the cube')
+        outside = f' {100 * (1 - inside):.0f} % of its surface is outside of the cube.'
+        return Truth(_in_place(mesh, _resolution(run)),
+                     f'The true shape is {file.name}, in metres and where it stands in the '
+                     f"object's frame.{outside if inside < 1 else ''}")
+
+    def _of_binvox(self, run: RecordedRun, size: float) -> Truth:
+        grid, resolution = read_binvox(self.path), _resolution(run)
+        side = grid.occupancy.shape[0]
+        if side != resolution:
+            raise ConfigError(f'{self.path}: {side} cells a side, where {run.path.name} has '
+                              f'{resolution}')
+        if self.fit:
+            return Truth(_turned(grid, run), f'The true shape is {self.path.name}, its cells '
+                                             "taken as the cube's.")
+        if abs(grid.size / size - 1) > _SAME_SIDE:
+            raise ConfigError(f"{self.path}: a cube of {grid.size:g} m, where the run's has "
+                              f"{size:g} m: --fit takes its cells as the cube's, --object-size "
+                              'tells the cube')
+        return Truth(grid.occupied(0.5), f'The true shape is {self.path.name}, cell by cell.')
 
 
-def known_truth(run: RecordedRun) -> NDArray[np.bool_] | None:
+def known_truth(run: RecordedRun) -> Truth | None:
     """Return the true cells where the camera says that it showed an object that ships."""
     camera = node_parameters(run, 'turntable_camera')
     mesh = Path(str(camera.get('mesh', '')))
@@ -49,28 +96,38 @@ def known_truth(run: RecordedRun) -> NDArray[np.bool_] | None:
         mesh.parts == (mesh.stem,) or mesh.parts[-3:-1] == ('active_recon', 'objects'))
     if not ships or camera.get('up') or camera.get('front'):
         return None
-    return read_truth(find_object(mesh.stem), run)
+    return TruthFile(Path(mesh.stem)).read(run)
 
 
-def with_reconstruction(run: RecordedRun, reconstructor: 'Reconstructor') -> RecordedRun:
-    """Return the run with the shapes that its images give where the bag holds none."""
-    told = {'needs_front': reconstructor.provenance['needs_front']}
-    return replace(run, provenance={**run.provenance, **told},
-                   episodes=[_reconstructed(episode, reconstructor) for episode in run.episodes])
+def _fitted(mesh: trimesh.Trimesh, run: RecordedRun) -> NDArray[np.bool_]:
+    return _turned(voxelise(fit_to_grid(mesh), _resolution(run)), run)
 
 
-def lacks_reconstruction(run: RecordedRun) -> bool:
-    """Return whether there is a view after which no shape was recorded."""
-    return any(shown_grid(view) is None for episode in run.episodes for view in episode.views)
+def _turned(grid: VoxelGrid, run: RecordedRun) -> NDArray[np.bool_]:
+    yaw = node_parameters(run, 'reconstructor').get('object_yaw', 0.0)
+    return VoxelGrid(turned(grid.occupancy, yaw)).occupied(0.5)
 
 
-def _reconstructed(episode: RecordedEpisode, reconstructor: 'Reconstructor') -> RecordedEpisode:
-    views = []
-    for step in seen_again(episode.views, reconstructor):
-        grid = step.known.grid
-        views.append(replace(step.view, reconstruction=grid, entropy=grid.entropy(),
-                             occupied=grid.above(reconstructor.threshold)))
-    return replace(episode, views=views)
+def _share_inside(mesh: trimesh.Trimesh) -> float:
+    """Return the share of a mesh's surface that is in the unit cube about the origin."""
+    if np.abs(mesh.bounds).max() <= 0.5:
+        return 1.0
+    points, _ = trimesh.sample.sample_surface(mesh, _SAMPLES, seed=0)
+    return float((np.abs(points) <= 0.5).all(axis=1).mean())
+
+
+def _in_place(mesh: trimesh.Trimesh, resolution: int) -> NDArray[np.bool_]:
+    """Return the cells of a mesh in the unit cube; what sticks out of it is closed outside."""
+    third = mesh.copy()
+    third.apply_transform(np.diag([1 / 3, 1 / 3, 1 / 3, 1]))
+    middle = (slice(resolution, 2 * resolution),) * 3
+    return voxelise(third, 3 * resolution).occupied(0.5)[middle]
+
+
+def _object_size(run: RecordedRun) -> float:
+    size = node_parameters(run, 'reconstructor').get('object_size')
+    return next((grid.size for episode in run.episodes for view in episode.views
+                 if (grid := shown_grid(view)) is not None), size or 1.0)
 
 
 def _resolution(run: RecordedRun) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 from active_recon.errors import ConfigError, DataError
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file, save
 from torch import nn, Tensor
 from torch.optim import Optimizer
 
@@ -33,7 +33,8 @@ def save_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
                        'log': checkpoint.log})
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix('.part')
-    save_file(tensors, unfinished, {'checkpoint': meta})
+    # Written here, since safetensors would keep others of the user's group from reading it
+    unfinished.write_bytes(save(tensors, {'checkpoint': meta}))
     unfinished.replace(path)
 
 
@@ -49,8 +50,7 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
                                 for name, tensor in tensors.items()
                                 if name.startswith('module.')})
     except (OSError, SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise DataError(f'{path}: expected a whole checkpoint of this model, got: '
-                        f'{error}') from error
+        raise DataError(f'{path}: no whole checkpoint of this model: {error}') from error
     for name, parameter in module.named_parameters():
         for key in ('step', 'exp_avg', 'exp_avg_sq'):
             stored_name = f'optimizer.{key}.{name}'
@@ -66,6 +66,6 @@ def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
     """Restore as `load_checkpoint`; raises ConfigError where it was made under other settings."""
     stored = load_checkpoint(path, module, optimizer)
     if stored.settings != settings:
-        raise ConfigError(f'{path}: expected a checkpoint of the same settings ({settings}), '
-                          f'got {stored.settings}')
+        raise ConfigError(f'{path}: made under other settings, {stored.settings}, where these '
+                          f'are asked for: {settings}')
     return stored

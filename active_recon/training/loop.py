@@ -9,6 +9,7 @@ from typing import Any
 from active_recon.config import Config
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ActiveReconError, ConfigError
+from active_recon.interrupts import held_interrupts
 from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
 from lightning_fabric import Fabric
 import torch
@@ -52,6 +53,10 @@ class TrainingDivergedError(ActiveReconError):
     """A loss that is not finite."""
 
 
+class TrainingStoppedError(KeyboardInterrupt):
+    """Ctrl-C or SIGTERM, answered once the step was done and its checkpoint saved."""
+
+
 @dataclass(frozen=True)
 class Draw:
     """What a step learns from: the arguments of its module, and the objects they came from."""
@@ -62,13 +67,18 @@ class Draw:
 
 @dataclass(frozen=True)
 class Run:
-    """Where a training stands on disk, whom it tells, and on how many processes it runs."""
+    """
+    Where a training stands on disk, whom it tells, and on how many processes it runs.
+
+    `show` is called where it was validated, for who wants to look at what was learned.
+    """
 
     fabric: Fabric
     checkpoint_path: Path
     report: Callable[[int, Measured], None]
     resume: bool = False
     until: int | None = None  # stops early, as a cut would
+    show: Callable[[int], None] = lambda step: None
 
 
 def make_fabric(bfloat16: bool, devices: int = 1, nodes: int = 1) -> Fabric:
@@ -108,7 +118,8 @@ def train_steps(
     seed and the step alone, so a training that was cut off and resumed walks the same path as
     one that was not. `run.report` is called after every step with the losses, and with what
     `validate` measured where it did. Raises TrainingDivergedError naming the batch where a loss
-    is not finite, and ConfigError on a checkpoint of other settings.
+    is not finite, ConfigError on a checkpoint of other settings, and TrainingStoppedError where
+    it was asked to stop.
     """
     fabric = run.fabric
     parameters = [part for part in trained.parameters() if part.requires_grad]
@@ -119,32 +130,51 @@ def train_steps(
     if run.resume:
         begun = resume_checkpoint(run.checkpoint_path, trained, raw, settings)
     learner.train()
-    for step in range(begun.step, min(config.steps, run.until or config.steps)):
-        for group in raw.param_groups:
-            group['lr'] = config.learning_rate * learning_rate_share(
-                step, config.steps, config.warm_up)
-        drawn = draw(step)
-        losses = wrapped(*fabric.to_device(drawn.arguments))
-        _refuse_divergence(fabric, step, losses['loss'], views, drawn.objects)
-        optimizer.zero_grad(set_to_none=True)
-        fabric.backward(losses['loss'])
-        fabric.clip_gradients(wrapped, optimizer, max_norm=1.0)
-        optimizer.step()
-        measured = {name: value.item() for name, value in losses.items()}
-        last = step + 1 == config.steps
-        if last or (step + 1) % config.validate_every == 0:
+    with held_interrupts() as raise_if_asked:
+        for step in range(begun.step, min(config.steps, run.until or config.steps)):
+            for group in raw.param_groups:
+                group['lr'] = config.learning_rate * learning_rate_share(
+                    step, config.steps, config.warm_up)
+            drawn = draw(step)
+            losses = wrapped(*fabric.to_device(drawn.arguments))
+            _refuse_divergence(fabric, step, losses['loss'], views, drawn.objects)
+            optimizer.zero_grad(set_to_none=True)
+            fabric.backward(losses['loss'])
+            fabric.clip_gradients(wrapped, optimizer, max_norm=1.0)
+            optimizer.step()
+            measured = {name: value.item() for name, value in losses.items()}
+            last = step + 1 == config.steps
+            stopping = not last and _is_asked_to_stop(fabric, raise_if_asked)
+            if last or (step + 1) % config.validate_every == 0:
+                if fabric.is_global_zero:
+                    learner.eval()
+                    measured |= validate()
+                    run.show(step + 1)
+                    learner.train()
+                begun.log.append({'step': step + 1, **measured})
             if fabric.is_global_zero:
-                learner.eval()
-                measured |= validate()
-                learner.train()
-            begun.log.append({'step': step + 1, **measured})
-        if fabric.is_global_zero:
-            run.report(step + 1, measured)
-            if last or (step + 1) % config.checkpoint_every == 0:
-                save_checkpoint(run.checkpoint_path, trained, raw,
-                                Checkpoint(step + 1, settings, begun.log))
+                run.report(step + 1, measured)
+                if last or stopping or (step + 1) % config.checkpoint_every == 0:
+                    save_checkpoint(run.checkpoint_path, trained, raw,
+                                    Checkpoint(step + 1, settings, begun.log))
+            if stopping:
+                raise TrainingStoppedError(
+                    f'stopped at step {step + 1} of {config.steps}; continue with --resume')
     fabric.barrier()
     learner.eval()
+
+
+def _is_asked_to_stop(fabric: Fabric, raise_if_asked: Callable[[], None]) -> bool:
+    """Return whether any process was asked, the same on all of them."""
+    try:
+        raise_if_asked()
+        asked = False
+    except KeyboardInterrupt:
+        asked = True
+    if fabric.world_size > 1:
+        told = fabric.all_reduce(torch.tensor(float(asked)), reduce_op='sum')
+        asked = bool(torch.as_tensor(told) > 0)
+    return asked
 
 
 def _refuse_divergence(fabric: Fabric, step: int, loss: Tensor, views: ViewSet,

@@ -11,6 +11,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
 from active_recon.evaluation.validation import best_threshold, policy_auc, reconstruction_iou
 from active_recon.models.lifting import Lifting
+from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_config, network_entry
 from active_recon.models.weights import Bundle
 from active_recon.policies import learned_policy
@@ -26,6 +27,8 @@ import torch
 Report = Callable[[int, Measured], None]
 Reporting = Callable[[str, int], AbstractContextManager[Report]]
 """Opens the report of a stage, given its name and its number of steps."""
+Show = Callable[[str, int, ReconstructionNetwork], None]
+"""Takes a stage's name, the steps done, and the network as it is."""
 
 
 @dataclass(frozen=True)
@@ -74,12 +77,13 @@ class Plan:
 
 
 def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
-               reporting: Reporting, fabric: Fabric, resume: bool = False) -> Bundle:
+               reporting: Reporting, fabric: Fabric, resume: bool = False,
+               show: Show = lambda stage, step, network: None) -> Bundle:
     """
     Train as planned, with checkpoints of every stage in `out`; return what is to be saved.
 
     The threshold is chosen on validation. A stage whose checkpoint is there goes on with it if
-    `resume` is set.
+    `resume` is set. `show` is given the network whenever it was validated.
     """
     entry = network_entry(plan.model)
     config = plan.config
@@ -90,7 +94,8 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
 
     def run(stage: str, report: Report) -> Run:
         path = out / f'{stage}.safetensors'
-        return Run(fabric, path, report, resume and path.is_file())
+        return Run(fabric, path, report, resume and path.is_file(),
+                   show=lambda step: show(stage, step, network))
 
     if plan.joint and attention is not None:
         with reporting('joint', plan.reconstruction.steps) as report:

@@ -24,4 +24,4 @@ def free_port(first: int = DEFAULT_PORT) -> int:
             except OSError:
                 continue
             return port
-    raise ConfigError(f'expected a free port from {first} to {HIGHEST_PORT}, but all are taken')
+    raise ConfigError(f'no port is free from {first} to {HIGHEST_PORT}')

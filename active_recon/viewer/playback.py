@@ -56,7 +56,7 @@ class Playback:
     def __init__(self, run: RecordedRun, port: int = 0) -> None:
         self._states = recorded_states(run)
         if not self._states:
-            raise DataError(f'{run.path}: expected a run with views, but none was taken in it')
+            raise DataError(f'{run.path}: no view was taken in it')
         grid = self._states[-1].grid
         self.page = Page(run.path.name, grid.size if grid is not None else 1.0, port)
         self._step = self.page.add_steps(len(self._states), 'View')

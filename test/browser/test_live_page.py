@@ -237,5 +237,5 @@ def test_a_bag_plays_to_its_end_and_then_from_the_first_view(playback, chromium)
 
 
 def test_a_run_without_a_view_is_refused(tmp_path):
-    with pytest.raises(DataError, match='expected a run with views'):
+    with pytest.raises(DataError, match='no view was taken'):
         Playback(recorded_run(tmp_path, []))

@@ -15,7 +15,7 @@ def pages(tmp_path_factory):
     """Return the URLs of a page of one run and of one of three."""
     folder = tmp_path_factory.mktemp('pages')
     runs = [recorded_run('chair'), recorded_run('chair', 'uniform', 3), recorded_run('car')]
-    subjects = [Subject(letter, run, run.episodes[0], known_truth(run))
+    subjects = [Subject(letter, run, run.episodes[0], known_truth(run).cells)
                 for letter, run in zip(letters(), runs, strict=False)]
     for name, shown in (('one', subjects[:1]), ('three', subjects)):
         write_page(report_page(shown), folder / f'{name}.html')
@@ -67,6 +67,21 @@ def test_page_is_drawn_without_complaint_and_fits_its_window(opened, name, size,
     assert page.run('return document.documentElement.scrollWidth') <= size[0]
     assert page.run('return document.getElementById("trouble").hidden')
     assert page.errors() == []
+
+
+@pytest.mark.parametrize('name', ['one', 'three'])
+def test_no_figure_of_the_timing_table_is_cut_off_on_a_phone(opened, name):
+    page = opened(name, PHONE)
+    inside = page.run(
+        'return [...document.querySelectorAll(".timing")].map((table) => '
+        '[table.scrollWidth, table.parentElement.clientWidth, '
+        'Math.max(...[...table.querySelectorAll("td")].map((cell) => '
+        'cell.getBoundingClientRect().right)), '
+        'table.parentElement.getBoundingClientRect().right])')
+    assert inside
+    for wide, room, right, edge in inside:
+        assert wide <= room
+        assert right <= edge + 1
 
 
 def test_another_view_shows_another_shape_and_what_was_thought_then(opened, changed_share):

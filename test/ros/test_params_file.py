@@ -2,6 +2,8 @@
 
 from pathlib import Path
 import re
+import subprocess
+import sys
 
 from active_recon.errors import ConfigError
 from active_recon.nodes.params_file import read_params_file
@@ -45,7 +47,7 @@ def test_what_is_given_to_all_is_given_to_each_unless_it_has_its_own(tmp_path):
 @pytest.mark.parametrize(('text', 'said'), [
     ('', 'expected names with values, got None'),
     ('- a', 'expected names with values'),
-    ('{', 'expected a ROS parameters file in YAML'),
+    ('{', 'no ROS parameters file in YAML'),
     ('/**: {ros__parameters: {a: 1}}', 'expected a node among reconstructor.*, got none'),
     ('grasper: {ros__parameters: {a: 1}}', 'expected nodes among reconstructor.*, got grasper'),
     ('recorder: {topics: [a]}', 'recorder: expected ros__parameters and nothing else, got topics'),
@@ -64,3 +66,14 @@ def test_a_file_that_cannot_be_used_is_refused_with_its_name(tmp_path, text, sai
 def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(ConfigError, match='No such file'):
         read_params_file(tmp_path / 'none.yaml')
+
+
+def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_path):
+    path = tmp_path / 'some.yaml'
+    path.write_text('recorder:\n  ros__parameters: {max_bag_size_mb: 2\n')
+    ended = subprocess.run(
+        [sys.executable, '-m', 'active_recon.nodes.recorder', '--ros-args', '--params-file', path],
+        cwd=CONFIG.parent, capture_output=True, text=True)
+    assert ended.returncode == 1
+    assert 'Traceback' not in ended.stderr
+    assert str(path) in ended.stderr.splitlines()[-1]

@@ -133,5 +133,5 @@ def test_a_bag_that_is_damaged_inside_is_refused_and_not_played_in_part(
     poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
     assert play(path).wait(60) == 2
     (line,) = (tmp_path / 'said').read_text().splitlines()
-    assert line.startswith(f'active-recon: {path}: expected')
+    assert line.startswith(f'active-recon: {path}: ')
     assert not poses

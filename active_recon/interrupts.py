@@ -3,19 +3,21 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import signal
+import threading
 
 
 @contextmanager
 def held_interrupts() -> Iterator[Callable[[], None]]:
     """
-    Hold Ctrl-C and SIGTERM back in the block.
+    Hold Ctrl-C and SIGTERM back in the block, if it is the main thread's, which gets them.
 
     What is yielded raises KeyboardInterrupt when called after one came; so does the block's end,
     where nothing has been raised before.
     """
     asked: list[int] = []
+    mine = threading.current_thread() is threading.main_thread()
     before = {kind: signal.signal(kind, lambda kind, _frame: asked.append(kind))
-              for kind in (signal.SIGINT, signal.SIGTERM)}
+              for kind in ((signal.SIGINT, signal.SIGTERM) if mine else ())}
 
     def raise_if_asked() -> None:
         if asked:

@@ -1,0 +1,57 @@
+"""Networks and policies of one's own: from an installed package, or from a Python file."""
+
+from functools import cache
+from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+import sys
+from typing import Any
+
+from active_recon.errors import ConfigError
+
+NETWORKS_GROUP, POLICIES_GROUP = 'active_recon.networks', 'active_recon.policies'
+"""The groups of entry points under which packages offer theirs, each by its name."""
+
+
+@cache
+def installed(group: str) -> dict[str, Any]:
+    """Return the entry points of a group by their names, none of them loaded yet."""
+    return {point.name: point for point in entry_points(group=group)}
+
+
+def load_installed(group: str, name: str) -> Any:
+    """Return what an installed package offers; ConfigError where it cannot be imported."""
+    try:
+        return installed(group)[name].load()
+    except Exception as error:  # whatever the package raises as it is imported
+        raise ConfigError(f'{name}: cannot be imported from where {group} says: '
+                          f'{type(error).__name__}: {error}') from error
+
+
+def is_in_file(told: str) -> bool:
+    """Return whether a name is one in a file, as in my_file.py:Net."""
+    path, colon, name = told.rpartition(':')
+    return bool(colon) and path.endswith('.py') and name.isidentifier()
+
+
+def load_from_file(told: str) -> Any:
+    """
+    Return what `told`, my_file.py:Net, names.
+
+    Raises ConfigError where there is no such file, where it fails, or has no such name.
+    """
+    place, _, name = told.rpartition(':')
+    path = Path(place)
+    if not path.is_file():
+        raise ConfigError(f'{path}: no such file')
+    spec = spec_from_file_location(f'_own_{path.stem}', path)
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[spec.name] = module  # where dataclasses look for themselves
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever the file raises
+        raise ConfigError(f'{path}: fails with {type(error).__name__}: {error}') from error
+    if not hasattr(module, name):
+        raise ConfigError(f'{path}: has no {name}')
+    return getattr(module, name)
