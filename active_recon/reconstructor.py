@@ -17,10 +17,16 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """What is known after a view: the grid in the object frame, and the latent (C, h, w)."""
+    """
+    What is known after a view: the grid in the object frame, and the latent (C, h, w).
+
+    `image` is the view as the network saw it, (S, S, 3 or 4) uint8, the fourth channel what was
+    seen at all.
+    """
 
     grid: VoxelGrid
     latent: NDArray[np.float32]
+    image: NDArray[np.uint8] | None = None
 
 
 class Reconstructor:
@@ -94,7 +100,8 @@ class Reconstructor:
         occupancy, latent, self._state = self._runtime.step(
             shown, seen_by.turned(-self._yaw).scaled(1 / self.object_size), self._state)
         self._view_count += 1
-        return Reconstruction(VoxelGrid(turned(occupancy, self._yaw), self.object_size), latent)
+        grid = VoxelGrid(turned(occupancy, self._yaw), self.object_size)
+        return Reconstruction(grid, latent, shown)
 
 
 def load(model: str | Path | None = None, object_size: float = 1.0,

@@ -23,6 +23,8 @@ _STAMPS = 21
 _REGULAR, _NO_LONGER = 0.85, 0.6
 """This share of periods is near the median: of what becomes a stream, of what still is one."""
 _AT_LEAST, _SHARE = 2, 0.1
+_QUEUE = 10
+"""So many images wait for who is busy; what comes then is lost."""
 
 _NAMES = {'images': 'images', 'camera_info': 'camera infos', 'poses': 'poses'}
 _Moments = dict[int, dict[str, float]]  # by stamp, when each stream's message came
@@ -47,6 +49,8 @@ class StreamWatch:
             stream: deque(maxlen=_STAMPS) for stream in STREAMS}
         self._periods: dict[str, float] = {}
         self._moments: _Moments = {}
+        self._held_up: deque[tuple[float, float]] = deque()  # when, and for how long
+        self._lost_at: float | None = None
 
     def heard(self, stream: str, stamp: int, now: float) -> None:
         """Note a message of one of STREAMS, whether or not it can be used."""
@@ -57,6 +61,10 @@ class StreamWatch:
             stamps.clear()
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
+
+    def lost(self, now: float) -> None:
+        """Note that images were published, by their numbers, that did not come."""
+        self._lost_at = now
 
     def found(self, now: float) -> dict[str, str]:
         """
@@ -69,7 +77,25 @@ class StreamWatch:
             if len(stamps) == _STAMPS:
                 self._note_period(stream, np.diff(stamps) / 1e9)
         recent = self._since(now - WINDOW_S)
-        return {**self._silent(now), **dict(_missing(recent)), **dict(_late(recent))}
+        # Of the time before: who was held up hears only then of what it has missed
+        self._held_up.append((now, now - min(self._looked, now)))
+        while self._held_up[0][0] < now - _KEPT_S:
+            self._held_up.popleft()
+        missing = {f'missing_{stream}': f'{words}; {self._cause(stream, now)}'
+                   for stream, words in _missing(recent)}
+        return {**self._silent(now), **missing, **dict(_late(recent))}
+
+    def _cause(self, stream: str, now: float) -> str:
+        """Return in words where what is missing of a stream was lost."""
+        busy = max(time for _, time in self._held_up)
+        period = self._periods.get('images', 0.0)
+        if stream == 'images' and period and busy > max(_QUEUE * period, _LONGEST_LOOK_S):
+            return (f'lost in processing: this node was busy for {busy:.1f} s, and no more than '
+                    f'{_QUEUE} images wait')
+        if stream == 'images' and self._lost_at is not None and now - self._lost_at < _KEPT_S:
+            return ('lost in transport: they were published and did not arrive; is the connection '
+                    "too slow, or the middleware's buffer too small for such images?")
+        return 'lost in transport, or never published'
 
     def _note_period(self, stream: str, periods: NDArray[np.float64]) -> None:
         """Keep the period of a stream that comes regularly; one that no longer does has none."""
@@ -104,6 +130,7 @@ class StreamWatch:
 
 
 def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
+    """Yield the streams of which stamps are missing, and how many, in words."""
     stamps = {stream: {stamp for stamp, came in moments.items() if stream in came}
               for stream in STREAMS}
     of_camera = stamps['images'] | stamps['camera_info']
@@ -116,9 +143,9 @@ def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
         due = {stamp for stamp in awaited if stamp < last}
         lost = len(due - stamps[stream])
         if lost >= max(_AT_LEAST, _SHARE * len(due)):
-            yield f'missing_{stream}', (
+            yield stream, (
                 f'expected {_NAMES[stream]} of the same stamps as the rest that the camera '
-                f'sends, {lost} of the last {len(due)} did not come; is the network too slow?')
+                f'sends, {lost} of the last {len(due)} did not come')
 
 
 def _late(moments: _Moments) -> Iterator[tuple[str, str]]:

@@ -34,6 +34,13 @@ def test_what_was_not_recorded_is_named(tmp_path):
     assert 'so not compared: entropy, latent' in info(write_bag(tmp_path / 'run', partly))
 
 
+def test_what_was_lost_of_one_view_is_named_with_its_view(tmp_path):
+    messages = LoopRun().messages
+    lost = [entry for entry in messages if entry[1] == '/latent'][1]
+    partly = [entry for entry in messages if entry is not lost]
+    assert 'so not compared: the latent of view 2\n' in info(write_bag(tmp_path / 'run', partly))
+
+
 def test_provenance_and_parameters_are_told(tmp_path):
     with BagWriter(tmp_path / 'run') as writer:
         writer.add_provenance({'policy': 'random', 'seed': '3'})

@@ -75,6 +75,15 @@ def test_counters_and_records_have_words(key, words):
     assert key_words(key) == words
 
 
+def test_what_some_views_lack_was_lost_on_the_way_and_is_told(run):
+    first, second, third = run.episodes[0].views
+    [warning] = said(changed(run, views=[
+        replace(first, goal=None), replace(second, latent=None), replace(third, latent=None)]))
+    assert 'lacks the latent of views 2, 3, the goal after view 1' in warning
+    nothing = [replace(view, latent=None) for view in run.episodes[0].views]
+    assert said(changed(run, views=nothing)) == []  # nobody recorded it
+
+
 def test_refusal_of_a_kind_unknown_here_is_told_by_its_name(run):
     [warning] = said(counted(run, refused__gremlins=2))
     assert '2 messages were refused (gremlins)' in warning
@@ -113,7 +122,9 @@ def test_other_elevation_is_told(run, elevation_deg, warned):
     view = run.episodes[0].views[0]
     camera = orbit_camera(view.camera.azimuth, math.radians(elevation_deg))
     there = changed(run, first_goal=None, views=[replace(view, camera=camera)])
-    assert bool(said(there)) == warned
+    assert not said(there)  # the network takes any camera
+    bound = replace(there, provenance=run.provenance | {'needs_front': 'true'})
+    assert bool(said(bound)) == warned
     anywhere = replace(there, provenance={**there.provenance, 'needs_front': 'false'})
     assert not said(anywhere)
 

@@ -110,6 +110,23 @@ def test_a_third_that_is_missing_is_told_within_a_second_or_so_and_no_more_when_
     assert not streams.watch.found(streams.now)
 
 
+@pytest.mark.parametrize(('numbered', 'busy_s', 'said'), [
+    (False, 0.0, 'lost in transport, or never published'),
+    (True, 0.0, 'lost in transport: they were published'),
+    (True, 0.9, 'lost in processing: this node was busy for 0.9 s')])
+def test_missing_images_are_told_with_where_they_were_lost(numbered, busy_s, said):
+    streams = Streams()
+    streams.run(3.0)
+    streams.now += busy_s
+    found = ''
+    for _ in range(10):
+        streams.run(0.2, lambda which, number: which == 'images' and number % 3 == 1)
+        if numbered:
+            streams.watch.lost(streams.now)
+        found = streams.watch.found(streams.now).get('missing_images', found)
+    assert said in found
+
+
 def test_a_message_lost_now_and_then_is_not_told():
     streams = Streams()
     assert not streams.run(20.0, lambda which, number: which == 'images' and number % 40 == 39)

@@ -222,3 +222,22 @@ def test_a_recorded_goal_is_shown_where_its_own_camera_stands():
     (state,) = recorded_states(run)
     assert state.goal is camera
     np.testing.assert_allclose(state.scores.azimuths, AZIMUTHS)
+
+
+def test_what_nodes_warn_of_stands_right_after_how_far_the_loop_is():
+    problems = {'view_planner': 'no episode', 'reconstructor': 'no image'}
+    told = ['reconstructor warns: no image', 'view_planner warns: no episode']
+    assert link_words(links(), LoopState(), problems)[1:3] == told
+    assert link_words(links(publishers=0), LoopState(), problems)[1:] == told
+
+
+def test_an_image_of_the_last_episode_is_not_that_of_the_next():
+    observer = Observer()
+    observer.begin_episode('a', 100)
+    image = np.zeros((8, 8, 3), np.uint8)
+    observer.set_network_image(50, image)
+    assert observer.state.network_image is None
+    observer.set_network_image(110, image)
+    assert observer.state.network_image is image
+    observer.begin_episode('b', 120)
+    assert observer.state.network_image is None

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, TYPE_CHECKING
+from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.bag_options import with_bag_options
 from active_recon.cli.progress import bag_progress
@@ -10,7 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from active_recon.bags.raw import BagSummary
-    from active_recon.bags.run import RecordedEpisode, RecordedRun
+    from active_recon.bags.run import RecordedRun
     from active_recon.bags.scene import Scene
     from active_recon.bags.topics import Topics
 
@@ -54,6 +54,8 @@ def _tell_contents(path: Path, summary: 'BagSummary') -> None:
 
 
 def _tell_run(run: 'RecordedRun', replays: bool) -> None:
+    from active_recon.bags.missing import missing_words
+
     chosen = 'that its gate would take' if 'bag' in run.counters else 'that the loop took'
     typer.echo(f'{"can be replayed, with " if replays else ""}the views {chosen}:')
     for number, episode in enumerate(run.episodes, 1):
@@ -61,20 +63,9 @@ def _tell_run(run: 'RecordedRun', replays: bool) -> None:
         end = f', done: {episode.done}' if episode.done else ''
         typer.echo(f'  episode {number}: {len(episode.views)} views at azimuths {azimuths} degrees'
                    f'{end}')
-        if missing := _not_recorded(episode):
+        if missing := missing_words(episode):
             typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')
     if run.assumed and (not replays or 'bag' in run.counters):
         typer.echo('assumed, since the bag does not tell:')
         for assumption in run.assumed:
             typer.echo(f'  {assumption}')
-
-
-def _not_recorded(episode: 'RecordedEpisode') -> list[str]:
-    recorded: dict[str, list[Any]] = {
-        'probabilities': [view.reconstruction for view in episode.views],
-        'occupancy': [view.occupied for view in episode.views],
-        'entropy': [view.entropy for view in episode.views],
-        'latent': [view.latent for view in episode.views],
-        'goals': [view.goal for view in episode.views[:-1]],
-    }
-    return [what for what, values in recorded.items() if any(value is None for value in values)]

@@ -25,19 +25,26 @@ def view(
     port: Annotated[int, typer.Option(
         min=0, max=HIGHEST_PORT, help='Where the page is served, or at the next port that is '
                                       'free, which is told; 0 for any.')] = DEFAULT_PORT,
+    remap: Annotated[list[str] | None, typer.Option(
+        '--remap', '-r', metavar='FROM:=TO',
+        help='Another name for a topic of the loop that runs, or __ns:=/NAME for its namespace; '
+             'may be repeated.')] = None,
 ) -> None:
     """
     Show the loop in the browser, on a page of this machine alone.
 
     The object as it takes shape, the views taken, where the camera goes next and why. The page
-    may be opened late, twice, or closed: the loop does not notice. Ctrl-C ends it.
+    may be opened late, twice, or closed: the loop does not notice. Ctrl-C ends it. How large the
+    object is, its frame and what its topics are called is asked of the nodes that run.
 
     For example: active-recon view, or active-recon view bags/2026-11-21_10-00-00
     """
     if bag is None:
         # The node takes this process's place, and so hears its Ctrl-C
-        os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.viewer',
-                                  '--ros-args', '-p', f'port:={port}'])
+        size = [] if scene.object_size is None else ['-p', f'object_size:={scene.object_size}']
+        names = [word for each in remap or () for word in ('-r', each)]
+        os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.viewer', '--ros-args',
+                                  '-p', f'port:={port}', *size, *names])
     _step_through(bag, topics, scene, port)
 
 

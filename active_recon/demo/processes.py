@@ -13,8 +13,8 @@ import time
 from types import TracebackType
 
 from active_recon.errors import ActiveReconError
+from active_recon.nodes.shared_memory import PROFILE
 
-_PROFILE = Path(__file__).parents[1] / 'nodes' / 'fastdds_local.xml'
 _LAST_LINES = 8
 _STOP_S = 5.0  # for a node to close what it holds open
 _ASK_AGAIN_S = 1.0
@@ -31,7 +31,7 @@ def private_environment() -> dict[str, str]:
         'ROS_DOMAIN_ID': str(_free_domain_id()),
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         'RMW_IMPLEMENTATION': 'rmw_fastrtps_cpp',
-        'FASTRTPS_DEFAULT_PROFILES_FILE': str(_PROFILE),
+        'FASTRTPS_DEFAULT_PROFILES_FILE': str(PROFILE),
     }
 
 

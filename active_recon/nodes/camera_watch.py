@@ -27,6 +27,10 @@ class CameraWatch:
         """Note a message of a stream of `StreamWatch`, whether or not it can be used."""
         self._streams.heard(stream, stamp, time.monotonic())
 
+    def lost(self) -> None:
+        """Note that images were published that did not come."""
+        self._streams.lost(time.monotonic())
+
     def stands(self, camera: Camera, stamp: int, goal: Camera | None) -> None:
         """Note where the camera is, and the camera of its open goal."""
         self._motion.heard(camera, stamp, goal)

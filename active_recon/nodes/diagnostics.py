@@ -38,6 +38,7 @@ class Diagnostics:
         self._said_at: dict[str, float] = {}
         self._last_problem = ''
         self._troubles: dict[str, str] = {}
+        self._said_troubles: set[str] = set()
         self._failure = ''
         self._news = True
         self._told_at = -math.inf
@@ -81,17 +82,30 @@ class Diagnostics:
         self._say(f'warned/{kind}', message)
 
     def begin_trouble(self, kind: str, message: str) -> None:
-        """Warn of a state that is wrong until `end_trouble`; count and say its beginning."""
-        if kind not in self._troubles:
-            self._say(f'warned/{kind}', message)
+        """
+        Warn of a state that is wrong until `end_trouble`; count and say its beginning.
+
+        To be called again and again while it lasts: one that comes and goes is said, with its
+        end, once in `LOG_EVERY_S` seconds.
+        """
+        is_new = kind not in self._troubles
         self._troubles[kind] = message
+        if is_new:
+            self._notice(f'warned/{kind}', message)
+        if kind not in self._said_troubles and self._log(f'warned/{kind}', message):
+            self._said_troubles.add(kind)
 
     def end_trouble(self, kind: str) -> None:
-        """Take back the warning of a state, and say so; nothing where there was none."""
+        """Take back the warning of a state, and say so where its beginning was said."""
         message = self._troubles.pop(kind, None)
-        if message is not None:
-            self._news = True
+        if message is None:
+            return
+        self._news = True
+        if kind in self._said_troubles:
+            self._said_troubles.discard(kind)
             self._node.get_logger().info(f'over: {message}')
+        else:
+            self._unsaid[f'warned/{kind}'] += 1
 
     def fail(self, kind: str, message: str) -> None:
         """Say as an error what the node does no more; it stays the state until `recover`."""
@@ -114,17 +128,25 @@ class Diagnostics:
             self.refuse(error)
 
     def _say(self, key: str, message: str) -> None:
+        self._notice(key, message)
+        if not self._log(key, message):
+            self._unsaid[key] += 1
+
+    def _notice(self, key: str, message: str) -> None:
         self._counts[key] += 1
         self._last_problem = message
         self._news = True
+
+    def _log(self, key: str, message: str) -> bool:
+        """Say a message in the log, unless one of its kind was said only just; return whether."""
         now = time.monotonic()
         if now - self._said_at.get(key, -LOG_EVERY_S) < LOG_EVERY_S:
-            self._unsaid[key] += 1
-            return
+            return False
         unsaid = self._unsaid.pop(key, 0)
         more = f' (and {unsaid} more of this kind before)' if unsaid else ''
         self._said_at[key] = now
         self._node.get_logger().warning(f'{message}{more}')
+        return True
 
     def _tell_if_due(self) -> None:
         """Publish what is new, and in any case once a second."""

@@ -5,8 +5,9 @@ The dataclass says all that is to be known of them, without a running node; `Par
 them to ROS, refuses what is out of range, and applies what is changed while the node runs.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
 import math
 from typing import Any, Generic, get_args, get_origin, get_type_hints, TypeVar
 
@@ -138,7 +139,8 @@ class Parameters(Generic[Settings]):
     """
     The parameters of one running node; `now` holds their values.
 
-    Raises ConfigError, which names the parameter, what was expected and what came.
+    Raises ConfigError, which names the parameter, what was expected and what came. What a node is
+    given and does not have is a warning in its log, with the nearest name that it has.
     """
 
     def __init__(self, node: Node, settings: type[Settings]) -> None:
@@ -152,6 +154,7 @@ class Parameters(Generic[Settings]):
             values[name] = each.checked(given.value)
             node.set_descriptor(name, each.descriptor())
         self.now = settings(**values)
+        _warn_of_undeclared(node, self._declared)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -185,6 +188,15 @@ class Parameters(Generic[Settings]):
             commit()
 
 
+def _warn_of_undeclared(node: Node, known: Iterable[str]) -> None:
+    for name in getattr(node, '_parameter_overrides', ()):  # rclpy tells it nowhere else
+        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
+            near = get_close_matches(name, known, 1)
+            hint = f'did you mean {near[0]}?' if near else f'there are {", ".join(known)}'
+            node.get_logger().warning(f'parameter {name}: this node has none of that name, so it '
+                                      f'changes nothing; {hint}')
+
+
 class ReadOnlySaysWhy:
     """A node of which a read-only parameter, when it is set, says what to do instead."""
 
@@ -197,7 +209,7 @@ class ReadOnlySaysWhy:
         return result
 
 
-def tell(node: Node, name: str, value: str, description: str) -> None:
+def tell(node: Node, name: str, value: str | list[str], description: str) -> None:
     """Tell a fact about the node as a parameter that nobody can set; told anew, it is replaced."""
     if node.has_parameter(name):
         node.describe_parameter(name).read_only = False  # else ROS forgets it no more

@@ -18,8 +18,9 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
     Return the parameters that a file gives to each node that it names, in the file's order.
 
     A node may be named in a namespace (`/cell/recorder`) or in any (`/**/recorder`); what `/**`
-    gives, it gives to all. Raises ConfigError on what is no such file, on a node that is not the
-    package's, and on a parameter that the node does not have or that may not be so.
+    gives, it gives to all but those that leave it to another node. Raises ConfigError on what is
+    no such file, on a node that is not the package's, and on a parameter that the node does not
+    have or that may not be so.
     """
     given: dict[str, dict[str, Any]] = {}
     shared: dict[str, Any] = {}
@@ -40,7 +41,15 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
         raise ConfigError(f'{path}: expected a node among {", ".join(SETTINGS)}, got none')
     for node, values in given.items():
         _check(path, node, values, shared)
-    return {node: {**shared, **values} for node, values in given.items()}
+    return {node: {**_own(node, shared), **values} for node, values in given.items()}
+
+
+def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what all are given without what only other nodes have."""
+    own, *others = ({each.name for each in declared(settings)}
+                    for settings in (SETTINGS[node], *SETTINGS.values()))
+    return {name: value for name, value in shared.items()
+            if name in own or name not in set().union(*others)}
 
 
 def _parsed(path: Path) -> object:

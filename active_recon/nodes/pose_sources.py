@@ -7,6 +7,7 @@ import time
 from typing import Any, Protocol
 
 from active_recon.errors import ConfigError, MessageError
+from active_recon.nodes.awaited_inputs import AwaitedInputs
 from active_recon.nodes.clock import STEADY
 from active_recon.nodes.diagnostics import Diagnostics
 from active_recon.nodes.qos import HEARD_OFTEN, STREAM
@@ -49,21 +50,21 @@ def check_pose_source(settings: CameraPoseSettings) -> None:
 
 
 def hear_poses(node: Node, settings: CameraPoseSettings, object_frame: str, take: Take,
-               diagnostics: Diagnostics) -> PoseSource:
+               diagnostics: Diagnostics, inputs: AwaitedInputs) -> PoseSource:
     """Return what hands the poses to `take` from now on; raises as `check_pose_source`."""
     if settings.pose_source == 'turntable_joint':
-        return TurntablePoses(node, take, diagnostics, settings.as_fixed_camera(),
+        return TurntablePoses(node, take, diagnostics, inputs, settings.as_fixed_camera(),
                               settings.joint_name, object_frame)
     if settings.pose_source == 'tf':
         return TfPoses(node, take, diagnostics, object_frame)
-    return TopicPoses(node, take)
+    return TopicPoses(take, inputs)
 
 
 class TopicPoses:
     """The poses that others publish on `camera/pose`."""
 
-    def __init__(self, node: Node, take: Take) -> None:
-        node.create_subscription(PoseStamped, 'camera/pose', take, HEARD_OFTEN)
+    def __init__(self, take: Take, inputs: AwaitedInputs) -> None:
+        inputs.hear(PoseStamped, 'camera/pose', take, HEARD_OFTEN)
 
     def image_came(self, header: Header) -> None:
         """Leave it to the joiner, which interpolates."""
@@ -72,16 +73,15 @@ class TopicPoses:
 class TurntablePoses:
     """The poses of a fixed camera around an object that `turntable/joint_states` turns."""
 
-    def __init__(self, node: Node, take: Take, diagnostics: Diagnostics, camera: FixedCamera,
-                 joint: str, object_frame: str) -> None:
+    def __init__(self, node: Node, take: Take, diagnostics: Diagnostics, inputs: AwaitedInputs,
+                 camera: FixedCamera, joint: str, object_frame: str) -> None:
         self._take = take
         self._diagnostics = diagnostics
         self._camera = camera
         self._joint = joint
         self._object_frame = object_frame
         self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
-        node.create_subscription(
-            JointState, 'turntable/joint_states', self._on_joint, HEARD_OFTEN)
+        inputs.hear(JointState, 'turntable/joint_states', self._on_joint, HEARD_OFTEN)
 
     def _on_joint(self, msg: JointState) -> None:
         with self._diagnostics.refusing():

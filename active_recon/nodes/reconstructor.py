@@ -9,6 +9,7 @@ import uuid
 from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
 from active_recon.errors import DataError, MessageError
 from active_recon.nodes.after_hearing import AfterHearing
+from active_recon.nodes.awaited_inputs import AwaitedInputs
 from active_recon.nodes.camera_images import CameraImages
 from active_recon.nodes.camera_watch import CameraWatch
 from active_recon.nodes.clock import STEADY
@@ -19,6 +20,7 @@ from active_recon.nodes.qos import HEARD, LATCHED
 from active_recon.nodes.reference_capture import ReferenceCapture
 from active_recon.nodes.run import one_line
 from active_recon.nodes.settings.reconstructor import ReconstructorSettings
+from active_recon.nodes.topic_names import tell_names
 from active_recon.output import output_path
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import ViewGate
@@ -41,6 +43,11 @@ FACTS = {'weights_sha256': 'the hash of the weights',
          'config_sha256': "the hash of the network's sizes", 'runtime': 'what runs the network',
          'needs_front': "whether the network needs the object's front"}
 """What the node tells of its network as parameters, and what they mean."""
+TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'next_view',
+          'view', 'view_image', 'network_image', 'occupancy', 'probabilities', 'latent', 'entropy',
+          'episode')
+"""What the node hears and publishes."""
+
 
 class ReconstructorNode(ManagedNode):
     """Fold the views that the gate lets through into the reconstruction and publish it."""
@@ -56,6 +63,7 @@ class ReconstructorNode(ManagedNode):
         settings = self._settings.now
         self._background = settings.as_background()
         self.on_undo(self._capture.forget)
+        tell_names(self, TOPICS)
         check_pose_source(settings)
         self._reconstructor = self._load(settings)
         self._joiner = ViewJoiner(settings.max_pose_gap, masks=self._background.how == 'mask')
@@ -68,6 +76,7 @@ class ReconstructorNode(ManagedNode):
         self._reconstruction: Reconstruction | None = None
         self._view_pub = self.create_publisher(PoseStamped, 'view', LATCHED)
         self._view_image_pub = self.create_publisher(Image, 'view_image', LATCHED)
+        self._network_image_pub = self.create_publisher(Image, 'network_image', LATCHED)
         self._occupancy_pub = self.create_publisher(PointCloud2, 'occupancy', LATCHED)
         self._probabilities_pub = self.create_publisher(PointCloud2, 'probabilities', LATCHED)
         self._latent_pub = self.create_publisher(Image, 'latent', LATCHED)
@@ -84,14 +93,16 @@ class ReconstructorNode(ManagedNode):
         self._begin_episode()
         self._later = AfterHearing(self, self._fold_waiting)
         self.on_undo(self._later.close)
-        self.create_subscription(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
+        inputs = AwaitedInputs(self, self._diagnostics)
+        self.on_undo(inputs.forget)
+        inputs.hear(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
         if self._background.how == 'mask':
-            self.create_subscription(Image, 'camera/mask', self._on_mask, HEARD)
-        self._poses = hear_poses(
-            self, self._settings.now, self._object_frame, self._on_pose, self._diagnostics)
-        self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
+            inputs.hear(Image, 'camera/mask', self._on_mask, HEARD)
+        self._poses = hear_poses(self, self._settings.now, self._object_frame, self._on_pose,
+                                 self._diagnostics, inputs)
+        self._goals = self.create_subscription(PoseStamped, 'next_view', self._on_goal, HEARD)
         # Last: whoever is found by an image has been found by what belongs to it
-        CameraImages(self, self._diagnostics, self._on_image)
+        CameraImages(self, self._diagnostics, inputs, self._on_image, self._watch.lost)
         # What has waited in vain is refused
         self.create_timer(0.1, self._take_in, clock=STEADY)
         self.create_timer(0.1, self._watch.tell, clock=STEADY)
@@ -199,7 +210,7 @@ class ReconstructorNode(ManagedNode):
             if isinstance(view, MessageError):
                 self._diagnostics.refuse(view)
             elif not self._gate.wants(view.camera, view.stamp,
-                                      self.count_publishers('next_view') > 0):
+                                      self.count_publishers(self._goals.topic_name) > 0):
                 self._diagnostics.count('images_unused')
             else:
                 if self._waiting is not None:
@@ -232,6 +243,8 @@ class ReconstructorNode(ManagedNode):
         self._latent_pub.publish(latent_to_msg(reconstruction.latent, header))
         if image is not view.image:
             self._view_image_pub.publish(image_to_msg(image, header))
+        if reconstruction.image is not None:
+            self._network_image_pub.publish(image_to_msg(reconstruction.image[..., :3], header))
         self._view_pub.publish(pose_to_msg(view.camera.pose, header))
         self._probabilities_pub.publish(voxel_grid_to_msg(grid, PUBLISHED_FLOOR, header))
         self._entropy_pub.publish(entropy_to_msg(grid.entropy(), header))

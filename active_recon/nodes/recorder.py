@@ -4,22 +4,30 @@ from datetime import datetime
 from functools import partial
 from itertools import count
 from pathlib import Path
+import time
 
 from active_recon import __version__
 from active_recon.bags.metadata import QosProfile
 from active_recon.bags.writer import BagWriter
 from active_recon.errors import ActiveReconError, RecordingError
-from active_recon.nodes.asked_parameters import AskedParameters
 from active_recon.nodes.definitions import message_class, message_definition
 from active_recon.nodes.diagnostics import Diagnostics
+from active_recon.nodes.disk_rate import DiskRate
 from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
 from active_recon.nodes.qos import common_profile, offered_profile
 from active_recon.nodes.qos_warnings import QosWarnings
+from active_recon.nodes.recorded_nodes import RecordedNodes
+from active_recon.nodes.recorded_topics import RecordedTopics
 from active_recon.nodes.run import one_line, run_node
+from active_recon.nodes.sequence_gaps import SequenceGaps
 from active_recon.nodes.settings.recorder import DIAGNOSTICS, RecorderSettings
+from active_recon.nodes.topic_names import full_names
 from active_recon.output import output_path
+from msg_tools.episodes import done_from_msg
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 MADE_IT = ('weights_sha256', 'config_sha256', 'runtime', 'needs_front', 'policy', 'seed', 'object')
@@ -29,6 +37,7 @@ FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second
 # Who offers less than those before is no mistake: it is listened to anew.
 ADAPTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 QUEUE = 1000  # messages that may wait while the disk is slow
+_LAST_WORDS = 10  # looks: so long after the end of an episode, what belongs to it still comes
 
 
 class RecorderNode(ReadOnlySaysWhy, QosWarnings):
@@ -39,13 +48,15 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
         settings = Parameters(self, RecorderSettings).now
         self._output_dir = Path(settings.output_dir)
         self._max_bytes = 1_000_000 * settings.max_bag_size_mb
-        self._topics = [self.resolve_topic_name(name) for name in settings.topics]
+        self._stop_when_done = settings.stop_when_done
         self._diagnostics = Diagnostics(self)
+        self._topics = RecordedTopics(self, settings.topics, self._diagnostics)
         self._bag: BagWriter | None = None
         self._offered: dict[str, tuple[QosProfile, ...]] = {}
         self._heard: dict[str, Subscription] = {}
-        self._recorded_nodes: set[str] = set()
-        self._asked = AskedParameters(self, self._on_parameters)
+        self._gaps = SequenceGaps()
+        self._done_for = 0
+        self._nodes = RecordedNodes(self, self._on_parameters)
         self.create_service(Trigger, 'start', self._on_start)
         self.create_service(Trigger, 'stop', self._on_stop)
         self.create_timer(WATCH_EVERY_S, self._watch)
@@ -66,7 +77,10 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
         bag.attach_parameters(
             self.get_fully_qualified_name(), {each.name: each.value for each in own})
         self._bag = bag
-        self._asked.forget()
+        self._begun_at = time.time_ns()
+        self._disk = DiskRate(folder, time.monotonic())
+        self._topics.begin()
+        self._nodes.forget()
         self._diagnostics.recover()
         self._diagnostics.count('recording')
         self.get_logger().info(f'recording into {folder}')
@@ -82,36 +96,34 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
             self.destroy_subscription(subscription)
         self._heard.clear()
         self._offered.clear()
+        self._done_for = 0
         bag, self._bag = self._bag, None
         if bag is not None:
             self._diagnostics.count('recording', -1)
             bag.close()
+            self._disk.look(time.monotonic())
+            self.get_logger().info(f'recorded {self._disk.megabytes:.1f} MB in '
+                                   f'{self._disk.seconds:.0f} s into {bag.folder}')
 
     def _watch(self) -> None:
         """Listen to the publishers that have appeared, as each offers its messages."""
         if self._bag is None:
-            self._asked.ask(())
+            self._nodes.wait()
             return
+        published = set()
         for name in self._topics:
             publishers = self.get_publishers_info_by_topic(name)
+            published |= {name} if publishers else set()
+            self._gaps.published_by(name, {bytes(each.endpoint_gid) for each in publishers})
             offered = tuple(sorted(map(offered_profile, publishers), key=str))
             if publishers and self._offered.get(name) != offered:
                 self._offered[name] = offered
                 self._listen(name, publishers[0].topic_type, offered)
             if name != DIAGNOSTICS:  # which whole robots publish
-                self._record_nodes({_full_name(publisher.node_name, publisher.node_namespace)
-                                    for publisher in publishers})
-        around = {_full_name(name, namespace)
-                  for name, namespace in self.get_node_names_and_namespaces()}
-        own = self.get_fully_qualified_name()
-        self._asked.ask(name for name in around - {own} if name in self._recorded_nodes or (
-            name.rpartition('/')[0] == own.rpartition('/')[0] and not _is_hidden(name)))
-
-    def _record_nodes(self, names: set[str]) -> None:
-        """Ask who has begun to publish once more: when it was configured it had more to tell."""
-        for name in names - self._recorded_nodes:
-            self._asked.forget(name)
-        self._recorded_nodes |= names
+                self._nodes.heard(publishers)
+        self._topics.look(published)
+        self._stop_if_done()
+        self._nodes.ask()
 
     def _listen(self, name: str, type_name: str, offered: tuple[QosProfile, ...]) -> None:
         assert self._bag is not None
@@ -126,6 +138,7 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
             if heard.qos_profile == profile:
                 return
             self.destroy_subscription(heard)
+        self._gaps.listened_anew(name)
         self._heard[name] = self.create_subscription(
             message_class(type_name), name, partial(self._on_message, name), profile, raw=True,
             event_callbacks=ADAPTS)
@@ -139,12 +152,36 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
             self._fail(error)
             return
         self._diagnostics.count('messages')
+        lost = self._gaps.before(topic, info['publication_sequence_number'])
+        if lost:
+            self._diagnostics.count('lost', lost)
+            self._diagnostics.warn(f'lost{topic}', (
+                f'{topic}: expected every message that was published, {lost} were lost in '
+                "transport; is the connection too slow, or the middleware's buffer too small?"))
+        if self._stop_when_done and info['source_timestamp'] >= self._begun_at:
+            self._hear_of_the_end(topic, data)
+
+    def _hear_of_the_end(self, topic: str, data: bytes) -> None:
+        if topic in self._topics.named('done') and self._heard[topic].msg_type is Header:
+            with self._diagnostics.refusing():
+                _, reason = done_from_msg(deserialize_message(data, Header))
+                self._done_for = _LAST_WORDS if reason else 0
+
+    def _stop_if_done(self) -> None:
+        """End the recording when the last words have come."""
+        if not self._done_for:
+            return
+        self._done_for -= 1
+        if not self._done_for:
+            self.get_logger().info('the episode is done')
+            self._complete()
 
     def _on_parameters(self, node: str, parameters: dict[str, object]) -> None:
         if self._bag is None:
             return
         made_it = {name: str(parameters[name]) for name in MADE_IT if name in parameters
-                   and node in self._recorded_nodes}
+                   and node in self._nodes}
+        made_it |= self._topics.learn(full_names(parameters))
         try:
             self._bag.attach_parameters(node, parameters)
             if made_it:
@@ -159,6 +196,20 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
             self._bag.flush()
         except RecordingError as error:
             self._fail(error)
+            return
+        self._disk.look(time.monotonic())
+        self._diagnostics.tell('Bag (MB)', f'{self._disk.megabytes:.1f}', at_once=False)
+        self._diagnostics.tell(
+            'Disk (MB/s)', f'{self._disk.megabytes_per_s:.2f}', at_once=False)
+
+    def _complete(self) -> str:
+        """End the recording; return in words what kept the bag from being whole, '' if nothing."""
+        try:
+            self._end()
+        except RecordingError as error:
+            self._fail(error)
+            return one_line(error)
+        return ''
 
     def _fail(self, error: RecordingError) -> None:
         """Say that the recording has ended by itself; the bag has closed itself already."""
@@ -183,31 +234,15 @@ class RecorderNode(ReadOnlySaysWhy, QosWarnings):
         if self._bag is None:
             response.message = 'expected a recording to stop, but there is none'
             return response
-        response.message = str(self._bag.folder)
-        try:
-            self._end()
-            response.success = True
-        except RecordingError as error:
-            self._fail(error)
-            response.message = one_line(error)
+        folder = self._bag.folder
+        response.message = self._complete() or str(folder)
+        response.success = response.message == str(folder)
         return response
 
     def destroy_node(self) -> None:
         """Complete the bag before the node goes."""
-        try:
-            self._end()
-        except RecordingError as error:
-            self._fail(error)
+        self._complete()
         super().destroy_node()
-
-
-def _full_name(name: str, namespace: str) -> str:
-    return f'{namespace.rstrip("/")}/{name}'
-
-
-def _is_hidden(full_name: str) -> bool:
-    """Return whether ROS hides a node, as those of its command line that come and go."""
-    return full_name.rpartition('/')[2].startswith('_')
 
 
 def main(args: list[str] | None = None) -> None:

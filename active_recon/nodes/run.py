@@ -5,6 +5,7 @@ import faulthandler
 import signal
 
 from active_recon.errors import ActiveReconError, ConfigError
+from active_recon.nodes.shared_memory import make_room
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -27,6 +28,7 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
     asked_to_stop: list[int] = []
     for request in (signal.SIGINT, signal.SIGTERM):
         signal.signal(request, lambda number, _frame: asked_to_stop.append(number))
+    make_room()
     node = None
     try:
         _init(args)

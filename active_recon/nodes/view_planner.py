@@ -11,6 +11,7 @@ from active_recon.cameras import (
     orbit_camera,
 )
 from active_recon.errors import ActiveReconError
+from active_recon.nodes.awaited_inputs import AwaitedInputs
 from active_recon.nodes.clock import AHEAD_S, STEADY
 from active_recon.nodes.goal_publisher import GoalPublisher
 from active_recon.nodes.heard_views import HeardView, HeardViews
@@ -19,6 +20,7 @@ from active_recon.nodes.parameters import Commit, Parameters
 from active_recon.nodes.qos import HEARD, LATCHED
 from active_recon.nodes.run import one_line
 from active_recon.nodes.settings.view_planner import ViewPlannerSettings
+from active_recon.nodes.topic_names import tell_names
 from active_recon.planner import Decision, Goal, Planner
 from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
 from geometry_msgs.msg import PoseStamped
@@ -34,6 +36,9 @@ REPEAT_S = 1.0
 FIND_CAMERA_S = 1.0
 """So long after an episode was heard, nobody who publishes the camera's pose is waited for."""
 _STEEPEST = 1.5  # rad, of a first view
+TOPICS = ('camera/pose', 'view', 'latent', 'entropy', 'probabilities', 'episode', 'next_view',
+          'next_azimuth', 'azimuth_scores', 'done')
+"""What the node hears and publishes."""
 
 
 class ViewPlannerNode(ManagedNode):
@@ -48,6 +53,7 @@ class ViewPlannerNode(ManagedNode):
         """Load the policy, and offer its goals."""
         settings = self._settings.now
         self._frame = settings.object_frame
+        tell_names(self, TOPICS)
         self._policy = self._load(settings)
         self._planner = self._planner_of(settings, self._policy)
         self._goals = GoalPublisher(self, self._frame)
@@ -61,11 +67,15 @@ class ViewPlannerNode(ManagedNode):
         self._episode: Episode | None = None
         self._begun_at = self.get_clock().now().nanoseconds
         self._forget()
-        self.create_subscription(PoseStamped, 'camera/pose', self._on_camera, HEARD)
+        inputs = AwaitedInputs(self, self._diagnostics)
+        self.on_undo(inputs.forget)
+        hear_camera = (inputs.hear if math.isnan(self._settings.now.start_azimuth)
+                       else self.create_subscription)
+        self._cameras = hear_camera(PoseStamped, 'camera/pose', self._on_camera, HEARD)
         self._views = HeardViews(self, self._frame, self._diagnostics, self._decide)
         if self._planner.wants_volume:
             self._views.hear_volume(self._settings.now.object_size)
-        self.create_subscription(Header, 'episode', self._on_episode, LATCHED)
+        inputs.hear(Header, 'episode', self._on_episode, LATCHED)
         self.create_timer(0.1, self._ask_first, clock=STEADY)
         self.create_timer(0.1, self._give_up_late, clock=STEADY)
         self.create_timer(REPEAT_S, self._goals.repeat, clock=STEADY)
@@ -169,7 +179,7 @@ class ViewPlannerNode(ManagedNode):
             elevation = min(max(self._camera.elevation, -_STEEPEST), _STEEPEST)
         if math.isnan(elevation):  # it is the camera's, where there is one
             if (time.monotonic() - self._heard_at < FIND_CAMERA_S
-                    or self.count_publishers('camera/pose')):
+                    or self.count_publishers(self._cameras.topic_name)):
                 return None
             elevation = CANONICAL_ELEVATION
         return orbit_camera(settings.start_azimuth, elevation)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
+from active_recon.bags.missing import lost_words
 from active_recon.bags.parameters import node_parameters
 from active_recon.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, view_distance
 from active_recon.report.stages import two_clocks
@@ -34,7 +35,7 @@ def findings(subject: Subject) -> list[Finding]:
     """Return what the run earned, the warnings first."""
     found = [Finding(level, text) for level, text in (
         *_beginning(subject), *_stop(subject), *_counted(subject), *_missing(subject),
-        *_off_goal(subject), *_off_elevation(subject), *_estimate(subject))]
+        *_lost(subject), *_off_goal(subject), *_off_elevation(subject), *_estimate(subject))]
     return sorted(found, key=lambda finding: finding.level != 'warning')
 
 
@@ -91,6 +92,12 @@ def _missing(subject: Subject) -> Iterator[tuple[str, str]]:
         were = 'was' if gaps.unheard == 1 else 'were'
         yield 'warning', (f'{counted(gaps.unheard, "image")} that {were} recorded never reached '
                           'the reconstructor.')
+
+
+def _lost(subject: Subject) -> Iterator[tuple[str, str]]:
+    if lost := lost_words(subject.episode):
+        yield 'warning', (f'The recording lacks {", ".join(lost)}: it was published and did not '
+                          'reach the recorder.')
 
 
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:

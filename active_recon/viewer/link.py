@@ -17,16 +17,19 @@ class TopicLink:
     heard_ago_s: float | None = None
 
 
-def link_words(links: Mapping[str, TopicLink], state: LoopState) -> list[str]:
+def link_words(links: Mapping[str, TopicLink], state: LoopState,
+               problems: Mapping[str, str] | None = None) -> list[str]:
     """
     Return what a person should know of the link and the episode, the most telling first.
 
     `links` are the topics that matter by their role: 'image', 'view', 'occupancy', 'goal'.
+    `problems` are what nodes say is wrong, by their names.
     """
+    warnings = [f'{name} warns: {words}' for name, words in sorted((problems or {}).items())]
     if not any(link.publishers or link.heard_ago_s is not None for link in links.values()):
         return ['Waiting for a loop: nobody publishes on '
-                f'{", ".join(link.topic for link in links.values())} yet.']
-    words = [_progress(links['view'], state)]
+                f'{", ".join(link.topic for link in links.values())} yet.', *warnings]
+    words = [_progress(links['view'], state), *warnings]
     for link in links.values():
         if not link.publishers:
             words.append(f'No publisher on {link.topic} '

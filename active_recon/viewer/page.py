@@ -17,6 +17,7 @@ from viser import ClientHandle, uplot, ViserServer
 UPDATES_PER_S = 30.0
 _LOWEST, _HIGHEST = 0.02, 0.98  # below, nothing is published
 _FALLBACK_THRESHOLD = 0.5
+_NO_IMAGE = np.zeros((1, 1, 3), np.uint8)
 _LOOK_FROM = (2.1, -1.7, 2.5)  # sides of the voxel grid
 _LOOK_AT = (0.0, 0.0, -0.05)
 _LEGEND = """
@@ -71,6 +72,7 @@ class Page:
         self._told: Sequence[str] = ()
         self._own_threshold = _FALLBACK_THRESHOLD
         self._shown_views: object = None
+        self._shown_image: object = None
 
     def _build_figures(self) -> None:
         gui = self._server.gui
@@ -89,6 +91,9 @@ class Page:
                     'points': {'show': True, 'size': 8, 'fill': 'rgb(37, 99, 168)'}}),
                 scales=_entropy_scales(0), legend={'show': False}, height=170, visible=False,
                 axes=({'incrs': (1.0, 2.0, 5.0)}, {'size': 60.0}), padding=(12, 24, 0, 0))
+        with panel.add_tab('Network image'):
+            self._no_image = gui.add_markdown('The last view as the network saw it.')
+            self._image: Any = gui.add_image(_NO_IMAGE, visible=False)
         with panel.add_tab('What is shown'):
             gui.add_markdown(_LEGEND)
 
@@ -144,10 +149,25 @@ class Page:
                 self._entropy.data = (numbers, entropies)
                 self._entropy.scales = _entropy_scales(len(numbers))
 
+        self._draw_image(state)
+
+    def _draw_image(self, state: LoopState) -> None:
+        image = state.network_image
+        if image is self._shown_image:
+            return
+        self._shown_image = image
+        self._no_image.visible, self._image.visible = image is None, image is not None
+        if image is not None:
+            self._image.image = image
+
+    def set_object_size(self, object_size: float) -> None:
+        """Show a voxel grid of another side, metres."""
+        self._scene.set_object_size(object_size)
+
     def notify(self, title: str, words: str) -> None:
         """Show a note for some seconds to whoever looks."""
         for client in self._server.get_clients().values():
-            client.add_notification(title, words, auto_close_seconds=6.0)
+            client.add_notification(title, words, auto_close_seconds=12.0)
 
     def close(self) -> None:
         """Stop serving."""

@@ -47,6 +47,12 @@ class Scene:
         scene.add_label('/front', 'front', position=(0.88, 0, _FLOOR), anchor='center-center',
                         font_screen_scale=0.8)
 
+    def set_object_size(self, object_size: float) -> None:
+        """Forget what was drawn, and show a voxel grid of another side, metres."""
+        self.draw(LoopState(), self._threshold)
+        self._remove('/camera')
+        self._size = object_size
+
     def draw(self, state: LoopState, threshold: float) -> None:
         """Show a state, its cells above the threshold."""
         before, self._shown = self._shown, state

@@ -42,7 +42,8 @@ class LoopState:
     The loop at one moment; what is None is not known, or not yet.
 
     `grid` holds the probabilities after the last view and `threshold` that above which the loop
-    itself calls a cell occupied. `camera` is where the camera is now and `picture` what it sees,
+    itself calls a cell occupied. `network_image` is the last view as the network saw it, (S, S, 3)
+    uint8 RGB. `camera` is where the camera is now and `picture` what it sees,
     `goal` where it shall take the next view. `done` is why the episode has ended, '' before.
     """
 
@@ -50,6 +51,7 @@ class LoopState:
     views: tuple[TakenView, ...] = ()
     grid: VoxelGrid | None = None
     threshold: float | None = None
+    network_image: NDArray[np.uint8] | None = None
     camera: Camera | None = None
     picture: NDArray[np.uint8] | None = None
     goal: Camera | None = None
@@ -68,19 +70,20 @@ class Observer:
     def __init__(self) -> None:
         self.state = LoopState()
         self._begin = 0
-        self._goal_stamp = self._scores_stamp = self._done_stamp = -1
+        self._goal_stamp = self._scores_stamp = self._done_stamp = self._image_stamp = -1
 
     def begin_episode(self, identity: str, begin: int) -> None:
         """Begin an episode, unless it is the one that is known; what belongs to it stays."""
         if identity == self.state.episode:
             return
         if begin < self._begin:  # time has gone back, as where a recording is played
-            self._goal_stamp = self._scores_stamp = self._done_stamp = -1
+            self._goal_stamp = self._scores_stamp = self._done_stamp = self._image_stamp = -1
         known = self.state
         views = tuple(view for view in known.views if view.stamp >= begin >= self._begin)
         self._begin = begin
         self.state = LoopState(
             identity, views, known.grid if views else None, known.threshold if views else None,
+            known.network_image if self._image_stamp >= begin else None,
             known.camera, known.picture,
             known.goal if self._goal_stamp >= begin else None,
             known.scores if self._scores_stamp >= begin else None,
@@ -102,6 +105,12 @@ class Observer:
         self.state = replace(self.state, views=views)
         if views[-1] is view:
             self.state = replace(self.state, grid=grid, threshold=threshold)
+
+    def set_network_image(self, stamp: int, image: NDArray[np.uint8]) -> None:
+        """Note a view as the network saw it, (S, S, 3) uint8 RGB."""
+        if stamp >= self._begin:
+            self._image_stamp = stamp
+            self.state = replace(self.state, network_image=image)
 
     def set_goal(self, stamp: int, camera: Camera) -> None:
         """Note a goal; the same stamp again is the same goal."""

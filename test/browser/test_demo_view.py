@@ -8,12 +8,19 @@ import subprocess
 import sys
 import time
 
+from active_recon.demo.processes import private_environment
 from active_recon.viewer.address import is_served
 import pytest
 
 pytestmark = [pytest.mark.browser, pytest.mark.ros]
 ROOT = Path(__file__).parents[2]
 BUDGET_S = 120.0
+_LOOP = """
+/**/turntable_camera: {ros__parameters: {mesh: chair, object_size: 0.16, speed: 3.0}}
+/**/reconstructor: {ros__parameters: {object_size: 0.16, take_views: at_goal}}
+/**/view_planner: {ros__parameters: {object_size: 0.16, policy: farthest, max_views: 2,
+                                 entropy_tolerance: 0.0}}
+"""
 _CLICK = """
 [...document.querySelectorAll('button')].find((one) => one.innerText === arguments[0]).click()
 """
@@ -85,6 +92,8 @@ def test_the_page_follows_the_loop_and_begins_a_new_episode_when_asked(demo, chr
     chromium.run(_CLICK, 'New episode')
     chromium.until(lambda: episode(chromium.text()) not in ('', first), 'another', BUDGET_S)
     chromium.until(lambda: 'Done (max views): 2 views' in chromium.text(), 'its end', BUDGET_S)
+    chromium.run(_CLICK, 'Save mesh')
+    chromium.until(lambda: re.search(r'\w+-2\.ply', chromium.text()), 'the mesh', BUDGET_S)
     assert not chromium.errors()
 
 
@@ -99,6 +108,30 @@ def test_who_comes_late_is_shown_what_is_latched_at_another_port(demo, late_view
     assert code == 0
     assert 'Traceback' not in said
     assert not is_served(int(url.rpartition(':')[2]))
+
+
+@pytest.fixture
+def small_loop(tmp_path):
+    """Return a loop of a small object in a namespace, whose topics have other names."""
+    environment = private_environment()
+    (tmp_path / 'loop.yaml').write_text(_LOOP)
+    command = Command(tmp_path / 'up', 'up', '--params', str(tmp_path / 'loop.yaml'),
+                      '--namespace', 'cell_1', '-r', 'camera/image_raw:=usb_cam/image',
+                      '-r', 'view:=seen', **environment)
+    yield environment
+    command.kill()
+
+
+def test_a_loop_of_other_size_and_names_is_shown_without_being_told(
+        small_loop, tmp_path, chromium):
+    command = Command(tmp_path / 'view', 'view', '--port', '0', **small_loop)
+    try:
+        chromium.open(command.said(r'the page is at (http://127\.0\.0\.1:\d+)'))
+        chromium.until(lambda: 'Done (max views)' in chromium.text(), 'the views', BUDGET_S)
+        assert 'No publisher' not in chromium.text()
+        assert not chromium.errors()
+    finally:
+        command.kill()
 
 
 def test_ctrl_c_ends_the_demo_its_nodes_and_its_page(demo):

@@ -85,6 +85,10 @@ const notes = document.querySelectorAll('.mantine-Notification-closeButton');
 notes.forEach((note) => note.click());
 return notes.length
 """
+_IMAGES = """
+return [...document.querySelectorAll('img')].filter((one) => one.offsetParent).map(
+    (one) => [one.naturalWidth, one.naturalHeight])
+"""
 _BUTTON = """
 return [...document.querySelectorAll('button')].find((one) => one.innerText === arguments[0])
 """
@@ -145,6 +149,21 @@ def test_a_click_is_heard_once_and_a_button_can_be_out_of_reach(page, chromium):
     page.enable('Next object', True)
     chromium.until(lambda: not chromium.run(
         f'return (() => {{{_BUTTON}}})(arguments[0]).disabled', 'Next object'), 'the button')
+
+
+def test_the_last_view_is_shown_as_the_network_saw_it(page, chromium):
+    opened(chromium, page.url)
+    chromium.driver.find_element('css selector', '[role=tab][title="Network image"]').click()
+    chromium.until(lambda: 'as the network saw it' in chromium.text(), 'the tab')
+    observer = Observer()
+    observer.set_network_image(1, np.full((96, 96, 3), (200, 30, 60), np.uint8))
+    chromium.until(lambda: (page.draw(observer.state), chromium.run(_IMAGES))[1] == [[96, 96]],
+                   'the image')
+    assert 'as the network saw it' not in chromium.text()
+    observer.begin_episode('next', 2)
+    chromium.until(lambda: (page.draw(observer.state), chromium.run(_IMAGES))[1] == [],
+                   'no image of the next episode yet')
+    assert not chromium.errors()
 
 
 @pytest.mark.parametrize('size', [LAPTOP, PHONE])

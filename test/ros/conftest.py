@@ -13,6 +13,7 @@ import time
 from typing import Any, IO
 
 from active_recon.cameras import CANONICAL_ELEVATION, orbit_camera
+from active_recon.nodes.shared_memory import PROFILE
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
@@ -182,8 +183,7 @@ def ros_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     patch.setenv('ROS_DOMAIN_ID', str(domain))
     patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('ros_log')))
-    patch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE',
-                 str(ROOT / 'active_recon' / 'nodes' / 'fastdds_local.xml'))
+    patch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(PROFILE))
     patch.setenv('OMP_NUM_THREADS', '1')
     yield domain
     patch.undo()

@@ -2,6 +2,7 @@
 
 from dataclasses import make_dataclass
 import math
+from types import SimpleNamespace
 
 from active_recon.errors import ConfigError
 from active_recon.nodes.parameters import NEW_START, parameter, Parameters, ReadOnlySaysWhy, tell
@@ -146,3 +147,26 @@ def test_a_fact_is_told_anew_and_set_by_nobody(told):
     tell(node, 'fact', 'second', 'a fact')
     assert not node.set_parameters_atomically([Parameter('fact', value='mine')]).successful
     assert node.get_parameter('fact').value == 'second'
+
+
+def test_a_parameter_that_a_node_does_not_have_is_a_warning_with_the_nearest_name(
+        told, monkeypatch):
+    node = told(object_siez=0.3, seed=7, rate=2.0, use_sim_time=False)
+    said = []
+    monkeypatch.setattr(node, 'get_logger', lambda: SimpleNamespace(warning=said.append))
+    now = Parameters(node, settings_of(
+        object_size=(float, parameter(1.0, 'm')), rate=(float, parameter(1.0, 'Hz')))).now
+    assert (now.object_size, now.rate) == (1.0, 2.0)
+    assert said == [
+        'parameter object_siez: this node has none of that name, so it changes nothing; '
+        'did you mean object_size?',
+        'parameter seed: this node has none of that name, so it changes nothing; '
+        'there are object_size, rate']
+
+
+@pytest.mark.parametrize(('name', 'near'), [
+    ('reconstructor', 'object_size'), ('view_planner', 'object_size'), ('recorder', '')])
+def test_a_misspelt_parameter_is_said_in_the_log_of_a_node_that_runs(start_node, name, near):
+    node = start_node(name, object_siez=0.3)
+    line, = node.log('WARN.*parameter object_siez')
+    assert f'did you mean {near}?' in line or not near

@@ -35,13 +35,14 @@ def test_the_nodes_of_a_file_that_ships_agree_on_the_object(path):
 
 def test_what_is_given_to_all_is_given_to_each_unless_it_has_its_own(tmp_path):
     path = tmp_path / 'some.yaml'
-    path.write_text('/**: {ros__parameters: {object_size: 2, mesh: chair}}\n'
+    path.write_text('/**: {ros__parameters: {object_size: 2, mesh: chair, colour: red}}\n'
                     '/cell/recorder: {ros__parameters: {use_sim_time: true}}\n'
                     'view_planner: {ros__parameters: {object_size: 3}}\n')
     given = read_params_file(path)
     assert list(given) == ['recorder', 'view_planner']
     assert given['view_planner']['object_size'] == 3
-    assert given['recorder']['object_size'] == 2
+    assert given['recorder'] == {'use_sim_time': True, 'colour': 'red'}  # a node warns of it
+    assert 'mesh' not in given['view_planner']
 
 
 @pytest.mark.parametrize(('text', 'said'), [

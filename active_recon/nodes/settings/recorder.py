@@ -16,6 +16,8 @@ class RecorderSettings:
 
     output_dir: str = parameter('bags', 'the folder in which each recording gets its own')
     record_at_start: bool = parameter(True, 'whether to record without being asked')
+    stop_when_done: bool = parameter(
+        False, 'whether a recording ends by itself once an episode is done')
     topics: tuple[str, ...] = parameter(TOPICS, 'the topics to record')
     max_bag_size_mb: int = parameter(
         1000, 'a longer recording goes on in a second file, a third, ...', low=1, high=1_000_000)

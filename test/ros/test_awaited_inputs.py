@@ -1,0 +1,103 @@
+"""An input that has never had a message is warned of, with what could be heard instead."""
+
+from conftest import FakeCamera, FakeReconstructor, STREAM
+import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+
+pytestmark = pytest.mark.ros
+BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+@pytest.fixture
+def said(bench):
+    """Return what waits for a node to warn of an input, and returns the words."""
+    def words(node, name, *expected):
+        def found():
+            problem = bench.state(node).problem
+            return problem if all(part in problem for part in (name, *expected)) else ''
+
+        problem = bench.until(found, f'{expected} in the problem of {node}')
+        assert bench.counts(node)[f'warned/never_heard/{name}'] == 1
+        return problem
+
+    return words
+
+
+def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
+        start_node, bench, said):
+    for kind, topic in ((Image, 'usb_cam/image_raw'), (CompressedImage, 'front/color/compressed'),
+                        (CompressedImage, 'thermal')):
+        bench.node.create_publisher(kind, topic, STREAM)
+    reconstructor = start_node('reconstructor')
+    problem = said(
+        'reconstructor', 'camera/image_raw', '/usb_cam/image_raw has', '/thermal has', '/front')
+    assert ('/camera/image_raw or /camera/image_raw/compressed: expected messages, none has ever '
+            'come; nobody publishes there') in problem
+    for topic, name, other in (
+            ('/usb_cam/image_raw', 'camera/image_raw', '/usb_cam/image_raw'),
+            ('/front/color/compressed', 'camera/image_raw', '/front/color'),
+            ('/thermal', 'camera/image_raw/compressed', '/thermal')):
+        assert f'{topic} has a publisher: remap with -r {name}:={other}' in problem
+    assert '/latent has' not in problem  # its own
+    for name in ('camera/camera_info', 'camera/pose'):
+        assert f'/{name}: expected messages' in said('reconstructor', name)
+    assert len(reconstructor.log('WARN.*none has ever come')) == 3
+
+
+def test_a_publisher_that_is_silent_or_of_another_type_is_named_with_its_qos(
+        start_node, bench, said):
+    start_node('reconstructor')
+    bench.node.create_publisher(Image, 'camera/image_raw', BEST_EFFORT)
+    bench.node.create_publisher(Image, 'camera/camera_info', STREAM)
+    said('reconstructor', 'camera/image_raw',
+         '/bench publishes there (best effort, volatile) and has sent nothing yet',
+         '/bench publishes there (reliable, volatile) and sends sensor_msgs/msg/Image instead of '
+         'sensor_msgs/msg/CameraInfo')
+
+
+def test_the_first_message_takes_the_warning_back_for_good(start_node, bench, said):
+    reconstructor = start_node('reconstructor', take_views='all')
+    said('reconstructor', 'camera/pose', 'camera/camera_info', 'camera/image_raw')
+    FakeCamera(bench).show()
+    bench.until(lambda: not bench.state('reconstructor').problem, 'the end of the warnings')
+    bench.until(lambda: len(reconstructor.log('INFO.*over: .*none has ever')) == 3, 'their end')
+
+
+def test_a_compressed_image_is_an_image_that_was_heard(start_node, bench, said):
+    start_node('reconstructor')
+    publisher = bench.advertise(CompressedImage, 'camera/image_raw/compressed')
+    said('reconstructor', 'camera/camera_info')
+
+    def over():
+        publisher.publish(CompressedImage(format='png'))
+        return 'camera/image_raw' not in bench.state('reconstructor').problem
+
+    bench.until(over, 'no warning of the images')
+    assert '/camera/camera_info' in bench.state('reconstructor').problem
+
+
+def test_a_planner_without_a_reconstructor_says_so(start_node, bench, said):
+    start_node('view_planner', policy='farthest')
+    said('view_planner', 'episode', '/episode: expected messages, none has ever come')
+    assert '/camera/pose: expected' in said('view_planner', 'camera/pose')
+    FakeReconstructor(bench).begin('first')
+    bench.until(lambda: '/episode' not in bench.state('view_planner').problem, 'no warning')
+
+
+def test_a_planner_that_is_told_where_to_start_awaits_no_camera(start_node, bench, said):
+    start_node('view_planner', policy='farthest', start_azimuth=1.0)
+    problem = said('view_planner', 'episode', '/episode: expected messages')
+    assert '/camera/pose' not in problem
+
+
+def test_the_camera_info_that_is_refused_was_heard_all_the_same(start_node, bench, said):
+    start_node('reconstructor')
+    infos = bench.advertise(CameraInfo, 'camera/camera_info')
+    said('reconstructor', 'camera/image_raw')
+
+    def over():
+        infos.publish(CameraInfo())
+        return 'camera/camera_info' not in bench.state('reconstructor').problem
+
+    bench.until(over, 'no warning of the camera info')

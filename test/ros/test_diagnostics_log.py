@@ -1,0 +1,57 @@
+"""How often what comes and goes is said in the log: real diagnostics of a node of the test's."""
+
+from types import SimpleNamespace
+
+from active_recon.nodes import diagnostics as diagnostics_module
+from active_recon.nodes.diagnostics import Diagnostics, LOG_EVERY_S
+import pytest
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Return the diagnostics' time, in the test's hand."""
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(
+        diagnostics_module, 'time', SimpleNamespace(monotonic=lambda: clock.now))
+    return clock
+
+
+@pytest.fixture
+def said(monkeypatch, bench):
+    """Return the lines of the log."""
+    lines = []
+    monkeypatch.setattr(bench.node, 'get_logger', lambda: SimpleNamespace(
+        info=lambda line: lines.append(f'INFO {line}'),
+        warning=lambda line: lines.append(f'WARN {line}')))
+    return lines
+
+
+def test_a_trouble_that_comes_and_goes_is_said_with_its_end_once_in_a_while(bench, clock, said):
+    diagnostics = Diagnostics(bench.node)
+    for _ in range(50):
+        diagnostics.begin_trouble('silent', 'nothing comes')
+        clock.now += 0.1
+        diagnostics.end_trouble('silent')
+        clock.now += 0.05
+    assert said == ['WARN nothing comes', 'INFO over: nothing comes']
+    clock.now += LOG_EVERY_S
+    diagnostics.begin_trouble('silent', 'nothing comes')
+    diagnostics.end_trouble('silent')
+    assert said[2:] == ['WARN nothing comes (and 49 more of this kind before)',
+                        'INFO over: nothing comes']
+
+
+def test_a_trouble_that_stays_is_said_although_one_of_its_kind_was_said_just_before(
+        bench, clock, said):
+    diagnostics = Diagnostics(bench.node)
+    diagnostics.begin_trouble('silent', 'nothing comes')
+    diagnostics.end_trouble('silent')
+    for _ in range(3):
+        diagnostics.begin_trouble('silent', 'still nothing')
+        clock.now += 0.6 * LOG_EVERY_S
+    assert said == ['WARN nothing comes', 'INFO over: nothing comes', 'WARN still nothing']
+    diagnostics.end_trouble('silent')
+    diagnostics.end_trouble('silent')
+    assert said[3:] == ['INFO over: still nothing']
