@@ -18,7 +18,14 @@ from active_recon.cameras import (
 )
 from active_recon.errors import ConfigError, ViewError
 from active_recon.motion import MotionLimits, worth
-from active_recon.policies import Choice, load_policy, Observation, Policy, PolicyOptions
+from active_recon.policies import (
+    Choice,
+    DEFAULT_POLICY,
+    load_policy,
+    Observation,
+    Policy,
+    PolicyOptions,
+)
 from active_recon.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +114,7 @@ class Planner:
         self.reset()
 
     @classmethod
-    def load(cls, policy: str = 'attention', weights: Path | None = None, seed: int = 0,
+    def load(cls, policy: str = DEFAULT_POLICY, weights: Path | None = None, seed: int = 0,
              max_views: int = 5, entropy_tolerance: float = 0.01, object_yaw: float = 0.0,
              device: str = 'cpu', limits: MotionLimits | None = None,
              motion_weight: float = 0.0, elevation: float | None = None,

@@ -10,7 +10,7 @@ from active_recon.config import Config
 from active_recon.errors import WeightsError
 from safetensors import safe_open, SafetensorError
 
-DEFAULT_MODEL = '2d3d-attention'
+DEFAULT_MODEL, PAPER_MODEL = 'lifting', '2d3d-attention'
 FOLDER = Path(__file__).parent / 'weights'
 SHIPPED = FOLDER / f'{DEFAULT_MODEL}.safetensors'
 

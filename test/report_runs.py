@@ -16,6 +16,7 @@ from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
 from active_recon.shown_object import rendered_object
 from active_recon.voxels import VoxelGrid
+from active_recon.weights_files import find_weights, PAPER_MODEL
 import numpy as np
 
 BEGIN = 1_790_000_000_000_000_000
@@ -26,12 +27,13 @@ ARRIVALS = {'camera/image_raw': WAY, 'occupancy': WAY + NETWORK, 'latent': WAY +
             'entropy': WAY + NETWORK + HAND_OVER}
 
 
-def recorded_run(name='chair', policy='attention', views=5, start=0.5):
+def recorded_run(name='chair', policy='uniform', views=5, start=0.5):
     """Return a run of one episode, as the loop would have made it, with round times."""
+    weights = find_weights(PAPER_MODEL if policy == 'attention' else None)
     shown = rendered_object(find_object(name))
     # One thread: others give other last bits
-    reconstructor = Reconstructor.load(threads=1)
-    planner = Planner.load(policy, max_views=views, entropy_tolerance=0, threads=1)
+    reconstructor = Reconstructor.load(weights, threads=1)
+    planner = Planner.load(policy, weights, max_views=views, entropy_tolerance=0, threads=1)
     goal = first = _recorded(planner.first_goal(orbit_camera(start)), BEGIN + 50 * MS)
     taken = []
     while goal is not None:

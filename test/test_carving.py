@@ -6,7 +6,8 @@ from active_recon.cameras import Intrinsics, orbit_camera
 from active_recon.canonical import framing_camera
 from active_recon.config import LossConfig
 from active_recon.errors import ConfigError
-from active_recon.models.carving import Carving, CarvingConfig, foreground
+from active_recon.models.border import foreground
+from active_recon.models.carving import Carving, CarvingConfig
 from active_recon.models.network import Cameras
 from active_recon.models.registry import network_entry
 from active_recon.models.weights import Bundle, load_weights, save_weights

@@ -16,22 +16,30 @@ from active_recon.bags.settings import recorded_settings
 from active_recon.bags.verification import verify
 from active_recon.cameras import view_distance
 from active_recon.cli.main import main
-from active_recon.weights_files import weights_hash
+from active_recon.weights_files import find_weights, PAPER_MODEL, weights_hash
 import pytest
 
 ROOT = Path(__file__).parents[1]
-GOLDEN = ROOT / 'bags' / 'golden' / 'run'
+GOLDEN = ROOT / 'bags' / 'golden'
+PAPER = GOLDEN / 'paper'  # its network, with its policy; `run` is with the default of both
+
+
+@pytest.fixture(scope='module', params=['run', 'paper'])
+def golden(request):
+    """Return the folder of a golden run."""
+    return GOLDEN / request.param
 
 
 @pytest.fixture(scope='module')
-def run():
-    return read_run(GOLDEN)
+def run(golden):
+    return read_run(golden)
 
 
 @pytest.fixture(scope='module', autouse=True)
 def same_weights(run):
     """Fail every test with the reason where the run was made with weights of another day."""
-    recorded, shipped = run.provenance['weights_sha256'], weights_hash()
+    recorded = run.provenance['weights_sha256']
+    shipped = weights_hash(find_weights(PAPER_MODEL if run.path == PAPER else None))
     if recorded != shipped:
         pytest.fail(f'the weights that ship ({shipped[:12]}) are not those that the golden run '
                     f'was recorded with ({recorded[:12]}): record it anew by `make golden`')
@@ -53,8 +61,8 @@ def command(monkeypatch, capsys, *arguments):
     return end.value.code or 0, said.out + said.err
 
 
-def test_it_is_small_and_says_what_made_it(run):
-    assert sum(path.stat().st_size for path in GOLDEN.rglob('*')) < 2_000_000
+def test_it_is_small_and_says_what_made_it(golden, run):
+    assert sum(path.stat().st_size for path in golden.rglob('*')) < 2_000_000
     assert {'version', 'weights_sha256', 'config_sha256', 'policy', 'seed', 'object'} <= set(
         run.provenance)
     assert [(len(episode.views), episode.done) for episode in run.episodes] == [(4, 'max_views')]
@@ -85,18 +93,18 @@ def test_all_replays_have_one_hash(run, loop, count):
     pytest.param({'ONEDNN_MAX_CPU_ISA': 'SSE41'}, 1, marks=pytest.mark.slow),
     pytest.param({'ATEN_CPU_CAPABILITY': 'default', 'ONEDNN_MAX_CPU_ISA': 'SSE41'}, 2,
                  marks=pytest.mark.slow)])
-def test_another_processor_stays_within_tolerance(variables, threads):
+def test_another_processor_stays_within_tolerance(golden, variables, threads):
     ended = subprocess.run(
-        [sys.executable, '-m', 'active_recon.cli.main', 'replay', GOLDEN, '--threads',
+        [sys.executable, '-m', 'active_recon.cli.main', 'replay', golden, '--threads',
          str(threads)], capture_output=True, text=True, timeout=120,
         env={**os.environ, **variables, 'PYTHONPATH': str(ROOT)})
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert re.search(f'^({SAME_BITS}|{WITHIN_TOLERANCE}): what was recorded', ended.stdout, re.M)
 
 
-def test_the_command_tells_the_verdict_and_the_hash(run, loop, monkeypatch, capsys):
+def test_the_command_tells_the_verdict_and_the_hash(golden, run, loop, monkeypatch, capsys):
     expected = verify(run, *loop)
-    code, said = command(monkeypatch, capsys, 'replay', GOLDEN)
+    code, said = command(monkeypatch, capsys, 'replay', golden)
     assert code == 0
     assert f'hash {expected.hash}' in said
     assert f'{expected.comparison.verdict}: what was recorded' in said
@@ -126,16 +134,19 @@ def test_weights_that_are_nowhere_any_more_are_asked_for_by_their_hash(
 
 
 @pytest.fixture
-def copied(tmp_path):
+def copied(golden, tmp_path):
     """Return a copy of the bag that a new one may be written beside."""
-    return Path(shutil.copytree(GOLDEN, tmp_path / 'walk'))
+    return Path(shutil.copytree(golden, tmp_path / 'walk'))
 
 
 @pytest.mark.parametrize(('options', 'name', 'knows_policy'), [
     (('--threshold', '0.6'), 'threshold-0.6', True), (('--model', '2d3d'), '2d3d', False),
-    (('--policy', 'attention'), 'attention', True)])
+    (('--policy',), '', True)])
 def test_a_replay_under_others_is_a_bag_that_replays_to_the_same_bits(
-        copied, options, name, knows_policy, monkeypatch, capsys):
+        copied, run, options, name, knows_policy, monkeypatch, capsys):
+    if options == ('--policy',):  # its own, which asks for views that there are
+        name = run.provenance['policy']
+        options = (*options, name)
     code, said = command(monkeypatch, capsys, 'replay', copied, *options)
     beside = copied.with_name(f'walk_{name}')
     assert (code, f'wrote {beside}' in said) == (0, True)
@@ -155,7 +166,8 @@ def test_a_replay_under_others_is_a_bag_that_replays_to_the_same_bits(
 
 
 def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
-        copied, monkeypatch, capsys):
+        tmp_path, monkeypatch, capsys):
+    copied = shutil.copytree(PAPER, tmp_path / 'walk')
     code, said = command(monkeypatch, capsys, 'replay', copied, '--policy', 'farthest')
     assert code == 2
     assert 'azimuth of 45.0 degrees' in said
@@ -164,5 +176,5 @@ def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
 
 
 def test_a_place_for_a_bag_that_is_not_written_is_refused(tmp_path, monkeypatch, capsys):
-    code, said = command(monkeypatch, capsys, 'replay', GOLDEN, '--out', tmp_path / 'new')
+    code, said = command(monkeypatch, capsys, 'replay', PAPER, '--out', tmp_path / 'new')
     assert (code, '--out without --model' in said) == (2, True)

@@ -15,7 +15,7 @@ from active_recon.models.lifted import (
     statistics,
 )
 from active_recon.models.lifting import Lifting, LiftingConfig
-from active_recon.models.lifting_decoder import folded, unfolded
+from active_recon.models.lifting_decoder import Conv3d, folded, unfolded
 from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras
 import numpy as np
@@ -119,7 +119,7 @@ def test_cells_look_up_the_same_where_frame_and_cameras_turn_by_a_quarter(liftin
 
 def test_points_are_projected_as_the_camera_projects_them():
     camera = orbit_camera(0.4, -0.1, 1.7, Intrinsics(150, 140, 60, 70, 128, 128))
-    where, depth = projected(projection(Cameras.of([camera]), 128), cell_centers(8))
+    where, depth = projected(projection(Cameras.of([camera]), 128), 8)
     pixels, depths = camera.project(cell_centers(8).numpy())
     np.testing.assert_allclose((where[0].numpy() + 1) * 64, pixels, atol=1e-3)
     np.testing.assert_allclose(depth[0].numpy(), depths, atol=1e-5)
@@ -187,3 +187,37 @@ def test_half_precision_changes_little(lifting):
 def test_sizes_that_make_no_network_are_refused():
     with pytest.raises(ConfigError, match='channels of 1 or more'):
         LiftingConfig(head_channels=0)
+
+
+def test_a_convolution_gives_the_same_with_and_without_gradients():
+    convolution, cells = Conv3d(6), torch.randn(1, 6, 5, 5, 5)
+    with torch.no_grad():
+        assert_close(convolution(cells), torch.nn.functional.conv3d(
+            cells, convolution.weight, convolution.bias, padding=1))
+    assert_close(convolution(cells).detach(), torch.nn.functional.conv3d(
+        cells, convolution.weight, convolution.bias, padding=1).detach())
+
+
+class OneView(torch.nn.Module):
+    """A network's whole step, from tensors to tensors."""
+
+    def __init__(self, network):
+        super().__init__()
+        self.network = network
+
+    def forward(self, image, pose, intrinsics, state):
+        """Return the logits and the next state."""
+        return self.network(image, Cameras(pose, intrinsics), state)
+
+
+def test_a_whole_step_exports_and_looks_maps_up_in_two_dimensions(lifting):
+    image, camera = some_images(1), VIEWS.rows(slice(0, 1))
+    arguments = image, camera.poses, camera.intrinsics, lifting.initial_state(1)
+    with torch.no_grad():
+        exported = torch.export.export(OneView(lifting), arguments)
+        ours, _ = lifting(image, camera, arguments[3])
+        theirs, _ = exported.module()(*arguments)
+    assert_close(theirs, ours)
+    dimensions = {node.meta['val'].ndim for node in exported.graph.nodes
+                  if 'grid_sampler' in str(node.target)}
+    assert dimensions == {4}

@@ -11,6 +11,7 @@ from active_recon.models.carving import Carving
 from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.network import Cameras
 from active_recon.training.appearance import misplaced, pictured
+from active_recon.training.calibration import calibrate
 from active_recon.training.lifting import (
     draw_posed_batch,
     LiftingLearner,
@@ -78,8 +79,9 @@ def test_the_same_seed_draws_the_same_batch(seen_anyhow):
 def test_pictures_are_in_range_and_lose_only_what_they_say(seen_anyhow):
     objects, chosen = torch.arange(4).expand(3, 4), torch.arange(3)[:, None].expand(3, 4)
     seen = seen_anyhow.seen[objects, chosen]
-    pictures = pictured(seen_anyhow.images[objects, chosen], seen, seen_anyhow,
-                        np.random.default_rng(0))
+    pictures = pictured(seen_anyhow.images[objects, chosen], seen,
+                        seen_anyhow.cameras(objects, chosen), seen_anyhow.voxels.float(),
+                        seen_anyhow, np.random.default_rng(0))
     assert pictures.shape == (3, 4, 4, 128, 128)
     assert pictures.min() >= 0 and pictures.max() <= 1
     assert not (pictures[:, :, 3] > seen).any()
@@ -134,3 +136,27 @@ def test_the_losses_fall(seen_anyhow, bfloat16):
         heard.append({name: value.item() for name, value in losses.items()})
     assert heard[-1]['loss'] < 0.9 * heard[0]['loss']
     assert heard[-1]['silhouette'] < heard[0]['silhouette']
+
+
+def test_temperatures_make_the_truth_of_validation_more_likely(seen_anyhow):
+    torch.manual_seed(0)
+    network = Lifting.from_config(TINY).eval()
+    with torch.no_grad():
+        network.decoder.to_64.bias.mul_(8)  # far too sure
+
+    def nats():
+        state = network.initial_state(4)
+        for view in range(2):
+            own, chosen = torch.arange(4), torch.full((4,), view)
+            state = network.step(seen_anyhow.white(own, chosen),
+                                 seen_anyhow.cameras(own, chosen), state)
+        return torch.nn.functional.binary_cross_entropy_with_logits(
+            network.decode(state), seen_anyhow.voxels.float()).item()
+
+    with torch.no_grad():
+        before = nats()
+        found = calibrate(network, seen_anyhow)
+        assert nats() < before
+    assert list(found) == list(range(1, 9))  # as many views as there are
+    assert_close(network.temperatures[7:], network.temperatures[7:8].expand(5))
+    assert_close(network.temperatures[:8], torch.tensor(list(found.values())).float())

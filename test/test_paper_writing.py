@@ -11,7 +11,7 @@ from active_recon.paper.results import Claim, Column, PUBLISHED, Result, Table
 from active_recon.paper.study import Objects, Study
 from active_recon.paper.writing import is_current, provenance, read_result, write_result
 from active_recon.reporting import silent
-from active_recon.weights_files import find_weights
+from active_recon.weights_files import find_weights, PAPER_MODEL
 import numpy as np
 import pytest
 
@@ -143,5 +143,5 @@ def test_results_are_ready_for_json(study):
 
 
 def test_weights_that_ship_are_named_without_the_folder_they_happen_to_lie_in(study):
-    told = provenance(study, {}, {'ours': find_weights()})['weights']['ours']
+    told = provenance(study, {}, {'ours': find_weights(PAPER_MODEL)})['weights']['ours']
     assert told['file'] == '2d3d-attention.safetensors, which ships'

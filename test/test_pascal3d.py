@@ -12,6 +12,7 @@ from active_recon.meshes import load_mesh
 from active_recon.rendering import composite, Renderer
 from active_recon.voxelise import voxelise
 from active_recon.voxels import iou
+from active_recon.weights_files import PAPER_MODEL
 import numpy as np
 from PIL import Image
 import pytest
@@ -184,7 +185,7 @@ def test_classes_bear_the_names_of_our_categories_and_can_be_chosen(root):
     ({'bbox': [[5.0, 5.0]]}, 'not enough values'),
     ({'bbox': [[900.0, 900.0, 950.0, 950.0]]}, 'expected a box within the image of 400 x 400'),
     ({'cad_index': EMPTY}, 'expected the field cad_index, found none'),
-    ({'cad_index': 7}, '07.off: expected a mesh file, but there is no such file')])
+    ({'cad_index': 7}, '07.off: no such mesh file')])
 def test_what_cannot_be_measured_is_left_out_and_told_why(changes, reason, root):
     annotate(root, 'car_imagenet/bad', annotated(**changes))
     photograph(root, 'car_imagenet/bad.JPEG', np.full((400, 400, 3), 60, np.uint8))
@@ -232,7 +233,7 @@ def test_a_folder_that_is_not_pascal3d_is_refused(name, root):
 
 def test_photographs_of_which_none_can_be_read_are_refused_with_the_reasons(root):
     (root / 'CAD/car/01.off').unlink()
-    with pytest.raises(DataError, match='(?s)none can be read.*no such file'):
+    with pytest.raises(DataError, match='(?s)none can be read.*no such mesh file'):
         read(root)
     annotate(root, 'car_imagenet/one', annotated(truncated=1))
     with pytest.raises(DataError, match='(?s)none can be read.*it is truncated'):
@@ -251,8 +252,8 @@ def test_photographs_are_evaluated_at_their_single_view(root, tmp_path, monkeypa
     annotate(root, 'car_imagenet/two', annotated(truncated=1))
     monkeypatch.setattr('torch.set_num_threads', lambda threads: None)
     out = tmp_path / 'found.json'
-    monkeypatch.setattr('sys.argv', ['active-recon', 'evaluate', str(root), '--json', str(out),
-                                     '--threads', '1'])
+    asked = ['active-recon', 'evaluate', str(root), '--json', str(out), '--threads', '1']
+    monkeypatch.setattr('sys.argv', [*asked, '--model', PAPER_MODEL])
     with pytest.raises(SystemExit) as end:
         main()
     assert not end.value.code
@@ -263,3 +264,7 @@ def test_photographs_are_evaluated_at_their_single_view(root, tmp_path, monkeypa
     told = capsys.readouterr().err
     assert 'objects of 1 views: 1 views from 1 starts' in told
     assert 'objects: 1 read, 0 missing, 1 left out' in told
+    monkeypatch.setattr('sys.argv', asked)
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 2 and 'photographs without their cameras' in capsys.readouterr().err

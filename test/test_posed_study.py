@@ -24,7 +24,7 @@ from active_recon.evaluation.posed.scoring import pooled, scored, target
 from active_recon.evaluation.posed.study import Extent, study_set
 from active_recon.evaluation.posed.summary import markdown, robustness_figures, told
 from active_recon.models.carving import Carving
-from active_recon.models.lifted import cell_centers, projected, projection
+from active_recon.models.lifted import projected, projection
 from active_recon.voxels import iou, turned
 import numpy as np
 import pytest
@@ -175,7 +175,7 @@ def test_a_cut_view_lacks_a_third_of_the_cube(scene):
         others = [other for other in range(5) if other != view]
         torch.testing.assert_close(cut.seen[row, others], scene.views.seen[row, others])
         one = scene.views.cameras(torch.tensor([row]), torch.tensor([view]))
-        where, _ = projected(projection(one, 128), cell_centers(32))
+        where, _ = projected(projection(one, 128), 32)
         pixel = ((where[0] + 1) * 64).floor().long().clamp(0, 127)
         before, after = (seen[row, view][pixel[:, 1], pixel[:, 0]].float().mean()
                          for seen in (scene.views.seen, cut.seen))
@@ -276,5 +276,5 @@ def test_entrants_are_named_apart():
         load_entrants('carving,carving')
     with pytest.raises(ConfigError, match='got none'):
         load_entrants(' , ')
-    with pytest.raises(WeightsError, match='there is no such file'):
+    with pytest.raises(WeightsError, match='no such file'):
         load_entrants('carving,x=none.safetensors')

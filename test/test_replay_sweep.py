@@ -6,6 +6,7 @@ from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
 from active_recon.cli.main import main
 from active_recon.policies import POLICIES
 from active_recon.shown_object import ShownObject
+from active_recon.weights_files import PAPER_MODEL
 import numpy as np
 import pytest
 from recorded_runs import image_at
@@ -42,7 +43,8 @@ def test_a_sweep_has_nothing_to_compare_and_says_so(sweep, monkeypatch, capsys):
 def test_each_policy_takes_the_views_that_it_asks_for(
         sweep, tmp_path, policy, monkeypatch, capsys):
     out = tmp_path / policy
-    code, said = replayed(monkeypatch, capsys, sweep, '--policy', policy, '--out', out)
+    own = ['--model', PAPER_MODEL] if policy == 'attention' else []
+    code, said = replayed(monkeypatch, capsys, sweep, '--policy', policy, '--out', out, *own)
     assert code == 0, said
     (episode,) = read_run(out).episodes
     goals = [episode.first_goal, *(view.goal for view in episode.views[:-1])]

@@ -106,12 +106,14 @@ def test_page_draws_just_what_was_recorded(run):
     for packed, view in zip(panel['grids'], run.episodes[0].views, strict=True):
         cells = np.frombuffer(b64decode(packed), '<u2').reshape([panel['side']] * 3) / 65535
         np.testing.assert_allclose(cells, view.reconstruction.occupancy, atol=1 / 65535)
-        assert ((cells > panel['threshold']) == view.occupied.occupied(0)).all()
+        clear = np.abs(cells - panel['threshold']) > 1 / 65535
+        occupied = view.occupied.occupied(0)
+        assert ((cells > panel['threshold']) == occupied)[clear].all()
 
 
 def test_figures_known_of_a_run_stand_on_its_page(run):
     text = Elements(page_of(run)).text
-    for word in (run.path.name, run.provenance['weights_sha256'], 'attention', 'Chair',
+    for word in (run.path.name, run.provenance['weights_sha256'], 'uniform', 'Chair',
                  '/camera/image_raw', 'goal_tolerance'):
         assert word in text
 
@@ -140,7 +142,7 @@ def test_figure_that_is_not_finite_is_left_out(run):
     views = [replace(view, entropy=math.nan, goal=view.goal and replace(
         view.goal, scores=np.full(24, np.nan, np.float32))) for view in run.episodes[0].views]
     page = page_of(changed(run, views=views))
-    assert 'NaN' not in json.dumps(drawn_in(page))
+    json.dumps(drawn_in(page), allow_nan=False)
     assert 'nan' not in Elements(page).text
 
 

@@ -53,20 +53,20 @@ def test_mesh_is_in_metres_and_where_it_stands(run, tmp_path):
     box = trimesh.creation.box(bounds=[(0, 0, 0), (0.25, 0.25, 0.25)])
     box.export(tmp_path / 'box.ply')
     truth = TruthFile(tmp_path / 'box.ply').read(run)
-    expected = np.zeros((32, 32, 32), bool)
-    expected[16:24, 16:24, 16:24] = True
+    expected = np.zeros((64, 64, 64), bool)
+    expected[32:48, 32:48, 32:48] = True
     assert expected[truth.cells].mean() > 0.6  # and its surface's cells around it
     assert (truth.cells | ~expected).all()
     assert 'in metres and where it stands' in truth.placed
     assert cells_of(tmp_path / 'box.ply', run, True).mean() > 0.9  # fitted, it fills the cube
     small = cells_of(tmp_path / 'box.ply', run, object_size=0.5)
-    assert small[16:, 16:, 16:].mean() > 0.9 and not small[:15].any()
+    assert small[32:, 32:, 32:].mean() > 0.9 and not small[:31].any()
 
 
 def test_mesh_that_sticks_out_of_the_cube_is_cut_and_the_page_says_so(run, tmp_path):
     trimesh.creation.box((2, 0.5, 0.5)).export(tmp_path / 'bar.ply')
     truth = TruthFile(tmp_path / 'bar.ply').read(run)
-    assert truth.cells[:, 10:22, 10:22].all()
+    assert truth.cells[:, 20:44, 20:44].all()
     assert '% of its surface is outside of the cube' in truth.placed
     box = trimesh.creation.box((0.1, 0.1, 0.1))
     box.apply_translation((5, 0, 0))
@@ -79,7 +79,7 @@ def test_axes_of_the_true_mesh_are_options(run, tmp_path):
     box = trimesh.creation.box(bounds=[(0, 0, 0), (0.1, 0.1, 0.4)])
     box.export(tmp_path / 'stick.ply')
     lying = cells_of(tmp_path / 'stick.ply', run, False, 'y', 'z')
-    assert lying[20, 17, 17] and not lying[17, 17, 25]
+    assert lying[40, 34, 34] and not lying[34, 34, 50]
 
 
 def test_truth_turns_with_the_front_of_the_object_where_it_is_fitted(run):
@@ -92,7 +92,7 @@ def test_truth_that_does_not_fit_is_refused(run, tmp_path):
     write_binvox(VoxelGrid(np.ones((16, 16, 16), np.float32)), tmp_path / 'small.binvox')
     with pytest.raises(ConfigError, match='16 cells a side'):
         cells_of(tmp_path / 'small.binvox', run)
-    write_binvox(VoxelGrid(np.ones((32, 32, 32), np.float32), 0.2), tmp_path / 'other.binvox')
+    write_binvox(VoxelGrid(np.ones((64, 64, 64), np.float32), 0.2), tmp_path / 'other.binvox')
     with pytest.raises(ConfigError, match='a cube of 0.2 m'):
         cells_of(tmp_path / 'other.binvox', run)
     assert cells_of(tmp_path / 'other.binvox', run, True).all()

@@ -98,6 +98,6 @@ def test_the_background_shows_around_the_object(shown):
 
 def test_what_is_no_mesh_is_refused(tmp_path):
     (tmp_path / 'text.ply').write_text('no mesh')
-    with pytest.raises(MeshError, match='expected a mesh'):
+    with pytest.raises(MeshError, match='no mesh that can be read'):
         rendered_object(tmp_path / 'text.ply')
     assert issubclass(MeshError, DataError)

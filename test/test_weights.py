@@ -5,7 +5,13 @@ from pathlib import Path
 
 from active_recon.errors import WeightsError
 from active_recon.models.weights import Bundle, load_weights, save_weights
-from active_recon.weights_files import DEFAULT_MODEL, find_weights, SHIPPED, weights_hash
+from active_recon.weights_files import (
+    DEFAULT_MODEL,
+    find_weights,
+    PAPER_MODEL,
+    SHIPPED,
+    weights_hash,
+)
 import numpy as np
 import pytest
 from safetensors.torch import load_file, save_file
@@ -23,7 +29,7 @@ def saved(tmp_path, network, attention, tiny) -> Path:
 
 def rewritten(path, tiny, tensors=None, **metadata):
     """Write the file again with other tensors or metadata; None leaves a key out."""
-    told = {'model': DEFAULT_MODEL, 'config': json.dumps(tiny.to_dict()),
+    told = {'model': PAPER_MODEL, 'config': json.dumps(tiny.to_dict()),
             'threshold': '0.35'} | metadata
     save_file(load_file(path) if tensors is None else tensors, path,
               {key: value for key, value in told.items() if value is not None})
@@ -72,7 +78,7 @@ def test_the_card_beside_tells_where_the_weights_come_from(saved, tiny):
 def test_nothing_in_the_file_is_a_pickle(saved):
     raw = saved.read_bytes()
     header = int.from_bytes(raw[:8], 'little')
-    assert json.loads(raw[8:8 + header])['__metadata__']['model'] == DEFAULT_MODEL
+    assert json.loads(raw[8:8 + header])['__metadata__']['model'] == PAPER_MODEL
     numbers = sum(tensor.nbytes for tensor in load_file(saved).values())
     assert len(raw) == 8 + header + numbers  # a header in JSON, and numbers
 

@@ -1,6 +1,7 @@
 """The network and the planner that a run was made with, found again by what its bag says."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 import math
 from pathlib import Path
@@ -13,7 +14,7 @@ from active_recon.errors import WeightsError
 from active_recon.motion import MotionLimits
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
-from active_recon.weights_files import FOLDER, SHIPPED, weights_hash
+from active_recon.weights_files import find_weights, FOLDER, SHIPPED, weights_hash
 
 _OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
 _OF_LIMITS = tuple(field.name for field in fields(MotionLimits))
@@ -87,7 +88,7 @@ def recorded_settings(run: RecordedRun, weights: Path | None = None, instead: bo
         planner = _given(of_planner, _OF_PLANNER)
         own = of_planner.get('weights', '')
         same = own == of_reconstructor.get('weights', '')
-        planner['weights'] = found if same else Path(own) if own else SHIPPED
+        planner['weights'] = found if same else find_weights(own or None)
     return Settings(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
                     of_reconstructor.get('threads', 1))
 
@@ -98,9 +99,16 @@ def _given(parameters: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, A
             and not (isinstance(value, float) and math.isnan(value))}
 
 
+def _named(parameter: str) -> Path | None:
+    """Return the file that a node's parameter names, if it still ships where it is a name."""
+    with suppress(WeightsError):
+        return find_weights(parameter) if parameter else None
+    return None
+
+
 def _recorded_weights(run: RecordedRun, weights: Path | None, parameter: str) -> Path:
     wanted = run.provenance.get('weights_sha256')
-    named = [path for path in (weights, Path(parameter) if parameter else None) if path]
+    named = [path for path in (weights, _named(parameter)) if path]
     if wanted is None:
         return [*named, SHIPPED][0]
     for path in (*named, SHIPPED, *sorted(FOLDER.glob('*.safetensors'))):

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from active_recon.cli.policy_option import policy_option
 from active_recon.interrupts import held_interrupts
+from active_recon.policies import DEFAULT_POLICY
 import typer
 
 
@@ -12,7 +13,10 @@ def demo(
     object_name: Annotated[str, typer.Option(
         '--object', help='bed, car, chair, sofa, table, or the path of a mesh file.')] = 'chair',
     views: Annotated[int, typer.Option(min=1, max=24, help='Views to take.')] = 5,
-    policy: Annotated[str, policy_option('How the next view is chosen.')] = 'attention',
+    policy: Annotated[str, policy_option('How the next view is chosen.')] = DEFAULT_POLICY,
+    model: Annotated[str | None, typer.Option(
+        help='A model whose weights ship, or a weights file; attention takes 2d3d-attention.')
+    ] = None,
     seed: Annotated[int, typer.Option(
         min=0, help='Of the first view and of the policy random.')] = 0,
     output_dir: Annotated[Path, typer.Option(
@@ -30,7 +34,7 @@ def demo(
             from active_recon.objects import find_object
 
         folder = run_demo(
-            Demo(find_object(object_name), views, policy, seed, output_dir, view),
+            Demo(find_object(object_name), views, policy, seed, output_dir, view, model),
             console)
     except KeyboardInterrupt:
         console.print('interrupted; the nodes are stopped and the bag is closed')

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
@@ -47,6 +48,9 @@ def _read_photographs(root: Path, title: str, spec: 'NetworkSpec') -> 'ViewSet':
     from active_recon.datasets.pascal3d import list_photographs
     from active_recon.datasets.photographs import read_photographs
 
+    if not spec.needs_front:
+        raise ConfigError(f'{root}: photographs without their cameras are for networks that take '
+                          'them from the front alone, such as --model 2d3d-attention')
     photographs, left_out = list_photographs(root)
     with progress_bar(f'reading {title}', len(photographs)) as advance:
         views = read_photographs(photographs, left_out, lambda: advance(1, ''),

@@ -16,14 +16,16 @@ from active_recon.demo.table import loop_table, turning
 from active_recon.interrupts import held_interrupts
 from active_recon.meshes import load_mesh
 from active_recon.nodes.demo_watch import DemoWatch, watching
+from active_recon.policies import DEFAULT_POLICY
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.voxelise import voxelise
-from active_recon.voxels import RESOLUTION
+from active_recon.weights_files import find_weights
 import cv2
 import numpy as np
 from rich.console import Console, RenderableType
 from rich.live import Live
 
+_LIKELY_RESOLUTION = 64
 _START_S = 20.0
 _VIEW_S = 30.0
 _ANSWER_S = 10.0
@@ -34,15 +36,18 @@ class Demo:
     """
     What to show: a mesh file, how many views, which policy chooses them, and its seed.
 
+    `model` is a weights file, or a model whose weights ship; None: the default.
+
     With `view` the loop is shown in the browser too, and goes on until Ctrl-C.
     """
 
     mesh: Path
     views: int = 5
-    policy: str = 'attention'
+    policy: str = DEFAULT_POLICY
     seed: int = 0
     output_dir: Path = Path('bags')
     view: bool = False
+    model: str | None = None
 
 
 def run_demo(demo: Demo, console: Console) -> Path:
@@ -52,9 +57,10 @@ def run_demo(demo: Demo, console: Console) -> Path:
     Raises MeshError on what is no mesh, NodeError where a node dies, ActiveReconError where the
     loop does not go on. However it ends, the nodes are stopped and the bag is closed.
     """
+    find_weights(demo.model)  # refused here rather than by two nodes
     mesh = load_mesh(demo.mesh)
     truth = cache(partial(voxelise, mesh))
-    truth(RESOLUTION)  # most likely: later it would keep the loop's messages waiting
+    truth(_LIKELY_RESOLUTION)  # later it would keep the loop's messages waiting
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
     title = f'{demo.mesh.stem}: {demo.views} views, policy {demo.policy}'
@@ -110,10 +116,11 @@ def _go_on(nodes: NodeProcesses, console: Console) -> None:
 def _start_loop(nodes: NodeProcesses, demo: Demo, folder: Path) -> None:
     nodes.start('turntable_camera', {'mesh': demo.mesh, 'start_azimuth': _start_azimuth(demo)})
     # Goals only: `auto` takes views of its own accord while it has not yet met the planner.
-    nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal'})
+    weights = {'weights': demo.model} if demo.model else {}
+    nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal', **weights})
     # A tolerance of 0 keeps an early end away: as many views as were asked for are shown.
     nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
-                                 'max_views': demo.views, 'entropy_tolerance': 0.0})
+                                 'max_views': demo.views, 'entropy_tolerance': 0.0, **weights})
 
 
 def _start_azimuth(demo: Demo) -> float:

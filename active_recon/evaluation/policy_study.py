@@ -34,7 +34,7 @@ from active_recon.policies import (
 from active_recon.reporting import Advance, Reporting, silent
 from active_recon.runtimes import State
 from active_recon.runtimes.torch import TorchPolicyRuntime
-from active_recon.weights_files import DEFAULT_MODEL
+from active_recon.weights_files import PAPER_MODEL
 import numpy as np
 from torch import nn
 
@@ -56,7 +56,7 @@ def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
 
 
 def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count: int = 5,
-               seeds: int = 5, seed: int = 0, model: str = DEFAULT_MODEL) -> list[Contender]:
+               seeds: int = 5, seed: int = 0, model: str = PAPER_MODEL) -> list[Contender]:
     """
     Return the policies named, under all of their seeds.
 

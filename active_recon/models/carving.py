@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError
-from active_recon.models.lifted import cell_centers, projected, projection, sampled
+from active_recon.models.border import foreground
+from active_recon.models.lifted import projected, projection, sampled
 from active_recon.models.lifting_encoder import IMAGE_SIZE
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 import numpy as np
@@ -13,7 +14,6 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-_NEARLY, _CLEARLY = 0.015, 0.045  # distances of a colour from the background's, in [0, 1]
 _LATENT_SIDE = 4
 
 
@@ -74,8 +74,7 @@ class Carving(ReconstructionNetwork):
 
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
         """Carve by one more silhouette of each object."""
-        centers = cell_centers(self.resolution, encoded.device)
-        where, depth = projected(projection(cameras, IMAGE_SIZE), centers)
+        where, depth = projected(projection(cameras, IMAGE_SIZE), self.resolution)
         # Zeros come in beyond the image, where nothing is ruled out
         found = sampled(encoded.float() - 1, where)[:, 0] + 1  # (B, N)
         found = torch.where(depth > 0, found, 1).reshape(state['least'].shape)
@@ -86,21 +85,3 @@ class Carving(ReconstructionNetwork):
     def decode(self, state: State) -> Tensor:
         """Return the occupancy's logits, (B, 64, 64, 64)."""
         return (state['least'] - 0.5) * self.slope
-
-
-def foreground(images: Tensor) -> Tensor:
-    """
-    Return how far images (B, 3 or 4, S, S) are from their borders' colour, (B, 1, S, S).
-
-    0 is background, 1 is not. A fourth channel tells what was seen; where nothing was, it is 1.
-    """
-    seen = images[:, 3:] > 0.5 if images.shape[1] == 4 else torch.ones_like(
-        images[:, :1], dtype=torch.bool)
-    inner = -functional.max_pool2d(-seen.float(), 5, 1, 2)
-    padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
-    border = seen & (padded < 0.5)  # two pixels wide, along the end of what was seen
-    colors = torch.where(border, images[:, :3], torch.nan).flatten(2)
-    behind = colors.nanmedian(dim=2).values.nan_to_num(1.0)[:, :, None, None]
-    apart = (images[:, :3] - behind).abs().amax(dim=1, keepdim=True)
-    share = ((apart - _NEARLY) / (_CLEARLY - _NEARLY)).clamp(0, 1)
-    return torch.where(seen, share, 1.0)

@@ -1,7 +1,6 @@
 """Cells that look up what a view shows at their projection, and what several views agree on."""
 
 from collections.abc import Mapping
-from functools import cache
 
 from active_recon.models.network import Cameras
 import torch
@@ -14,12 +13,10 @@ _NEAREST = 0.05  # sides of the grid in front of the camera
 _SPREAD = 0.01
 
 
-@cache
 def cell_centers(side: int, device: torch.device | None = None) -> Tensor:
     """Return the centres of a grid's cells, (N, 3) of a unit cube, indexed [x, y, z]."""
-    with torch.inference_mode(False):  # kept, and used in training after
-        along = (torch.arange(side, device=device or 'cpu') + 0.5) / side - 0.5
-        return torch.stack(torch.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
+    along = (torch.arange(side, device=device) + 0.5) / side - 0.5
+    return torch.stack(torch.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
 
 
 def projection(cameras: Cameras, image_size: int) -> Tensor:
@@ -34,10 +31,16 @@ def projection(cameras: Cameras, image_size: int) -> Tensor:
         return (scale @ lenses @ torch.cat([rotation, moved], dim=2)).float()
 
 
-def projected(matrices: Tensor, centers: Tensor) -> tuple[Tensor, Tensor]:
-    """Return where matrices (B, 3, 4) see points (N, 3): (B, N, 2), and depths (B, N)."""
-    with torch.autocast(matrices.device.type, enabled=False):
-        seen = matrices[:, :, :3] @ centers.T + matrices[:, :, 3:]  # (B, 3, N)
+def projected(matrices: Tensor, side: int) -> tuple[Tensor, Tensor]:
+    """
+    Return where matrices (B, 3, 4) see the N centres of a grid's cells, in [x, y, z] order.
+
+    Places are (B, N, 2), in units in which the image reaches from -1 to 1; depths (B, N).
+    """
+    along = (torch.arange(side, device=matrices.device) + 0.5) / side - 0.5
+    axes = matrices[:, :, :3, None] * along + matrices[:, :, 3:, None] / 3  # (B, 3, 3, side)
+    seen = (axes[:, :, 0, :, None] + axes[:, :, 1, None, :])[..., None] + axes[:, :, 2, None, None]
+    seen = seen.flatten(2)  # (B, 3, N)
     depth = seen[:, 2]
     return (seen[:, :2] / depth[:, None].clamp(min=_NEAREST)).transpose(1, 2), depth
 
@@ -66,7 +69,7 @@ class Lookup(nn.Module):
         A weight is 0 where the cell is behind the camera, beyond its image, or where that image
         is not `seen` (B, 1, h, w); else 1.
         """
-        where, depth = projected(matrices, self.centers(maps))
+        where, depth = projected(matrices, self._side)
         features = sampled(torch.cat([maps, seen.to(maps.dtype)], dim=1), where)
         inside = (features[:, -1] > 0.5) & (depth > _NEAREST)
         return features[:, :-1], inside[:, None].float(), depth
@@ -115,15 +118,18 @@ def no_views(batch: int, channels: int, side: int, device: torch.device) -> dict
 
 def gathered(known: Mapping[str, Tensor], features: Tensor, weight: Tensor) -> dict[str, Tensor]:
     """
-    Return what views agree on with one more: features (B, C, N) of weight 0 or 1 (B, 1, N).
+    Return what views agree on with T more: features (T, B, C, N), weights 0 or 1 (T, B, 1, N).
 
     Their maximum is 0 at least and their minimum 0 at most: what no view saw.
     """
-    new = (features * weight).reshape(known['sum'].shape)
-    return {'count': known['count'] + weight.reshape(known['count'].shape),
-            'sum': known['sum'] + new,
-            'square': known['square'] + new * new, 'most': torch.maximum(known['most'], new),
-            'least': torch.minimum(known['least'], new)}
+    count, total, square, most, least = (
+        known[name] for name in ('count', 'sum', 'square', 'most', 'least'))
+    for found, inside in zip(features, weight, strict=True):
+        new = (found * inside).reshape(total.shape)
+        count, total, square = count + inside.reshape(count.shape), total + new, square + new * new
+        # The gradients of `where` take half the time of those of maximum and minimum
+        most, least = torch.where(new > most, new, most), torch.where(new < least, new, least)
+    return {'count': count, 'sum': total, 'square': square, 'most': most, 'least': least}
 
 
 def statistics(known: Mapping[str, Tensor]) -> Tensor:

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple, Self
 
+from active_recon.models.border import border_distance, seen_pixels, share_apart
 import torch
 from torch import nn, Tensor
 from torch.nn import functional
@@ -12,6 +13,8 @@ COARSE, FINE = 32, 64
 """Pixels a side of the two maps."""
 NO_EVIDENCE = 6.0
 """The foreground's logit where the camera saw nothing: no cell is carved there."""
+_TRUST = 4.0
+_AT_128 = 8  # channels: more would take longer than all that is narrower
 
 
 class Maps(NamedTuple):
@@ -84,7 +87,7 @@ class PyramidEncoder(nn.Module):
         super().__init__()
         at_64, at_32, at_16, at_8 = channels
         # No norm where the maps are wide: it would take longer than what it follows
-        self.down_64 = nn.Sequential(nn.Conv2d(4, at_64, 5, stride=2, padding=2), nn.ReLU(),
+        self.down_64 = nn.Sequential(nn.Conv2d(6, at_64, 5, stride=2, padding=2), nn.ReLU(),
                                      nn.Conv2d(at_64, at_64, 3, padding=1), nn.ReLU())
         self.down_32 = nn.Sequential(_halved(at_64, at_32), Residual(at_32))
         self.down_16 = nn.Sequential(_halved(at_32, at_16), Residual(at_16))
@@ -96,14 +99,21 @@ class PyramidEncoder(nn.Module):
         half = width // 2
         self.up_32, self.lateral_64 = nn.Conv2d(width, half, 1), nn.Conv2d(at_64, half, 1)
         self.smooth_64 = _smooth(half)
-        self.foreground = nn.Conv2d(half, 4, 3, padding=1)
+        self.silhouette = nn.Conv2d(half, 4 * _AT_128, 1)
+        self.shown_128 = nn.Conv2d(6, _AT_128, 3, padding=1)
+        # What is learned, and how far what is unlike the border's colour is trusted
+        self.foreground = nn.Conv2d(2 * _AT_128, 2, 3, padding=1)
+        self.foreground.bias = nn.Parameter(torch.tensor([0.0, _TRUST]))
         self.coarse, self.fine = nn.Conv2d(width + 1, coarse, 1), nn.Conv2d(half + 4, fine, 1)
 
     def forward(self, images: Tensor) -> Maps:
         """Return the maps of images (B, 3, 128, 128), or (B, 4, ...) with what was seen."""
-        seen = images[:, 3:] if images.shape[1] == 4 else torch.ones_like(images[:, :1])
-        shown = torch.cat([(2 * images[:, :3] - 1) * seen, seen], dim=1)
-        at_64 = self.down_64(shown.contiguous(memory_format=torch.channels_last))
+        seen = seen_pixels(images)
+        apart = border_distance(images)
+        plain = share_apart(apart, seen)
+        shown = torch.cat([(2 * images[:, :3] - 1) * seen, seen, apart * seen, plain], dim=1)
+        shown = shown.contiguous(memory_format=torch.channels_last)
+        at_64 = self.down_64(shown)
         at_32 = self.down_32(at_64)
         at_16 = self.down_16(at_32)
         at_8 = self.down_8(at_16)
@@ -111,15 +121,16 @@ class PyramidEncoder(nn.Module):
         up_16 = self.smooth_16(_doubled(self.up_8(at_8)) + self.lateral_16(at_16))
         up_32 = self.smooth_32(_doubled(up_16) + self.lateral_32(at_32))
         up_64 = self.smooth_64(_doubled(self.up_32(up_32)) + self.lateral_64(at_64))
-        fourfold = self.foreground(up_64)  # (B, 4, 64, 64)
-        share = fourfold.sigmoid()
-        coarse = self.coarse(torch.cat(
-            [up_32, functional.avg_pool2d(share.mean(dim=1, keepdim=True), 2)], dim=1))
-        fine = self.fine(torch.cat([up_64, share], dim=1))
-        foreground = functional.pixel_shuffle(fourfold, 2)
-        foreground = torch.where(seen > 0.5, foreground,
-                                 torch.full_like(foreground, NO_EVIDENCE))
-        return Maps(coarse, fine, functional.avg_pool2d(seen, 2).to(fine.dtype), foreground)
+        at_128 = torch.cat([functional.pixel_shuffle(self.silhouette(up_64), 2),
+                            self.shown_128(shown)], dim=1)
+        learned, trust = self.foreground(functional.relu(at_128)).split(1, dim=1)
+        silhouette = learned + functional.softplus(trust) * (2 * plain - 1)  # (B, 1, 128, 128)
+        share = silhouette.sigmoid()
+        coarse = self.coarse(torch.cat([up_32, functional.avg_pool2d(share, 4)], dim=1))
+        fine = self.fine(torch.cat([up_64, functional.pixel_unshuffle(share, 2)], dim=1))
+        silhouette = torch.where(seen > 0.5, silhouette,
+                                 torch.full_like(silhouette, NO_EVIDENCE))
+        return Maps(coarse, fine, functional.avg_pool2d(seen, 2).to(fine.dtype), silhouette)
 
 
 def _smooth(channels: int) -> nn.Sequential:

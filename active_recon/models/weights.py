@@ -10,7 +10,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry
-from active_recon.weights_files import DEFAULT_MODEL, read_metadata, SHIPPED, weights_hash
+from active_recon.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
 from safetensors.torch import save
 import torch
@@ -26,7 +26,7 @@ class Bundle:
     config: Config
     threshold: float
     card: dict[str, Any] = field(default_factory=dict)
-    model: str = DEFAULT_MODEL
+    model: str = PAPER_MODEL
 
 
 def save_weights(path: Path, bundle: Bundle) -> None:

@@ -25,6 +25,7 @@ from active_recon.output import output_path
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.view_gate import ViewGate
 from active_recon.voxels import PUBLISHED_FLOOR, write_mesh
+from active_recon.weights_files import find_weights
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg, pose_to_msg
@@ -112,9 +113,8 @@ class ReconstructorNode(ManagedNode):
         """Load the network and run it once, so that the first view is as fast as the others."""
         # One thread by default: with more, the slowest of the loop's busy cores is waited for
         reconstructor = Reconstructor.load(
-            Path(settings.weights) if settings.weights else None, settings.device,
-            settings.object_size, settings.object_yaw, _given(settings.threshold),
-            settings.threads)
+            find_weights(settings.weights or None), settings.device, settings.object_size,
+            settings.object_yaw, _given(settings.threshold), settings.threads)
         for fact, meaning in FACTS.items():
             tell(self, fact, reconstructor.provenance.get(fact, ''), meaning)
         reconstructor.warm_up()

@@ -1,7 +1,6 @@
 """ROS shell of the planner: after every view, where to look next, or that it is enough."""
 
 import math
-from pathlib import Path
 import time
 
 from active_recon.cameras import (
@@ -23,6 +22,7 @@ from active_recon.nodes.settings.view_planner import ViewPlannerSettings
 from active_recon.nodes.topic_names import tell_names
 from active_recon.planner import Decision, Goal, Planner
 from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
+from active_recon.weights_files import find_weights
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
@@ -83,7 +83,7 @@ class ViewPlannerNode(ManagedNode):
     def _load(self, settings: ViewPlannerSettings) -> Policy:
         return load_policy(settings.policy, PolicyOptions(
             np.random.default_rng(settings.seed), settings.max_views,
-            Path(settings.weights) if settings.weights else None, threads=settings.threads))
+            find_weights(settings.weights or None), threads=settings.threads))
 
     def _planner_of(self, settings: ViewPlannerSettings, policy: Policy) -> Planner:
         return Planner(

@@ -30,7 +30,7 @@ from active_recon.paper.systems import (
     views_seen,
 )
 from active_recon.voxels import RESOLUTION
-from active_recon.weights_files import find_weights, read_card, weights_hash
+from active_recon.weights_files import find_weights, PAPER_MODEL, read_card, weights_hash
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
@@ -62,7 +62,7 @@ def compared(study: Study) -> list[Compared]:
     rows = [Compared(system.label, weights, system.resolution,
                      system.model != MODEL and system.resolution == RESOLUTION)
             for system, weights in trained.items()]
-    own = find_weights(study.model)
+    own = find_weights(study.model or PAPER_MODEL)
     if own.is_file() and weights_hash(own) not in {weights_hash(row.weights) for row in rows}:
         rows.append(Compared(SHIPPED if study.model is None else f'`{study.model}`', own))
     return rows

@@ -12,7 +12,7 @@ from active_recon.datasets.views import read_views, ViewSet
 from active_recon.errors import DataError, WeightsError
 from active_recon.reporting import Reporting, silent
 from active_recon.voxels import RESOLUTION
-from active_recon.weights_files import find_weights
+from active_recon.weights_files import find_weights, PAPER_MODEL
 
 SAMPLES = 75_000
 REAL = {'real_val': 'real models, `val`', 'real_cc0': 'real models that ship (CC0)',
@@ -99,7 +99,7 @@ class Study:
     @property
     def weights(self) -> Path:
         """Where the weights of the paper's network lie; raises WeightsError if there are none."""
-        path = find_weights(self.model)
+        path = find_weights(self.model or PAPER_MODEL)
         if not path.is_file():
             raise WeightsError(f"{path}: expected weights of the paper's network, found no file; "
                                'name some by --model, or train them with `active-recon train`')

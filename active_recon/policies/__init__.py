@@ -2,6 +2,7 @@
 
 from active_recon.policies.base import Choice, Observation, Policy
 from active_recon.policies.registry import (
+    DEFAULT_POLICY,
     learned_policy,
     load_policy,
     POLICIES,
@@ -9,5 +10,5 @@ from active_recon.policies.registry import (
     PolicyOptions,
 )
 
-__all__ = ['Choice', 'Observation', 'POLICIES', 'Policy', 'PolicyEntry', 'PolicyOptions',
-           'learned_policy', 'load_policy']
+__all__ = ['Choice', 'DEFAULT_POLICY', 'Observation', 'POLICIES', 'Policy', 'PolicyEntry',
+           'PolicyOptions', 'learned_policy', 'load_policy']

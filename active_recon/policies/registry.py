@@ -54,6 +54,8 @@ class PolicyEntry:
         return 'seed' in self.parameters
 
 
+DEFAULT_POLICY = 'uniform'  # the best on validation of those that the default network can have
+
 LEARNED: dict[str, Callable[[PolicyRuntime], Policy]] = {'2d3d-attention': AttentionPolicy}
 """What makes a policy of the model that was trained beside a network, by the network's name."""
 

@@ -11,7 +11,7 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.models.weights import Bundle, load_weights
 from active_recon.runtimes.base import State
-from active_recon.weights_files import config_hash, weights_hash
+from active_recon.weights_files import config_hash, SHIPPED, weights_hash
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -89,8 +89,8 @@ def load_policy(weights: Path | None, device: str, threads: int | None) -> Torch
     """Return the policy of a weights file; raises WeightsError where it has none."""
     model = _load(weights, device).attention
     if model is None:
-        raise WeightsError(f'{weights}: expected weights with a view policy in them, as '
-                           '`active-recon train --model 2d3d-attention` makes; there is none')
+        raise WeightsError(f'{(weights or SHIPPED).name}: no view policy in these weights: take '
+                           'those of 2d3d-attention, or a policy that is not learned')
     return TorchPolicyRuntime(model, threads)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.network import Cameras
 from active_recon.training import variation
+from active_recon.training.tables import tables
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -17,15 +18,18 @@ SHARES = {'white': 0.2, 'plain': 0.15, 'gradient': 0.1, 'noise': 0.1, 'clutter':
 MOST_TURN, MOST_SHIFT = np.radians(1.0), 0.01
 """How far poses are off: radians, and shares of the distance."""
 _CUT_SHARE, _MOST_CUT = 0.12, 0.4  # of the views, and of a view's side
+_TABLE_SHARE = 0.3  # of the sequences
 _NOISE, _DARKEST, _BRIGHTEST = 0.03, 0.6, 2.2
 
 
-def pictured(images: Tensor, seen: Tensor, views: ViewSet, rng: np.random.Generator) -> Tensor:
+def pictured(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, views: ViewSet,
+             rng: np.random.Generator) -> Tensor:
     """
     Return premultiplied images (T, B, S, S, 4) uint8 as pictures (T, B, 4, S, S) in [0, 1].
 
-    The fourth channel is `seen` (T, B, S, S) bool, which pixels there are, of which some views
-    lose more: their image ends earlier. What is random comes from `rng` alone.
+    Some objects, of voxels (B, R, R, R), stand on a table. The fourth channel is `seen`
+    (T, B, S, S) bool, which pixels there are, of which some views lose more: their image ends
+    earlier. What is random comes from `rng` alone.
     """
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
@@ -37,6 +41,11 @@ def pictured(images: Tensor, seen: Tensor, views: ViewSet, rng: np.random.Genera
         if len(rows):
             behind[:, rows] = draw(views, length, len(rows), rng).expand(
                 length, -1, -1, side, side)
+    on_table = torch.from_numpy(np.flatnonzero(rng.random(size) < _TABLE_SHARE))
+    if len(on_table):
+        table = tables(Cameras(cameras.poses[:, on_table], cameras.intrinsics[:, on_table]),
+                       voxels[on_table], side, rng)
+        behind[:, on_table] = behind[:, on_table] * (1 - table[:, :, 3:]) + table[:, :, :3]
     # Shadows are deepened or lifted on the object alone, so that black stays black
     gamma = _tensor(np.exp(rng.uniform(np.log(_DARKEST), np.log(_BRIGHTEST), (size, 1, 1, 1))))
     alpha = planes[:, :, 3:]

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.lifting import Lifting
-from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.training.appearance import misplaced, pictured
 from active_recon.training.batches import mirror_some
@@ -72,7 +71,8 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
         voxels[row] = turned_by_quarters(voxels[row], int(quarter))
     alpha = images[..., 3].float() / 255
     if varied:
-        return PosedBatch(pictured(images, seen, views, rng), misplaced(cameras, rng), alpha,
+        return PosedBatch(pictured(images, seen, cameras, voxels, views, rng),
+                          misplaced(cameras, rng), alpha,
                           voxels, objects)
     planes = images.permute(0, 1, 4, 2, 3).float() / 255
     return PosedBatch(with_seen(planes[:, :, :3] + 1 - planes[:, :, 3:], seen), cameras, alpha,
@@ -96,11 +96,9 @@ class LiftingLearner(nn.Module):
                 voxels: Tensor) -> dict[str, Tensor]:
         """Take in images (T, B, 4, S, S) of cameras (T, B, ...); compare with voxels and alpha."""
         maps = self.network.maps(images.flatten(0, 1))
-        state = self.network.initial_state(len(voxels))
-        each = [part.reshape(*images.shape[:2], *part.shape[1:]) for part in maps]
-        for number in range(len(images)):
-            state = self.network.look_up(Maps(*(part[number] for part in each)),
-                                         cameras.rows(number), state)
+        state = self.network.look_up(
+            maps, Cameras(cameras.poses.flatten(0, 1), cameras.intrinsics.flatten(0, 1)),
+            self.network.initial_state(len(voxels)))
         logits, rough = self.network.logits(state)
         with torch.autocast(logits.device.type, enabled=False):
             volume = volume_loss(logits.float(), voxels, self._kind)

@@ -16,6 +16,7 @@ from active_recon.models.registry import network_config, network_entry
 from active_recon.models.weights import Bundle
 from active_recon.policies import learned_policy
 from active_recon.runtimes.torch import TorchPolicyRuntime
+from active_recon.training.calibration import calibrate
 from active_recon.training.joint import train_jointly
 from active_recon.training.lifting import train_lifting
 from active_recon.training.loop import Measured, Run, TrainingConfig
@@ -109,6 +110,7 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
             train_lifting(network, training, plan.reconstruction, plan.loss,
                           run('reconstruction', report),
                           lambda model: reconstruction_iou(model, validation))
+        calibrate(network, validation)
     elif not frozen:
         with reporting('reconstruction', plan.reconstruction.steps) as report:
             train_reconstruction(network, training, plan.reconstruction, plan.loss,

@@ -3,6 +3,7 @@
 import signal
 
 from active_recon.reconstructor import Reconstructor
+from active_recon.weights_files import find_weights, PAPER_MODEL
 from conftest import LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.stamps import nanoseconds_from_stamp
@@ -20,8 +21,12 @@ TOLD_S, RECOVERED_S = 3.0, 6.0
 
 
 def computed(shown, degrees):
-    """Return the occupancy after each of those views, as a message without a stamp."""
-    reconstructor = Reconstructor.load()
+    """
+    Return the occupancy after each of those views, as a message without a stamp.
+
+    By the paper's network, which sees images alone: bits do not hang on those of the poses.
+    """
+    reconstructor = Reconstructor.load(find_weights(PAPER_MODEL))
     grids = [reconstructor.add_view(shown.images[at // 15], shown.cameras[at // 15]).grid
              for at in degrees]
     return [voxel_grid_to_msg(grid, reconstructor.threshold, Header()) for grid in grids]

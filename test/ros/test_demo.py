@@ -141,7 +141,8 @@ def test_demo_leaves_a_bag_a_mesh_and_a_picture_within_a_minute(finished):
 
 def test_demo_tells_of_each_view_what_the_bag_holds(finished, messages):
     told = rows(finished[1])
-    truth = voxelise(load_mesh(find_object('chair'))).occupied(0.5)
+    resolution = load_runtime().spec.resolution
+    truth = voxelise(load_mesh(find_object('chair')), resolution).occupied(0.5)
     assert [row[0] for row in told] == list(range(1, VIEWS + 1))
     for row, view, occupancy in zip(told, messages['/view'], messages['/occupancy'], strict=True):
         position = view.pose.position
@@ -181,8 +182,8 @@ def test_the_bag_replays_to_the_same_bits_on_the_machine_that_made_it(finished):
 def test_the_bag_says_what_made_it(finished):
     summary = open_bag(finished[0]).summary()
     assert summary.provenance == {
-        'version': __version__, 'object': 'chair.glb', 'policy': 'attention', 'seed': '0',
-        'needs_front': 'true', **load_runtime(threads=1).provenance}
+        'version': __version__, 'object': 'chair.glb', 'policy': 'uniform', 'seed': '0',
+        'needs_front': 'false', **load_runtime(threads=1).provenance}
     assert {name: parameters['use_sim_time']
             for name, parameters in summary.parameters.items()} == dict.fromkeys(
         ('recorder', 'turntable_camera', 'reconstructor', 'view_planner'), False)

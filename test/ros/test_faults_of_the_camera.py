@@ -11,6 +11,7 @@ import time
 
 from active_recon.faults import FAULTS
 from active_recon.shown_object import rendered_object
+from active_recon.weights_files import PAPER_MODEL
 from hand_listed_loop import computed, DEGREES, Loop, RECOVERED_S
 import pytest
 import torch
@@ -72,6 +73,7 @@ def start(start_shared_node, mesh, tmp_path_factory):
         'turntable_camera': partial(start_shared_node, 'turntable_camera', mesh=mesh, rate=RATE,
                                     time_scale=50.0),
         'reconstructor': partial(start_shared_node, 'reconstructor', take_views='at_goal',
+                                 weights=PAPER_MODEL,
                                  output_dir=tmp_path_factory.mktemp('meshes')),
         'view_planner': partial(start_shared_node, 'view_planner', policy='uniform',
                                 max_views=len(DEGREES), entropy_tolerance=0.0, start_azimuth=0.0)}

@@ -93,7 +93,8 @@ def test_a_node_that_is_asked_to_stop_ends_cleanly_in_every_state(
 def test_weights_that_are_missing_leave_a_node_unconfigured_and_say_why(
         start_node, bench, tmp_path, name):
     path = tmp_path / 'late.safetensors'
-    node = start_node(name, ready=False, autostart=False, weights=path)
+    policy = {'policy': 'attention'} if name == 'view_planner' else {}
+    node = start_node(name, ready=False, autostart=False, weights=path, **policy)
     supervisor = Supervisor(bench, name)
     assert not supervisor.set('configure')
     assert supervisor.state() == 'unconfigured'

@@ -5,6 +5,7 @@ import signal
 
 from active_recon.cameras import azimuth_difference, orbit_camera
 from active_recon.runtimes import load_policy_runtime
+from active_recon.weights_files import find_weights, PAPER_MODEL
 from conftest import FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_to_msg
@@ -20,11 +21,13 @@ pytestmark = pytest.mark.ros
 
 @pytest.fixture(scope='module')
 def latent():
-    return np.zeros(load_policy_runtime().facts['latent_shape'], np.float32)
+    policy = load_policy_runtime(find_weights(PAPER_MODEL))
+    return np.zeros(policy.facts['latent_shape'], np.float32)
 
 
 def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent):
-    planner = start_node('view_planner', max_views=2, entropy_tolerance=0.0, start_azimuth=2.0)
+    planner = start_node('view_planner', policy='attention', weights=PAPER_MODEL, max_views=2,
+                         entropy_tolerance=0.0, start_azimuth=2.0)
     fake = FakeReconstructor(bench)
     scores = bench.hear(PointCloud2, 'azimuth_scores', LATCHED)
     begin = bench.now()

@@ -3,6 +3,7 @@
 import math
 
 from active_recon.cameras import Camera
+from active_recon.weights_files import PAPER_MODEL
 from conftest import FakeCamera
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
@@ -15,7 +16,7 @@ MS = 1_000_000
 
 @pytest.fixture(scope='module')
 def reconstructor(start_shared_node):
-    return start_shared_node('reconstructor', max_pose_gap=0.1)
+    return start_shared_node('reconstructor', max_pose_gap=0.1, weights=PAPER_MODEL)
 
 
 @pytest.fixture(scope='module')

@@ -13,7 +13,7 @@ from active_recon.evaluation.posed.scene import Scene
 from active_recon.evaluation.posed.scoring import iou_scores, pooled, Scores, Target
 from active_recon.evaluation.posed.walking import some_objects, walk
 from active_recon.evaluation.rollouts import batches, Observer
-from active_recon.models.lifted import cell_centers, projected, projection
+from active_recon.models.lifted import projected, projection
 from active_recon.models.network import Cameras
 from active_recon.voxels import turned
 import numpy as np
@@ -144,7 +144,7 @@ def cut_views(views: ViewSet, chosen: NDArray[np.int64], share: float, seed: int
     across = torch.arange(size) + 0.5
     for row, view in enumerate(chosen.tolist()):
         one = Cameras(views.poses[row, view][None], views.intrinsics[row, view][None])
-        where, _ = projected(projection(one, size), cell_centers(16))
+        where, _ = projected(projection(one, size), 16)
         axis, sign = int(rng.integers(2)), 1 - 2 * int(rng.integers(2))
         end = sign * float(torch.quantile(sign * where[0, :, axis], 1 - share))
         kept = sign * (across / size * 2 - 1) <= sign * end

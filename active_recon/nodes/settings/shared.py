@@ -19,7 +19,8 @@ class ManagedSettings:
 class NetworkSettings:
     """Of a node that runs a network."""
 
-    weights: str = parameter('', 'a weights file; empty for those that ship')
+    weights: str = parameter(
+        '', 'a weights file, or a model whose weights ship; empty for those of the default')
     threads: int = parameter(1, 'CPU threads of the network', low=1, high=256)
 
 

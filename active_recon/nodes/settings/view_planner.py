@@ -12,7 +12,7 @@ from active_recon.nodes.settings.shared import (
     ManagedSettings,
     NetworkSettings,
 )
-from active_recon.policies import POLICIES
+from active_recon.policies import DEFAULT_POLICY, POLICIES
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,9 @@ class ViewPlannerSettings(FrontSettings, CubeSettings, NetworkSettings, ManagedS
     """What the view planner is told."""
 
     policy: str = parameter(
-        'attention', 'how the next view is chosen', choices=tuple(POLICIES), changeable=True)
+        DEFAULT_POLICY, 'how the next view is chosen; attention is learned, and takes weights '
+        'that bring it, such as those of 2d3d-attention', choices=tuple(POLICIES),
+        changeable=True)
     seed: int = parameter(0, 'of the policy random', low=0, high=2**32 - 1, changeable=True)
     max_views: int = parameter(
         5, 'views after which an episode is done', low=1, high=1000, changeable=True)

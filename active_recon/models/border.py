@@ -1,0 +1,57 @@
+"""What an image's border tells of the background: its colour, and what is unlike it."""
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+_NEARLY, _CLEARLY = 0.015, 0.045  # distances of a colour from the background's, in [0, 1]
+_HALVINGS = 8  # of the range of a colour: to one grey level of 256
+
+
+def foreground(images: Tensor) -> Tensor:
+    """
+    Return how far images (B, 3 or 4, S, S) are from their borders' colour, (B, 1, S, S).
+
+    0 is background, 1 is not. A fourth channel tells what was seen; where nothing was, it is 1.
+    """
+    return share_apart(border_distance(images), seen_pixels(images))
+
+
+def share_apart(distance: Tensor, seen: Tensor) -> Tensor:
+    """Return distances of colour as shares of foreground; 1 where nothing was seen."""
+    share = ((distance - _NEARLY) / (_CLEARLY - _NEARLY)).clamp(0, 1)
+    return torch.where(seen > 0.5, share, 1.0)
+
+
+def seen_pixels(images: Tensor) -> Tensor:
+    """Return the fourth channel of images (B, 3 or 4, S, S), or 1 where there is none."""
+    return images[:, 3:] if images.shape[1] == 4 else torch.ones_like(images[:, :1])
+
+
+def border_distance(images: Tensor) -> Tensor:
+    """
+    Return the largest difference of a channel from the border's median, (B, 1, S, S) in [0, 1].
+
+    The border is two pixels wide, along the end of what was seen.
+    """
+    seen = seen_pixels(images) > 0.5
+    inner = -functional.max_pool2d(-seen.float(), 5, 1, 2)
+    padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
+    border = (seen & (padded < 0.5)).float().flatten(2)  # (B, 1, S * S)
+    behind = _median(images[:, :3].float().flatten(2), border)
+    return (images[:, :3] - behind[..., None]).abs().amax(dim=1, keepdim=True)
+
+
+def _median(values: Tensor, weights: Tensor) -> Tensor:
+    """
+    Return the medians of values (B, C, N) in [0, 1] of weight 1, (B, C, 1); 1 where none is.
+
+    By halving the range, since sorting is no part of the graphs that are exported.
+    """
+    half = weights.sum(dim=2, keepdim=True) / 2
+    high = torch.ones_like(values[:, :, :1])
+    for halving in range(1, _HALVINGS + 1):
+        lower = high - 0.5 ** halving
+        below = ((values <= lower) * weights).sum(dim=2, keepdim=True)
+        high = torch.where((below >= half) & (half > 0), lower, high)
+    return high
