@@ -4,7 +4,7 @@ from active_recon.bags.writer import BagWriter
 from active_recon.cli.main import app
 from active_recon.errors import DataError
 from foreign_recordings import images, joints
-from loop_bags import LoopRun, write_bag
+from loop_bags import BEGIN, LoopRun, write_bag
 import pytest
 from typer.testing import CliRunner
 
@@ -27,6 +27,13 @@ def test_a_run_of_the_loop_tells_its_views_and_its_end(bag):
     assert 'can be replayed, with the views that the loop took' in told
     assert '3 views at azimuths 0, 115, 229 degrees, done: max_views' in told
     assert 'not recorded' not in told
+
+
+def test_an_episode_that_ended_before_its_first_view_is_told(tmp_path):
+    begun = LoopRun().messages[:2]  # that it began, and that nothing is done
+    told = info(write_bag(tmp_path / 'run', begun + LoopRun('second', BEGIN + 10**10).messages))
+    assert '  episode 1: no view\n' in told
+    assert '  episode 2: 3 views at azimuths' in told
 
 
 def test_what_was_not_recorded_is_named(tmp_path):

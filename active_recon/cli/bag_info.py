@@ -61,8 +61,8 @@ def _tell_run(run: 'RecordedRun', replays: bool) -> None:
     for number, episode in enumerate(run.episodes, 1):
         azimuths = ', '.join(f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
         end = f', done: {episode.done}' if episode.done else ''
-        typer.echo(f'  episode {number}: {len(episode.views)} views at azimuths {azimuths} degrees'
-                   f'{end}')
+        taken = f'{len(episode.views)} views at azimuths {azimuths} degrees'
+        typer.echo(f'  episode {number}: {taken if azimuths else "no view"}{end}')
         if missing := missing_words(episode):
             typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')
     if run.assumed and (not replays or 'bag' in run.counters):
