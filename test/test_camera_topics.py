@@ -21,6 +21,16 @@ def of_encoding(encoding, pixels):
     return make
 
 
+def noted_bag(path, provenance, messages):
+    """Write a bag with a recorder's note of what the nodes heard; return its path."""
+    with BagWriter(path) as bag:
+        bag.add_provenance(provenance)
+        for time, topic, msg in sorted(messages, key=lambda entry: entry[0]):
+            bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
+            bag.write(topic, serialize_message(msg), time + DELAY, time)
+    return path
+
+
 MASK = np.zeros((24, 32), np.uint8)
 MASK[8:16, 8:16] = 255
 mask, depth = of_encoding('mono8', MASK), of_encoding('16UC1', np.ones((24, 32), np.uint16))
@@ -59,23 +69,14 @@ def test_a_grey_camera_is_a_camera(tmp_path):
 def test_the_name_that_the_nodes_heard_decides_between_two_cameras(tmp_path):
     messages = images('/left/image') + images('/right/image', png) + joints()
     messages += images('/right/rectified')
-    with BagWriter(tmp_path / 'run') as bag:
-        bag.add_provenance({'camera/image_raw': '/right/rectified'})
-        for time, topic, msg in sorted(messages, key=lambda entry: entry[0]):
-            bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
-            bag.write(topic, serialize_message(msg), time + DELAY, time)
-    (episode,) = read_run(tmp_path / 'run').episodes
+    heard = {'camera/image_raw': '/right/rectified'}
+    (episode,) = read_run(noted_bag(tmp_path / 'run', heard, messages)).episodes
     assert len(episode.views) == len(AZIMUTHS)
 
 
 def test_what_the_nodes_heard_as_a_mask_is_no_camera(tmp_path):
     messages = images('/seen') + images('/soft') + joints()
-    with BagWriter(tmp_path / 'run') as bag:
-        bag.add_provenance({'camera/mask': '/soft'})
-        for time, topic, msg in sorted(messages, key=lambda entry: entry[0]):
-            bag.add_topic(topic, type_name(msg), definition(type_name(msg)))
-            bag.write(topic, serialize_message(msg), time + DELAY, time)
-    (episode,) = read_run(tmp_path / 'run').episodes
+    (episode,) = read_run(noted_bag(tmp_path / 'run', {'camera/mask': '/soft'}, messages)).episodes
     assert len(episode.views) == len(AZIMUTHS)
 
 

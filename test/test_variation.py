@@ -65,7 +65,7 @@ def test_the_smallest_batches_can_be_varied(size, images, views):
 
 
 def test_every_kind_of_background_occurs_in_its_share():
-    kinds = draw_kinds(4000, rng())
+    kinds = draw_kinds(SHARES, 4000, rng())
     assert set(BACKGROUNDS) == set(SHARES) - {'white'}
     assert sum(SHARES.values()) == pytest.approx(1)
     for kind, share in SHARES.items():

@@ -119,7 +119,7 @@ def run_plan(plan: Plan, training: Sequence[Objects], validation: Objects, out: 
 
             def report(step: int, measured: Measured) -> None:
                 nonlocal done
-                advance(step - done, f'loss {measured["loss"]:.4f}')
+                advance(step - done, f'loss {measured["loss"]:.4f}' if measured else '')
                 done = step
 
             yield report

@@ -1,7 +1,5 @@
 """What cameras of any kind would see of rendered views: rooms, darkness, noise, cut images."""
 
-from collections.abc import Callable
-
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.network import Cameras
 from active_recon.training import variation
@@ -34,13 +32,8 @@ def pictured(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, vie
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
     planes[:, :, :3] = variation.recolored(planes, rng)
-    kinds = rng.choice(list(SHARES), size, p=list(SHARES.values()))
-    behind = torch.ones(length, size, 3, side, side)
-    for kind, draw in BACKGROUNDS.items():
-        rows = torch.from_numpy(np.flatnonzero(kinds == kind))
-        if len(rows):
-            behind[:, rows] = draw(views, length, len(rows), rng).expand(
-                length, -1, -1, side, side)
+    kinds = variation.draw_kinds(SHARES, size, rng)
+    behind = variation.drawn_backgrounds(kinds, BACKGROUNDS, views, length, rng)
     on_table = torch.from_numpy(np.flatnonzero(rng.random(size) < _TABLE_SHARE))
     if len(on_table):
         table = tables(Cameras(cameras.poses[:, on_table], cameras.intrinsics[:, on_table]),
@@ -114,6 +107,6 @@ def _tensor(numbers: NDArray[np.float64]) -> Tensor:
     return torch.from_numpy(numbers.astype(np.float32))
 
 
-BACKGROUNDS: dict[str, Callable[[ViewSet, int, int, np.random.Generator], Tensor]] = {
+BACKGROUNDS: dict[str, variation.Background] = {
     **variation.BACKGROUNDS, 'black': _black, 'dark': _dark}
 """See `variation.BACKGROUNDS`."""

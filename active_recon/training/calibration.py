@@ -8,7 +8,7 @@ from active_recon.models.lifting import Lifting
 import numpy as np
 import torch
 
-_MOST_OBJECTS, _BATCH = 64, 4
+MOST_OBJECTS, _BATCH = 64, 4
 _CELLS = 20_000  # of each object
 
 
@@ -29,7 +29,7 @@ def calibrate(network: Lifting, validation: ViewSet,
     counts = range(1, min(len(network.temperatures), shown) + 1)
     logits: dict[int, list[np.ndarray]] = {count: [] for count in counts}
     truth: list[np.ndarray] = []
-    chosen = np.sort(rng.permutation(len(validation))[:_MOST_OBJECTS])
+    chosen = np.sort(rng.permutation(len(validation))[:MOST_OBJECTS])
     for objects in torch.split(torch.from_numpy(chosen), _BATCH):
         order = torch.from_numpy(rng.random((len(objects), shown)).argsort(axis=1))
         voxels = validation.voxels[objects].numpy() > 0

@@ -16,7 +16,7 @@ from active_recon.models.registry import network_config, network_entry
 from active_recon.models.weights import Bundle
 from active_recon.policies import learned_policy
 from active_recon.runtimes.torch import TorchPolicyRuntime
-from active_recon.training.calibration import calibrate
+from active_recon.training.calibration import calibrate, MOST_OBJECTS
 from active_recon.training.joint import train_jointly
 from active_recon.training.lifting import train_lifting
 from active_recon.training.loop import Measured, Run, TrainingConfig
@@ -110,7 +110,8 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
             train_lifting(network, training, plan.reconstruction, plan.loss,
                           run('reconstruction', report),
                           lambda model: reconstruction_iou(model, validation))
-        calibrate(network, validation)
+        with reporting('temperatures', min(MOST_OBJECTS, len(validation))) as report:
+            calibrate(network, validation, lambda done: report(done, {}))
     elif not frozen:
         with reporting('reconstruction', plan.reconstruction.steps) as report:
             train_reconstruction(network, training, plan.reconstruction, plan.loss,

@@ -1,6 +1,6 @@
 """What a camera would vary and a renderer does not: background, light, colours and aim."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from active_recon.datasets.views import on_background, ViewSet
 import numpy as np
@@ -14,6 +14,9 @@ MOST_SCALE = 0.04
 _MOSAIC_MARGIN = 1 / 4  # of an image's side: no crop of a mosaic shows an object whole
 _SHAPES = 8  # painted over each other on a cluttered canvas
 _LUMA = torch.tensor([0.299, 0.587, 0.114])
+
+Background = Callable[[ViewSet, int, int, np.random.Generator], Tensor]
+"""Draws T views of n sequences' backgrounds; see `BACKGROUNDS`."""
 
 
 def vary(images: Tensor, intrinsics: Tensor, views: ViewSet,
@@ -29,7 +32,7 @@ def vary(images: Tensor, intrinsics: Tensor, views: ViewSet,
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
     planes[:, :, :3] = recolored(planes, rng)
-    kinds = draw_kinds(size, rng)
+    kinds = draw_kinds(SHARES, size, rng)
     away = torch.from_numpy(np.flatnonzero(kinds != 'white'))
     if len(away):
         shown = planes[:, away]
@@ -37,20 +40,29 @@ def vary(images: Tensor, intrinsics: Tensor, views: ViewSet,
         planes[:, away] = pictured.view_as(shown)
         intrinsics = intrinsics.clone()
         intrinsics[:, away] = motion.reshape(length, -1, 3, 3) @ intrinsics[:, away]
-    behind = torch.ones(length, size, 3, side, side)
-    for kind, draw in BACKGROUNDS.items():
-        rows = torch.from_numpy(np.flatnonzero(kinds == kind))
-        if len(rows):
-            behind[:, rows] = draw(views, length, len(rows), rng).expand(
-                length, -1, -1, side, side)
+    behind = drawn_backgrounds(kinds, BACKGROUNDS, views, length, rng)
     pictures = behind.mul_(1 - planes[:, :, 3:]).add_(planes[:, :, :3])
     pictures[:, away] *= light(len(away), side, rng)
     return pictures.clamp_(0, 1), intrinsics
 
 
-def draw_kinds(size: int, rng: np.random.Generator) -> NDArray[np.str_]:
+def draw_kinds(shares: Mapping[str, float], size: int,
+               rng: np.random.Generator) -> NDArray[np.str_]:
     """Return the background's kind of each of `size` sequences, (size,)."""
-    return rng.choice(list(SHARES), size, p=list(SHARES.values()))
+    return rng.choice(list(shares), size, p=list(shares.values()))
+
+
+def drawn_backgrounds(kinds: NDArray[np.str_], backgrounds: Mapping[str, Background],
+                      views: ViewSet, length: int, rng: np.random.Generator) -> Tensor:
+    """Return T = `length` views of a background of each of kinds (B,), (T, B, 3, S, S)."""
+    side = views.image_size
+    behind = torch.ones(length, len(kinds), 3, side, side)  # white, but for what is drawn
+    for kind, draw in backgrounds.items():
+        rows = torch.from_numpy(np.flatnonzero(kinds == kind))
+        if len(rows):
+            behind[:, rows] = draw(views, length, len(rows), rng).expand(
+                length, -1, -1, side, side)
+    return behind
 
 
 def moved(planes: Tensor, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
@@ -180,7 +192,7 @@ def _tensor(numbers: NDArray[np.float64]) -> Tensor:
     return torch.from_numpy(numbers.astype(np.float32))
 
 
-BACKGROUNDS: dict[str, Callable[[ViewSet, int, int, np.random.Generator], Tensor]] = {
+BACKGROUNDS: dict[str, Background] = {
     'plain': _plain, 'gradient': _gradient, 'noise': _noise, 'clutter': _clutter,
     'pieces': _pieces}
 """

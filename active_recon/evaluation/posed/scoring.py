@@ -83,7 +83,8 @@ def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: 
       thresholds of objects under those fitted to cells anywhere
     - those of `SurfaceScores`, where `surfaces` are asked for
     """
-    scores = _own_scores(expit(logits), truth, entrant, '')
+    whole = expit(logits)
+    scores = _own_scores(whole, truth, entrant, '')
     diagrams: dict[str, NDArray[np.float64]] = {}
     if entrant.grid_temperatures:
         cooled = logits / np.float32(entrant.grid_temperatures.get(count, 1.0))
@@ -97,12 +98,12 @@ def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: 
             occupancy = expit(near / np.float32(temperature))
             scores[f'{prefix}brier'] = brier(occupancy, full)
             diagrams[f'{prefix}calibration_error'] = reliability(occupancy, full)
-    scores |= iou_scores(expit(logits), truth, entrant.sides, entrant.thresholds)
+    scores |= iou_scores(whole, truth, entrant.sides, entrant.thresholds)
     threshold = entrant.thresholds[max(entrant.sides)]
     if len(logits) == truth.finest:
-        scores['thin_recall'] = recall(expit(logits) > threshold, truth.thin)
+        scores['thin_recall'] = recall(whole > threshold, truth.thin)
     if surfaces and truth.surface is not None:
-        scores |= asdict(surface_scores(voxel_surface(expit(logits), threshold), truth.surface))
+        scores |= asdict(surface_scores(voxel_surface(whole, threshold), truth.surface))
     return scores, diagrams
 
 
