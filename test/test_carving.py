@@ -6,7 +6,7 @@ from active_recon.cameras import Intrinsics, orbit_camera
 from active_recon.canonical import framing_camera
 from active_recon.config import LossConfig
 from active_recon.errors import ConfigError
-from active_recon.models.border import foreground
+from active_recon.models.border import border_distance, border_evenness, foreground
 from active_recon.models.carving import Carving, CarvingConfig
 from active_recon.models.network import Cameras
 from active_recon.models.registry import network_entry
@@ -80,6 +80,15 @@ def test_the_background_is_what_the_border_shows():
     share = foreground(image)
     assert share[..., 40:80, 50:90].eq(1).all()
     assert share.sum() == 40 * 40
+
+
+def test_a_border_tells_of_the_background_where_it_is_of_one_colour():
+    even = torch.full((1, 3, 128, 128), 0.3)
+    even[..., 100:, 50:90] = 0.6  # the object meets the border
+    scattered = torch.rand(1, 3, 128, 128, generator=torch.Generator().manual_seed(0))
+    told = [border_evenness(border_distance(images), images).item()
+            for images in (even, scattered, torch.zeros(1, 4, 128, 128))]
+    assert told[0] == 1 and told[1] == 0 and told[2] == 0
 
 
 def test_a_dilated_silhouette_leaves_more(bar):

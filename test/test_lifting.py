@@ -140,6 +140,19 @@ def test_what_views_agree_on_are_their_mean_spread_and_extremes():
     assert spread == pytest.approx((4 + 0.01) ** 0.5)
 
 
+def test_what_views_agree_on_has_the_gradients_that_torch_derives():
+    generator = torch.Generator().manual_seed(1)
+    found = torch.randn(3, 2, 4, 8, generator=generator, dtype=torch.float64).requires_grad_()
+    inside = (torch.rand(3, 2, 1, 8, generator=generator) > 0.3).double()
+    nothing = {name: value.double() for name, value in no_views(2, 4, 2, None).items()}
+
+    def agreed(features):
+        known = gathered(nothing, features, inside)
+        return tuple(known[name] for name in ('sum', 'square', 'most', 'least'))
+
+    assert torch.autograd.gradcheck(agreed, (found,))
+
+
 def test_folded_cells_unfold_into_the_same_places():
     cells = torch.rand(2, 3, 8, 8, 8)
     assert_close(unfolded(folded(cells)), cells)

@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
+from active_recon.training import appearance, variation
 from active_recon.training.variation import (
     BACKGROUNDS,
     draw_kinds,
     MOST_SCALE,
     MOST_SHIFT,
     moved,
-    SHARES,
     vary,
 )
 import numpy as np
@@ -64,11 +64,12 @@ def test_the_smallest_batches_can_be_varied(size, images, views):
         assert pictures.shape == (1, size, 3, 64, 64)
 
 
-def test_every_kind_of_background_occurs_in_its_share():
-    kinds = draw_kinds(SHARES, 4000, rng())
-    assert set(BACKGROUNDS) == set(SHARES) - {'white'}
-    assert sum(SHARES.values()) == pytest.approx(1)
-    for kind, share in SHARES.items():
+@pytest.mark.parametrize('module', [variation, appearance])
+def test_every_kind_of_background_occurs_in_its_share(module):
+    kinds = draw_kinds(module.SHARES, 4000, rng())
+    assert set(module.BACKGROUNDS) == set(module.SHARES) - {'white'}
+    assert sum(module.SHARES.values()) == pytest.approx(1)
+    for kind, share in module.SHARES.items():
         assert (kinds == kind).mean() == pytest.approx(share, abs=0.03)
 
 
@@ -128,9 +129,9 @@ def test_objects_are_moved_each_in_its_own_way_and_by_up_to_two_pixels():
     assert len(centers.round(decimals=3).unique(dim=1)[0]) > 390
 
 
-@pytest.mark.parametrize('kind', BACKGROUNDS)
+@pytest.mark.parametrize('kind', sorted(set(appearance.BACKGROUNDS) - {'black'}))
 def test_a_background_fills_every_view_and_no_two_sequences_are_alike(kind, views):
-    drawn = BACKGROUNDS[kind](views, LENGTH, 8, rng()).expand(LENGTH, 8, 3, 64, 64)
+    drawn = appearance.BACKGROUNDS[kind](views, LENGTH, 8, rng()).expand(LENGTH, 8, 3, 64, 64)
     assert 0 <= drawn.min() < drawn.max() <= 1
     for other in range(1, 8):
         assert (drawn[:, 0] != drawn[:, other]).any()

@@ -5,6 +5,7 @@ from torch import Tensor
 from torch.nn import functional
 
 _NEARLY, _CLEARLY = 0.015, 0.045  # distances of a colour from the background's, in [0, 1]
+_SCATTERED, _EVEN = 0.35, 0.7  # shares of the border that is nearly of one colour
 _HALVINGS = 8  # of the range of a colour: to one grey level of 256
 
 
@@ -34,12 +35,28 @@ def border_distance(images: Tensor) -> Tensor:
 
     The border is two pixels wide, along the end of what was seen.
     """
+    behind = _median(images[:, :3].float().flatten(2), _border(images).flatten(2))
+    return (images[:, :3] - behind[..., None]).abs().amax(dim=1, keepdim=True)
+
+
+def border_evenness(distance: Tensor, images: Tensor) -> Tensor:
+    """
+    Return how much a border's colour tells of the background, (B, 1, 1, 1) in [0, 1].
+
+    1 where most of the border has the colour that `distance` is measured from; 0 in clutter.
+    """
+    border = _border(images)
+    count = border.sum(dim=(2, 3), keepdim=True)
+    alike = ((distance < _CLEARLY) * border).sum(dim=(2, 3), keepdim=True) / count.clamp(min=1)
+    return ((alike - _SCATTERED) / (_EVEN - _SCATTERED)).clamp(0, 1)
+
+
+def _border(images: Tensor) -> Tensor:
+    """Return 1 along the end of what images show, two pixels wide, else 0, (B, 1, S, S)."""
     seen = seen_pixels(images) > 0.5
     inner = -functional.max_pool2d(-seen.float(), 5, 1, 2)
     padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
-    border = (seen & (padded < 0.5)).float().flatten(2)  # (B, 1, S * S)
-    behind = _median(images[:, :3].float().flatten(2), border)
-    return (images[:, :3] - behind[..., None]).abs().amax(dim=1, keepdim=True)
+    return (seen & (padded < 0.5)).float()
 
 
 def _median(values: Tensor, weights: Tensor) -> Tensor:

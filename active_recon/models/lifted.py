@@ -1,10 +1,12 @@
 """Cells that look up what a view shows at their projection, and what several views agree on."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from active_recon.models.network import Cameras
 import torch
 from torch import nn, Tensor
+from torch.autograd.function import FunctionCtx
 from torch.nn import functional
 
 GEOMETRY = 5
@@ -122,14 +124,45 @@ def gathered(known: Mapping[str, Tensor], features: Tensor, weight: Tensor) -> d
 
     Their maximum is 0 at least and their minimum 0 at most: what no view saw.
     """
-    count, total, square, most, least = (
-        known[name] for name in ('count', 'sum', 'square', 'most', 'least'))
-    for found, inside in zip(features, weight, strict=True):
-        new = (found * inside).reshape(total.shape)
-        count, total, square = count + inside.reshape(count.shape), total + new, square + new * new
-        # The gradients of `where` take half the time of those of maximum and minimum
-        most, least = torch.where(new > most, new, most), torch.where(new < least, new, least)
-    return {'count': count, 'sum': total, 'square': square, 'most': most, 'least': least}
+    new = (_Agreement.apply if features.requires_grad else _agreement)(features, weight)
+    total, square, most, least = (part.reshape(known['sum'].shape) for part in new)
+    return {'count': known['count'] + weight.sum(dim=0).reshape(known['count'].shape),
+            'sum': known['sum'] + total, 'square': known['square'] + square,
+            'most': torch.where(most > known['most'], most, known['most']),
+            'least': torch.where(least < known['least'], least, known['least'])}
+
+
+def _agreement(features: Tensor, weight: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return sum, sum of squares, maximum and minimum of (T, B, C, N) over T views."""
+    new = features * weight
+    return new.sum(dim=0), (new * new).sum(dim=0), new.amax(dim=0), new.amin(dim=0)
+
+
+class _Agreement(torch.autograd.Function):
+    """`_agreement` whose gradients take half the time of those that torch derives."""
+
+    @staticmethod
+    def forward(ctx: FunctionCtx, features: Tensor,
+                weight: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return what `_agreement` returns."""
+        found = _agreement(features, weight)
+        ctx.save_for_backward(features, weight, *found[2:])
+        return found
+
+    @staticmethod
+    def backward(ctx: Any, total: Tensor, square: Tensor, most: Tensor,
+                 least: Tensor) -> tuple[Tensor, None]:
+        """Return the gradient of the features; an extreme's goes to all views that reach it."""
+        features, weight, highest, lowest = ctx.saved_tensors
+        square = 2 * square
+        gradient = torch.empty_like(features)
+        for out, found, inside in zip(gradient, features, weight, strict=True):
+            new = found * inside
+            torch.addcmul(total, square, new, out=out)
+            out.addcmul_(most, (new == highest).to(out.dtype))
+            out.addcmul_(least, (new == lowest).to(out.dtype))
+            out.mul_(inside)
+        return gradient, None
 
 
 def statistics(known: Mapping[str, Tensor]) -> Tensor:

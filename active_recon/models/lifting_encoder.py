@@ -3,7 +3,12 @@
 import math
 from typing import NamedTuple, Self
 
-from active_recon.models.border import border_distance, seen_pixels, share_apart
+from active_recon.models.border import (
+    border_distance,
+    border_evenness,
+    seen_pixels,
+    share_apart,
+)
 import torch
 from torch import nn, Tensor
 from torch.nn import functional
@@ -110,7 +115,8 @@ class PyramidEncoder(nn.Module):
         """Return the maps of images (B, 3, 128, 128), or (B, 4, ...) with what was seen."""
         seen = seen_pixels(images)
         apart = border_distance(images)
-        plain = share_apart(apart, seen)
+        # One half where the border has no one colour and tells nothing
+        plain = 0.5 + border_evenness(apart, images) * (share_apart(apart, seen) - 0.5)
         shown = torch.cat([(2 * images[:, :3] - 1) * seen, seen, apart * seen, plain], dim=1)
         shown = shown.contiguous(memory_format=torch.channels_last)
         at_64 = self.down_64(shown)

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-SHARES = {'white': 0.2, 'plain': 0.15, 'gradient': 0.1, 'noise': 0.1, 'clutter': 0.15,
-          'pieces': 0.1, 'black': 0.12, 'dark': 0.08}
+SHARES = {'white': 0.16, 'plain': 0.12, 'gradient': 0.08, 'noise': 0.1, 'clutter': 0.14,
+          'pieces': 0.12, 'tiles': 0.1, 'black': 0.11, 'dark': 0.07}
 """The share of the sequences that stand before each kind of background."""
 MOST_TURN, MOST_SHIFT = np.radians(1.0), 0.01
 """How far poses are off: radians, and shares of the distance."""
@@ -103,10 +103,25 @@ def _dark(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> 
         rng.uniform(0.02, 0.3, (count, 1, 1, 1)))
 
 
+def _tiles(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> Tensor:
+    """Return tiles of any size, turn and colour, (T, count, 3, S, S)."""
+    rows = torch.from_numpy(rng.integers(3, 25, count))
+    colors = torch.from_numpy(rng.random((length, count, 3, 24, 24), np.float32))
+    grey = colors.mean(dim=2, keepdim=True)
+    colors = torch.lerp(grey, colors, _tensor(rng.random((count, 1, 1, 1))))
+    angle = _tensor(rng.uniform(0, np.pi, (count, 1, 1)))
+    along = torch.arange(views.image_size) / views.image_size - 0.5
+    across, down = (along * part + along[:, None] * other for part, other in (
+        (angle.cos(), angle.sin()), (-angle.sin(), angle.cos())))  # (count, S, S)
+    column, row = ((part * rows[:, None, None]).floor().long() % 24 for part in (across, down))
+    return colors[:, torch.arange(count)[:, None, None], :, row, column].permute(
+        3, 0, 4, 1, 2)
+
+
 def _tensor(numbers: NDArray[np.float64]) -> Tensor:
     return torch.from_numpy(numbers.astype(np.float32))
 
 
 BACKGROUNDS: dict[str, variation.Background] = {
-    **variation.BACKGROUNDS, 'black': _black, 'dark': _dark}
+    **variation.BACKGROUNDS, 'black': _black, 'dark': _dark, 'tiles': _tiles}
 """See `variation.BACKGROUNDS`."""
