@@ -27,8 +27,8 @@ setup(
     python_requires='>=3.11',
     packages=find_packages(include=[NAME, f'{NAME}.*', 'msg_tools', 'msg_tools.*']),
     package_data={NAME: [
-        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*', 'nodes/*.xml',
-        'report/templates/*']},
+        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*',
+        'nodes/runtime/*.xml', 'report/templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -19,16 +19,17 @@ from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from active_recon.cameras import Camera, Intrinsics, orbit_camera
+    from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
     from active_recon.planner import Planner
     from active_recon.reconstructor import load, Reconstructor
-    from active_recon.voxels import VoxelGrid
+    from active_recon.volumes.voxels import VoxelGrid
 
 __version__ = '0.1.0'
 __all__ = ['Camera', 'Intrinsics', 'Planner', 'Reconstructor', 'VoxelGrid', 'load', 'orbit_camera']
-_MODULES = {'Camera': 'cameras', 'Intrinsics': 'cameras', 'orbit_camera': 'cameras',
-            'Planner': 'planner', 'Reconstructor': 'reconstructor', 'load': 'reconstructor',
-            'VoxelGrid': 'voxels'}
+_MODULES = {
+    'Camera': 'geometry.cameras', 'Intrinsics': 'geometry.cameras',
+    'orbit_camera': 'geometry.cameras', 'Planner': 'planner', 'Reconstructor': 'reconstructor',
+    'load': 'reconstructor', 'VoxelGrid': 'volumes.voxels'}
 
 
 def __getattr__(name: str) -> Any:

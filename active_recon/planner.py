@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from active_recon.cameras import (
+from active_recon.acquisition.motion import MotionLimits, worth
+from active_recon.errors import ConfigError, ViewError
+from active_recon.geometry.cameras import (
     azimuth_difference,
     AZIMUTHS,
     Camera,
@@ -16,8 +18,6 @@ from active_recon.cameras import (
     TURN,
     view_distance,
 )
-from active_recon.errors import ConfigError, ViewError
-from active_recon.motion import MotionLimits, worth
 from active_recon.policies import (
     Choice,
     DEFAULT_POLICY,
@@ -26,7 +26,7 @@ from active_recon.policies import (
     Policy,
     PolicyOptions,
 )
-from active_recon.voxels import turned, VoxelGrid
+from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from active_recon.cameras import Camera
-from active_recon.canonical import network_image, NetworkSpec
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.canonical import network_image, NetworkSpec
+from active_recon.models.weights_files import find_weights
 from active_recon.runtimes import load_runtime, Runtime
-from active_recon.voxels import turned, VoxelGrid
-from active_recon.weights_files import find_weights
+from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 

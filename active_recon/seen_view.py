@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 

@@ -6,9 +6,9 @@ import sys
 import tempfile
 import time
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.settings import recorded_settings
-from active_recon.bags.verification import verify
+from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.settings import recorded_settings
 from benchmarks.figures import Figure
 
 GOLDEN = Path(__file__).parents[1] / 'bags' / 'golden' / 'run'

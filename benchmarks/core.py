@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
-from active_recon.meshes import load_mesh
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
-from active_recon.rendering import composite, Renderer
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
 from benchmarks.figures import Figure, timed_ms
 import numpy as np
 

@@ -9,10 +9,10 @@ import sys
 from tempfile import TemporaryDirectory
 import time
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
-from active_recon.demo.processes import NodeProcesses, private_environment
-from active_recon.meshes import load_mesh
-from active_recon.rendering import composite, Renderer
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
+from active_recon.launching.processes import NodeProcesses, private_environment
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
 from benchmarks.core import OBJECTS
 from benchmarks.figures import Figure
 from benchmarks.memory import peak_mb
@@ -72,8 +72,8 @@ def reconstructor_process() -> Iterator[tuple[float, int]]:
 
 def _latencies_ms() -> list[float]:
     """Publish views one by one as a camera would; return how long each occupancy took."""
-    from active_recon.nodes.loop_watch import joined_domain
-    from active_recon.nodes.qos import LATCHED
+    from active_recon.launching.loop_watch import joined_domain
+    from active_recon.nodes.runtime.qos import LATCHED
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import intrinsics_to_msg, pose_to_msg
     from msg_tools.images import image_to_msg

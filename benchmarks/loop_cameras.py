@@ -6,9 +6,9 @@ import math
 import time
 from typing import Any
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
-from active_recon.meshes import load_mesh
-from active_recon.rendering import composite, Renderer
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
 from benchmarks.core import OBJECTS
 import numpy as np
 
@@ -106,8 +106,8 @@ def moving_camera() -> Iterator[Callable[[], float]]:
 @contextmanager
 def _joined() -> Iterator[tuple[Any, Any, Any, Any]]:
     """Yield what hears poses, what publishes an image from an azimuth, what spins, what asks."""
-    from active_recon.nodes.loop_watch import joined_domain, LoopWatch
-    from active_recon.nodes.qos import LATCHED
+    from active_recon.launching.loop_watch import joined_domain, LoopWatch
+    from active_recon.nodes.runtime.qos import LATCHED
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import camera_to_msgs
     from msg_tools.goals import view_goal_from_msg

@@ -16,11 +16,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 import time
 
-from active_recon.bags.metadata import yaml_mapping
+from active_recon.bags.storage.metadata import yaml_mapping
 from active_recon.datasets.making import make_dataset, shape_jobs
-from active_recon.demo.processes import NodeProcesses, private_environment
 from active_recon.errors import ActiveReconError
-from active_recon.nodes.run import one_line
+from active_recon.launching.processes import NodeProcesses, private_environment
+from active_recon.nodes.runtime.run import one_line
 from benchmarks.memory import Memory, MemoryUse
 from benchmarks.soak_watch import soak_watch, SoakWatch
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import time
 
-from active_recon.nodes.loop_watch import joined_domain, LoopWatch
+from active_recon.launching.loop_watch import joined_domain, LoopWatch
 from diagnostic_msgs.msg import DiagnosticArray
 from msg_tools.diagnostics import diagnostics_from_msg
 from msg_tools.episodes import done_from_msg, Episode, episode_from_msg

@@ -5,9 +5,9 @@ from contextlib import contextmanager
 import time
 from typing import Any
 
-from active_recon.cameras import AZIMUTHS, CANONICAL_INTRINSICS, orbit_camera
-from active_recon.meshes import load_mesh
-from active_recon.rendering import composite, Renderer
+from active_recon.geometry.cameras import AZIMUTHS, CANONICAL_INTRINSICS, orbit_camera
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
 from benchmarks.core import OBJECTS
 from benchmarks.figures import Figure
 from benchmarks.loop import reconstructor_process
@@ -38,8 +38,8 @@ def stream_figures() -> list[Figure]:
 @contextmanager
 def _camera() -> Iterator[Callable[[str, tuple[int, int], int], list[float]]]:
     """Yield what sends images at a rate and returns the seconds to each occupancy, 0: none."""
-    from active_recon.nodes.loop_watch import joined_domain
-    from active_recon.nodes.qos import LATCHED
+    from active_recon.launching.loop_watch import joined_domain
+    from active_recon.nodes.runtime.qos import LATCHED
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import camera_to_msgs
     from msg_tools.images import image_to_msg

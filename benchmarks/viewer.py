@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
-from active_recon.demo.processes import NodeProcesses, private_environment
+from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.viewer.address import free_port, is_served
 from benchmarks.figures import Figure
 from benchmarks.loop_cameras import GoalTimes, moving_camera, showing_camera

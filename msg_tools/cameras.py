@@ -5,9 +5,9 @@ A pose is that of the camera's optical frame in the object frame. The core count
 image's corner (the centre of the first pixel is 0.5), ROS from the first pixel's centre (0).
 """
 
-from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import MessageError, ViewError
-from active_recon.lenses import Distortion, MODELS
+from active_recon.geometry.cameras import Camera, Intrinsics, OBJECT_FRAME
+from active_recon.geometry.lenses import Distortion, MODELS
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-OBJECT_FRAME = 'object'
 _LARGEST = 1e9  # metres or pixels: what is computed with more may overflow
 
 

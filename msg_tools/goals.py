@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 import math
 
-from active_recon.cameras import Camera, wrap_azimuth
 from active_recon.errors import MessageError
+from active_recon.geometry.cameras import Camera, OBJECT_FRAME, wrap_azimuth
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import OBJECT_FRAME, pose_from_msg, pose_to_msg
+from msg_tools.cameras import pose_from_msg, pose_to_msg
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 import numpy as np
 from numpy.typing import NDArray

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from active_recon.cameras import Camera
-from active_recon.voxels import VoxelGrid
-from msg_tools.cameras import camera_to_msgs, OBJECT_FRAME, pose_to_msg
+from active_recon.geometry.cameras import Camera, OBJECT_FRAME
+from active_recon.volumes.voxels import VoxelGrid
+from msg_tools.cameras import camera_to_msgs, pose_to_msg
 from msg_tools.entropy import entropy_to_msg
 from msg_tools.goals import azimuth_goal_to_msg, score_table_to_msg, view_goal_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg

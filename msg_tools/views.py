@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import MessageError
+from active_recon.geometry.cameras import Camera, Intrinsics
 from msg_tools.camera_images import pixels_from_msg, size_from_msg
 import numpy as np
 from numpy.typing import NDArray

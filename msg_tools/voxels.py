@@ -1,7 +1,7 @@
 """Voxel grids to and from PointCloud2: one point for each cell above a threshold."""
 
 from active_recon.errors import DataError, MessageError
-from active_recon.voxels import grid_from_points, RESOLUTION, VoxelGrid
+from active_recon.volumes.voxels import grid_from_points, RESOLUTION, VoxelGrid
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header

@@ -14,9 +14,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 import time
 
-from active_recon.cameras import orbit_camera
-from active_recon.demo.processes import NodeProcesses, private_environment
-from active_recon.nodes.graph_access import (
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.launching.loop_watch import joined_domain
+from active_recon.launching.processes import NodeProcesses, private_environment
+from active_recon.nodes.runtime.graph_access import (
     Access,
     differences,
     joined,
@@ -24,8 +25,7 @@ from active_recon.nodes.graph_access import (
     read_policies,
     write_policies,
 )
-from active_recon.nodes.loop_watch import joined_domain
-from active_recon.nodes.settings.recorder import TOPICS
+from active_recon.parameters.recorder import TOPICS
 from msg_tools.cameras import pose_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from rclpy.node import Node, NodeNameNonExistentError

@@ -8,7 +8,7 @@ from pathlib import Path
 import random
 import sys
 
-from active_recon.bags.writer import BagWriter
+from active_recon.bags.storage.writer import BagWriter
 
 TYPE, DEFINITION = 'std_msgs/msg/String', 'string data\n'
 

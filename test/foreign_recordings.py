@@ -2,7 +2,7 @@
 
 from io import BytesIO
 
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from loop_bags import BEGIN, header, PERIOD
 from msg_tools.cameras import camera_to_msgs
 from msg_tools.images import image_to_msg

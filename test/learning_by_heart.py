@@ -1,7 +1,7 @@
 """What a network makes of one object that it sees again and again."""
 
 from active_recon.training.losses import volume_loss
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import torch
 
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from active_recon.bags.writer import BagWriter
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
-from active_recon.voxels import PUBLISHED_FLOOR, VoxelGrid
+from active_recon.bags.storage.writer import BagWriter
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.volumes.voxels import PUBLISHED_FLOOR, VoxelGrid
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
 from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
 from msg_tools.entropy import entropy_to_msg

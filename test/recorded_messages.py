@@ -6,8 +6,8 @@ import resource
 import subprocess
 import sys
 
-from active_recon.bags.metadata import QosProfile
-from active_recon.bags.writer import BagWriter
+from active_recon.bags.storage.metadata import QosProfile
+from active_recon.bags.storage.writer import BagWriter
 import numpy as np
 from pymcap_cli.doctor import examine_mcap, Severity
 from rosbags.typesys import get_typestore, Stores

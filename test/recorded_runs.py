@@ -3,14 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
-from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
-from active_recon.cameras import Camera, orbit_camera
+from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
+from active_recon.geometry.cameras import Camera, orbit_camera
 from active_recon.planner import Decision, Planner
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import RandomPolicy
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes.torch import TorchPolicyRuntime, TorchRuntime
-from active_recon.voxels import grid_from_points
+from active_recon.volumes.voxels import grid_from_points
 import numpy as np
 
 THRESHOLD, FLOOR = 0.15, 0.02

@@ -4,8 +4,8 @@ from functools import cache
 import math
 
 from active_recon.calibration.board import Board
-from active_recon.cameras import Camera, Intrinsics, orbit_camera
-from active_recon.lenses import Distortion
+from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.geometry.lenses import Distortion
 import cv2
 import numpy as np
 

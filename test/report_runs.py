@@ -3,20 +3,20 @@
 from dataclasses import replace
 from pathlib import Path
 
-from active_recon.bags.run import (
+from active_recon.bags.runs.run import (
     RecordedEpisode,
     RecordedGoal,
     RecordedRun,
     RecordedView,
     TopicSummary,
 )
-from active_recon.cameras import orbit_camera
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.objects import find_object
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
-from active_recon.shown_object import rendered_object
-from active_recon.voxels import VoxelGrid
-from active_recon.weights_files import find_weights, PAPER_MODEL
+from active_recon.simulation.shown_object import rendered_object
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 
 BEGIN = 1_790_000_000_000_000_000

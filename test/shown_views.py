@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.datasets.views import ViewSet
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from torch import Tensor
 

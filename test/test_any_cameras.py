@@ -1,16 +1,16 @@
 """Views of any cameras: drawn, written, read and framed as the robot frames them."""
 
-from active_recon.cameras import Camera, Intrinsics, orbit_camera
-from active_recon.canonical import framed_image, framed_layers, framing_camera
 from active_recon.datasets.drawn_cameras import draw_camera, filling_distance, TURNTABLE, Viewing
 from active_recon.datasets.layout import list_objects, ObjectFolder, write_object
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.datasets.views import read_views
 from active_recon.errors import ConfigError, DataError, ViewError
-from active_recon.framing import share_outside
-from active_recon.rendering import composite, Renderer
+from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.geometry.canonical import framed_image, framed_layers, framing_camera
+from active_recon.geometry.framing import share_outside
 from active_recon.shapes import make_shape
-from active_recon.voxels import binvox_side, VoxelGrid
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import binvox_side, VoxelGrid
 import cv2
 import numpy as np
 import pytest

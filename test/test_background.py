@@ -1,12 +1,12 @@
 """The object is told from the room by a mask, by an image of the empty scene, or by a colour."""
 
-from active_recon.background import Background, off_color, off_reference, on_white
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
-from active_recon.canonical import canonical_image
+from active_recon.acquisition.background import Background, off_color, off_reference, on_white
 from active_recon.errors import ConfigError, ViewError
-from active_recon.rendering import composite, Renderer
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.geometry.canonical import canonical_image
 from active_recon.shapes import make_shape
-from active_recon.voxels import iou
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
 import pytest

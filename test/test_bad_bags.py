@@ -3,8 +3,8 @@
 import struct
 import tracemalloc
 
-from active_recon.bags import packing
-from active_recon.bags.reading import read_run
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.storage import compression as packing
 from active_recon.cli.main import main
 from active_recon.errors import DataError
 from foreign_recordings import images, joints

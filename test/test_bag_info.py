@@ -1,6 +1,6 @@
 """`active-recon bag info`: what is in a bag, whether it can be replayed, what is missing."""
 
-from active_recon.bags.writer import BagWriter
+from active_recon.bags.storage.writer import BagWriter
 from active_recon.cli.main import app
 from active_recon.errors import DataError
 from foreign_recordings import images, joints

@@ -1,6 +1,6 @@
 """However a bag came to its end, readers that we did not write read all that it holds."""
 
-from active_recon.bags.repair import repair_bag
+from active_recon.bags.storage.repair import repair_bag
 from active_recon.errors import RecordingError
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory

@@ -1,9 +1,9 @@
 """Bags: what is written is what readers that we did not write read."""
 
-from active_recon.bags import writer
-from active_recon.bags.files import mcap_files
-from active_recon.bags.storage import open_bag
-from active_recon.bags.writer import BagWriter
+from active_recon.bags.storage import writer
+from active_recon.bags.storage.files import mcap_files
+from active_recon.bags.storage.opening import open_bag
+from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import RecordingError
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory

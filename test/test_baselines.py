@@ -9,7 +9,7 @@ from active_recon.evaluation.baselines import (
     thumbnails,
 )
 from active_recon.evaluation.metrics import episodes
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 import torch
 

@@ -2,12 +2,12 @@
 
 import dataclasses
 
-from active_recon.cameras import azimuth_difference
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.making import Job, make_dataset
 from active_recon.datasets.views import read_views
+from active_recon.geometry.cameras import azimuth_difference
 from active_recon.training.batches import draw_batch
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 import torch

@@ -8,9 +8,9 @@ from active_recon.calibration.board import detect_all, Detection
 from active_recon.calibration.fit import overall_error, rigid
 from active_recon.calibration.lens import project, write_lens
 from active_recon.calibration.placement import Placement
-from active_recon.cameras import orbit_camera
 from active_recon.cli.main import app
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import orbit_camera
 import cv2
 import numpy as np
 import pytest

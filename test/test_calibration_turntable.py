@@ -9,10 +9,10 @@ from active_recon.calibration.lens import estimate_lens, project, read_lens, wri
 from active_recon.calibration.placement import Placement
 from active_recon.calibration.remarks import of_angles
 from active_recon.calibration.turntable import fit_turntable
-from active_recon.cameras import azimuth_difference, Camera
 from active_recon.errors import ConfigError, DataError
-from active_recon.lenses import Distortion
-from active_recon.turntable_pose import FixedCamera
+from active_recon.geometry.cameras import azimuth_difference, Camera
+from active_recon.geometry.lenses import Distortion
+from active_recon.geometry.turntable_pose import FixedCamera
 import cv2
 import numpy as np
 import pytest

@@ -1,8 +1,8 @@
 """Which of a bag's topics are the camera's: by option, by the recorder's note, by name or type."""
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.topics import Topics
-from active_recon.bags.writer import BagWriter
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.topics import Topics
+from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import DataError
 from foreign_recordings import AZIMUTHS, IMAGES, images, joints, png, TIMES
 from loop_bags import DELAY, header, LoopRun, type_name, write_bag

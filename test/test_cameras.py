@@ -2,7 +2,8 @@
 
 import math
 
-from active_recon.cameras import (
+from active_recon.errors import ViewError
+from active_recon.geometry.cameras import (
     azimuth_difference,
     AZIMUTHS,
     Camera,
@@ -13,8 +14,7 @@ from active_recon.cameras import (
     orbit_camera,
     wrap_azimuth,
 )
-from active_recon.errors import ViewError
-from active_recon.lenses import Distortion
+from active_recon.geometry.lenses import Distortion
 import numpy as np
 import pytest
 

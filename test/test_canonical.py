@@ -3,20 +3,25 @@
 from dataclasses import replace
 import math
 
-from active_recon.cameras import (
+from active_recon.errors import ViewError
+from active_recon.geometry.cameras import (
     Camera,
     CANONICAL_DISTANCE,
     CANONICAL_INTRINSICS,
     Intrinsics,
     orbit_camera,
 )
-from active_recon.canonical import canonical_image, framed_image, network_image, NetworkSpec
-from active_recon.errors import ViewError
-from active_recon.framing import cube_corners
-from active_recon.lenses import Distortion
-from active_recon.rendering import composite, Renderer
+from active_recon.geometry.canonical import (
+    canonical_image,
+    framed_image,
+    network_image,
+    NetworkSpec,
+)
+from active_recon.geometry.framing import cube_corners
+from active_recon.geometry.lenses import Distortion
 from active_recon.shapes import make_shape
-from active_recon.voxels import iou
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
 import pytest

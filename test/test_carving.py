@@ -2,17 +2,17 @@
 
 import math
 
-from active_recon.cameras import Intrinsics, orbit_camera
-from active_recon.canonical import framing_camera
 from active_recon.config import LossConfig
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import Intrinsics, orbit_camera
+from active_recon.geometry.canonical import framing_camera
 from active_recon.models.border import border_distance, border_evenness, foreground
 from active_recon.models.carving import Carving, CarvingConfig
 from active_recon.models.network import Cameras
 from active_recon.models.registry import network_entry
 from active_recon.models.weights import Bundle, load_weights, save_weights
-from active_recon.rendering import composite, Renderer
-from active_recon.voxelise import voxelise
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxelisation import voxelise
 import numpy as np
 import pytest
 import torch

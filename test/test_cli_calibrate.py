@@ -3,9 +3,9 @@
 import math
 
 from active_recon.calibration.lens import project, write_lens
-from active_recon.cameras import Camera
 from active_recon.cli.main import app
-from active_recon.turntable_pose import FixedCamera
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.turntable_pose import FixedCamera
 import cv2
 import numpy as np
 import pytest

@@ -5,7 +5,7 @@ from dataclasses import replace
 import gzip
 import json
 
-from active_recon.bags import reading
+from active_recon.bags.runs import reading
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.objects import find_object

@@ -5,7 +5,7 @@ import math
 
 from active_recon.cli.main import main
 from active_recon.models.weights import load_weights
-from active_recon.weights_files import weights_hash
+from active_recon.models.weights_files import weights_hash
 import pytest
 from safetensors.torch import load_file
 import torch

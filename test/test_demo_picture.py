@@ -2,15 +2,15 @@
 
 import math
 
-from active_recon.cameras import orbit_camera
 from active_recon.demo.drawing import PAPER
 from active_recon.demo.picture import COLUMNS, run_picture, TILE, turntable_plan
-from active_recon.rendering import composite, Renderer
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.seen_view import SeenView
 from active_recon.view_colors import view_color
-from active_recon.voxel_boxes import height_range, voxel_boxes
-from active_recon.voxelise import voxelise
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.boxes import height_range, voxel_boxes
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 import trimesh

@@ -3,9 +3,9 @@
 from collections import Counter
 from pathlib import Path
 
-from active_recon.cameras import azimuth_difference, orbit_camera
 from active_recon.errors import ConfigError
-from active_recon.faults import CameraFaults, FAULTS, read_faults, Shot
+from active_recon.geometry.cameras import azimuth_difference, orbit_camera
+from active_recon.simulation.faults import CameraFaults, FAULTS, read_faults, Shot
 import numpy as np
 import pytest
 

@@ -2,10 +2,10 @@
 
 import math
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.topics import Topics
-from active_recon.cameras import CANONICAL_INTRINSICS
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.topics import Topics
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS
 from foreign_recordings import AZIMUTHS, cameras, IMAGES, images, joints, png, TIMES
 from loop_bags import BEGIN, PERIOD, write_bag
 from msg_tools.images import image_to_msg

@@ -3,11 +3,11 @@
 from dataclasses import replace
 import math
 
-from active_recon.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera
 from active_recon.errors import ViewError
-from active_recon.framing import require_in_image, share_outside
-from active_recon.lenses import Distortion
-from active_recon.rendering import Renderer
+from active_recon.geometry.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera
+from active_recon.geometry.framing import require_in_image, share_outside
+from active_recon.geometry.lenses import Distortion
+from active_recon.volumes.rendering import Renderer
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

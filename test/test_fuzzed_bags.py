@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import resource
 import signal
 
-from active_recon.bags.reading import read_run
+from active_recon.bags.runs.reading import read_run
 from active_recon.errors import ActiveReconError
 from foreign_recordings import cameras, images, joints, png
 from loop_bags import DELAY, LoopRun, type_name, write_bag

@@ -8,15 +8,15 @@ import shutil
 import subprocess
 import sys
 
-from active_recon.bags.comparison import NOTHING_RECORDED, SAME_BITS, WITHIN_TOLERANCE
-from active_recon.bags.reading import read_run
-from active_recon.bags.replay import replay, replay_hash
-from active_recon.bags.run_writing import write_run
-from active_recon.bags.settings import recorded_settings
-from active_recon.bags.verification import verify
-from active_recon.cameras import view_distance
+from active_recon.bags.replay.comparison import NOTHING_RECORDED, SAME_BITS, WITHIN_TOLERANCE
+from active_recon.bags.replay.replay import replay, replay_hash
+from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.run_writing import write_run
+from active_recon.bags.runs.settings import recorded_settings
 from active_recon.cli.main import main
-from active_recon.weights_files import find_weights, PAPER_MODEL, weights_hash
+from active_recon.geometry.cameras import view_distance
+from active_recon.models.weights_files import find_weights, PAPER_MODEL, weights_hash
 import pytest
 
 ROOT = Path(__file__).parents[1]

@@ -1,6 +1,6 @@
 """Images that are missing: told where a camera streams, never where it only looks so."""
 
-from active_recon.bags.image_gaps import FEWEST, gaps_between, ImageGaps, unheard_images
+from active_recon.bags.runs.image_gaps import FEWEST, gaps_between, ImageGaps, unheard_images
 import numpy as np
 import pytest
 

@@ -7,8 +7,8 @@ import subprocess
 import sys
 import time
 
-from active_recon.bags.repair import repair_bag
-from active_recon.bags.salvage import Salvage
+from active_recon.bags.storage.repair import repair_bag
+from active_recon.bags.storage.salvage import Salvage
 import endless_recording
 from mcap.records import Message
 import pytest

@@ -3,7 +3,7 @@
 import math
 
 from active_recon.errors import ViewError
-from active_recon.lenses import Distortion
+from active_recon.geometry.lenses import Distortion
 import cv2
 import numpy as np
 import pytest

@@ -3,8 +3,8 @@
 from dataclasses import replace
 import math
 
-from active_recon.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.models.lifted import (
     cell_centers,
     gathered,

@@ -19,7 +19,7 @@ from active_recon.training.lifting import (
     turned_by_quarters,
 )
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 import torch

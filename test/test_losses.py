@@ -1,9 +1,9 @@
 """The losses of the reconstruction: nothing where there is nothing to learn."""
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.config import LossConfig
-from active_recon.silhouettes import frustum, project
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.training.losses import reconstruction_loss, silhouette_loss, volume_loss
+from active_recon.volumes.silhouettes import frustum, project
 import pytest
 import torch
 from torch.testing import assert_close

@@ -2,8 +2,8 @@
 
 from active_recon.datasets.making import make_dataset, make_object, mesh_jobs, shape_jobs, yawed
 from active_recon.errors import ConfigError, DataError
-from active_recon.rendering import Renderer
-from active_recon.voxelise import voxelise
+from active_recon.volumes.rendering import Renderer
+from active_recon.volumes.voxelisation import voxelise
 import numpy as np
 import pytest
 import trimesh

@@ -19,7 +19,7 @@ from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
-from active_recon.voxels import entropy, paper_entropy, turned
+from active_recon.volumes.voxels import entropy, paper_entropy, turned
 import numpy as np
 import pytest
 from shown_views import part_of

@@ -3,7 +3,7 @@
 import itertools
 
 from active_recon.errors import ConfigError, MeshError
-from active_recon.meshes import fit_to_grid, load_mesh, upright
+from active_recon.volumes.meshes import fit_to_grid, load_mesh, upright
 import numpy as np
 import pytest
 import trimesh

@@ -1,6 +1,5 @@
 """Episodes, IoU view by view, and the latents of other objects."""
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, pose_azimuths
 from active_recon.errors import DataError
 from active_recon.evaluation.metrics import (
     episodes,
@@ -10,11 +9,12 @@ from active_recon.evaluation.metrics import (
 )
 from active_recon.evaluation.rollouts import nearest_views, roll_out
 from active_recon.evaluation.validation import best_threshold, policy_auc, reconstruction_iou
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, pose_azimuths
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Choice
 from active_recon.policies.geometric import BlindPolicy, FarthestPolicy, RandomPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 import torch

@@ -4,7 +4,6 @@ import math
 import os
 from pathlib import Path
 
-from active_recon.cameras import Intrinsics, orbit_camera
 from active_recon.datasets.middlebury import MARGIN, read_photographs
 from active_recon.errors import ActiveReconError, ConfigError, DataError
 from active_recon.evaluation.posed.entrants import Entrant
@@ -15,10 +14,11 @@ from active_recon.evaluation.posed.photographs import (
     photograph_figures,
 )
 from active_recon.evaluation.posed.summary import markdown
+from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.models.carving import Carving
-from active_recon.rendering import composite, Renderer
-from active_recon.voxelise import voxelise
-from active_recon.voxels import iou
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
 import pytest

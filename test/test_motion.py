@@ -3,9 +3,9 @@
 from dataclasses import replace
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
+from active_recon.acquisition.motion import MotionLimits, worth
 from active_recon.errors import ConfigError, ViewError
-from active_recon.motion import MotionLimits, worth
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.planner import Planner
 from active_recon.policies import Observation
 from active_recon.policies.attention import AttentionPolicy

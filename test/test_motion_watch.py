@@ -2,10 +2,10 @@
 
 import math
 
-from active_recon.cameras import orbit_camera
-from active_recon.motion_watch import MotionWatch
-from active_recon.stillness import STILL_ANGLE
-from active_recon.turntable import Turntable
+from active_recon.acquisition.motion_monitor import MotionWatch
+from active_recon.acquisition.stillness import STILL_ANGLE
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.simulation.turntable import Turntable
 import numpy as np
 import pytest
 

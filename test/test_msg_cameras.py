@@ -2,15 +2,15 @@
 
 import math
 
-from active_recon.cameras import (
+from active_recon.errors import MessageError
+from active_recon.geometry.cameras import (
     AZIMUTHS,
     Camera,
     CANONICAL_INTRINSICS,
     Intrinsics,
     orbit_camera,
 )
-from active_recon.errors import MessageError
-from active_recon.lenses import Distortion
+from active_recon.geometry.lenses import Distortion
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import (
     camera_from_msgs,

@@ -3,8 +3,8 @@
 from array import array
 from itertools import permutations
 
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.errors import MessageError
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from msg_tools.images import image_to_msg
 from msg_tools.joins import StampJoiner
 from msg_tools.views import interpolated, ViewJoiner

@@ -1,7 +1,7 @@
 """Voxels, episodes and stamps between ROS and the core."""
 
 from active_recon.errors import MessageError
-from active_recon.voxels import PUBLISHED_FLOOR, VoxelGrid
+from active_recon.volumes.voxels import PUBLISHED_FLOOR, VoxelGrid
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.episodes import (
     done_from_msg,

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.models.network import Cameras
 from active_recon.models.ogn import OgnConfig
 from active_recon.models.ptn import PtnConfig

@@ -4,9 +4,9 @@ import hashlib
 import re
 
 from active_recon.errors import MeshError
-from active_recon.meshes import load_mesh
 from active_recon.objects import find_object, shipped_objects
-from active_recon.voxelise import voxelise
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.voxelisation import voxelise
 import pytest
 
 CREDITS = (find_object('chair').parent / 'CREDITS.md').read_text()

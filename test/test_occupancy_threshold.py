@@ -1,7 +1,7 @@
 """The threshold of one object keeps the set of cells whose expected IoU is highest."""
 
-from active_recon.occupancy_threshold import best_threshold, expected_iou
-from active_recon.voxels import iou
+from active_recon.volumes.occupancy_threshold import best_threshold, expected_iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 

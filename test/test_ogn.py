@@ -5,7 +5,7 @@ from dataclasses import replace
 from active_recon.errors import ConfigError
 from active_recon.models.octree import cells_per_level, EMPTY, FILLED, MIXED, states_of
 from active_recon.models.ogn import octree_report, Ogn, OgnConfig, SIZES
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import pytest
 from shown_views import cameras_at
 import torch

@@ -8,7 +8,7 @@ from active_recon.evaluation.oracle import roll_out_oracle, rows_of, sequence_io
 from active_recon.evaluation.rollouts import nearest_views, roll_out
 from active_recon.policies.base import Choice
 from active_recon.policies.geometric import BlindPolicy, RandomPolicy
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 from shown_views import part_of

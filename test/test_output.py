@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from active_recon.errors import ConfigError
-from active_recon.output import output_path
+from active_recon.nodes.runtime.output import output_path
 import pytest
 
 

@@ -2,9 +2,10 @@
 
 import json
 
-from active_recon import weights_files as weights_module
 from active_recon.errors import WeightsError
+from active_recon.models import weights_files as weights_module
 from active_recon.models.weights import load_weights
+from active_recon.models.weights_files import FOLDER
 from active_recon.paper import systems
 from active_recon.paper.study import Study
 from active_recon.paper.systems import (
@@ -18,7 +19,6 @@ from active_recon.paper.systems import (
     TWO_STAGE,
     views_seen,
 )
-from active_recon.weights_files import FOLDER
 from paper_study import untrained
 import pytest
 

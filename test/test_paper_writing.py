@@ -5,13 +5,13 @@ import json
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.evaluation.statistics import Interval
+from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.document import write_document
 from active_recon.paper.results import Claim, Column, PUBLISHED, Result, Table
 from active_recon.paper.study import Objects, Study
 from active_recon.paper.writing import is_current, provenance, read_result, write_result
 from active_recon.reporting import silent
-from active_recon.weights_files import find_weights, PAPER_MODEL
 import numpy as np
 import pytest
 

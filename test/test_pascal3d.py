@@ -4,15 +4,15 @@ import json
 import math
 import re
 
-from active_recon.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.datasets.pascal3d import list_photographs
 from active_recon.datasets.photographs import read_photographs
 from active_recon.errors import DataError
-from active_recon.meshes import load_mesh
-from active_recon.rendering import composite, Renderer
-from active_recon.voxelise import voxelise
-from active_recon.voxels import iou
-from active_recon.weights_files import PAPER_MODEL
+from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
+from active_recon.models.weights_files import PAPER_MODEL
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import iou
 import numpy as np
 from PIL import Image
 import pytest

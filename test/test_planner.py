@@ -2,13 +2,13 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, Camera, orbit_camera
 from active_recon.errors import ConfigError, ViewError
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, Camera, orbit_camera
 from active_recon.planner import Planner
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 

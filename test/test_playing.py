@@ -1,7 +1,7 @@
 """What of a bag can be played."""
 
-from active_recon.bags.metadata import Topic
-from active_recon.bags.playing import played_topics
+from active_recon.bags.runs.playing import played_topics
+from active_recon.bags.storage.metadata import Topic
 from active_recon.errors import ConfigError, DataError
 from mcap.opcode import Opcode
 import pytest

@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.errors import ConfigError, ViewError, WeightsError
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.policies import load_policy, Observation, POLICIES, PolicyOptions
 from active_recon.policies.attention import AttentionPolicy, gaps_to_taken, kept_apart

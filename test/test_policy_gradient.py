@@ -2,12 +2,12 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS
 from active_recon.config import RewardConfig
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
 from active_recon.evaluation.rollouts import nearest_views
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.training import policy_gradient
@@ -22,7 +22,7 @@ from active_recon.training.policy_gradient import (
     run_episodes,
     train_policy,
 )
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 from shown_views import cameras_at

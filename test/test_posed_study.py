@@ -25,7 +25,7 @@ from active_recon.evaluation.posed.study import Extent, study_set
 from active_recon.evaluation.posed.summary import markdown, robustness_figures, told
 from active_recon.models.carving import Carving
 from active_recon.models.lifted import projected, projection
-from active_recon.voxels import iou, turned
+from active_recon.volumes.voxels import iou, turned
 import numpy as np
 import pytest
 from scipy.special import logit

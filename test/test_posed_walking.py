@@ -1,6 +1,5 @@
 """Which views come when, and that views are shown once each, whatever is asked after them."""
 
-from active_recon.cameras import orbit_camera, TURN
 from active_recon.evaluation.posed.walking import (
     even_orders,
     on_turntable,
@@ -9,6 +8,7 @@ from active_recon.evaluation.posed.walking import (
     walk,
 )
 from active_recon.evaluation.rollouts import Observer
+from active_recon.geometry.cameras import orbit_camera, TURN
 import numpy as np
 import pytest
 import torch

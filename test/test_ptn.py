@@ -1,11 +1,11 @@
 """The Perspective Transformer Nets: the mean of codes, and learning from silhouettes alone."""
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.ptn import PerspectiveTransformerNet, PtnConfig, SIZES
 from active_recon.models.registry import network_entry
-from active_recon.silhouettes import frustum, project_all
 from active_recon.training.losses import silhouette_loss
-from active_recon.voxels import iou
+from active_recon.volumes.silhouettes import frustum, project_all
+from active_recon.volumes.voxels import iou
 from shown_views import known_after
 import torch
 from torch.testing import assert_close

@@ -5,13 +5,13 @@ import os
 from pathlib import Path
 import shutil
 
-from active_recon.cameras import orbit_camera
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.splits import list_split
 from active_recon.datasets.views import read_views
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.shapes import CATEGORIES
-from active_recon.silhouettes import frustum, project_all
-from active_recon.voxels import iou
+from active_recon.volumes.silhouettes import frustum, project_all
+from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
 import pytest

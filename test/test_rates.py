@@ -3,7 +3,7 @@
 import math
 import sys
 
-from active_recon.rates import Durations, Rate, WINDOW_S
+from active_recon.nodes.runtime.rates import Durations, Rate, WINDOW_S
 import numpy as np
 import pytest
 

@@ -4,17 +4,17 @@
 from contextlib import closing, contextmanager, suppress
 import sqlite3
 
-from active_recon.bags.comparison import compare, NOTHING_RECORDED, SAME_BITS
-from active_recon.bags.files import mcap_files
-from active_recon.bags.reading import read_run
-from active_recon.bags.replay import ReplayedEpisode, ReplayedView
-from active_recon.bags.writer import BagWriter
+from active_recon.bags.replay.comparison import compare, NOTHING_RECORDED, SAME_BITS
+from active_recon.bags.replay.replay import ReplayedEpisode, ReplayedView
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.storage.files import mcap_files
+from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import DataError
 from active_recon.reconstructor import Reconstruction
 from active_recon.report.scene import scene
 from active_recon.report.subject import Subject
 from active_recon.viewer.playback import recorded_states
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 from loop_bags import BEGIN, DELAY, header, LENS, LoopRun, PERIOD, STILL, type_name, write_bag
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus

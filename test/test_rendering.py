@@ -2,11 +2,11 @@
 
 import math
 
-from active_recon.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera
 from active_recon.datasets.making import yawed
-from active_recon.meshes import load_mesh
-from active_recon.rendering import composite, Renderer
-from active_recon.voxels import iou
+from active_recon.geometry.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
 from PIL import Image

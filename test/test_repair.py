@@ -5,7 +5,7 @@ import random
 import subprocess
 import sys
 
-from active_recon.bags.repair import repair_bag
+from active_recon.bags.storage.repair import repair_bag
 from active_recon.errors import DataError
 from mcap.reader import make_reader
 import pytest

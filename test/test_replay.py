@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from active_recon.bags.comparison import (
+from active_recon.acquisition.motion import MotionLimits
+from active_recon.bags.replay.comparison import (
     compare,
     DIFFERENT,
     NOTHING_RECORDED,
@@ -10,14 +11,13 @@ from active_recon.bags.comparison import (
     TOLERANCES,
     WITHIN_TOLERANCE,
 )
-from active_recon.bags.replay import replay, replay_hash
-from active_recon.bags.settings import recorded_settings
-from active_recon.cameras import orbit_camera
+from active_recon.bags.replay.replay import replay, replay_hash
+from active_recon.bags.runs.settings import recorded_settings
 from active_recon.errors import DataError, WeightsError
-from active_recon.motion import MotionLimits
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.models.weights_files import FOLDER, SHIPPED, weights_hash
 from active_recon.policies.geometric import FarthestPolicy
-from active_recon.voxels import VoxelGrid
-from active_recon.weights_files import FOLDER, SHIPPED, weights_hash
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 from recorded_runs import (

@@ -1,12 +1,12 @@
 """A sweep bag under every policy: it has all the views that any of them may ask for."""
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.sweep import record_sweep
-from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.sweep import record_sweep
 from active_recon.cli.main import main
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
+from active_recon.models.weights_files import PAPER_MODEL
 from active_recon.policies import POLICIES
-from active_recon.shown_object import ShownObject
-from active_recon.weights_files import PAPER_MODEL
+from active_recon.simulation.shown_object import ShownObject
 import numpy as np
 import pytest
 from recorded_runs import image_at

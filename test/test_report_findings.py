@@ -3,9 +3,9 @@
 from dataclasses import replace
 import math
 
-from active_recon.bags.image_gaps import ImageGaps
-from active_recon.bags.run import RecordedGoal
-from active_recon.cameras import orbit_camera
+from active_recon.bags.runs.image_gaps import ImageGaps
+from active_recon.bags.runs.run import RecordedGoal
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.report.findings import findings
 from active_recon.report.subject import Subject
 from active_recon.report.words import key_words

@@ -3,8 +3,8 @@
 from dataclasses import replace
 import math
 
-from active_recon.bags.run import Candidates, RecordedGoal
-from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
+from active_recon.bags.runs.run import Candidates, RecordedGoal
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
 from active_recon.report.subject import Subject
 from active_recon.report.turntable_map import place, spread_out, turntable_map
 import numpy as np

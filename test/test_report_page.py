@@ -11,7 +11,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from active_recon.bags.run import TopicSummary
+from active_recon.bags.runs.run import TopicSummary
 from active_recon.errors import ConfigError, DataError
 from active_recon.report.page import MOST_SUBJECTS, report_page, write_page
 from active_recon.report.subject import letters, Subject

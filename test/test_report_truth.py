@@ -4,14 +4,14 @@ from dataclasses import replace
 import math
 from pathlib import Path
 
-from active_recon.bags.rebuilt import lacks_reconstruction, with_reconstruction
-from active_recon.bags.run import RecordedRun
+from active_recon.bags.runs.rebuilt import lacks_reconstruction, with_reconstruction
+from active_recon.bags.runs.run import RecordedRun
 from active_recon.errors import ConfigError, DataError, MeshError
 from active_recon.objects import find_object
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.subject import Subject
 from active_recon.report.truth import known_truth, TruthFile
-from active_recon.voxels import VoxelGrid, write_binvox
+from active_recon.volumes.voxels import VoxelGrid, write_binvox
 import numpy as np
 import pytest
 from report_runs import changed, recorded_run

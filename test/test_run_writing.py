@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.run_writing import write_run
-from active_recon.bags.settings import recorded_settings
-from active_recon.bags.under_others import Others, run_under
-from active_recon.cameras import Camera, orbit_camera
+from active_recon.bags.replay.what_if import Others, run_under
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.run_writing import write_run
+from active_recon.bags.runs.settings import recorded_settings
 from active_recon.errors import RecordingError
+from active_recon.geometry.cameras import Camera, orbit_camera
 import numpy as np
 import pytest
 from recorded_messages import doctor

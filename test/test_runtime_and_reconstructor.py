@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.cameras import Camera, CANONICAL_DISTANCE, Intrinsics, orbit_camera
 from active_recon.errors import ConfigError, ViewError
+from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, Intrinsics, orbit_camera
 from active_recon.models.network import Cameras
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.reconstructor import Reconstructor

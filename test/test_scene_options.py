@@ -2,13 +2,13 @@
 
 import math
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.rebuilt import lacks_reconstruction, rebuilt
-from active_recon.bags.scene import Scene, told_background
-from active_recon.bags.topics import Topics
-from active_recon.cameras import CANONICAL_DISTANCE, CANONICAL_INTRINSICS
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.rebuilt import lacks_reconstruction, rebuilt
+from active_recon.bags.runs.scene import Scene, told_background
+from active_recon.bags.runs.topics import Topics
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import CANONICAL_DISTANCE, CANONICAL_INTRINSICS
 import cv2
 from foreign_recordings import AZIMUTHS, cameras, images, joints, TIMES
 from loop_bags import header, write_bag

@@ -3,22 +3,22 @@
 from contextlib import nullcontext
 import math
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.views import read_views
 from active_recon.evaluation.policy_study import compare, contenders, run_all
 from active_recon.evaluation.trial import Trial
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network import Cameras
 from active_recon.models.registry import NETWORKS
 from active_recon.models.weights import load_weights, save_weights
 from active_recon.planner import Planner
 from active_recon.policies import POLICIES
 from active_recon.reconstructor import Reconstructor
-from active_recon.rendering import composite, Renderer
 from active_recon.runtimes.torch import TorchRuntime
 from active_recon.training.loop import make_fabric, TrainingConfig
 from active_recon.training.plan import Plan, train_plan
-from active_recon.voxels import iou, turned
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import iou, turned
 import numpy as np
 import pytest
 import torch

@@ -1,7 +1,7 @@
 """The shape basis: distances, principal shapes, and fitting them to silhouettes."""
 
-from active_recon.cameras import orbit_camera
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.models.registry import network_entry
 from active_recon.models.shape_basis import (
     fit_shapes,
@@ -14,8 +14,8 @@ from active_recon.models.shape_basis import (
 )
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.shapes import CATEGORIES
-from active_recon.silhouettes import frustum, project
-from active_recon.voxels import iou
+from active_recon.volumes.silhouettes import frustum, project
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 from shown_views import cameras_at

@@ -6,7 +6,7 @@ import shutil
 from active_recon import shapes
 from active_recon.errors import ConfigError
 from active_recon.shapes import ALL_CATEGORIES, generators_hash, make_shape
-from active_recon.voxelise import voxelise
+from active_recon.volumes.voxelisation import voxelise
 import numpy as np
 import pytest
 from scipy import ndimage

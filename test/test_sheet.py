@@ -2,7 +2,7 @@
 
 from active_recon.cli.main import app
 from active_recon.errors import DataError
-from active_recon.sheet import contact_sheet, sequence_sheet
+from active_recon.volumes.sheet import contact_sheet, sequence_sheet
 import cv2
 import numpy as np
 import pytest

@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.cameras import Camera, orbit_camera
-from active_recon.silhouettes import frustum, project, project_all
+from active_recon.geometry.cameras import Camera, orbit_camera
+from active_recon.volumes.silhouettes import frustum, project, project_all
 import numpy as np
 import pytest
 import torch

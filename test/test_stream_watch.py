@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.stream_watch import STREAMS, StreamWatch, WINDOW_S
+from active_recon.acquisition.stream_monitor import STREAMS, StreamWatch, WINDOW_S
 import numpy as np
 import pytest
 

@@ -2,12 +2,12 @@
 
 import math
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.sweep import IMAGES_EACH, record_sweep
-from active_recon.cameras import azimuth_difference, AZIMUTHS
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.sweep import IMAGES_EACH, record_sweep
 from active_recon.cli.main import app
 from active_recon.errors import MeshError, RecordingError
-from active_recon.shown_object import rendered_object
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS
+from active_recon.simulation.shown_object import rendered_object
 import numpy as np
 import pytest
 from recorded_messages import errors_in, small_disk

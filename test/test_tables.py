@@ -1,6 +1,6 @@
 """Tables stand under objects: seen from above alone, shaded where the object is in the way."""
 
-from active_recon.cameras import Intrinsics, orbit_camera
+from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.models.lifted import projected, projection
 from active_recon.models.network import Cameras
 from active_recon.training.tables import tables

@@ -2,9 +2,8 @@
 
 from active_recon.datasets.making import make_object, shape_jobs
 from active_recon.errors import ConfigError
-from active_recon.meshes import fit_to_grid
 from active_recon.shapes import ALL_CATEGORIES, make_shape, THINGS
-from active_recon.shapes.parts import box
+from active_recon.shapes.common.parts import box
 from active_recon.shapes.things import GENERATORS, KINDS, thing
 from active_recon.shapes.things.animals import beast, bird, fish, plush
 from active_recon.shapes.things.colors import draw_palette
@@ -17,7 +16,8 @@ from active_recon.shapes.things.shells import carton
 from active_recon.shapes.things.soft import blob
 from active_recon.shapes.things.solids import circle, extruded, pipe, revolved, skin, swept, torus
 from active_recon.shapes.things.vessels import bucket, mug, pan
-from active_recon.voxelise import voxelise
+from active_recon.volumes.meshes import fit_to_grid
+from active_recon.volumes.voxelisation import voxelise
 import numpy as np
 import pytest
 from scipy import ndimage

@@ -2,10 +2,10 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, CANONICAL_DISTANCE
 from active_recon.errors import ConfigError, DataError, MeshError, ViewError
-from active_recon.shown_object import rendered_object
-from active_recon.turntable import Turntable
+from active_recon.geometry.cameras import azimuth_difference, CANONICAL_DISTANCE
+from active_recon.simulation.shown_object import rendered_object
+from active_recon.simulation.turntable import Turntable
 import numpy as np
 import pytest
 import trimesh

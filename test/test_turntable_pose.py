@@ -2,9 +2,9 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, Camera, orbit_camera
 from active_recon.errors import ConfigError, ViewError
-from active_recon.turntable_pose import FixedCamera
+from active_recon.geometry.cameras import azimuth_difference, Camera, orbit_camera
+from active_recon.geometry.turntable_pose import FixedCamera
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

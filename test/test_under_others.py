@@ -4,18 +4,18 @@ from dataclasses import replace
 import math
 from pathlib import Path
 
-from active_recon.bags.comparison import compare, SAME_BITS
-from active_recon.bags.replay import replay
-from active_recon.bags.run import RecordedEpisode, RecordedView
-from active_recon.bags.settings import recorded_settings, Settings
-from active_recon.bags.under_others import beside, explored, Others, reconstructed, run_under
-from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.bags.replay.comparison import compare, SAME_BITS
+from active_recon.bags.replay.replay import replay
+from active_recon.bags.replay.what_if import beside, explored, Others, reconstructed, run_under
+from active_recon.bags.runs.run import RecordedEpisode, RecordedView
+from active_recon.bags.runs.settings import recorded_settings, Settings
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network_2d3d import Network2d3d
 from active_recon.models.weights import Bundle, save_weights
+from active_recon.models.weights_files import config_hash, weights_hash
 from active_recon.planner import Planner
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
-from active_recon.weights_files import config_hash, weights_hash
 import numpy as np
 import pytest
 from recorded_runs import episode_of, image_at, loop_of, policies, run_of, SECOND, THRESHOLD

@@ -2,9 +2,9 @@
 
 import math
 
-from active_recon.cameras import Camera, orbit_camera
+from active_recon.acquisition.view_gate import ViewGate
 from active_recon.errors import ConfigError
-from active_recon.view_gate import ViewGate
+from active_recon.geometry.cameras import Camera, orbit_camera
 import pytest
 
 PERIOD = 100_000_000  # nanoseconds

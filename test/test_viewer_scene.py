@@ -2,10 +2,10 @@
 
 from types import SimpleNamespace
 
-from active_recon.cameras import AZIMUTHS
+from active_recon.geometry.cameras import AZIMUTHS
 from active_recon.viewer.scene import relative_scores, Scene
 from active_recon.viewer.state import LoopState, Scores
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 

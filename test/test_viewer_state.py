@@ -3,14 +3,14 @@
 from itertools import permutations
 from pathlib import Path
 
-from active_recon.bags.run import (
+from active_recon.bags.runs.run import (
     Candidates,
     RecordedEpisode,
     RecordedGoal,
     RecordedRun,
     RecordedView,
 )
-from active_recon.cameras import AZIMUTHS, orbit_camera
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.viewer.link import ago, link_words, TopicLink
 from active_recon.viewer.playback import recorded_states
 from active_recon.viewer.scene import certainty_colors, relative_scores, shown_cells
@@ -23,7 +23,7 @@ from active_recon.viewer.state import (
     TakenView,
     thumbnail,
 )
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 

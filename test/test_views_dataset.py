@@ -3,12 +3,12 @@
 import re
 import shutil
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS
 from active_recon.datasets.layout import list_objects, write_voxels
 from active_recon.datasets.views import on_background, read_views
 from active_recon.errors import DataError
-from active_recon.rendering import composite
-from active_recon.voxels import VoxelGrid
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS
+from active_recon.volumes.rendering import composite
+from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
 import pytest

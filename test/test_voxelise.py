@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.voxelise import voxelise
-from active_recon.voxels import iou
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 import trimesh

@@ -3,7 +3,7 @@
 import math
 
 from active_recon.errors import ConfigError, DataError
-from active_recon.voxels import (
+from active_recon.volumes.voxels import (
     entropy,
     grid_from_points,
     iou,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from active_recon.errors import WeightsError
 from active_recon.models.weights import Bundle, load_weights, save_weights
-from active_recon.weights_files import (
+from active_recon.models.weights_files import (
     DEFAULT_MODEL,
     find_weights,
     PAPER_MODEL,

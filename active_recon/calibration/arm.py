@@ -13,8 +13,8 @@ from active_recon.calibration.fit import (
     rigid,
 )
 from active_recon.calibration.lens import board_pose
-from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Intrinsics
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

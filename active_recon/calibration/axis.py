@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from active_recon.cameras import azimuth_difference
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import azimuth_difference
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

@@ -24,8 +24,8 @@ from active_recon.calibration.remarks import (
 )
 from active_recon.calibration.turntable import FEWEST_IMAGES as FEWEST_OF_TABLE
 from active_recon.calibration.turntable import fit_turntable
-from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Camera, Intrinsics
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from active_recon.calibration.board import Detection
 from active_recon.calibration.lens import project
-from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Intrinsics
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares

@@ -7,9 +7,9 @@ import math
 from pathlib import Path
 
 from active_recon.calibration.board import Detection
-from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import DataError, ViewError
-from active_recon.lenses import Distortion
+from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.geometry.lenses import Distortion
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

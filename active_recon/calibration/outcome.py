@@ -9,8 +9,8 @@ from active_recon.calibration.files import read_image
 from active_recon.calibration.fit import ImageFit, overall_error
 from active_recon.calibration.lens import write_lens
 from active_recon.calibration.picture import picture_of
-from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Intrinsics
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -6,7 +6,7 @@ import math
 from active_recon.calibration.fit import ImageFit
 from active_recon.calibration.lens import project
 from active_recon.calibration.placement import cube_corners
-from active_recon.cameras import Intrinsics
+from active_recon.geometry.cameras import Intrinsics
 from active_recon.view_colors import view_color
 import cv2
 import numpy as np

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from active_recon.calibration.board import Board
 from active_recon.calibration.turntable import TurntableFit
-from active_recon.cameras import Camera
 from active_recon.errors import ConfigError, DataError
+from active_recon.geometry.cameras import Camera
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

@@ -7,7 +7,12 @@ from active_recon.calibration.fit import ImageFit, overall_error
 from active_recon.calibration.lens import project
 from active_recon.calibration.placement import cube_corners
 from active_recon.calibration.turntable import TurntableFit
-from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE, Intrinsics
+from active_recon.geometry.cameras import (
+    Camera,
+    CANONICAL_ELEVATION,
+    ELEVATION_TOLERANCE,
+    Intrinsics,
+)
 import numpy as np
 from numpy.typing import NDArray
 

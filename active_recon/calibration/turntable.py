@@ -7,8 +7,8 @@ from active_recon.calibration.axis import compare_angles, find_axis
 from active_recon.calibration.board import Detection
 from active_recon.calibration.fit import fit, fitted_images, ImageFit, parameters_of, rigid
 from active_recon.calibration.lens import board_pose
-from active_recon.cameras import Intrinsics
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Intrinsics
 import numpy as np
 from numpy.typing import NDArray
 

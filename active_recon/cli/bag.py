@@ -24,7 +24,7 @@ def repair(
 
     Example: active-recon bag repair bags/2026-11-21_14-30-00
     """
-    from active_recon.bags.repair import bag_files, repair_bag
+    from active_recon.bags.storage.repair import bag_files, repair_bag
     from active_recon.cli.progress import progress_bar
 
     with progress_bar('repairing', len(bag_files(path))) as advance:

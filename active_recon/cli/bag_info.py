@@ -9,10 +9,10 @@ from active_recon.cli.progress import bag_progress
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.bags.raw import BagSummary
-    from active_recon.bags.run import RecordedRun
-    from active_recon.bags.scene import Scene
-    from active_recon.bags.topics import Topics
+    from active_recon.bags.runs.run import RecordedRun
+    from active_recon.bags.runs.scene import Scene
+    from active_recon.bags.runs.topics import Topics
+    from active_recon.bags.storage.raw import BagSummary
 
 
 @with_bag_options
@@ -31,7 +31,7 @@ def info(
     Example: active-recon bag info drive.db3 --image /cam/color --azimuth /table/joints
     --object-size 0.16
     """
-    from active_recon.bags.description import describe_bag
+    from active_recon.bags.runs.description import describe_bag
 
     described = describe_bag(path, topics, scene, bag_progress(path))
     _tell_contents(path, described.summary)
@@ -54,7 +54,7 @@ def _tell_contents(path: Path, summary: 'BagSummary') -> None:
 
 
 def _tell_run(run: 'RecordedRun', replays: bool) -> None:
-    from active_recon.bags.missing import missing_words
+    from active_recon.bags.runs.missing import missing_words
 
     chosen = 'that its gate would take' if 'bag' in run.counters else 'that the loop took'
     typer.echo(f'{"can be replayed, with " if replays else ""}the views {chosen}:')

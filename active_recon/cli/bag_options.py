@@ -10,7 +10,7 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.bags.scene import Scene
+    from active_recon.bags.runs.scene import Scene
 
 _PANEL = "Other people's bags"
 
@@ -66,7 +66,7 @@ def with_bag_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def run(**values: Any) -> None:
-        from active_recon.bags.topics import Topics
+        from active_recon.bags.runs.topics import Topics
 
         topics = Topics(**{name: values.pop(name) for name in _TOPICS})
         scene = _scene(**{name: values.pop(name) for name in _SCENE})
@@ -85,7 +85,7 @@ def with_bag_options(command: Callable[..., None]) -> Callable[..., None]:
 def _scene(object_size: float | None, object_yaw_deg: float | None, elevation_deg: float | None,
            camera_position: str | None, camera_orientation: str | None,
            background: str) -> 'Scene':
-    from active_recon.bags.scene import Scene, told_background
+    from active_recon.bags.runs.scene import Scene, told_background
 
     how, empty_scene = told_background(background)
     return Scene(object_size, _radians(object_yaw_deg), _radians(elevation_deg),

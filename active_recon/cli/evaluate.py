@@ -78,7 +78,7 @@ def evaluate(
     from active_recon.evaluation.policy_study import compare, contender_names, contenders, run_all
     from active_recon.evaluation.trial import Trial
     from active_recon.models.weights import load_weights
-    from active_recon.weights_files import find_weights, weights_hash
+    from active_recon.models.weights_files import find_weights, weights_hash
     import torch
 
     if training and validation is None:

@@ -26,7 +26,7 @@ def play(
     Example: active-recon play bags/2026-11-21_14-30-00 --rate 2
     --topics camera/image_raw,camera/camera_info,camera/pose
     """
-    from active_recon.bags.playing import played_topics
+    from active_recon.bags.runs.playing import played_topics
 
     played_topics(bag, rate, topics, bag_progress(bag))
     # The node takes this process's place, and so hears its Ctrl-C

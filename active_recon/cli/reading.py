@@ -9,8 +9,8 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.canonical import NetworkSpec
     from active_recon.datasets.views import ViewSet
+    from active_recon.geometry.canonical import NetworkSpec
 
 Split = Annotated[str | None, typer.Option(
     '--split-file', help="ShapeNet's published split file (JSON), or 'sorted': the sorted ids of "

@@ -27,11 +27,11 @@ def record_sweep(
 
     Example: active-recon record-sweep chair --out bags/chair-sweep
     """
-    from active_recon.bags.sweep import record_sweep
-    from active_recon.cameras import AZIMUTHS
+    from active_recon.bags.runs.sweep import record_sweep
     from active_recon.cli.progress import progress_bar
+    from active_recon.geometry.cameras import AZIMUTHS
     from active_recon.objects import find_object
-    from active_recon.shown_object import rendered_object
+    from active_recon.simulation.shown_object import rendered_object
 
     with progress_bar('rendering and recording', len(AZIMUTHS)) as advance:
         shown = rendered_object(find_object(model), object_size, background, up, front)

@@ -16,12 +16,12 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.bags.run import RecordedRun
-    from active_recon.bags.scene import Scene
-    from active_recon.bags.settings import Settings
-    from active_recon.bags.topics import Topics
-    from active_recon.bags.under_others import Others
-    from active_recon.bags.verification import Verification
+    from active_recon.bags.replay.verification import Verification
+    from active_recon.bags.replay.what_if import Others
+    from active_recon.bags.runs.run import RecordedRun
+    from active_recon.bags.runs.scene import Scene
+    from active_recon.bags.runs.settings import Settings
+    from active_recon.bags.runs.topics import Topics
     from active_recon.reconstructor import Reconstructor
 
 
@@ -67,12 +67,12 @@ def replay(
 
     Example: active-recon replay drive.db3 --object-size 0.16 --mesh mug.ply
     """
-    from active_recon.bags.comparison import NOTHING_RECORDED
-    from active_recon.bags.reading import read_run
-    from active_recon.bags.settings import recorded_settings
-    from active_recon.bags.under_others import Others
-    from active_recon.bags.verification import verify
-    from active_recon.weights_files import find_weights
+    from active_recon.bags.replay.comparison import NOTHING_RECORDED
+    from active_recon.bags.replay.verification import verify
+    from active_recon.bags.replay.what_if import Others
+    from active_recon.bags.runs.reading import read_run
+    from active_recon.bags.runs.settings import recorded_settings
+    from active_recon.models.weights_files import find_weights
 
     others = Others(find_weights(model) if model else None, policy, threshold)
     if out and others == Others():
@@ -119,7 +119,7 @@ def _tell_reconstructed(verified: 'Verification', run: 'RecordedRun',
 
 
 def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
-    from active_recon.bags.comparison import DIFFERENT
+    from active_recon.bags.replay.comparison import DIFFERENT
 
     ran_s = (run.end - run.begin) / 1e9
     typer.echo(f'views: {verified.view_count}, read and replayed in {took_s:.2f} s, '
@@ -143,8 +143,8 @@ def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
 
 def _write_under(run: 'RecordedRun', settings: 'Settings', others: 'Others',
                  out: Path | None, files: ShapeFiles) -> None:
-    from active_recon.bags.run_writing import write_run
-    from active_recon.bags.under_others import beside, run_under
+    from active_recon.bags.replay.what_if import beside, run_under
+    from active_recon.bags.runs.run_writing import write_run
 
     with _bar('replaying', run) as advance:
         other = run_under(run, settings, others, lambda: advance(1, ''))

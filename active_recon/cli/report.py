@@ -9,9 +9,9 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.bags.run import RecordedRun
-    from active_recon.bags.scene import Scene
-    from active_recon.bags.topics import Topics
+    from active_recon.bags.runs.run import RecordedRun
+    from active_recon.bags.runs.scene import Scene
+    from active_recon.bags.runs.topics import Topics
     from active_recon.report.subject import Subject
     from active_recon.report.truth import TruthFile
 
@@ -52,7 +52,7 @@ def report(
 
     Example: active-recon report bags/2026-11-21_10-00-00 --out run.html
     """
-    from active_recon.bags.reading import read_run
+    from active_recon.bags.runs.reading import read_run
     from active_recon.report.page import report_page, write_page
     from active_recon.report.truth import TruthFile
 
@@ -80,10 +80,10 @@ def _subjects(run: 'RecordedRun', scene: 'Scene', truth: 'TruthFile | None', epi
     """Return the episodes of a run that the page shows, their letters after `before` others."""
     from itertools import islice
 
-    from active_recon.bags.rebuilt import rebuilt
+    from active_recon.bags.runs.rebuilt import rebuilt
+    from active_recon.models.weights_files import find_weights
     from active_recon.report.subject import letters, Subject
     from active_recon.report.truth import known_truth
-    from active_recon.weights_files import find_weights
 
     run, computed = rebuilt(run, scene, find_weights(model) if model else None)
     true = known_truth(run) if truth is None else truth.read(run, scene.object_size)

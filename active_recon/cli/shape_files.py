@@ -9,7 +9,7 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.voxels import VoxelGrid
+    from active_recon.volumes.voxels import VoxelGrid
 
 VOXEL_FORMATS = ('binvox', 'npz')
 
@@ -28,7 +28,7 @@ class ShapeFiles:
 
     def __post_init__(self) -> None:
         """Refuse suffixes that nothing is written for, before any work is done."""
-        from active_recon.voxels import MESH_FORMATS
+        from active_recon.volumes.voxels import MESH_FORMATS
 
         for option, path, formats in (('--mesh', self.mesh, MESH_FORMATS),
                                       ('--voxels', self.voxels, VOXEL_FORMATS)):
@@ -37,7 +37,7 @@ class ShapeFiles:
 
     def write(self, grids: Sequence['VoxelGrid'], threshold: float) -> None:
         """Write the shapes, and tell their files; raises DataError where there is no surface."""
-        from active_recon.voxels import write_binvox, write_mesh
+        from active_recon.volumes.voxels import write_binvox, write_mesh
         import numpy as np
 
         for number, grid in enumerate(grids, 1):

@@ -42,9 +42,9 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
     import math
 
     from active_recon.datasets.making import MESH_SUFFIXES
-    from active_recon.meshes import load_mesh
     from active_recon.shapes import ALL_CATEGORIES, make_shape
-    from active_recon.sheet import contact_sheet
+    from active_recon.volumes.meshes import load_mesh
+    from active_recon.volumes.sheet import contact_sheet
 
     if meshes is None:
         objects = [make_shape(name, seed)
@@ -60,8 +60,8 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
 def _training(root: Path, rows: int) -> 'NDArray[np.uint8]':
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.views import read_views
-    from active_recon.sheet import sequence_sheet
     from active_recon.training.batches import draw_batch
+    from active_recon.volumes.sheet import sequence_sheet
     import numpy as np
 
     rng = np.random.default_rng(0)

@@ -112,7 +112,7 @@ def study(
 
 
 def _those_that_ship() -> str:
-    from active_recon.weights_files import FOLDER
+    from active_recon.models.weights_files import FOLDER
 
     return ','.join(name for name in _SHIPPED if (FOLDER / f'{name}.safetensors').is_file())
 

@@ -92,10 +92,10 @@ def train(
     from active_recon.config import LossConfig, RewardConfig
     from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
     from active_recon.models.weights import save_weights
+    from active_recon.models.weights_files import find_weights
     from active_recon.shapes import generators_hash
     from active_recon.training.loop import make_fabric, TrainingConfig, TrainingStoppedError
     from active_recon.training.plan import Plan, train_plan
-    from active_recon.weights_files import find_weights
     import torch
 
     if scheme not in ('two-stage', 'joint'):
@@ -160,7 +160,7 @@ def train(
 
 def _begun(path: Path) -> 'Bundle':
     from active_recon.models.weights import load_weights
-    from active_recon.weights_files import read_card
+    from active_recon.models.weights_files import read_card
 
     return replace(load_weights(path), card=read_card(path))
 

@@ -36,6 +36,6 @@ def up(
 
     Example: active-recon up --params config/arm.yaml -r camera/image_raw:=/wrist/image_raw
     """
-    from active_recon.demo.up import run_up, Start
+    from active_recon.launching.up import run_up, Start
 
     run_up(Start(params, namespace, remap or (), log_level.value), typer.echo)

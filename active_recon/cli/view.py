@@ -8,12 +8,12 @@ import time
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.bag_options import with_bag_options
-from active_recon.viewer.address import DEFAULT_PORT, HIGHEST_PORT
+from active_recon.parameters.viewer import DEFAULT_PORT, HIGHEST_PORT
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.bags.scene import Scene
-    from active_recon.bags.topics import Topics
+    from active_recon.bags.runs.scene import Scene
+    from active_recon.bags.runs.topics import Topics
 
 
 @with_bag_options
@@ -49,8 +49,8 @@ def view(
 
 
 def _step_through(bag: Path, topics: 'Topics', scene: 'Scene', port: int) -> None:
-    from active_recon.bags.reading import read_run
-    from active_recon.bags.rebuilt import rebuilt
+    from active_recon.bags.runs.reading import read_run
+    from active_recon.bags.runs.rebuilt import rebuilt
     from active_recon.interrupts import held_interrupts
     from active_recon.viewer.page import UPDATES_PER_S
     from active_recon.viewer.playback import Playback

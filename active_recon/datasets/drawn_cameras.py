@@ -4,9 +4,9 @@ from dataclasses import dataclass
 import hashlib
 import math
 
-from active_recon.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera, TURN
 from active_recon.errors import ConfigError
-from active_recon.framing import cube_corners
+from active_recon.geometry.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera, TURN
+from active_recon.geometry.framing import cube_corners
 import numpy as np
 from numpy.typing import NDArray
 

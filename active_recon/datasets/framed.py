@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from active_recon.cameras import Camera
-from active_recon.canonical import framed_layers, framing_camera
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.canonical import framed_layers, framing_camera
 import numpy as np
 from numpy.typing import NDArray
 import torch

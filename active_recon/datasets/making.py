@@ -12,11 +12,11 @@ from pathlib import Path
 from active_recon.datasets.drawn_cameras import TURNTABLE, Viewing
 from active_recon.datasets.layout import ObjectFolder, write_object, write_voxels
 from active_recon.errors import ActiveReconError, DataError
-from active_recon.meshes import file_rotation, fit_to_grid, load_mesh
-from active_recon.rendering import Renderer
 from active_recon.shapes import check_category, make_shape
-from active_recon.voxelise import voxelise
-from active_recon.voxels import FINE_RESOLUTION
+from active_recon.volumes.meshes import file_rotation, fit_to_grid, load_mesh
+from active_recon.volumes.rendering import Renderer
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import FINE_RESOLUTION
 import numpy as np
 import trimesh
 

@@ -6,11 +6,11 @@ from functools import partial
 from pathlib import Path
 import re
 
-from active_recon.cameras import TURN
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.making import Job, yawed
 from active_recon.errors import DataError
-from active_recon.meshes import load_mesh
+from active_recon.geometry.cameras import TURN
+from active_recon.volumes.meshes import load_mesh
 import numpy as np
 import trimesh
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
-from active_recon.cameras import Camera, Intrinsics
 from active_recon.errors import ConfigError, DataError, ViewError
-from active_recon.meshes import upright
+from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.volumes.meshes import upright
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from active_recon.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ActiveReconError, DataError
-from active_recon.meshes import load_mesh
+from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.models.encoder import IMAGE_SIZE
 from active_recon.models.network import Cameras
-from active_recon.voxelise import voxelise
-from active_recon.voxels import RESOLUTION
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import RESOLUTION
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from active_recon.cameras import Camera, VIEW_COUNT
 from active_recon.datasets.framed import FramedViews, OnDemand, read_cameras, weighted
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Camera, VIEW_COUNT
 from active_recon.models.network import Cameras
-from active_recon.voxels import RESOLUTION
+from active_recon.volumes.voxels import RESOLUTION
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -3,19 +3,19 @@
 from collections.abc import Sequence
 import math
 
-from active_recon.cameras import (
+from active_recon.demo.drawing import centred, PAPER, paste, QUIET, text
+from active_recon.geometry.cameras import (
     azimuth_difference,
     AZIMUTHS,
     Camera,
     CANONICAL_INTRINSICS,
     orbit_camera,
 )
-from active_recon.demo.drawing import centred, PAPER, paste, QUIET, text
-from active_recon.rendering import composite, Renderer
 from active_recon.seen_view import SeenView
 from active_recon.view_colors import view_color
-from active_recon.voxel_boxes import height_range, voxel_picture
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.boxes import height_range, voxel_picture
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -9,17 +9,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 import time
 
-from active_recon.cameras import wrap_azimuth
 from active_recon.demo.picture import run_picture
-from active_recon.demo.processes import NodeProcesses, private_environment
 from active_recon.demo.table import loop_table, turning
+from active_recon.geometry.cameras import wrap_azimuth
 from active_recon.interrupts import held_interrupts
-from active_recon.meshes import load_mesh
-from active_recon.nodes.demo_watch import DemoWatch, watching
+from active_recon.launching.demo_watch import DemoWatch, watching
+from active_recon.launching.processes import NodeProcesses, private_environment
+from active_recon.models.weights_files import find_weights
 from active_recon.policies import DEFAULT_POLICY
 from active_recon.viewer.address import free_port, HOST, is_served
-from active_recon.voxelise import voxelise
-from active_recon.weights_files import find_weights
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.voxelisation import voxelise
 import cv2
 import numpy as np
 from rich.console import Console, RenderableType

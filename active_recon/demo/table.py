@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 import math
 
-from active_recon.cameras import Camera
+from active_recon.geometry.cameras import Camera
 from active_recon.seen_view import SeenView
 from rich.console import Group
 from rich.table import Table

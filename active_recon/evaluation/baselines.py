@@ -1,7 +1,7 @@
 """Two answers that know nothing of an image's detail, to measure a network against."""
 
 from active_recon.datasets.views import ViewSet
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
 from numpy.typing import NDArray

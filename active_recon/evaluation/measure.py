@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass, field, fields
 import math
 from typing import Any
 
-from active_recon.cameras import azimuth_difference
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.metrics import half_the_set_away
 from active_recon.evaluation.oracle import oracle_batch, roll_out_oracle
@@ -18,9 +17,10 @@ from active_recon.evaluation.rollouts import (
     Step,
 )
 from active_recon.evaluation.statistics import by_object, mean_interval
+from active_recon.geometry.cameras import azimuth_difference
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies import Policy
-from active_recon.voxels import entropy, iou, paper_entropy, turned
+from active_recon.volumes.voxels import entropy, iou, paper_entropy, turned
 import numpy as np
 from numpy.typing import NDArray
 import torch

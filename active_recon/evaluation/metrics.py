@@ -5,7 +5,7 @@ from active_recon.errors import DataError
 from active_recon.evaluation.rollouts import roll_out
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies import Policy
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 from numpy.typing import NDArray
 import torch

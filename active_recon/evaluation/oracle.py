@@ -7,7 +7,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.environment import run_episode, TimeStep
 from active_recon.evaluation.rollouts import batches, Observer, RenderedObjects, Seen, Step
 from active_recon.models.network import ReconstructionNetwork, State
-from active_recon.voxels import iou
+from active_recon.volumes.voxels import iou
 import numpy as np
 from numpy.typing import NDArray
 import torch

@@ -22,6 +22,7 @@ from active_recon.evaluation.subsets import best_subsets
 from active_recon.evaluation.trial import Contender, Trial
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights, state_hash
+from active_recon.models.weights_files import PAPER_MODEL
 from active_recon.policies import (
     Choice,
     learned_policy,
@@ -34,7 +35,6 @@ from active_recon.policies import (
 from active_recon.reporting import Advance, Reporting, silent
 from active_recon.runtimes import State
 from active_recon.runtimes.torch import TorchPolicyRuntime
-from active_recon.weights_files import PAPER_MODEL
 import numpy as np
 from torch import nn
 

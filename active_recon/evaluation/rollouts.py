@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from active_recon.cameras import azimuth_difference, pose_azimuths
 from active_recon.datasets.views import ViewSet
 from active_recon.environment import run_episode, TimeStep
+from active_recon.geometry.cameras import azimuth_difference, pose_azimuths
 from active_recon.models.network import ReconstructionNetwork, State
 from active_recon.policies import Choice, Observation, Policy
-from active_recon.voxels import PUBLISHED_FLOOR
+from active_recon.volumes.voxels import PUBLISHED_FLOOR
 import numpy as np
 from numpy.typing import NDArray
 import torch

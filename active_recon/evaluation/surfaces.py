@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_opening

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from itertools import chain
 from typing import NamedTuple, Self
 
-from active_recon.cameras import Camera, TURN
-from active_recon.canonical import NetworkSpec
+from active_recon.geometry.cameras import Camera, TURN
+from active_recon.geometry.canonical import NetworkSpec
 import numpy as np
 import torch
 from torch import nn, Tensor

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from functools import cache
 import math
 
-from active_recon.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.config import Config
 from active_recon.errors import ConfigError, DataError
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.models.encoder import IMAGE_SIZE
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
-from active_recon.silhouettes import frustum, project, project_all
+from active_recon.volumes.silhouettes import frustum, project, project_all
 import numpy as np
 from numpy.typing import NDArray
 import torch

@@ -10,7 +10,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry
-from active_recon.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
+from active_recon.models.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
 from safetensors.torch import save
 import torch

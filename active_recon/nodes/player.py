@@ -4,15 +4,15 @@ from collections.abc import Iterator
 from pathlib import Path
 import time
 
-from active_recon.bags.playing import played_topics
-from active_recon.bags.raw import RawMessage
-from active_recon.bags.storage import open_bag
+from active_recon.bags.runs.playing import played_topics
+from active_recon.bags.storage.opening import open_bag
+from active_recon.bags.storage.raw import RawMessage
 from active_recon.errors import ConfigError
-from active_recon.nodes.definitions import message_class
-from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
-from active_recon.nodes.qos import common_profile
-from active_recon.nodes.run import run_node
-from active_recon.nodes.settings.player import PlayerSettings
+from active_recon.nodes.runtime.definitions import message_class
+from active_recon.nodes.runtime.parameters import Parameters, ReadOnlySaysWhy
+from active_recon.nodes.runtime.qos import common_profile
+from active_recon.nodes.runtime.run import run_node
+from active_recon.parameters.player import PlayerSettings
 from msg_tools.stamps import stamp_from_nanoseconds
 from rclpy.clock import Clock as SystemClock
 from rclpy.clock_type import ClockType

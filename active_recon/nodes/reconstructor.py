@@ -6,26 +6,26 @@ from pathlib import Path
 import time
 import uuid
 
-from active_recon.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.acquisition.view_gate import ViewGate
 from active_recon.errors import DataError, MessageError
-from active_recon.nodes.after_hearing import AfterHearing
-from active_recon.nodes.awaited_inputs import AwaitedInputs
-from active_recon.nodes.camera_images import CameraImages
-from active_recon.nodes.camera_watch import CameraWatch
-from active_recon.nodes.clock import STEADY
-from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
-from active_recon.nodes.parameters import Commit, Parameters, tell
-from active_recon.nodes.pose_sources import check_pose_source, hear_poses
-from active_recon.nodes.qos import HEARD, LATCHED
-from active_recon.nodes.reference_capture import ReferenceCapture
-from active_recon.nodes.run import one_line
-from active_recon.nodes.settings.reconstructor import ReconstructorSettings
-from active_recon.nodes.topic_names import tell_names
-from active_recon.output import output_path
+from active_recon.geometry.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.models.weights_files import find_weights
+from active_recon.nodes.camera.images import CameraImages
+from active_recon.nodes.camera.monitor import CameraWatch
+from active_recon.nodes.camera.pose_sources import check_pose_source, hear_poses
+from active_recon.nodes.camera.reference_capture import ReferenceCapture
+from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
+from active_recon.nodes.runtime.clock import STEADY
+from active_recon.nodes.runtime.deferred_work import AfterHearing
+from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
+from active_recon.nodes.runtime.output import output_path
+from active_recon.nodes.runtime.parameters import Commit, Parameters, tell
+from active_recon.nodes.runtime.qos import HEARD, LATCHED
+from active_recon.nodes.runtime.run import one_line
+from active_recon.nodes.runtime.topic_names import tell_names
+from active_recon.parameters.reconstructor import ReconstructorSettings
 from active_recon.reconstructor import Reconstruction, Reconstructor
-from active_recon.view_gate import ViewGate
-from active_recon.voxels import PUBLISHED_FLOOR, write_mesh
-from active_recon.weights_files import find_weights
+from active_recon.volumes.voxels import PUBLISHED_FLOOR, write_mesh
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg, pose_to_msg

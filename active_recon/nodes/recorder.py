@@ -7,22 +7,22 @@ from pathlib import Path
 import time
 
 from active_recon import __version__
-from active_recon.bags.metadata import QosProfile
-from active_recon.bags.writer import BagWriter
+from active_recon.bags.storage.metadata import QosProfile
+from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import ActiveReconError, RecordingError
-from active_recon.nodes.definitions import message_class, message_definition
-from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.disk_rate import DiskRate
-from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
-from active_recon.nodes.qos import common_profile, offered_profile
-from active_recon.nodes.qos_warnings import QosWarnings
-from active_recon.nodes.recorded_nodes import RecordedNodes
-from active_recon.nodes.recorded_topics import RecordedTopics
-from active_recon.nodes.run import one_line, run_node
-from active_recon.nodes.sequence_gaps import SequenceGaps
-from active_recon.nodes.settings.recorder import DIAGNOSTICS, RecorderSettings
-from active_recon.nodes.topic_names import full_names
-from active_recon.output import output_path
+from active_recon.nodes.recording.disk_rate import DiskRate
+from active_recon.nodes.recording.recorded_nodes import RecordedNodes
+from active_recon.nodes.recording.recorded_topics import RecordedTopics
+from active_recon.nodes.recording.sequence_gaps import SequenceGaps
+from active_recon.nodes.runtime.definitions import message_class, message_definition
+from active_recon.nodes.runtime.diagnostics import Diagnostics
+from active_recon.nodes.runtime.output import output_path
+from active_recon.nodes.runtime.parameters import Parameters, ReadOnlySaysWhy
+from active_recon.nodes.runtime.qos import common_profile, offered_profile
+from active_recon.nodes.runtime.qos_warnings import QosWarnings
+from active_recon.nodes.runtime.run import one_line, run_node
+from active_recon.nodes.runtime.topic_names import full_names
+from active_recon.parameters.recorder import DIAGNOSTICS, RecorderSettings
 from msg_tools.episodes import done_from_msg
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.serialization import deserialize_message

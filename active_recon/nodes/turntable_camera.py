@@ -5,17 +5,17 @@ from pathlib import Path
 
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import DataError
-from active_recon.faults import CameraFaults, read_faults, Sent, Shot
-from active_recon.nodes.clock import ClockWatch
-from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.parameters import Commit, Parameters, ReadOnlySaysWhy, tell
-from active_recon.nodes.qos import HEARD, STREAM
-from active_recon.nodes.qos_warnings import QosWarnings
-from active_recon.nodes.run import one_line, run_node
-from active_recon.nodes.settings.turntable_camera import TurntableCameraSettings
+from active_recon.nodes.runtime.clock import ClockWatch
+from active_recon.nodes.runtime.diagnostics import Diagnostics
+from active_recon.nodes.runtime.parameters import Commit, Parameters, ReadOnlySaysWhy, tell
+from active_recon.nodes.runtime.qos import HEARD, STREAM
+from active_recon.nodes.runtime.qos_warnings import QosWarnings
+from active_recon.nodes.runtime.run import one_line, run_node
 from active_recon.objects import find_object
-from active_recon.shown_object import rendered_object, ShownObject, stored_object
-from active_recon.turntable import Turntable
+from active_recon.parameters.turntable_camera import TurntableCameraSettings
+from active_recon.simulation.faults import CameraFaults, read_faults, Sent, Shot
+from active_recon.simulation.shown_object import rendered_object, ShownObject, stored_object
+from active_recon.simulation.turntable import Turntable
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs
 from msg_tools.goals import azimuth_goal_from_msg

@@ -3,26 +3,26 @@
 import math
 import time
 
-from active_recon.cameras import (
+from active_recon.errors import ActiveReconError
+from active_recon.geometry.cameras import (
     Camera,
     CANONICAL_DISTANCE,
     CANONICAL_ELEVATION,
     orbit_camera,
 )
-from active_recon.errors import ActiveReconError
-from active_recon.nodes.awaited_inputs import AwaitedInputs
-from active_recon.nodes.clock import AHEAD_S, STEADY
-from active_recon.nodes.goal_publisher import GoalPublisher
-from active_recon.nodes.heard_views import HeardView, HeardViews
-from active_recon.nodes.life_cycle import ManagedNode, run_managed_node
-from active_recon.nodes.parameters import Commit, Parameters
-from active_recon.nodes.qos import HEARD, LATCHED
-from active_recon.nodes.run import one_line
-from active_recon.nodes.settings.view_planner import ViewPlannerSettings
-from active_recon.nodes.topic_names import tell_names
+from active_recon.models.weights_files import find_weights
+from active_recon.nodes.loop.goal_publisher import GoalPublisher
+from active_recon.nodes.loop.view_synchronizer import HeardView, HeardViews
+from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
+from active_recon.nodes.runtime.clock import AHEAD_S, STEADY
+from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
+from active_recon.nodes.runtime.parameters import Commit, Parameters
+from active_recon.nodes.runtime.qos import HEARD, LATCHED
+from active_recon.nodes.runtime.run import one_line
+from active_recon.nodes.runtime.topic_names import tell_names
+from active_recon.parameters.view_planner import ViewPlannerSettings
 from active_recon.planner import Decision, Goal, Planner
 from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
-from active_recon.weights_files import find_weights
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg

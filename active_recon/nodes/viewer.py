@@ -5,13 +5,13 @@ from functools import partial
 import math
 import os
 
-from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.followed_loop import Loop, LoopFinder
-from active_recon.nodes.heard_loop import HeardLoop
-from active_recon.nodes.parameters import Parameters, ReadOnlySaysWhy
-from active_recon.nodes.qos_warnings import QosWarnings
-from active_recon.nodes.run import run_node
-from active_recon.nodes.settings.viewer import ViewerSettings
+from active_recon.nodes.loop.followed_loop import Loop, LoopFinder
+from active_recon.nodes.loop.loop_subscriber import HeardLoop
+from active_recon.nodes.runtime.diagnostics import Diagnostics
+from active_recon.nodes.runtime.parameters import Parameters, ReadOnlySaysWhy
+from active_recon.nodes.runtime.qos_warnings import QosWarnings
+from active_recon.nodes.runtime.run import run_node
+from active_recon.parameters.viewer import ViewerSettings
 from active_recon.viewer.link import link_words
 from active_recon.viewer.page import Page
 from rclpy.client import Client

@@ -19,6 +19,7 @@ from active_recon.models.network import Cameras
 from active_recon.models.ogn import octree_report, Ogn
 from active_recon.models.registry import network_entry
 from active_recon.models.weights import load_weights
+from active_recon.models.weights_files import find_weights, PAPER_MODEL, read_card, weights_hash
 from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.measured import measure, Measured
 from active_recon.paper.results import Claim, Column, Table
@@ -29,8 +30,7 @@ from active_recon.paper.systems import (
     systems,
     views_seen,
 )
-from active_recon.voxels import RESOLUTION
-from active_recon.weights_files import find_weights, PAPER_MODEL, read_card, weights_hash
+from active_recon.volumes.voxels import RESOLUTION
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 

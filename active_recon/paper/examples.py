@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from active_recon.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.datasets.pascal3d import list_photographs
 from active_recon.datasets.photographs import read_photographs
 from active_recon.datasets.views import ViewSet
@@ -14,6 +13,7 @@ from active_recon.errors import DataError
 from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.rollouts import roll_out, Step
 from active_recon.evaluation.statistics import mean_interval, Values
+from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.models.weights import Bundle, load_weights
 from active_recon.paper.plotting import Picture, tiles
 from active_recon.paper.results import Column, counted, Result, Table
@@ -22,8 +22,8 @@ from active_recon.paper.systems import have_systems, R2N2, SHAPE_BASIS, TWO_STAG
 from active_recon.paper.table5 import sets as unseen_sets
 from active_recon.paper.writing import provenance
 from active_recon.policies import load_policy, PolicyOptions
-from active_recon.voxel_boxes import height_range, voxel_picture
-from active_recon.voxels import iou, VoxelGrid
+from active_recon.volumes.boxes import height_range, voxel_picture
+from active_recon.volumes.voxels import iou, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 import torch

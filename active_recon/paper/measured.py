@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.measure import Episodes
@@ -11,13 +10,14 @@ from active_recon.evaluation.policy_study import contenders
 from active_recon.evaluation.rollouts import batches, roll_out
 from active_recon.evaluation.statistics import Values
 from active_recon.evaluation.trial import read_arrays, Trial, write_arrays
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights
 from active_recon.paper.study import Objects, Study
 from active_recon.policies import Choice, Observation
 from active_recon.policies.geometric import BlindPolicy
 from active_recon.runtimes import State
-from active_recon.silhouettes import frustum, project_all
+from active_recon.volumes.silhouettes import frustum, project_all
 import numpy as np
 from numpy.typing import NDArray
 import torch

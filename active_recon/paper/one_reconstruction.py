@@ -29,11 +29,11 @@ def main(root: str, category: str, name: str, weights: str, threads: str, views:
         seconds[step] = time.perf_counter() - start
 
     with timed('loading models'):
-        from active_recon.canonical import network_image
         from active_recon.datasets.layout import ObjectFolder
-        from active_recon.rendering import composite
+        from active_recon.geometry.canonical import network_image
         from active_recon.runtimes import load_runtime
-        from active_recon.voxels import VoxelGrid, write_binvox, write_mesh
+        from active_recon.volumes.rendering import composite
+        from active_recon.volumes.voxels import VoxelGrid, write_binvox, write_mesh
         runtime = load_runtime(Path(weights), threads=int(threads))
     with timed('pre-processing data'):
         folder = ObjectFolder(Path(root), category, name)

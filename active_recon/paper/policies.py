@@ -10,6 +10,7 @@ from active_recon.evaluation.policy_study import blind_names, policy_study
 from active_recon.evaluation.statistics import Interval
 from active_recon.evaluation.trial import Trial
 from active_recon.models.weights import load_weights
+from active_recon.models.weights_files import read_card, weights_hash
 from active_recon.paper.claims import all_larger, headroom, larger
 from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
 from active_recon.paper.results import Cell, Claim, Column, Result, Table
@@ -24,7 +25,6 @@ from active_recon.paper.systems import (
 from active_recon.paper.writing import provenance
 from active_recon.training.loop import TrainingConfig
 from active_recon.training.plan import Plan
-from active_recon.weights_files import read_card, weights_hash
 
 _OWN = 'attention'
 

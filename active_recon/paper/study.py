@@ -10,9 +10,9 @@ from active_recon.datasets.layout import list_objects, ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.errors import DataError, WeightsError
+from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.reporting import Reporting, silent
-from active_recon.voxels import RESOLUTION
-from active_recon.weights_files import find_weights, PAPER_MODEL
+from active_recon.volumes.voxels import RESOLUTION
 
 SAMPLES = 75_000
 REAL = {'real_val': 'real models, `val`', 'real_cc0': 'real models that ship (CC0)',

@@ -10,12 +10,12 @@ from active_recon.config import LossConfig
 from active_recon.errors import WeightsError
 from active_recon.models.registry import network_entry, NETWORKS
 from active_recon.models.weights import save_weights
+from active_recon.models.weights_files import find_weights, read_card
 from active_recon.paper.study import Objects, Study
 from active_recon.training.loop import make_fabric, Measured, TrainingConfig
 from active_recon.training.plan import Plan, Report, seeded, train_plan
 from active_recon.training.supervised import mean_length, steps_for
-from active_recon.voxels import FINE_RESOLUTION, RESOLUTION
-from active_recon.weights_files import find_weights, read_card
+from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
 
 BATCH, POLICY_BATCH = 32, 48
 LEARNING_RATE, POLICY_LEARNING_RATE = 6e-4, 5e-4

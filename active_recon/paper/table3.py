@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from active_recon.evaluation.statistics import mean_interval, Values
+from active_recon.models.weights_files import read_card
 from active_recon.paper import published
 from active_recon.paper.claims import all_larger, FAILS, HOLDS, larger, OPEN
 from active_recon.paper.comparison import (
@@ -26,7 +27,6 @@ from active_recon.paper.study import REAL, Study
 from active_recon.paper.systems import JOINT, TWO_STAGE
 from active_recon.paper.writing import provenance
 from active_recon.shapes import CATEGORIES
-from active_recon.weights_files import read_card
 import numpy as np
 from numpy.typing import NDArray
 

@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference, pose_azimuths, TURN
 from active_recon.errors import ViewError
+from active_recon.geometry.cameras import azimuth_difference, pose_azimuths, TURN
 from active_recon.policies.base import Choice, Observation
 from active_recon.runtimes import PolicyRuntime, State
 import numpy as np

@@ -1,6 +1,6 @@
 """The policies that look at no image: random, uniform, farthest."""
 
-from active_recon.cameras import direction_distance, pose_azimuths, pose_directions, TURN
+from active_recon.geometry.cameras import direction_distance, pose_azimuths, pose_directions, TURN
 from active_recon.policies.base import Choice, distance_to_taken, is_fresh, Observation
 from active_recon.runtimes import State
 import numpy as np

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from active_recon.errors import ConfigError, WeightsError
+from active_recon.models.weights_files import read_metadata, SHIPPED
 from active_recon.plugins import installed, load_installed, POLICIES_GROUP
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Policy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 from active_recon.runtimes import load_policy_runtime, PolicyRuntime
-from active_recon.weights_files import read_metadata, SHIPPED
 import numpy as np
 
 

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
-from active_recon.bags.missing import lost_words
-from active_recon.bags.parameters import node_parameters
-from active_recon.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, view_distance
+from active_recon.acquisition.view_gate import GOAL_TOLERANCE
+from active_recon.bags.runs.missing import lost_words
+from active_recon.bags.runs.parameters import node_parameters
+from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, view_distance
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import degrees, Subject
 from active_recon.report.words import counted, refused, times, warned
-from active_recon.view_gate import GOAL_TOLERANCE
 
 _STOPPED = {
     'max_views': ('view limit', 'It stopped because it had taken as many views as it was '

@@ -6,7 +6,7 @@ from itertools import accumulate, pairwise
 from statistics import median_low
 from typing import NamedTuple
 
-from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedView
+from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedView
 
 NS_PER_MS = 1e6
 ONE_CLOCK_S = 60.0

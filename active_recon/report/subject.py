@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import math
 
-from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
-from active_recon.cameras import azimuth_difference
-from active_recon.voxels import iou, VoxelGrid
+from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
+from active_recon.geometry.cameras import azimuth_difference
+from active_recon.volumes.voxels import iou, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 

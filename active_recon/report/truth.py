@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from active_recon.bags.parameters import node_parameters
-from active_recon.bags.run import RecordedRun
+from active_recon.bags.runs.parameters import node_parameters
+from active_recon.bags.runs.run import RecordedRun
 from active_recon.errors import ConfigError, DataError
-from active_recon.meshes import fit_to_grid, load_mesh, read_mesh
 from active_recon.objects import find_object, shipped_objects
 from active_recon.report.subject import shown_grid
-from active_recon.voxelise import voxelise
-from active_recon.voxels import read_binvox, RESOLUTION, turned, VoxelGrid
+from active_recon.volumes.meshes import fit_to_grid, load_mesh, read_mesh
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import read_binvox, RESOLUTION, turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 import trimesh

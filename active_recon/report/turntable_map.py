@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
-from active_recon.bags.run import RecordedGoal, RecordedView
-from active_recon.cameras import azimuth_difference, TURN, VIEW_COUNT
+from active_recon.bags.runs.run import RecordedGoal, RecordedView
+from active_recon.geometry.cameras import azimuth_difference, TURN, VIEW_COUNT
 from active_recon.report.charts import Figure, view_color
 from active_recon.report.images import data_uri
 from active_recon.report.subject import degrees, shown_grid, Subject

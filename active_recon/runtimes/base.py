@@ -5,13 +5,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol, TYPE_CHECKING
 
-from active_recon.cameras import Camera
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import Camera
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # it brings OpenCV, for which no list of policies need wait
-    from active_recon.canonical import NetworkSpec
+    from active_recon.geometry.canonical import NetworkSpec
 
 State = Mapping[str, NDArray[np.float32]]
 """What a network or a policy knows after some views: named arrays, batch first."""

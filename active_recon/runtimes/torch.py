@@ -5,13 +5,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
-from active_recon.cameras import Camera, orbit_camera
-from active_recon.canonical import network_image
 from active_recon.errors import ConfigError, WeightsError
+from active_recon.geometry.cameras import Camera, orbit_camera
+from active_recon.geometry.canonical import network_image
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.models.weights import Bundle, load_weights
+from active_recon.models.weights_files import config_hash, SHIPPED, weights_hash
 from active_recon.runtimes.base import State
-from active_recon.weights_files import config_hash, SHIPPED, weights_hash
 import numpy as np
 from numpy.typing import NDArray
 import torch

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from active_recon.errors import ConfigError
-from active_recon.meshes import fit_to_grid
+from active_recon.volumes.meshes import fit_to_grid
 import numpy as np
 import trimesh
 
@@ -30,11 +30,11 @@ def make_shape(category: str, seed: int) -> trimesh.Trimesh:
     """
     Return one object of a category, coloured, fitted to the grid; the same for the same seed.
 
-    Each category is a module of this package with a function of its own name,
-    `(rng) -> Trimesh`, that draws structure, proportions and materials; things have a package.
+    Each category is a package with a module `generator` and in it a function of the category's
+    name, `(rng) -> Trimesh`, that draws structure, proportions and materials.
     """
     check_category(category)
-    module = 'things' if category in THINGS else category
+    module = 'things' if category in THINGS else f'{category}.generator'
     generate: Callable[[np.random.Generator], trimesh.Trimesh] = getattr(
         import_module(f'{__name__}.{module}'), category)
     salt = int.from_bytes(hashlib.sha256(category.encode()).digest()[:4], 'big')

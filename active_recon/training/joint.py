@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from active_recon.cameras import AZIMUTHS
 from active_recon.config import LossConfig, RewardConfig
 from active_recon.datasets.views import ViewSet
+from active_recon.geometry.cameras import AZIMUTHS
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.training.loop import (

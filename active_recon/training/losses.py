@@ -1,7 +1,7 @@
 """The reconstruction's losses of section 3.2, as means."""
 
 from active_recon.config import LossConfig
-from active_recon.silhouettes import project
+from active_recon.volumes.silhouettes import project
 import torch
 from torch import Tensor
 from torch.nn import functional

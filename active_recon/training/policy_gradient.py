@@ -4,17 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from active_recon.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.config import RewardConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.environment import run_episode, TimeStep
 from active_recon.errors import ConfigError
 from active_recon.evaluation.rollouts import nearest_views, RenderedObjects, Seen
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COUNT
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.weights import state_hash
 from active_recon.policies.attention import kept_apart
-from active_recon.silhouettes import frustum, project_all
 from active_recon.training.loop import (
     Draw,
     Measured,
@@ -23,7 +22,8 @@ from active_recon.training.loop import (
     train_steps,
     TrainingConfig,
 )
-from active_recon.voxels import iou
+from active_recon.volumes.silhouettes import frustum, project_all
+from active_recon.volumes.voxels import iou
 import numpy as np
 import torch
 from torch import nn, Tensor

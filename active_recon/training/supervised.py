@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 
-from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
-from active_recon.silhouettes import frustum
 from active_recon.training.batches import draw_batch
 from active_recon.training.loop import (
     Draw,
@@ -17,6 +16,7 @@ from active_recon.training.loop import (
     TrainingConfig,
 )
 from active_recon.training.losses import reconstruction_loss
+from active_recon.volumes.silhouettes import frustum
 import numpy as np
 import torch
 from torch import nn, Tensor

@@ -3,10 +3,9 @@
 import socket
 
 from active_recon.errors import ConfigError
+from active_recon.parameters.viewer import DEFAULT_PORT, HIGHEST_PORT
 
 HOST = '127.0.0.1'
-DEFAULT_PORT = 8080
-HIGHEST_PORT = 65000  # with room for the next free one
 
 
 def is_served(port: int) -> bool:

@@ -7,7 +7,8 @@ import math
 from typing import Any
 
 from active_recon.errors import ConfigError
-from active_recon.viewer.address import HIGHEST_PORT, HOST
+from active_recon.parameters.viewer import HIGHEST_PORT
+from active_recon.viewer.address import HOST
 from active_recon.viewer.scene import Scene
 from active_recon.viewer.state import entropy_lines, LoopState
 import numpy as np

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from active_recon.bags.run import RecordedEpisode, RecordedGoal, RecordedRun
+from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun
 from active_recon.errors import DataError
 from active_recon.viewer.page import Page
 from active_recon.viewer.state import (

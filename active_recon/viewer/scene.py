@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from active_recon.cameras import Camera, view_distance
+from active_recon.geometry.cameras import Camera, view_distance
 from active_recon.view_colors import Color, view_color
 from active_recon.viewer.state import LoopState, Scores, TakenView
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
 from numpy.typing import NDArray

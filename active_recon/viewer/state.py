@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import math
 
-from active_recon.cameras import Camera
-from active_recon.voxels import VoxelGrid
+from active_recon.geometry.cameras import Camera
+from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 
-from active_recon.demo.processes import private_environment
+from active_recon.launching.processes import private_environment
 from active_recon.viewer.address import is_served
 import pytest
 

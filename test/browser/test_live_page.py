@@ -1,18 +1,18 @@
 """The page in a real browser, with no ROS: what it draws, and its slider and buttons."""
 
-from active_recon.bags.run import (
+from active_recon.bags.runs.run import (
     Candidates,
     RecordedEpisode,
     RecordedGoal,
     RecordedRun,
     RecordedView,
 )
-from active_recon.cameras import AZIMUTHS, orbit_camera
 from active_recon.errors import ConfigError, DataError
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.viewer.page import Page
 from active_recon.viewer.playback import PLAY, Playback
 from active_recon.viewer.state import LoopState, Observer, Scores, TakenView
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 

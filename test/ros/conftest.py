@@ -12,8 +12,8 @@ import tempfile
 import time
 from typing import Any, IO
 
-from active_recon.cameras import CANONICAL_ELEVATION, orbit_camera
-from active_recon.nodes.shared_memory import PROFILE
+from active_recon.geometry.cameras import CANONICAL_ELEVATION, orbit_camera
+from active_recon.nodes.runtime.shared_memory import PROFILE
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs, pose_to_msg

@@ -2,8 +2,8 @@
 
 import signal
 
+from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.reconstructor import Reconstructor
-from active_recon.weights_files import find_weights, PAPER_MODEL
 from conftest import LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.stamps import nanoseconds_from_stamp

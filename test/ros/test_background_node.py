@@ -1,9 +1,9 @@
 """The room behind the object becomes white before the network sees it, over real DDS."""
 
-from active_recon.background import off_color, off_reference, on_white
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.acquisition.background import off_color, off_reference, on_white
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.reconstructor import Reconstructor
-from active_recon.voxels import PUBLISHED_FLOOR
+from active_recon.volumes.voxels import PUBLISHED_FLOOR
 from conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs

@@ -3,8 +3,8 @@
 from active_recon.calibration.board import Detection
 from active_recon.calibration.fit import ImageFit
 from active_recon.calibration.outcome import Calibration
-from active_recon.cameras import CANONICAL_INTRINSICS
-from active_recon.nodes.settings.camera_pose import CameraPoseSettings
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS
+from active_recon.parameters.camera_pose import CameraPoseSettings
 import numpy as np
 import pytest
 import rclpy

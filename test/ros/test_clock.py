@@ -3,7 +3,7 @@
 import itertools
 import math
 
-from active_recon.cameras import Camera
+from active_recon.geometry.cameras import Camera
 from conftest import FakeCamera, FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg

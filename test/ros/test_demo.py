@@ -10,16 +10,16 @@ import sys
 import time
 
 from active_recon import __version__
-from active_recon.bags.comparison import SAME_BITS
-from active_recon.bags.reading import read_run
-from active_recon.bags.settings import recorded_settings
-from active_recon.bags.storage import open_bag
-from active_recon.bags.verification import verify
-from active_recon.meshes import load_mesh
+from active_recon.bags.replay.comparison import SAME_BITS
+from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.settings import recorded_settings
+from active_recon.bags.storage.opening import open_bag
 from active_recon.objects import find_object
 from active_recon.runtimes import load_runtime
-from active_recon.voxelise import voxelise
-from active_recon.voxels import grid_from_points, iou
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import grid_from_points, iou
 import cv2
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory

@@ -2,9 +2,9 @@
 
 from types import SimpleNamespace
 
-from active_recon.cameras import orbit_camera
-from active_recon.nodes.demo_watch import DemoWatch
-from active_recon.voxels import VoxelGrid
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.launching.demo_watch import DemoWatch
+from active_recon.volumes.voxels import VoxelGrid
 from msg_tools.loop import view_to_msgs
 import numpy as np
 import pytest

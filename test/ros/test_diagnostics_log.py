@@ -2,8 +2,8 @@
 
 from types import SimpleNamespace
 
-from active_recon.nodes import diagnostics as diagnostics_module
-from active_recon.nodes.diagnostics import Diagnostics, LOG_EVERY_S
+from active_recon.nodes.runtime import diagnostics as diagnostics_module
+from active_recon.nodes.runtime.diagnostics import Diagnostics, LOG_EVERY_S
 import pytest
 
 pytestmark = pytest.mark.ros

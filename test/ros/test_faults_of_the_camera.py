@@ -9,9 +9,9 @@ from functools import partial
 import logging
 import time
 
-from active_recon.faults import FAULTS
-from active_recon.shown_object import rendered_object
-from active_recon.weights_files import PAPER_MODEL
+from active_recon.models.weights_files import PAPER_MODEL
+from active_recon.simulation.faults import FAULTS
+from active_recon.simulation.shown_object import rendered_object
 from hand_listed_loop import computed, DEGREES, Loop, RECOVERED_S
 import pytest
 import torch

@@ -1,11 +1,11 @@
 """What a watcher finds out of a loop, over real DDS: where it is, what it says, what is wrong."""
 
-from active_recon.cameras import orbit_camera
-from active_recon.nodes.diagnostics import Diagnostics
-from active_recon.nodes.followed_loop import Loop, LoopFinder
-from active_recon.nodes.heard_loop import HeardLoop
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.nodes.loop.followed_loop import Loop, LoopFinder
+from active_recon.nodes.loop.loop_subscriber import HeardLoop
+from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.viewer import TOPICS
-from active_recon.voxels import VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 from conftest import LATCHED, STREAM
 import cv2
 from geometry_msgs.msg import PoseStamped

@@ -6,9 +6,9 @@ import runpy
 import sys
 from types import ModuleType
 
-from active_recon.nodes.parameters import declared
-from active_recon.nodes.settings.every_node import SETTINGS
-from active_recon.nodes.settings.recorder import TOPICS
+from active_recon.parameters.declaration import declared
+from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.recorder import TOPICS
 import pytest
 
 ROOT = Path(__file__).parents[2]

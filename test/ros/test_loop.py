@@ -3,10 +3,10 @@
 from functools import partial
 import signal
 
-from active_recon.cameras import azimuth_difference, AZIMUTHS, orbit_camera
 from active_recon.datasets.layout import ObjectFolder, write_object
-from active_recon.rendering import Renderer
-from active_recon.voxels import VoxelGrid
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
+from active_recon.volumes.rendering import Renderer
+from active_recon.volumes.voxels import VoxelGrid
 from conftest import LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg

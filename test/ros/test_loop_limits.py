@@ -1,10 +1,10 @@
 """The loop under limits of motion, over real DDS, and its bag, which replays under the same."""
 
-from active_recon.bags.comparison import SAME_BITS, WITHIN_TOLERANCE
-from active_recon.bags.reading import read_run
-from active_recon.bags.settings import recorded_settings
-from active_recon.bags.verification import verify
-from active_recon.motion import MotionLimits
+from active_recon.acquisition.motion import MotionLimits
+from active_recon.bags.replay.comparison import SAME_BITS, WITHIN_TOLERANCE
+from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.settings import recorded_settings
 from conftest import LATCHED
 import pytest
 from std_msgs.msg import Header

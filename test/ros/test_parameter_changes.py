@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.cameras import Camera
-from active_recon.nodes.parameters import NEW_START
+from active_recon.geometry.cameras import Camera
+from active_recon.parameters.declaration import NEW_START
 from conftest import FakeCamera, FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from active_recon.errors import DataError
-from active_recon.nodes.parameter_table import BEGIN, END, parameter_table, with_table
-from active_recon.nodes.parameters import declared
-from active_recon.nodes.settings.every_node import SETTINGS
+from active_recon.parameters.declaration import declared
+from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.table import BEGIN, END, parameter_table, with_table
 import pytest
 
 README = Path(__file__).parents[2] / 'README.md'
@@ -13,7 +13,7 @@ README = Path(__file__).parents[2] / 'README.md'
 
 def test_the_readme_tells_the_parameters_of_the_code():
     text = README.read_text()
-    assert with_table(text) == text, 'python -m active_recon.nodes.parameter_table README.md'
+    assert with_table(text) == text, 'python -m active_recon.parameters.table README.md'
 
 
 def test_every_parameter_has_a_row_with_its_default():

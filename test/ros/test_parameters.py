@@ -5,7 +5,8 @@ import math
 from types import SimpleNamespace
 
 from active_recon.errors import ConfigError
-from active_recon.nodes.parameters import NEW_START, parameter, Parameters, ReadOnlySaysWhy, tell
+from active_recon.nodes.runtime.parameters import Parameters, ReadOnlySaysWhy, tell
+from active_recon.parameters.declaration import NEW_START, parameter
 import pytest
 from rclpy.node import Node
 from rclpy.parameter import Parameter

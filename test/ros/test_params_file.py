@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 from active_recon.errors import ConfigError
-from active_recon.nodes.params_file import read_params_file
+from active_recon.parameters.params_file import read_params_file
 import pytest
 
 CONFIG = Path(__file__).parents[2] / 'config'

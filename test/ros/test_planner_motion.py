@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.cameras import azimuth_difference
+from active_recon.geometry.cameras import azimuth_difference
 from conftest import FakeReconstructor
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp

@@ -3,9 +3,9 @@
 import math
 import signal
 
-from active_recon.cameras import azimuth_difference, orbit_camera
+from active_recon.geometry.cameras import azimuth_difference, orbit_camera
+from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.runtimes import load_policy_runtime
-from active_recon.weights_files import find_weights, PAPER_MODEL
 from conftest import FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_to_msg

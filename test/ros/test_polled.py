@@ -1,7 +1,7 @@
 """A polled subscription keeps what comes until its node takes it, and wakes nobody."""
 
-from active_recon.nodes.polled import Polled, taken
-from active_recon.nodes.qos import LATCHED, LATCHED_HEARD_LATE
+from active_recon.nodes.runtime.polled import Polled, taken
+from active_recon.nodes.runtime.qos import LATCHED, LATCHED_HEARD_LATE
 import pytest
 from std_msgs.msg import Header
 

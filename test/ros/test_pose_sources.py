@@ -3,11 +3,11 @@
 import sys
 from types import SimpleNamespace
 
-from active_recon.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.errors import ConfigError
-from active_recon.nodes.pose_sources import check_pose_source, TfPoses
-from active_recon.nodes.settings.reconstructor import ReconstructorSettings
-from active_recon.turntable_pose import FixedCamera
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.geometry.turntable_pose import FixedCamera
+from active_recon.nodes.camera.pose_sources import check_pose_source, TfPoses
+from active_recon.parameters.reconstructor import ReconstructorSettings
 from conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
 from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Vector3
 from msg_tools.cameras import intrinsics_to_msg, pose_from_msg, pose_to_msg

@@ -6,7 +6,7 @@ from pathlib import Path
 import resource
 import signal
 
-from active_recon.nodes.sequence_gaps import SequenceGaps
+from active_recon.nodes.recording.sequence_gaps import SequenceGaps
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from mcap.exceptions import EndOfFile, McapError

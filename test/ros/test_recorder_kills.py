@@ -6,7 +6,7 @@ import resource
 import signal
 import time
 
-from active_recon.bags.repair import repair_bag
+from active_recon.bags.storage.repair import repair_bag
 from geometry_msgs.msg import PoseStamped
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 import pytest

@@ -1,7 +1,7 @@
 """The image of the empty scene is the first that was taken after it was asked for."""
 
 from active_recon.errors import MessageError
-from active_recon.nodes.reference_capture import ReferenceCapture
+from active_recon.nodes.camera.reference_capture import ReferenceCapture
 import numpy as np
 import pytest
 from std_srvs.srv import Trigger

@@ -2,7 +2,7 @@
 
 import re
 
-from active_recon.weights_files import SHIPPED
+from active_recon.models.weights_files import SHIPPED
 import numpy as np
 import pytest
 from safetensors.numpy import save_file

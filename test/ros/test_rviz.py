@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from active_recon.nodes.settings.recorder import TOPICS
-from msg_tools.cameras import OBJECT_FRAME
+from active_recon.geometry.cameras import OBJECT_FRAME
+from active_recon.parameters.recorder import TOPICS
 import pytest
 import yaml
 

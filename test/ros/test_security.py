@@ -7,7 +7,12 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 from active_recon.errors import DataError
-from active_recon.nodes.graph_access import differences, joined, read_policies, write_policies
+from active_recon.nodes.runtime.graph_access import (
+    differences,
+    joined,
+    read_policies,
+    write_policies,
+)
 from conftest import ROOT
 import pytest
 

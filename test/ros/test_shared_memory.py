@@ -3,7 +3,7 @@
 from pathlib import Path
 import re
 
-from active_recon.nodes.shared_memory import PROFILE
+from active_recon.nodes.runtime.shared_memory import PROFILE
 import numpy as np
 import pytest
 

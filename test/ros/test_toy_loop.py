@@ -3,10 +3,10 @@
 from pathlib import Path
 import signal
 
-from active_recon.bags.reading import read_run
-from active_recon.bags.settings import recorded_settings
-from active_recon.bags.under_others import Others, run_under
-from active_recon.bags.verification import verify
+from active_recon.bags.replay.verification import verify
+from active_recon.bags.replay.what_if import Others, run_under
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.settings import recorded_settings
 from active_recon.models.registry import NETWORKS
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.policies import POLICIES

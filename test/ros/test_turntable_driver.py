@@ -3,8 +3,8 @@
 import math
 from pathlib import Path
 
-from active_recon.cameras import azimuth_difference, CANONICAL_INTRINSICS, orbit_camera
-from active_recon.turntable_pose import FixedCamera
+from active_recon.geometry.cameras import azimuth_difference, CANONICAL_INTRINSICS, orbit_camera
+from active_recon.geometry.turntable_pose import FixedCamera
 from conftest import BUDGET_S, STREAM
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import intrinsics_to_msg, pose_from_msg

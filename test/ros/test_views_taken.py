@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.cameras import Camera
-from active_recon.weights_files import PAPER_MODEL
+from active_recon.geometry.cameras import Camera
+from active_recon.models.weights_files import PAPER_MODEL
 from conftest import FakeCamera
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg

@@ -7,8 +7,8 @@ from pathlib import Path
 from active_recon.errors import ConfigError
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights
-from active_recon.voxels import FINE_RESOLUTION, RESOLUTION
-from active_recon.weights_files import find_weights, weights_hash
+from active_recon.models.weights_files import find_weights, weights_hash
+from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
 
 SIDES = (FINE_RESOLUTION, RESOLUTION)
 """Cells a side at which networks are measured, as far as they have them."""

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from active_recon.cameras import pose_directions
 from active_recon.errors import ConfigError
 from active_recon.evaluation.calibration import BINS
 from active_recon.evaluation.posed.entrants import Entrant
@@ -17,6 +16,7 @@ from active_recon.evaluation.posed.walking import (
     walk,
 )
 from active_recon.evaluation.rollouts import batches, Observer
+from active_recon.geometry.cameras import pose_directions
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit

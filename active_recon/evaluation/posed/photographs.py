@@ -8,13 +8,13 @@ whose centre is in every silhouette, so that probabilities of 64 cells are avera
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from active_recon.canonical import framed_layers
 from active_recon.datasets.middlebury import PosedPhotographs
 from active_recon.datasets.views import with_seen
 from active_recon.evaluation.posed.entrants import Entrant
+from active_recon.geometry.canonical import framed_layers
 from active_recon.models.lifted import cell_centers
 from active_recon.models.network import Cameras
-from active_recon.voxels import iou, RESOLUTION
+from active_recon.volumes.voxels import iou, RESOLUTION
 import cv2
 import numpy as np
 from numpy.typing import NDArray

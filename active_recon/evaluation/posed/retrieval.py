@@ -8,7 +8,7 @@ from active_recon.datasets.views import read_views
 from active_recon.evaluation.baselines import thumbnails
 from active_recon.evaluation.posed.scene import IMAGE_SIZE, Scene
 from active_recon.evaluation.posed.scoring import Scores
-from active_recon.voxels import iou, RESOLUTION, turned
+from active_recon.volumes.voxels import iou, RESOLUTION, turned
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import math
 from typing import NamedTuple
 
-from active_recon.cameras import pose_directions, TURN
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.measuring import orders_of, Plan, targets_of
@@ -13,9 +12,10 @@ from active_recon.evaluation.posed.scene import Scene
 from active_recon.evaluation.posed.scoring import iou_scores, pooled, Scores, Target
 from active_recon.evaluation.posed.walking import some_objects, walk
 from active_recon.evaluation.rollouts import batches, Observer
+from active_recon.geometry.cameras import pose_directions, TURN
 from active_recon.models.lifted import projected, projection
 from active_recon.models.network import Cameras
-from active_recon.voxels import turned
+from active_recon.volumes.voxels import turned
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

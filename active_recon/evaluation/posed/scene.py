@@ -10,7 +10,7 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.evaluation.posed.walking import on_turntable
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.reporting import Reporting, silent
-from active_recon.voxels import FINE_RESOLUTION, RESOLUTION
+from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
 import numpy as np
 import torch
 from torch import Tensor

@@ -12,8 +12,8 @@ from active_recon.evaluation.surfaces import (
     thin_cells,
     voxel_surface,
 )
-from active_recon.occupancy_threshold import best_threshold
-from active_recon.voxels import iou
+from active_recon.volumes.occupancy_threshold import best_threshold
+from active_recon.volumes.voxels import iou
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit

@@ -3,15 +3,15 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from active_recon.cameras import (
+from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.rollouts import Observer
+from active_recon.geometry.cameras import (
     CANONICAL_ELEVATION,
     ELEVATION_TOLERANCE,
     pose_directions,
     TURN,
     VIEW_COUNT,
 )
-from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.rollouts import Observer
 import numpy as np
 from numpy.typing import NDArray
 import torch

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from active_recon.shapes.parts import assemble
+from active_recon.shapes.common.parts import assemble
 from active_recon.shapes.things.assembled import ASSEMBLED
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import chance, choose, Generator

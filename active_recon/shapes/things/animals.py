@@ -3,7 +3,7 @@
 
 import math
 
-from active_recon.shapes.parts import Color
+from active_recon.shapes.common.parts import Color
 from active_recon.shapes.things.colors import draw_palette, furry
 from active_recon.shapes.things.drawing import chance, choose
 from active_recon.shapes.things.fields import ball, Body, limb, molten

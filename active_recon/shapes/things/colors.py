@@ -2,7 +2,7 @@
 
 import colorsys
 
-from active_recon.shapes import materials
+from active_recon.shapes.common import materials
 import numpy as np
 from numpy.typing import NDArray
 

@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.shapes.parts import assemble, box, ellipsoid, Mesh, rod
-from active_recon.shapes.soft_parts import cushion, smoothed
+from active_recon.shapes.common.parts import assemble, box, ellipsoid, Mesh, rod
+from active_recon.shapes.common.soft_parts import cushion, smoothed
 from active_recon.shapes.things.colors import draw_palette, ripe
 from active_recon.shapes.things.drawing import chance, choose, section, smooth_profile
 from active_recon.shapes.things.solids import (

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 import math
 from typing import TypeVar
 
-from active_recon.shapes.soft_parts import smoothed
+from active_recon.shapes.common.soft_parts import smoothed
 from active_recon.shapes.things.solids import circle
 import numpy as np
 from numpy.typing import NDArray

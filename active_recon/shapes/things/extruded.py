@@ -3,7 +3,7 @@
 from collections.abc import Callable
 import math
 
-from active_recon.shapes.parts import assemble, box, Mesh
+from active_recon.shapes.common.parts import assemble, box, Mesh
 from active_recon.shapes.things import outlines
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import chance, choose, Generator, section

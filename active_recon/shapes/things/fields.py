@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from active_recon.shapes.parts import Color, Mesh
+from active_recon.shapes.common.parts import Color, Mesh
 from active_recon.shapes.things.solids import painted
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

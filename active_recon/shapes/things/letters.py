@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.shapes.parts import assemble, box, Mesh
+from active_recon.shapes.common.parts import assemble, box, Mesh
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import arc, chance
 from active_recon.shapes.things.solids import circle, moved, swept

@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.shapes.parts import assemble, beam, box, Mesh
+from active_recon.shapes.common.parts import assemble, beam, box, Mesh
 from active_recon.shapes.things import outlines
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import chance, choose, Generator, helix, smooth_profile

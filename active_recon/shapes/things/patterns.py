@@ -3,7 +3,7 @@
 from collections.abc import Callable
 import math
 
-from active_recon.shapes.parts import Mesh
+from active_recon.shapes.common.parts import Mesh
 from active_recon.shapes.things.colors import Palette
 from active_recon.shapes.things.solids import painted
 import numpy as np

@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.shapes.parts import Mesh
+from active_recon.shapes.common.parts import Mesh
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull

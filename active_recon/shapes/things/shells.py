@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.shapes.parts import assemble, beam, box, Mesh
-from active_recon.shapes.soft_parts import smoothed
+from active_recon.shapes.common.parts import assemble, beam, box, Mesh
+from active_recon.shapes.common.soft_parts import smoothed
 from active_recon.shapes.things.bent import shade, sheet
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import (

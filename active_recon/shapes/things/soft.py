@@ -2,8 +2,8 @@
 
 import math
 
-from active_recon.shapes.parts import assemble, Mesh, rod
-from active_recon.shapes.soft_parts import smoothed
+from active_recon.shapes.common.parts import assemble, Mesh, rod
+from active_recon.shapes.common.soft_parts import smoothed
 from active_recon.shapes.things.animals import beast, bird, fish, plush
 from active_recon.shapes.things.colors import draw_palette, ripe
 from active_recon.shapes.things.drawing import chance, choose, Generator

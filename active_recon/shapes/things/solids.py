@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 import math
 
-from active_recon.shapes.parts import Color, Mesh
+from active_recon.shapes.common.parts import Color, Mesh
 from active_recon.shapes.things.polygons import area, triangulated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -1,0 +1,121 @@
+"""Where the camera can go, and what the way there costs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, TURN, wrap_azimuth
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+END_TOLERANCE = 1e-4
+"""Limits are written with a few digits: so little beyond the range is still within it, radians."""
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """
+    The azimuths that a turntable or an arm can reach, radians in the object frame.
+
+    - azimuth_range: low and high, counter-clockwise from low to high, both within; it may lead
+      through 0, as (5.5, 1.0) and (-0.8, 1.0) do; a whole turn limits nothing
+    - forbidden_sectors: low, high, low, high, ..., each as a range; the ends are forbidden too
+    - reachable_azimuths: the only ones that there are; empty: any
+
+    Raises ConfigError where one of them is no such thing, or together they leave no azimuth.
+    """
+
+    azimuth_range: Sequence[float] = (0.0, TURN)
+    forbidden_sectors: Sequence[float] = ()
+    reachable_azimuths: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what is no range, no sectors, no azimuth, or leaves nothing."""
+        if len(self.azimuth_range) != 2 or not _are_sectors(self.azimuth_range):
+            raise ConfigError('azimuth_range: expected low and high, two azimuths that differ, '
+                              f'rad, got {list(self.azimuth_range)}')
+        if not _are_sectors(self.forbidden_sectors):
+            raise ConfigError('forbidden_sectors: expected pairs of low and high, rad, that '
+                              f'differ, got {list(self.forbidden_sectors)}')
+        if not np.isfinite(self.reachable_azimuths).all():
+            raise ConfigError('reachable_azimuths: expected finite azimuths, rad, got '
+                              f'{list(self.reachable_azimuths)}')
+        if not self.allows(self.candidates(AZIMUTHS)).any():
+            raise ConfigError(
+                'azimuth_range, forbidden_sectors, reachable_azimuths: expected to leave an '
+                'azimuth where the camera can go, but together they leave none')
+
+    def allows(self, azimuths: ArrayLike) -> NDArray[np.bool_]:
+        """Return for each azimuth whether the camera can go there."""
+        asked = np.asarray(azimuths, np.float64)
+        low, high = self.azimuth_range
+        allowed = _within(asked, low, high, END_TOLERANCE)
+        for low, high in self._sectors:
+            allowed &= ~_within(asked, low, high, _ROUNDING)
+        if self.reachable_azimuths:
+            away = np.abs(azimuth_difference(asked[..., None], self.reachable_azimuths))
+            allowed &= away.min(axis=-1) <= END_TOLERANCE
+        return allowed
+
+    def candidates(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Return the azimuths among which a goal is sought, (N,) in [0, 2 pi).
+
+        They are the reachable ones where those are listed, else a grid of azimuths, (M,), and the
+        middle of every stretch that is free and yet too narrow for one of the grid. What else
+        cannot be reached is still among them.
+        """
+        if self.reachable_azimuths:
+            return np.unique([wrap_azimuth(azimuth) for azimuth in self.reachable_azimuths])
+        free = grid[self.allows(grid)]
+        middles = [middle for low, width in self._stretches()
+                   if self.allows(middle := wrap_azimuth(low + width / 2))
+                   and not ((free - low) % TURN <= width).any()]
+        return np.append(grid, middles)
+
+    @property
+    def _sectors(self) -> list[tuple[float, float]]:
+        return list(zip(self.forbidden_sectors[::2], self.forbidden_sectors[1::2], strict=True))
+
+    def _stretches(self) -> list[tuple[float, float]]:
+        """Return the begin and the width of what lies between one end of a limit and the next."""
+        low, high = self.azimuth_range
+        ends = [] if _width(low, high) == TURN else [low, high]
+        marks = np.unique([wrap_azimuth(end) for end in (*ends, *self.forbidden_sectors)])
+        widths = np.diff(marks, append=marks[:1] + TURN)
+        return list(zip(marks.tolist(), widths.tolist(), strict=True))
+
+
+def worth(scores: NDArray[np.float32], travel: NDArray[np.float64],
+          motion_weight: float) -> NDArray[np.float32]:
+    """
+    Return what candidates are worth, (N,): a policy's scores less the cost of the way.
+
+    The scores are brought to [0, 1], and half a turn of `travel` (radians) costs
+    `motion_weight`: so one weight means the same to every policy. With 0 the scores stay as they
+    are.
+    """
+    if motion_weight == 0:
+        return scores
+    spread = max(float(np.ptp(scores)), 1e-9)
+    quality = (scores - scores.min()).astype(np.float64) / spread
+    return np.asarray(quality - motion_weight * travel / math.pi, np.float32)
+
+
+def _are_sectors(ends: Sequence[float]) -> bool:
+    """Whether these are pairs of finite azimuths that differ."""
+    return (len(ends) % 2 == 0 and all(map(math.isfinite, ends))
+            and all(low != high for low, high in zip(ends[::2], ends[1::2], strict=True)))
+
+
+def _within(azimuths: NDArray[np.float64], low: float, high: float,
+            tolerance: float) -> NDArray[np.bool_]:
+    return np.asarray(
+        (azimuths - low + tolerance) % TURN <= _width(low, high) + 2 * tolerance)
+
+
+def _width(low: float, high: float) -> float:
+    """Return how far it is counter-clockwise from low to high, (0, 2 pi]."""
+    return TURN if high - low >= TURN else (high - low) % TURN or TURN

@@ -1,0 +1,1 @@
+"""Runs computed anew, and compared with what was recorded."""

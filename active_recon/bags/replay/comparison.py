@@ -1,0 +1,144 @@
+"""What a replay computed beside what was recorded: the same bits, or how far apart."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from active_recon.bags.replay.replay import ReplayedEpisode, ReplayedView
+from active_recon.bags.runs.run import RecordedGoal
+from active_recon.geometry.cameras import Camera, view_distance
+from active_recon.planner import Goal
+from active_recon.volumes.voxels import PUBLISHED_FLOOR, VoxelGrid
+from msg_tools.cameras import pose_through_msg
+import numpy as np
+
+TOLERANCES: Mapping[str, float] = {
+    'probabilities': 1e-4,
+    'occupancy': 1e-4,
+    'latent': 1e-4,
+    'entropy': 1e-4,
+    'goal': 1e-4,
+    'scores': 1e-3,
+    'stop': 0.0,
+}
+"""How far another machine's replay may be off: probabilities and latents as they are, entropy as a
+share, goals in radians between the views, scores in the policy's units, and whether the episode
+ended not at all."""
+
+SAME_BITS, WITHIN_TOLERANCE, DIFFERENT, NOTHING_RECORDED = (
+    'same bits', 'within tolerance', 'different', 'nothing recorded')
+
+
+@dataclass
+class Deviation:
+    """Of one quantity: how many were compared, how many had the same bits, the largest gap."""
+
+    tolerance: float
+    compared: int = 0
+    same: int = 0
+    largest: float = 0.0
+
+    @property
+    def verdict(self) -> str:
+        """One of the four words above."""
+        if not self.compared:
+            return NOTHING_RECORDED
+        if self.same == self.compared:
+            return SAME_BITS
+        return WITHIN_TOLERANCE if self.largest <= self.tolerance else DIFFERENT
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The deviation of each quantity, by the names of TOLERANCES."""
+
+    deviations: Mapping[str, Deviation] = field(default_factory=lambda: {
+        name: Deviation(tolerance) for name, tolerance in TOLERANCES.items()})
+
+    @property
+    def verdict(self) -> str:
+        """The worst of the quantities; what was not recorded does not count."""
+        verdicts = {deviation.verdict for deviation in self.deviations.values()}
+        return next((word for word in (DIFFERENT, WITHIN_TOLERANCE, SAME_BITS)
+                     if word in verdicts), NOTHING_RECORDED)
+
+
+def compare(episodes: Sequence[ReplayedEpisode], threshold: float) -> Comparison:
+    """
+    Compare all that was recorded of each view with what the replay made of it.
+
+    `threshold` is that above which the replay calls a cell occupied. An episode that had begun
+    before the recording is left out: the network had seen more of it than the bag has.
+    """
+    comparison = Comparison()
+    for episode in episodes:
+        if episode.recorded.begun_before:
+            continue
+        for view in episode.views:
+            done = episode.recorded.done_after(view.recorded)
+            for name, same, apart in _deviations(view, done, threshold):
+                deviation = comparison.deviations[name]
+                deviation.compared += 1
+                deviation.same += same
+                # A NaN is as far off as can be
+                deviation.largest = max(deviation.largest, apart if apart == apart else np.inf)
+    return comparison
+
+
+def _deviations(view: ReplayedView, done: str,
+                threshold: float) -> Iterator[tuple[str, bool, float]]:
+    """Yield the name of each recorded quantity, whether its bits are the same, and the gap."""
+    recorded, grid = view.recorded, view.reconstruction.grid
+    if recorded.reconstruction is not None:
+        yield 'probabilities', *_cells(recorded.reconstruction, grid, PUBLISHED_FLOOR)
+    if recorded.occupied is not None:
+        yield 'occupancy', *_cells(recorded.occupied, grid, threshold)
+    if recorded.latent is not None:
+        latent = view.reconstruction.latent
+        yield ('latent', np.array_equal(recorded.latent, latent),
+               _largest(recorded.latent, latent))
+    if recorded.entropy is not None:
+        entropy = grid.entropy()
+        yield ('entropy', recorded.entropy == entropy,
+               abs(recorded.entropy - entropy) / max(abs(recorded.entropy), 1e-9))
+    if view.decision is None:
+        return
+    if done != 'stopped' and (recorded.goal is not None or done):  # a service says no more when
+        stopped_alike = view.decision.reason == done
+        yield 'stop', stopped_alike, 0.0 if stopped_alike else np.inf
+    if recorded.goal is not None and view.decision.goal is not None:
+        yield from _goal(recorded.goal, view.decision.goal)
+
+
+def _goal(recorded: RecordedGoal, goal: Goal) -> Iterator[tuple[str, bool, float]]:
+    yield ('goal', _is_pose_of(recorded.camera, goal.camera),
+           view_distance(recorded.camera, goal.camera))
+    if recorded.scores is not None:
+        yield ('scores', np.array_equal(recorded.scores, goal.scores),
+               _largest(recorded.scores, goal.scores))
+
+
+def _is_pose_of(recorded: Camera, camera: Camera) -> bool:
+    """Return whether a pose is that of the camera, or what its message makes of it, bit by bit."""
+    return any(np.array_equal(recorded.pose, pose)
+               for pose in (camera.pose, pose_through_msg(camera.pose)))
+
+
+def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, float]:
+    """
+    Compare a recorded cloud of the cells above a threshold with the whole grid.
+
+    A cell that is missing in the cloud was at most at the threshold.
+    """
+    recorded = recorded.as_fine_as(grid)
+    if recorded.occupancy.shape != grid.occupancy.shape:
+        return False, np.inf
+    told = recorded.occupancy > 0
+    apart = np.where(told, np.abs(recorded.occupancy - grid.occupancy),
+                     np.maximum(grid.occupancy - np.float32(above), 0))
+    return np.array_equal(recorded.occupancy, grid.above(above).occupancy), float(apart.max())
+
+
+def _largest(recorded: np.ndarray, replayed: np.ndarray) -> float:
+    if recorded.shape != replayed.shape:
+        return np.inf
+    return float(np.abs(recorded - replayed).max(initial=0))

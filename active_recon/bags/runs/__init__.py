@@ -1,0 +1,1 @@
+"""Bags as runs: the views of an episode, its parameters, its goals."""

@@ -1,0 +1,164 @@
+"""The camera of a bag as the reconstructor's node would have seen it: images joined to poses."""
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+import math
+from typing import Any
+
+from active_recon.bags.runs.scene import Scene
+from active_recon.bags.runs.topics import CameraTopics, IMAGE_ROLE, INFO_ROLE, POSE_ROLE, Topics
+from active_recon.bags.storage.message_types import (
+    FLOAT,
+    JOINT_STATE,
+    POSE,
+    read_message,
+)
+from active_recon.bags.storage.raw import Bag
+from active_recon.errors import DataError, MessageError
+from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics
+from active_recon.reporting import Advance, Reporting, silent
+from msg_tools.camera_images import size_from_msg
+from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
+from msg_tools.goals import joint_position_from_msg
+from msg_tools.stamps import nanoseconds_from_stamp
+from msg_tools.views import UnreadView, ViewJoiner
+import numpy as np
+from numpy.typing import NDArray
+
+
+class CameraStream:
+    """
+    Reads the camera's topics of a bag.
+
+    Poses are interpolated and refused as in the node. Where a bag has azimuths alone and the
+    scene tells no position, or where it has no camera info of a calibrated camera, the camera
+    stands at that azimuth as the scene says, and the shorter side of its image is what the
+    canonical camera sees. Azimuths without stamps are joined to the images on their receive
+    times. Raises ConfigError where the scene tells what the bag does.
+
+    `assumed` tells in words what neither bag nor scene does, once the views were read.
+
+    `received` tells when what bears a stamp was received, by the topic's name in the loop,
+    nanoseconds; `images` are the stamp and the receive time of each image read, wanted or not.
+    """
+
+    def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics, scene: Scene,
+                 reporting: Reporting = silent) -> None:
+        self._bag = bag
+        self._camera = camera
+        self._topics = topics
+        self._scene = scene
+        self._reporting = reporting
+        self._unstamped = False
+        self._lenses: list[tuple[int, Intrinsics]] = []
+        self._poses: list[tuple[int, NDArray[np.float64]]] = []
+        self.images: list[tuple[int, int]] = []
+        self.assumed: list[str] = []
+        self.received: dict[str, dict[int, int]] = {
+            IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
+
+    def views(self, wanted: Callable[[int], bool]) -> Iterator[UnreadView | MessageError]:
+        """
+        Yield the images whose stamps are wanted, with their cameras, or why they are refused.
+
+        Raises DataError where the images' times run backwards.
+        """
+        yield from self._read_cameras()
+        with self._reporting('reading the images', self._camera.image.count) as advance:
+            yield from self._joined(wanted, advance)
+
+    def begins_after(self, stamp: int) -> bool:
+        """Return whether an image of that stamp, or what tells of its camera, came too early."""
+        firsts = [entries[0][0] for entries in (self._poses, self._lenses)
+                  if entries and not self._unstamped]
+        return stamp < max(min(self.images)[0] if self.images else math.inf, *firsts)
+
+    def _joined(self, wanted: Callable[[int], bool], advance: Advance
+                ) -> Iterator[UnreadView | MessageError]:
+        joiner = ViewJoiner(self._topics.max_pose_gap)
+        fed = 0
+        for message in self._bag.messages({self._camera.image.name}):
+            advance(1, '')
+            msg = read_message(message)
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            self.images.append((stamp, message.received))
+            if not wanted(stamp):
+                continue
+            self.received[IMAGE_ROLE].setdefault(stamp, message.received)
+            time = message.received if self._unstamped else stamp
+            while fed < len(self._poses) and (fed == 0 or self._poses[fed - 1][0] < time):
+                joiner.add_pose(*self._poses[fed])
+                fed += 1
+            try:
+                joiner.add_intrinsics(time, self._lens(time, *size_from_msg(msg)))
+                joiner.add_image(time, msg, now=0)
+            except MessageError as error:
+                if error.kind == 'out_of_order':
+                    raise DataError(f'{message.topic}: the times run backwards: {error}',
+                                    error.kind) from error
+                yield error
+                continue
+            for view in joiner.joined(now=math.inf):  # what may come has come
+                yield replace(view, stamp=stamp) if isinstance(view, UnreadView) else view
+
+    def _read_cameras(self) -> Iterator[MessageError]:
+        """Read the poses and lenses, in the order of their stamps; yield what is refused."""
+        info, azimuth = self._camera.camera_info, self._camera.azimuth
+        poses = []
+        for message in self._bag.messages({azimuth.name, *([info.name] if info else ())}):
+            msg = read_message(message)
+            stamp = (0 if message.type_name == FLOAT
+                     else nanoseconds_from_stamp(msg.header.stamp))
+            role = POSE_ROLE if message.topic == azimuth.name else INFO_ROLE
+            self.received[role].setdefault(stamp, message.received)
+            try:
+                if role == POSE_ROLE:
+                    poses.append((stamp, message.received, self._pose(msg)))
+                else:
+                    self._lenses.append((stamp, intrinsics_from_msg(msg)))
+            except MessageError as error:
+                yield error
+        self._place()
+        self._unstamped = not any(stamp for stamp, _, _ in poses)
+        self._poses = [(received if self._unstamped else stamp, self._placed(pose))
+                       for stamp, received, pose in poses]
+        self._poses.sort(key=_stamp)
+        self._lenses.sort(key=_stamp)
+
+    def _pose(self, msg: Any) -> NDArray[np.float64]:
+        kind = self._camera.azimuth.type_name
+        if kind == POSE:
+            return pose_from_msg(msg, self._topics.object_frame)
+        angle = (joint_position_from_msg(msg, self._topics.joint) if kind == JOINT_STATE
+                 else float(msg.data))
+        if not math.isfinite(angle):
+            raise MessageError(f'expected a finite azimuth, got {angle}', 'azimuth')
+        return self._scene.pose_at(angle, self._topics.turned_object)
+
+    def _place(self) -> None:
+        """Decide how much is known of where the camera stands, and refuse what is told twice."""
+        scene, azimuth = self._scene, self._camera.azimuth
+        has_poses, recorded = azimuth.type_name == POSE, bool(self._lenses)
+        if not has_poses and scene.camera_position is None:
+            self._lenses.clear()  # at a distance that nobody knows, a lens says nothing
+        scene.require_needed(azimuth.name, has_poses, has_poses and bool(self._lenses))
+        self.assumed = scene.assumed(self._camera.image.name, has_poses, recorded)
+
+    def _placed(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pose itself, or one at its azimuth where no lens is known."""
+        if self._lenses or self._scene.camera_position is not None:
+            return pose
+        return self._scene.orbit_pose(Camera(pose).azimuth)
+
+    def _lens(self, time: int, height: int, width: int) -> Intrinsics:
+        """Return the camera info of that time, or the last before it."""
+        if self._lenses:
+            return self._lenses[max(bisect_right(self._lenses, time, key=_stamp) - 1, 0)][1]
+        side = min(height, width)
+        focal = CANONICAL_INTRINSICS.fx * side / CANONICAL_INTRINSICS.width
+        return Intrinsics(focal, focal, width / 2, height / 2, width, height)
+
+
+def _stamp(entry: tuple[int, object]) -> int:
+    return entry[0]

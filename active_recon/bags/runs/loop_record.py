@@ -1,0 +1,126 @@
+"""What the loop published in a bag: views, what they led to, goals, episodes, counters."""
+
+from collections.abc import Callable
+from typing import Any
+
+from active_recon.bags.runs.run import Candidates
+from active_recon.bags.storage.message_types import (
+    CLOUD,
+    DIAGNOSTICS,
+    FLOAT,
+    HEADER,
+    IMAGE,
+    JOINT_STATE,
+    POSE,
+    read_message,
+)
+from active_recon.bags.storage.raw import Bag, RawMessage
+from active_recon.errors import ActiveReconError, DataError
+from msg_tools.cameras import pose_from_msg
+from msg_tools.diagnostics import diagnostics_from_msg
+from msg_tools.entropy import entropy_from_msg
+from msg_tools.episodes import done_from_msg, episode_from_msg
+from msg_tools.goals import azimuth_goal_from_msg, scores_from_msg, view_goal_from_msg
+from msg_tools.images import image_from_msg, latent_from_msg
+from msg_tools.stamps import nanoseconds_from_stamp
+from msg_tools.voxels import voxel_grid_from_msg
+import numpy as np
+from numpy.typing import NDArray
+
+LOOP = {'episode': HEADER, 'view': POSE, 'occupancy': CLOUD, 'probabilities': CLOUD,
+        'latent': IMAGE, 'entropy': JOINT_STATE, 'next_view': POSE, 'next_azimuth': JOINT_STATE,
+        'azimuth_scores': CLOUD, 'done': HEADER, 'view_image': IMAGE}
+"""The loop's own topics and their types."""
+_DIAGNOSTICS = '/diagnostics'
+
+
+class LoopRecord:
+    """
+    The loop's topics, their names after a namespace such as '/'; read once, as a whole.
+
+    - parts: what was said, by the topic's name in the loop, then by its stamp in nanoseconds
+    - published, received: when it was, the same way; what was published again counts once
+    - counters: the last ones of `/diagnostics`, by node; counted: all of them, with the times at
+      which they were received
+
+    In older recordings an entropy has no stamp and is that of all cells: there it is computed of
+    the `probabilities` of each view.
+    `object_size` is the grid's side in metres. Raises DataError on what is not as the loop's
+    nodes write it.
+    """
+
+    def __init__(self, bag: Bag, namespace: str, object_size: float, object_frame: str) -> None:
+        self.parts: dict[str, dict[int, Any]] = {role: {} for role in LOOP}
+        self.published: dict[str, dict[int, int]] = {role: {} for role in LOOP}
+        self.received: dict[str, dict[int, int]] = {role: {} for role in LOOP}
+        self.counters: dict[str, dict[str, int]] = {}
+        self.counted: dict[str, list[tuple[int, dict[str, int]]]] = {}
+        self._from_msg: dict[str, Callable[[Any], Any]] = {
+            'episode': episode_from_msg,
+            'view': lambda msg: pose_from_msg(msg, object_frame),
+            'occupancy': lambda msg: voxel_grid_from_msg(msg, object_size),
+            'probabilities': lambda msg: voxel_grid_from_msg(msg, object_size),
+            'latent': latent_from_msg,
+            'view_image': image_from_msg,
+            'entropy': entropy_from_msg,
+            'next_view': lambda msg: view_goal_from_msg(msg, object_frame),
+            'next_azimuth': azimuth_goal_from_msg,
+            'azimuth_scores': _scores_from_msg,
+            'done': done_from_msg,
+        }
+        roles = {namespace + role: role for role in LOOP}
+        unstamped = False
+        for message in bag.messages({*roles, _DIAGNOSTICS}):
+            if message.topic == _DIAGNOSTICS:
+                self._count(message)
+            elif roles[message.topic] == 'entropy' and message.type_name == FLOAT:
+                unstamped = True
+            else:
+                self._take(roles[message.topic], message)
+        if unstamped:
+            self._compute_entropies()
+        self._refine_empty_grids()
+
+    def _take(self, role: str, message: RawMessage) -> None:
+        if message.type_name != LOOP[role]:
+            raise DataError(f'{message.topic}: expected messages of {LOOP[role]}, as the loop '
+                            f'publishes them, got {message.type_name}', 'topics')
+        msg = read_message(message)
+        stamp = nanoseconds_from_stamp(msg.stamp if LOOP[role] == HEADER else msg.header.stamp)
+        if stamp in self.parts[role] and role != 'done':
+            return  # only an end can be taken back, under the stamp of the episode
+        try:
+            self.parts[role][stamp] = self._from_msg[role](msg)
+        except ActiveReconError as error:
+            raise DataError(f'{message.topic} at {message.received / 1e9:.3f} s: {error}',
+                            error.kind) from error
+        self.published[role][stamp] = message.published
+        self.received[role][stamp] = message.received
+
+    def _refine_empty_grids(self) -> None:
+        """Give grids that were recorded without a cell those of the grid recorded next to them."""
+        recorded = self.parts['occupancy'], self.parts['probabilities']
+        told = {stamp: grid for grids in recorded for stamp, grid in grids.items()
+                if grid.occupancy.any()}
+        for grids in recorded if told else ():
+            for stamp in [stamp for stamp, grid in grids.items() if not grid.occupancy.any()]:
+                nearest = min(told, key=lambda other: abs(other - stamp))
+                grids[stamp] = grids[stamp].as_fine_as(told[nearest])
+
+    def _compute_entropies(self) -> None:
+        for stamp, grid in self.parts['probabilities'].items():
+            self.parts['entropy'].setdefault(stamp, grid.entropy())
+            for times in (self.published, self.received):
+                times['entropy'].setdefault(stamp, times['probabilities'][stamp])
+
+    def _count(self, message: RawMessage) -> None:
+        if message.type_name != DIAGNOSTICS:
+            return
+        for name, status in diagnostics_from_msg(read_message(message)).items():
+            known = self.counters[name.lstrip('/')] = dict(status.counts)
+            self.counted.setdefault(name.lstrip('/'), []).append((message.received, known))
+
+
+def _scores_from_msg(msg: Any) -> tuple[Candidates, NDArray[np.float32]]:
+    positions, azimuths, scores = scores_from_msg(msg)
+    return Candidates(positions.astype(np.float64), azimuths.astype(np.float64)), scores

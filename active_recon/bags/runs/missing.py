@@ -1,0 +1,43 @@
+"""What a recording lacks of an episode's views."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from active_recon.bags.runs.run import RecordedEpisode
+
+_PLANNED = 'goal'
+
+
+def missing_parts(episode: RecordedEpisode) -> Mapping[str, Sequence[int]]:
+    """Return by what is missing the numbers of the views without it; a goal follows its view."""
+    parts: dict[str, list[Any]] = {
+        'probabilities': [view.reconstruction for view in episode.views],
+        'occupancy': [view.occupied for view in episode.views],
+        'entropy': [view.entropy for view in episode.views],
+        'latent': [view.latent for view in episode.views],
+        _PLANNED: [view.goal for view in episode.views[:-1]],
+    }
+    without = {part: [number for number, value in enumerate(values, 1) if value is None]
+               for part, values in parts.items()}
+    return {part: numbers for part, numbers in without.items() if numbers}
+
+
+def missing_words(episode: RecordedEpisode) -> list[str]:
+    """Return in words what is missing, and of which views where it is not of all."""
+    return [part if _of_all(episode, part, numbers) else _of_some(part, numbers)
+            for part, numbers in missing_parts(episode).items()]
+
+
+def lost_words(episode: RecordedEpisode) -> list[str]:
+    """Return in words what is missing of some views and not of all: it was lost on the way."""
+    return [_of_some(part, numbers) for part, numbers in missing_parts(episode).items()
+            if not _of_all(episode, part, numbers)]
+
+
+def _of_all(episode: RecordedEpisode, part: str, numbers: Sequence[int]) -> bool:
+    return len(numbers) == len(episode.views) - (part == _PLANNED)
+
+
+def _of_some(part: str, numbers: Sequence[int]) -> str:
+    views = f'view{"s" if len(numbers) > 1 else ""} {", ".join(map(str, numbers))}'
+    return f'the {part} {"after" if part == _PLANNED else "of"} {views}'

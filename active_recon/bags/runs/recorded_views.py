@@ -1,0 +1,157 @@
+"""The views of a bag: those that the loop says it took, or those that its gate lets through."""
+
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+import math
+from typing import Any
+
+from active_recon.acquisition.view_gate import ViewGate
+from active_recon.bags.runs.camera_stream import CameraStream
+from active_recon.bags.runs.loop_record import LoopRecord
+from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedView
+from active_recon.bags.runs.scene import Scene
+from active_recon.errors import DataError, MessageError, ViewError
+from active_recon.geometry.cameras import azimuth_difference, Camera, OrbitCamera, view_distance
+from msg_tools.episodes import Episode
+from msg_tools.views import View
+
+_ROUNDING = 1e-9  # rad
+
+
+def recorded_episodes(stream: CameraStream, record: LoopRecord,
+                      scene: Scene) -> list[RecordedEpisode]:
+    """
+    Return the episodes that the loop recorded, each with its views in the order it took them.
+
+    What was recorded before any episode began is one without an id. Views from before the
+    recording, of which a latched message tells, are left out. The background is taken away as the
+    scene says, where the loop did not. Raises DataError where the image of another view is
+    missing or its camera is, ViewError where the object is not found in an image.
+    """
+    stamps = sorted(record.parts['view'])
+    views = _taken_views(stream, stamps)
+    before = set(stamps) - {view.stamp for view in views}
+    begun: list[Episode] = sorted(record.parts['episode'].values(), key=lambda each: each.begin)
+    if views and (not begun or views[0].stamp < begun[0].begin):
+        begun.insert(0, Episode('', views[0].stamp))
+    ends = [episode.begin for episode in begun[1:]] + [math.inf]
+    return [replace(
+        _episode(episode, [view for view in views if episode.begin <= view.stamp < end],
+                 end, stream, record, scene),
+        begun_before=any(episode.begin <= stamp < end for stamp in before))
+        for episode, end in zip(begun, ends, strict=True)]
+
+
+def gated_views(stream: CameraStream, gate: ViewGate,
+                scene: Scene) -> tuple[RecordedEpisode, dict[str, int]]:
+    """
+    Return the views that the gate of the reconstructor's node lets through, as one episode.
+
+    And with it the node's counters. Raises DataError where not one image becomes a view.
+    """
+    views = []
+    counters: Counter[str] = Counter()
+    refusal = ''
+    for view in stream.views(wanted=lambda stamp: True):
+        try:
+            if isinstance(view, MessageError):
+                raise view
+            if not gate.wants(view.camera, view.stamp):
+                counters['images'] += 1
+                counters['images_unused'] += 1
+                continue
+            views.append(_view(view.read(), None, stream, None, scene))
+        except ViewError as error:
+            refusal = refusal or str(error)
+            counters[f'refused/{error.kind}'] += 1
+            continue
+        counters['images'] += 1
+        gate.took(view.camera)
+    if not counters['images']:
+        raise DataError(f'no image has an azimuth: {refusal or "there is no image"}', 'no_views')
+    if not views and refusal:
+        raise DataError(f'not one image became a view: {refusal}', 'no_views')
+    if not views:
+        raise DataError(f'the camera never stands still in its {counters["images"]} images: '
+                        'expected one that does for its views', 'no_views')
+    counters['views'] = len(views)
+    return RecordedEpisode('', views[0].stamp, None, views, ''), dict(counters)
+
+
+def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
+    found = {}
+    refusal = ''
+    for view in stream.views(wanted=frozenset(stamps).__contains__):
+        try:
+            if isinstance(view, MessageError):
+                raise view
+            found[view.stamp] = view.read()
+        except MessageError as error:
+            refusal = refusal or str(error)
+    for number, stamp in enumerate(stamps, 1):
+        if stamp not in found and not (found and stream.begins_after(stamp)):
+            raise DataError(f'the image or the camera of view {number} ({stamp / 1e9:.3f} s) is '
+                            f'missing: {refusal or "the image was not recorded"}', 'no_image')
+    return [found[stamp] for stamp in stamps if stamp in found]
+
+
+def _episode(episode: Episode, views: Sequence[View], end: float, stream: CameraStream,
+             record: LoopRecord, scene: Scene) -> RecordedEpisode:
+    """Return an episode, with each goal after the view that it was decided upon."""
+    asked: dict[int, list[RecordedGoal]] = {}
+    published = [record.published['view'][view.stamp] for view in views]
+    for goal in _goals(record, episode.begin, end):
+        after = bisect_right(published, record.published['next_view'][goal.stamp])
+        before = asked.setdefault(after, [])
+        # One from where the last was: `plan` asked for it again
+        if not before or view_distance(before[-1].camera, goal.camera) > _ROUNDING:
+            before.append(goal)
+    decided = {after: replace(first, instead=instead)
+               for after, (first, *instead) in asked.items()}
+    reasons = [(record.published['done'][stamp], reason)
+               for stamp, (_, reason) in record.parts['done'].items()
+               if episode.begin <= stamp < end]
+    return RecordedEpisode(
+        episode.id, episode.begin, decided.get(0),
+        [_view(view, decided.get(number), stream, record, scene)
+         for number, view in enumerate(views, 1)],
+        max(reasons, default=(0, ''))[1])
+
+
+def _goals(record: LoopRecord, begin: int, end: float) -> list[RecordedGoal]:
+    goals = []
+    for stamp, camera in sorted(record.parts['next_view'].items()):
+        if begin <= stamp < end:
+            candidates, scores = record.parts['azimuth_scores'].get(stamp, (None, None))
+            azimuth = record.parts['next_azimuth'].get(stamp)
+            goals.append(RecordedGoal(
+                camera if azimuth is None else _with_azimuth(camera, azimuth), stamp, candidates,
+                scores, record.received['next_view'][stamp]))
+    return goals
+
+
+def _with_azimuth(camera: Camera, azimuth: float) -> Camera:
+    """Return a goal's camera with the bits of a joint's angle: its own went through a sine."""
+    if abs(float(azimuth_difference(azimuth, camera.azimuth))) > _ROUNDING:
+        return camera  # a joint that counts otherwise
+    return OrbitCamera(camera.pose, camera.intrinsics, azimuth)
+
+
+def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
+          record: LoopRecord | None, scene: Scene) -> RecordedView:
+    parts = record.parts if record else {}
+    received = {role: times[view.stamp]
+                for role, times in (stream.received | (record.received if record else {})).items()
+                if view.stamp in times}
+
+    def part(role: str) -> Any:
+        return parts.get(role, {}).get(view.stamp)
+
+    image = part('view_image')  # where the background was taken away, the network saw this
+    if image is None:
+        image = scene.cleared(view.image)
+    return RecordedView(view.stamp, image, view.camera,
+                        part('probabilities'), part('occupancy'), part('latent'), part('entropy'),
+                        goal, received, (part('done') or (0, ''))[1])

@@ -1,0 +1,81 @@
+"""A run of plain numbers written as a bag, on the loop's topics: the inverse of reading one."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from active_recon.bags.runs.parameters import node_parameters
+from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun
+from active_recon.bags.storage.atomic_bag import whole_bag, write_message
+from active_recon.bags.storage.metadata import QosProfile
+from active_recon.bags.storage.writer import BagWriter
+from active_recon.geometry.cameras import OBJECT_FRAME
+from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
+from msg_tools.loop import goal_to_msgs, image_to_msgs, view_to_msgs
+
+_UNNAMED = 'unnamed'  # of a bag without episodes: on the wire each has an id
+_LATCHED = QosProfile(durability='transient_local')
+_STREAM = QosProfile()
+
+
+def write_run(run: RecordedRun, folder: Path) -> None:
+    """
+    Write a run as a new bag, whole or not at all.
+
+    Poses and clouds are in the run's own `object_frame`. What a view or a goal does not tell when
+    it was received bears its stamp. Raises RecordingError where the folder exists or the disk is
+    full.
+    """
+    with whole_bag(folder) as bag:
+        _write(run, bag)
+
+
+def _write(run: RecordedRun, bag: BagWriter) -> None:
+    bag.add_provenance(run.provenance)
+    for node, parameters in run.parameters.items():
+        bag.attach_parameters(node, parameters)
+    frame = node_parameters(run, 'reconstructor').get('object_frame', OBJECT_FRAME)
+    messages = (found for episode in run.episodes for found in _messages(episode, frame))
+    for received, topic, stamp, msg in sorted(messages, key=lambda found: found[0]):
+        qos = _STREAM if topic.startswith('camera/') else _LATCHED
+        write_message(bag, f'/{topic}', msg, received, stamp, qos)
+
+
+def _messages(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
+    """Yield when each message was received, its topic, its stamp, and itself."""
+    received = episode.begin
+    for message in _of_views(episode, frame):
+        received = max(received, message[0])
+        yield message
+    if episode.done and not any(map(episode.done_after, episode.views)):  # no view has ended it
+        yield received, 'done', received, done_to_msg(received, episode.done)
+
+
+def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
+    begin = Episode(episode.id or _UNNAMED, episode.begin)
+    yield episode.begin, 'episode', episode.begin, episode_to_msg(begin)
+    yield episode.begin, 'done', episode.begin, done_to_msg(episode.begin, '')
+    yield from _of_goal(episode.first_goal, frame)
+    for view in episode.views:
+        messages = image_to_msgs(view.stamp, view.image, view.camera, frame) | view_to_msgs(
+            view.stamp, view.camera, view.reconstruction, view.occupied, view.latent,
+            view.entropy, frame)
+        yield from _at(messages, view.stamp, view.received)
+        if reason := episode.done_after(view):
+            received = max([view.stamp, *view.received.values()])
+            yield received, 'done', view.stamp, done_to_msg(view.stamp, reason)
+        yield from _of_goal(view.goal, frame)
+
+
+def _of_goal(asked: RecordedGoal | None, frame: str) -> Iterator[tuple[int, str, int, Any]]:
+    for goal in () if asked is None else (asked, *asked.instead):
+        scores = None if goal.candidates is None or goal.scores is None else (
+            goal.candidates.positions, goal.candidates.azimuths, goal.scores)
+        messages = goal_to_msgs(goal.stamp, goal.camera, scores, frame)
+        yield from _at(messages, goal.stamp, dict.fromkeys(messages, goal.received))
+
+
+def _at(messages: Mapping[str, Any], stamp: int,
+        received: Mapping[str, int]) -> Iterator[tuple[int, str, int, Any]]:
+    for topic, msg in messages.items():
+        yield received.get(topic, stamp), topic, stamp, msg

@@ -1,0 +1,1 @@
+"""Bags as files: MCAP and sqlite3, read, written, repaired."""

@@ -1,0 +1,118 @@
+"""A recording in MCAP, of one file or of several that follow each other."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from active_recon.bags.storage.compression import StoredFiles
+from active_recon.bags.storage.mcap_file import mcap_records
+from active_recon.bags.storage.message_types import require_standard
+from active_recon.bags.storage.metadata import (
+    Contents,
+    parameters_node,
+    PROVENANCE,
+    qos_from_yaml,
+    Topic,
+    yaml_mapping,
+)
+from active_recon.bags.storage.raw import bag_summary, BagSummary, RawMessage
+from active_recon.errors import DataError
+from active_recon.reporting import Advance, Reporting, silent
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
+
+_Record = RawMessage | Metadata | Attachment
+
+
+class McapBag:
+    """MCAP files that follow each other in the recording of that path."""
+
+    def __init__(self, path: Path, files: StoredFiles) -> None:
+        self._path = path
+        self._files = files
+
+    def summary(self, reporting: Reporting = silent) -> BagSummary:
+        """Read all of the files and say what is in them."""
+        size = sum(path.stat().st_size for path in self._files.paths)
+        with reporting('checking the bag', size) as advance:
+            return self._summary(advance)
+
+    def _summary(self, advance: Advance) -> BagSummary:
+        topics: dict[str, Topic] = {}
+        contents = Contents()
+        provenance: dict[str, str] = {}
+        parameters: dict[str, Mapping[str, Any]] = {}
+        for record in self._records(topics, advance):
+            if isinstance(record, RawMessage):
+                contents.add(record.topic, record.received)
+            elif isinstance(record, Metadata) and record.name == PROVENANCE:
+                provenance = record.metadata
+            elif isinstance(record, Attachment) and (node := parameters_node(record.name)):
+                parameters[node] = yaml_mapping(
+                    record.data, f'{self._path}: {record.name}')
+        return bag_summary(topics.values(), contents, provenance, parameters)
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of the topics, file after file, each in its order."""
+        wanted = frozenset(topics)
+        for record in self._records({}, lambda steps, note: None):
+            if isinstance(record, RawMessage) and record.topic in wanted:
+                yield record
+
+    def _records(self, topics: dict[str, Topic], advance: Advance
+                 ) -> Iterator[_Record]:
+        """Yield what the files hold; `topics` gathers those that they announce."""
+        with self._files.opened() as files:
+            yield from new_in_bag(
+                self._file_records(mcap_records(path, advance, name), name, topics)
+                for name, path in zip(self._files.paths, files, strict=True))
+
+    def _file_records(self, records: Iterator[McapRecord], name: Path, topics: dict[str, Topic]
+                      ) -> Iterator[_Record]:
+        schemas: dict[int, Schema] = {}
+        channels: dict[int, Topic] = {}
+        for record in records:
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+                if record.encoding == 'ros2msg':
+                    require_standard(record.name, record.data, name)
+            elif isinstance(record, Channel):
+                channels[record.id] = topics[record.topic] = Topic(
+                    record.topic, _type_name(record, schemas),
+                    qos_from_yaml(record.metadata.get('offered_qos_profiles', '')))
+            elif isinstance(record, Message):
+                if record.channel_id not in channels:
+                    raise DataError(f'{name}: expected messages of announced channels, got '
+                                    f'one of channel {record.channel_id}', 'damaged')
+                topic = channels[record.channel_id]
+                try:
+                    data = self._files.message(record.data)
+                except DataError as error:
+                    raise DataError(f'{name}: {error}', error.kind) from error
+                yield RawMessage(topic.name, topic.type_name, data, record.log_time,
+                                 record.publish_time or record.log_time)
+            elif isinstance(record, Metadata | Attachment):
+                yield record
+
+
+def new_in_bag(files: Iterable[Iterator[_Record]]) -> Iterator[_Record]:
+    """
+    Yield the records of files that follow each other without what a file repeats of those before.
+
+    That is the last message of a topic, once more with its bytes and its time of publication.
+    """
+    last: dict[str, tuple[int, bytes]] = {}
+    for number, records in enumerate(files):
+        for record in records:
+            if isinstance(record, RawMessage):
+                said = record.published, record.data
+                if number and last.get(record.topic) == said:
+                    continue
+                last[record.topic] = said
+            yield record
+
+
+def _type_name(channel: Channel, schemas: Mapping[int, Schema]) -> str:
+    schema = schemas.get(channel.schema_id)
+    name = schema.name if schema else 'unknown'
+    # What is not CDR bears a name that no type has, and is so read by nobody.
+    return name if channel.message_encoding == 'cdr' else f'{name} as {channel.message_encoding}'

@@ -1,0 +1,49 @@
+"""What every bag is read as: raw messages, and a summary of them."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from active_recon.bags.runs.run import TopicSummary
+from active_recon.bags.storage.metadata import Contents, Topic
+from active_recon.reporting import Reporting, silent
+
+
+@dataclass(frozen=True)
+class RawMessage:
+    """A message as it went over the wire, CDR; times in nanoseconds since 1970."""
+
+    topic: str
+    type_name: str
+    data: bytes
+    received: int
+    published: int
+
+
+@dataclass(frozen=True)
+class BagSummary:
+    """What is in a bag; `begin` and `end` are receive times, 0 where it holds no message."""
+
+    topics: list[TopicSummary]
+    begin: int
+    end: int
+    provenance: Mapping[str, str]
+    parameters: Mapping[str, Mapping[str, Any]]
+
+
+def bag_summary(topics: Iterable[Topic], contents: Contents, provenance: Mapping[str, str],
+                parameters: Mapping[str, Mapping[str, Any]]) -> BagSummary:
+    """Return the summary of what was counted."""
+    counted = [TopicSummary(topic.name, topic.type_name, contents.counts[topic.name], topic.qos)
+               for topic in sorted(topics, key=lambda topic: topic.name)]
+    return BagSummary(counted, contents.begin, contents.end, provenance, parameters)
+
+
+class Bag(Protocol):
+    """A bag that can be read any number of times."""
+
+    def summary(self, reporting: Reporting = silent) -> BagSummary:
+        """Read all of the bag and say what is in it; DataError where it is damaged."""
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of the topics in the bag's order; DataError where it is damaged."""

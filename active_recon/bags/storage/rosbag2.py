@@ -1,0 +1,79 @@
+"""Bags in rosbag2's other storage, sqlite3."""
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, ExitStack
+from pathlib import Path
+
+from active_recon.bags.storage.compression import StoredFiles
+from active_recon.bags.storage.message_types import require_standard
+from active_recon.bags.storage.metadata import (
+    Contents,
+    DURABILITIES,
+    QosProfile,
+    RELIABILITIES,
+    Topic,
+)
+from active_recon.bags.storage.raw import bag_summary, BagSummary, RawMessage
+from active_recon.errors import ActiveReconError, DataError
+from active_recon.reporting import Reporting, silent
+from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.rosbag2 import Reader
+
+
+class OtherBag:
+    """Databases that follow each other in the recording of that path, as rosbags reads them."""
+
+    def __init__(self, path: Path, files: StoredFiles) -> None:
+        self._path = path
+        self._files = files
+
+    def summary(self, reporting: Reporting = silent) -> BagSummary:
+        """Say what is in the bag, once all of it has been read."""
+        contents = Contents()
+        topics: dict[str, Topic] = {}
+        with self._readers() as readers, reporting(
+                'checking the bag', sum(reader.message_count for reader in readers)) as advance:
+            for reader in readers:
+                topics |= {each.topic: Topic(each.topic, each.msgtype, _offered(each))
+                           for each in reader.connections}
+                for connection, received, data in reader.messages():
+                    self._files.message(data)
+                    contents.add(connection.topic, received)
+                    advance(1, '')
+        return bag_summary(topics.values(), contents, {}, {})
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """Yield the messages of the topics, file after file, each by its receive times."""
+        with self._readers() as readers:
+            for reader in readers:
+                wanted = [each for each in reader.connections if each.topic in topics]
+                for connection, received, data in reader.messages(wanted) if wanted else ():
+                    yield RawMessage(connection.topic, connection.msgtype,
+                                     self._files.message(data), received, received)
+
+    @contextmanager
+    def _readers(self) -> Iterator[list[Reader]]:
+        """Open a reader of each file, whose errors are told as ours."""
+        try:
+            with self._files.opened() as files, ExitStack() as stack:
+                readers = [stack.enter_context(Reader(file)) for file in files]
+                for connection in (each for reader in readers for each in reader.connections):
+                    if connection.msgdef.format == MessageDefinitionFormat.MSG:
+                        require_standard(
+                            connection.msgtype, connection.msgdef.data.encode(), self._path)
+                yield readers
+        except ActiveReconError as error:
+            told = str(error)
+            raise DataError(told if told.startswith(str(self._path)) else f'{self._path}: {told}',
+                            error.kind) from error
+        except Exception as error:  # the library raises whatever damaged bytes lead it to
+            raise DataError(f'{self._path}: no bag of rosbag2 (MCAP or sqlite3) that can be read: '
+                            f'{" ".join(str(error).split())}') from error
+
+
+def _offered(connection: Connection) -> tuple[QosProfile, ...]:
+    profiles = getattr(connection.ext, 'offered_qos_profiles', ())
+    named = ((profile.reliability.name.lower(), profile.durability.name.lower())
+             for profile in profiles)
+    return tuple(QosProfile(reliability, durability) for reliability, durability in named
+                 if reliability in RELIABILITIES and durability in DURABILITIES)

@@ -1,0 +1,1 @@
+"""Cameras, their lenses, and what of an image a network gets."""

@@ -1,0 +1,279 @@
+"""
+Cameras around an object: azimuth and elevation to pose, intrinsics, projection.
+
+Frames follow REP-103. The object frame is right-handed with z up, its origin the centre of the
+voxel grid. A camera's pose is that of its optical frame: z forward, x right, y down. Azimuth is
+counter-clockwise about +z from +x.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from active_recon.errors import ViewError
+from active_recon.geometry.lenses import Distortion
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+TURN = 2 * math.pi
+OBJECT_FRAME = 'object'
+VIEW_COUNT = 24
+AZIMUTHS: NDArray[np.float64] = np.arange(VIEW_COUNT) * TURN / VIEW_COUNT
+"""Azimuths of the rendered views, radians, (24,)."""
+CANONICAL_ELEVATION = math.radians(30)
+ELEVATION_TOLERANCE = math.radians(5)
+"""A camera further off the canonical elevation is warned of: the network never saw it."""
+CANONICAL_DISTANCE = 2.1
+"""Distance of the canonical camera in sides of the voxel grid: the grid's sphere just fits."""
+
+
+def wrap_azimuth(azimuth: float) -> float:
+    """Return the azimuth in [0, 2 pi)."""
+    wrapped = azimuth % TURN
+    return 0.0 if wrapped >= TURN else wrapped  # -1e-20 % TURN rounds up to TURN itself
+
+
+def azimuth_difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    """Return a minus b, the short way round, in [-pi, pi); shapes broadcast."""
+    apart = np.asarray(a, np.float64) - np.asarray(b, np.float64)
+    return np.asarray((apart + math.pi) % TURN - math.pi)
+
+
+def nearest_view(azimuth: float, azimuths: ArrayLike = AZIMUTHS) -> int:
+    """Return the index of the azimuth nearest to the one asked for, the short way round."""
+    return int(np.argmin(np.abs(azimuth_difference(azimuths, azimuth))))
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """
+    A lens: focal lengths and principal point in pixels, image size in pixels, and how it bends.
+
+    `distortion` is None where it bends nothing: a pinhole.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+    distortion: Distortion | None = None
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """K of the paper's section 3.2, (3, 3)."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
+
+    def resized(self, width: int, height: int) -> 'Intrinsics':
+        """Return the same lens seen on an image of another size."""
+        across, down = width / self.width, height / self.height
+        return Intrinsics(self.fx * across, self.fy * down, self.cx * across, self.cy * down,
+                          width, height, self.distortion)
+
+
+_FOCAL = 35 / 32 * 137  # R2N2's lens and sensor, verified by reprojection
+CANONICAL_INTRINSICS = Intrinsics(_FOCAL, _FOCAL, 68.5, 68.5, 137, 137)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pose in the object frame, (4, 4) object from optical frame, and a lens."""
+
+    pose: NDArray[np.float64]
+    intrinsics: Intrinsics = CANONICAL_INTRINSICS
+
+    def __post_init__(self) -> None:
+        """Refuse what is no rigid pose."""
+        if self.pose.shape != (4, 4) or not np.isfinite(self.pose).all():
+            raise ViewError(f'expected a finite 4 x 4 camera pose, got\n{self.pose}', 'pose')
+        rotation = self.pose[:3, :3]
+        if (not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
+                or np.linalg.det(rotation) < 0):  # a mirror is no rotation
+            raise ViewError(f'expected a rotation in the camera pose, got\n{rotation}', 'pose')
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Optical centre in the object frame, metres, (3,)."""
+        return self.pose[:3, 3]
+
+    @property
+    def distance(self) -> float:
+        """Metres from the object frame's origin."""
+        return float(np.linalg.norm(self.position))
+
+    @property
+    def azimuth(self) -> float:
+        """Radians in [0, 2 pi), counter-clockwise about +z from +x."""
+        return wrap_azimuth(math.atan2(self.position[1], self.position[0]))
+
+    @property
+    def elevation(self) -> float:
+        """Radians up from the horizon."""
+        across = math.hypot(self.position[0], self.position[1])
+        return math.atan2(self.position[2], across)
+
+    @property
+    def direction(self) -> NDArray[np.float64]:
+        """Unit vector from the object frame's origin to the camera, (3,)."""
+        return self.position / self.distance
+
+    def turned(self, yaw: float) -> 'Camera':
+        """Return the camera turned counter-clockwise about +z, radians; by 0 it stays as it is."""
+        if yaw == 0:
+            return self
+        turn = np.eye(4)
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        turn[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        return Camera(turn @ self.pose, self.intrinsics)
+
+    def scaled(self, factor: float) -> 'Camera':
+        """Return the camera at `factor` times its distance, in the same direction."""
+        if factor == 1:
+            return self
+        pose = self.pose.copy()
+        pose[:3, 3] *= factor
+        return Camera(pose, self.intrinsics)
+
+    @property
+    def object_to_camera(self) -> NDArray[np.float64]:
+        """[R t; 0 1] of the paper's section 3.2, (4, 4): the inverse of the pose."""
+        rotation, position = self.pose[:3, :3], self.pose[:3, 3]
+        inverse = np.eye(4)
+        inverse[:3, :3] = rotation.T
+        inverse[:3, 3] = -rotation.T @ position
+        return inverse
+
+    def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """
+        Project points of the object frame, P^s ~ T P^w (section 3.2).
+
+        Takes (N, 3) metres; returns pixels (N, 2), where the centre of the first pixel is
+        (0.5, 0.5), and depths along the optical axis (N,). What lies behind the camera (a depth
+        of 0 or less) has no pixel, and numbers without a meaning stand in its place.
+        """
+        transform = self.object_to_camera
+        optical = np.asarray(points, np.float64) @ transform[:3, :3].T + transform[:3, 3]
+        if self.intrinsics.distortion is not None:
+            depth = np.where(optical[:, 2:] > 0, optical[:, 2:], np.nan)
+            bent = self.intrinsics.distortion.bend(optical[:, :2] / depth)
+            lens = self.intrinsics
+            return bent * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[:, 2]
+        image = optical @ self.intrinsics.matrix.T
+        with np.errstate(divide='ignore', invalid='ignore'):
+            return image[:, :2] / image[:, 2:], optical[:, 2]
+
+    def ray_directions(self, samples: int = 1) -> NDArray[np.float64]:
+        """
+        Return rays through the pixels in the object frame, (height, width, 3), depth 1 each.
+
+        `samples` asks for a grid of samples x samples rays in each pixel; height and width grow
+        by that factor.
+        """
+        lens = self.intrinsics.resized(
+            self.intrinsics.width * samples, self.intrinsics.height * samples)
+        across = (np.arange(lens.width) + 0.5 - lens.cx) / lens.fx
+        down = (np.arange(lens.height) + 0.5 - lens.cy) / lens.fy
+        right, below, forward = self.pose[:3, :3].T
+        if lens.distortion is None:
+            rays: NDArray[np.float64] = (
+                across[None, :, None] * right + down[:, None, None] * below + forward)
+            return rays
+        seen = np.stack(np.meshgrid(across, down), axis=-1)
+        straight = lens.distortion.straighten(seen.reshape(-1, 2)).reshape(seen.shape)
+        return np.asarray(straight[..., :1] * right + straight[..., 1:] * below + forward)
+
+
+class OrbitCamera(Camera):
+    """
+    A camera made from azimuth, elevation and distance, which it has to the last bit.
+
+    What is None is that of the pose, as where a field was replaced.
+    """
+
+    def __init__(self, pose: NDArray[np.float64], intrinsics: Intrinsics = CANONICAL_INTRINSICS,
+                 azimuth: float | None = None, elevation: float | None = None,
+                 distance: float | None = None) -> None:
+        super().__init__(pose, intrinsics)
+        object.__setattr__(self, '_made_from', (
+            super().azimuth if azimuth is None else wrap_azimuth(azimuth),
+            super().elevation if elevation is None else elevation,
+            super().distance if distance is None else distance))
+
+    _made_from: tuple[float, float, float]
+
+    @property
+    def azimuth(self) -> float:
+        """Radians in [0, 2 pi), counter-clockwise about +z from +x."""
+        return self._made_from[0]
+
+    @property
+    def elevation(self) -> float:
+        """Radians up from the horizon."""
+        return self._made_from[1]
+
+    @property
+    def distance(self) -> float:
+        """Metres from the object frame's origin."""
+        return self._made_from[2]
+
+
+def orbit_camera(
+    azimuth: float,
+    elevation: float = CANONICAL_ELEVATION,
+    distance: float = CANONICAL_DISTANCE,
+    intrinsics: Intrinsics = CANONICAL_INTRINSICS,
+) -> OrbitCamera:
+    """
+    Return the camera that looks at the origin from an azimuth, upright.
+
+    Angles in radians, distance in metres. An elevation of exactly +-pi/2 has no upright.
+    """
+    if not all(map(math.isfinite, (azimuth, elevation, distance))) or distance <= 0:
+        raise ViewError('expected finite angles and a distance above 0, got azimuth '
+                        f'{azimuth}, elevation {elevation}, distance {distance}', 'pose')
+    if abs(elevation) >= math.pi / 2 - 1e-6:
+        raise ViewError(f'expected an elevation within +-90 degrees, got {elevation} rad', 'pose')
+    backward = np.array([math.cos(elevation) * math.cos(azimuth),
+                         math.cos(elevation) * math.sin(azimuth), math.sin(elevation)])
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    pose = np.eye(4)
+    pose[:3, 0] = right
+    pose[:3, 1] = np.cross(-backward, right)
+    pose[:3, 2] = -backward
+    pose[:3, 3] = distance * backward
+    return OrbitCamera(pose, intrinsics, azimuth, elevation, distance)
+
+
+def view_distance(a: Camera, b: Camera) -> float:
+    """
+    Return how far apart two views of the object are, radians in [0, pi].
+
+    The angle at the object's centre between the two cameras: how far each is away and how it is
+    rolled makes no other view. This is the one distance of goals, gates and policies.
+    """
+    return float(direction_distance(a.direction, b.direction))
+
+
+def direction_distance(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    """Return the angles between directions (..., 3) and (..., 3), radians; shapes broadcast."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    # The arc cosine alone would be off by 1e-8 near 0
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))
+
+
+def nearest_camera(camera: Camera, cameras: Sequence[Camera]) -> int:
+    """Return the index of the camera of the nearest view; the first of those alike."""
+    directions = np.array([each.direction for each in cameras])
+    return int(direction_distance(directions, camera.direction).argmin())
+
+
+def pose_directions(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the unit vectors from the object to cameras, poses (..., 4, 4) to (..., 3)."""
+    positions = poses[..., :3, 3]
+    return np.asarray(positions / np.linalg.norm(positions, axis=-1, keepdims=True))
+
+
+def pose_azimuths(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the azimuths of poses, (..., 4, 4) to (...), radians in [0, 2 pi)."""
+    return np.asarray(np.arctan2(poses[..., 1, 3], poses[..., 0, 3]) % TURN)

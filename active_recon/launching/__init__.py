@@ -1,0 +1,1 @@
+"""The nodes as processes: started, watched and stopped together."""

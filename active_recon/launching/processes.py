@@ -1,0 +1,137 @@
+"""Nodes as processes of their own, started and stopped together."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+import os
+from pathlib import Path
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+from types import TracebackType
+
+from active_recon.errors import ActiveReconError
+from active_recon.nodes.runtime.shared_memory import PROFILE
+
+_LAST_LINES = 8
+_STOP_S = 5.0  # for a node to close what it holds open
+_ASK_AGAIN_S = 1.0
+_DOMAINS = range(41, 102)  # people choose low numbers by hand, as the tests do
+
+
+class NodeError(ActiveReconError):
+    """A node that ended by itself."""
+
+
+def private_environment() -> dict[str, str]:
+    """Return the variables under which nodes hear this machine alone, on a domain of their own."""
+    return {
+        'ROS_DOMAIN_ID': str(_free_domain_id()),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'RMW_IMPLEMENTATION': 'rmw_fastrtps_cpp',
+        'FASTRTPS_DEFAULT_PROFILES_FILE': str(PROFILE),
+    }
+
+
+def _free_domain_id() -> int:
+    """Return a domain id whose first participant's port nobody holds."""
+    for domain in random.sample(_DOMAINS, len(_DOMAINS)):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', 7410 + 250 * domain))  # the DDS standard's numbering
+            except OSError:
+                continue
+            return domain
+    raise NodeError(f'expected a free ROS domain from {_DOMAINS[0]} to {_DOMAINS[-1]}, but other '
+                    'nodes use them all')
+
+
+class NodeProcesses:
+    """
+    Starts nodes by their module's name, tells which has died, and stops them, the last first.
+
+    A node's output goes to a log in `log_folder`, or, without one, to where this process's own
+    goes. `environment` is added to this process's.
+    """
+
+    def __init__(self, log_folder: Path | None = None,
+                 environment: Mapping[str, str] | None = None) -> None:
+        self._logs = log_folder
+        self._environment = {**os.environ, **(environment or {}), 'PYTHONUNBUFFERED': '1'}
+        if log_folder is not None:
+            self._environment |= {
+                'ROS_LOG_DIR': str(log_folder), 'RCUTILS_COLORIZED_OUTPUT': '0'}
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, node: str, parameters: Mapping[str, object], namespace: str = '',
+              arguments: Sequence[str] = ()) -> None:
+        """
+        Start `active_recon.nodes.<node>` with parameters and further arguments of ROS.
+
+        In a namespace, for example '/cell_1', it is known here as 'cell_1.<node>'.
+        """
+        settings = [*arguments, *(word for name, value in parameters.items()
+                                  for word in ('-p', f'{name}:={_as_yaml(value)}'))]
+        known_as = node
+        if namespace:
+            settings += ['-r', f'__ns:={namespace}']
+            known_as = f'{namespace.strip("/").replace("/", ".")}.{node}'
+        with ExitStack() as opened:
+            log = self._log(known_as)
+            output = None if log is None else opened.enter_context(log.open('wb'))
+            # A session of its own keeps the terminal's Ctrl-C from it: we stop the nodes.
+            self._running[known_as] = subprocess.Popen(
+                [sys.executable, '-m', f'active_recon.nodes.{node}', '--ros-args', *settings],
+                stdin=subprocess.DEVNULL, stdout=output, stderr=output and subprocess.STDOUT,
+                env=self._environment, start_new_session=True)
+
+    def pid(self, node: str) -> int:
+        """Return the process id of a node that was started."""
+        return self._running[node].pid
+
+    def check(self) -> None:
+        """Raise NodeError, with the last lines of its log, where a node has ended."""
+        for node, process in self._running.items():
+            code = process.poll()
+            if code is None:
+                continue
+            log = self._log(node)
+            if log is None:
+                raise NodeError(f'{node} ended with code {code}')
+            lines = log.read_text(errors='replace').splitlines()[-_LAST_LINES:]
+            said = '\n  '.join(lines) or '(it said nothing)'
+            raise NodeError(f'{node} ended with code {code}. It said last:\n  {said}')
+
+    def stop(self) -> None:
+        """Ask the nodes to end, the last started first, and wait; kill what does not."""
+        deadline = time.monotonic() + _STOP_S
+        while alive := [process for process in reversed(self._running.values())
+                        if process.poll() is None]:
+            late = time.monotonic() > deadline
+            for process in alive:
+                process.send_signal(signal.SIGKILL if late else signal.SIGINT)
+            # Some libraries swallow what interrupts their import, so it is said again.
+            with suppress(subprocess.TimeoutExpired):
+                alive[-1].wait(_ASK_AGAIN_S)
+        self._running.clear()
+
+    def _log(self, node: str) -> Path | None:
+        return self._logs and self._logs / f'{node}.txt'
+
+    def __enter__(self) -> 'NodeProcesses':
+        """Stop the nodes where the block ends, however it ends."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Stop the nodes."""
+        self.stop()
+
+
+def _as_yaml(value: object) -> str:
+    """Return a parameter's value as the command line takes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str | Path) else str(value)

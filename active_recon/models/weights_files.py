@@ -1,0 +1,79 @@
+"""Weights files by name, hash and card, without reading a network."""
+
+from dataclasses import dataclass
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from active_recon.config import Config
+from active_recon.errors import WeightsError
+from safetensors import safe_open, SafetensorError
+
+DEFAULT_MODEL, PAPER_MODEL = 'lifting', '2d3d-attention'
+FOLDER = Path(__file__).parents[1] / 'weights'
+SHIPPED = FOLDER / f'{DEFAULT_MODEL}.safetensors'
+
+
+@dataclass(frozen=True)
+class WeightsMetadata:
+    """What a weights file says of itself: the network's name, its sizes, and the threshold."""
+
+    model: str
+    config: dict[str, Any]
+    threshold: float
+
+
+def read_metadata(path: Path) -> WeightsMetadata:
+    """Return what a weights file says of itself; raises WeightsError where it is not whole."""
+    if not path.is_file():
+        raise WeightsError(f'{path}: no such file: expected weights (.safetensors)')
+    try:
+        with safe_open(path, framework='np') as stored:
+            metadata = stored.metadata() or {}
+    except (SafetensorError, OSError) as error:
+        raise WeightsError(f'{path}: no whole safetensors file: {error}') from error
+    if 'model' not in metadata:
+        raise WeightsError(f'{path}: names no model: expected weights of one of the networks')
+    try:
+        return WeightsMetadata(metadata['model'], json.loads(metadata['config']),
+                               float(metadata['threshold']))
+    except (KeyError, ValueError, TypeError) as error:
+        raise WeightsError(f'{path}: its config cannot be read: {error}') from error
+
+
+def find_weights(model: str | Path | None = None) -> Path:
+    """
+    Return the weights file of a model's name, or of a path; None is the default's.
+
+    Raises WeightsError where a name is meant whose weights do not ship.
+    """
+    if model is None:
+        return SHIPPED
+    path = Path(model)
+    if path.suffix == '.safetensors' or len(path.parts) > 1:
+        return path
+    shipped = FOLDER / f'{model}.safetensors'
+    if not shipped.is_file():
+        names = ', '.join(sorted(file.stem for file in FOLDER.glob('*.safetensors')))
+        raise WeightsError(f'{model}: neither a weights file (.safetensors) nor a model whose '
+                           f'weights ship ({names}); `active-recon train` makes weights')
+    return shipped
+
+
+def read_card(path: Path) -> dict[str, Any]:
+    """Return the card beside weights; empty where there is none."""
+    beside = path.with_suffix('.json')
+    card: dict[str, Any] = json.loads(beside.read_text()) if beside.is_file() else {}
+    return card
+
+
+def weights_hash(path: Path | None = None) -> str:
+    """Return the SHA-256 of a weights file; None is the one that ships."""
+    return hashlib.sha256((path or SHIPPED).read_bytes()).hexdigest()
+
+
+def config_hash(config: Config | dict[str, Any]) -> str:
+    """Return the SHA-256 of a network's sizes."""
+    sizes = config.to_dict() if isinstance(config, Config) else config
+    return hashlib.sha256(json.dumps(sizes, sort_keys=True).encode()).hexdigest()

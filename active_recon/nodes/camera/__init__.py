@@ -1,0 +1,1 @@
+"""A camera as a node receives it: images, poses, faults."""

@@ -1,0 +1,1 @@
+"""The loop as its nodes and its observers receive it."""

@@ -1,0 +1,1 @@
+"""What a recorder records, and what it notices while it does."""

@@ -1,0 +1,1 @@
+"""What every node needs: life cycle, clock, QoS, parameters, diagnostics."""

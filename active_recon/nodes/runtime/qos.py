@@ -1,0 +1,57 @@
+"""How the nodes publish and hear, and how a topic's QoS is recorded and offered again."""
+
+from collections.abc import Iterable
+
+from active_recon.bags.storage.metadata import QosProfile
+from rclpy.duration import Infinite
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Reliable, and the last one is kept for whoever comes late."""
+LATCHED_HEARD_LATE = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Hears the latched, and who takes what came only now and then misses none of it."""
+STREAM = QoSProfile(depth=5)
+"""Reliable; who listens best effort is served as well."""
+HEARD = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Best effort, which hears reliable and best-effort publishers alike."""
+HEARD_OFTEN = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""The same for poses, of which a fast tracker sends many while the network runs."""
+_UNKNOWN_NODE = '_NODE_NAME_UNKNOWN_'  # an endpoint may be discovered before its node's name
+
+
+def endpoint_node(endpoint: TopicEndpointInfo) -> str | None:
+    """Return the full name of the node that has the endpoint; None while it is not known."""
+    if endpoint.node_name == _UNKNOWN_NODE:
+        return None
+    return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
+
+
+def offered_profile(publisher: TopicEndpointInfo) -> QosProfile:
+    """Return what a publisher offers, as a bag says it."""
+    profile = publisher.qos_profile
+    return QosProfile(profile.reliability.name.lower(), profile.durability.name.lower())
+
+
+def common_profile(offered: Iterable[QosProfile], depth: int) -> QoSProfile:
+    """Return the strictest request that hears all of the publishers."""
+    offered = list(offered)
+    reliable = all(profile.reliability == 'reliable' for profile in offered)
+    latched = bool(offered) and all(
+        profile.durability == 'transient_local' for profile in offered)
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE))
+
+
+def profile_words(profile: QoSProfile) -> str:
+    """Return what decides whether two profiles fit, in words."""
+    words = [profile.reliability.name, profile.durability.name]
+    if 0 < profile.deadline.nanoseconds < Infinite.nanoseconds:
+        words.append(f'deadline {profile.deadline.nanoseconds / 1e9:g} s')
+    if profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC:
+        words.append('liveliness manual by topic')
+    if 0 < profile.liveliness_lease_duration.nanoseconds < Infinite.nanoseconds:
+        words.append(f'lease {profile.liveliness_lease_duration.nanoseconds / 1e9:g} s')
+    return ', '.join(words).lower().replace('_', ' ')

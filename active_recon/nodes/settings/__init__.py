@@ -1,1 +1,0 @@
-"""The parameters of each node, as data."""

@@ -1,0 +1,106 @@
+"""
+A node's parameters, declared as data: a frozen dataclass, each field made by `parameter`.
+
+The dataclass says all that is to be known of them, without a running node and without ROS.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields
+import math
+from typing import Any, get_args, get_origin, get_type_hints
+
+from active_recon.errors import ConfigError
+
+NEW_START = 'a change needs a new start'
+
+
+def parameter(default: object, description: str, *, low: float | None = None,
+              high: float | None = None, choices: Sequence[str] = (),
+              changeable: bool = False) -> Any:
+    """
+    Return the field of a parameter: bool, int, float, str, or a tuple of floats or strings.
+
+    `low` and `high` are the ends of its range, both inside it and given together; of a tuple they
+    are those of its elements. `choices` are the words that a string may be. A default of NaN
+    stands for 'not given' and may be passed as such. One that is `changeable` may change while
+    the node runs.
+    """
+    return field(default=default, metadata={
+        'description': description, 'low': low, 'high': high, 'choices': tuple(choices),
+        'changeable': changeable})
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What is declared of one parameter: its field, read."""
+
+    name: str
+    kind: type
+    of: type | None
+    default: Any
+    description: str
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+    changeable: bool
+
+    @property
+    def expected(self) -> str:
+        """What a value has to be, in words."""
+        kind = self.of or self.kind
+        if self.choices:
+            one = f'one of {", ".join(self.choices)}'
+        elif kind in (bool, str):
+            one = 'a string' if kind is str else 'true or false'
+        else:
+            between = ('' if self.low is None or self.high is None else
+                       f' from {number_words(self.low)} to {number_words(self.high)}')
+            absent = ', or nan' if self.may_be_nan else ''
+            one = f'{"an integer" if kind is int else "a number"}{between}{absent}'
+        return f'a list, each {one}' if self.of else one
+
+    def checked(self, value: Any) -> Any:
+        """Return the value as its kind; ConfigError where it is another or out of range."""
+        if self.of is not None and (value is None or isinstance(value, Sequence)):
+            # An empty list has no type in ROS
+            elements = tuple(_as(self.of, element) for element in value or ())
+            if not isinstance(value, str) and all(map(self._allows, elements)):
+                return elements
+        elif self.of is None and self._allows(_as(self.kind, value)):
+            return _as(self.kind, value)
+        raise ConfigError(f'parameter {self.name}: expected {self.expected}, got {value!r}')
+
+    @property
+    def may_be_nan(self) -> bool:
+        """Whether a value that is not given is told by NaN."""
+        return isinstance(self.default, float) and math.isnan(self.default)
+
+    def _allows(self, value: object) -> bool:
+        if type(value) is not (self.of or self.kind):
+            return False
+        if isinstance(value, str):
+            return not self.choices or value in self.choices
+        if isinstance(value, float) and math.isnan(value):
+            return self.may_be_nan
+        if isinstance(value, int | float) and self.low is not None and self.high is not None:
+            return self.low <= value <= self.high
+        return not isinstance(value, float) or math.isfinite(value)
+
+
+def number_words(number: float) -> str:
+    """Return a number as it is told to people."""
+    return str(int(number)) if number == number // 1 else f'{number:.4g}'
+
+
+def _as(kind: type, value: object) -> object:
+    """Return an integer as a float where a float is wanted, all else as it is."""
+    return float(value) if kind is float and type(value) is int else value
+
+
+def declared(settings: type) -> Iterator[Declared]:
+    """Yield the parameters of a dataclass of settings, in their order."""
+    kinds = get_type_hints(settings)
+    for each in fields(settings):
+        kind = kinds[each.name]
+        of = get_args(kind)[0] if get_origin(kind) is tuple else None
+        yield Declared(each.name, kind, of, each.default, **each.metadata)

@@ -1,0 +1,79 @@
+"""ROS parameters files of the package's nodes, checked before any node is started."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from active_recon.errors import ConfigError
+from active_recon.parameters.declaration import declared
+from active_recon.parameters.every_node import SETTINGS
+import yaml
+
+_OF_ROS = {'use_sim_time'}
+"""Parameters that every node has without declaring them."""
+
+
+def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
+    """
+    Return the parameters that a file gives to each node that it names, in the file's order.
+
+    A node may be named in a namespace (`/cell/recorder`) or in any (`/**/recorder`); what `/**`
+    gives, it gives to all but those that leave it to another node. Raises ConfigError on what is
+    no such file, on a node that is not the package's, and on a parameter that the node does not
+    have or that may not be so.
+    """
+    given: dict[str, dict[str, Any]] = {}
+    shared: dict[str, Any] = {}
+    for key, entry in _mapping(path, path.name, _parsed(path)).items():
+        name = str(key).rpartition('/')[2]
+        values = _mapping(path, str(key), entry)
+        if list(values) != ['ros__parameters']:
+            raise ConfigError(f'{path}: {key}: expected ros__parameters and nothing else, got '
+                              f'{", ".join(map(str, values)) or "nothing"}')
+        values = _mapping(path, str(key), values['ros__parameters'])
+        if name == '**':
+            shared.update(values)
+        elif name not in SETTINGS:
+            raise ConfigError(f'{path}: expected nodes among {", ".join(SETTINGS)}, got {key}')
+        else:
+            given.setdefault(name, {}).update(values)
+    if not given:
+        raise ConfigError(f'{path}: expected a node among {", ".join(SETTINGS)}, got none')
+    for node, values in given.items():
+        _check(path, node, values, shared)
+    return {node: {**_own(node, shared), **values} for node, values in given.items()}
+
+
+def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what all are given without what only other nodes have."""
+    own, *others = ({each.name for each in declared(settings)}
+                    for settings in (SETTINGS[node], *SETTINGS.values()))
+    return {name: value for name, value in shared.items()
+            if name in own or name not in set().union(*others)}
+
+
+def _parsed(path: Path) -> object:
+    try:
+        return yaml.safe_load(path.read_text())
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise ConfigError(f'{path}: no ROS parameters file in YAML: '
+                          f'{" ".join(str(error).split())}') from error
+
+
+def _mapping(path: Path, where: str, value: object) -> Mapping[Any, Any]:
+    if not isinstance(value, Mapping):
+        raise ConfigError(f'{path}: {where}: expected names with values, got {value!r}')
+    return value
+
+
+def _check(path: Path, node: str, values: Mapping[str, Any], shared: Mapping[str, Any]) -> None:
+    known = {each.name: each for each in declared(SETTINGS[node])}
+    for name, value in {**shared, **values}.items():
+        if name in known:
+            try:
+                known[name].checked(value)
+            except ConfigError as error:
+                raise ConfigError(f'{path}: {node}: {error}') from None
+        elif name in values and name not in _OF_ROS:
+            raise ConfigError(f'{path}: {node}: expected parameters among {", ".join(known)}, '
+                              f'got {name}')

@@ -1,0 +1,1 @@
+"""Parametric objects of the category bookshelf."""

@@ -1,0 +1,1 @@
+"""A turntable with a camera, its faults, and the objects that it shows."""

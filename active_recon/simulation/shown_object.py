@@ -1,0 +1,56 @@
+"""An object as a simulated camera shows it: images around it, and the cameras that took them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from active_recon.datasets.layout import ObjectFolder
+from active_recon.errors import DataError
+from active_recon.geometry.cameras import AZIMUTHS, Camera, nearest_view, orbit_camera
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class ShownObject:
+    """Images, each (H, W, 3) uint8 RGB, and the camera of each in the object frame, metres."""
+
+    name: str
+    images: list[NDArray[np.uint8]]
+    cameras: list[Camera]
+
+    def seen_from(self, azimuth: float) -> tuple[NDArray[np.uint8], Camera]:
+        """Return the image nearest to an azimuth, and the camera that really took it."""
+        index = nearest_view(azimuth, [camera.azimuth for camera in self.cameras])
+        return self.images[index], self.cameras[index]
+
+
+def rendered_object(path: Path, object_size: float = 1.0, background: float = 255.0,
+                    up: str | None = None, front: str | None = None) -> ShownObject:
+    """
+    Return a mesh rendered from 24 azimuths, its longest side `object_size` metres.
+
+    `background` is grey in [0, 255]. Raises MeshError as `load_mesh` does.
+    """
+    renderer = Renderer(load_mesh(path, up, front))
+    cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+    images = [composite(renderer.render(camera), background) for camera in cameras]
+    return ShownObject(path.name, images, [_scaled(camera, object_size) for camera in cameras])
+
+
+def stored_object(folder: ObjectFolder, object_size: float = 1.0,
+                  background: float = 255.0) -> ShownObject:
+    """Return an object of a dataset in R2N2's layout; raises DataError where it is not whole."""
+    cameras = folder.cameras()
+    if not cameras:
+        raise DataError(f'{folder.images_folder}: expected views, got none')
+    images = [composite(folder.image(index), background) for index in range(len(cameras))]
+    return ShownObject(f'{folder.category}/{folder.name}', images,
+                       [_scaled(camera, object_size) for camera in cameras])
+
+
+def _scaled(camera: Camera, size: float) -> Camera:
+    pose = camera.pose.copy()
+    pose[:3, 3] *= size
+    return Camera(pose, camera.intrinsics)

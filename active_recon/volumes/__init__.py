@@ -1,0 +1,1 @@
+"""Voxel grids and meshes: measured, converted, rendered, written to disk."""

@@ -1,0 +1,110 @@
+"""Meshes to images: ray casting with embree, flat shading, straight alpha."""
+
+from typing import Any
+
+from active_recon.geometry.cameras import Camera
+import cv2
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+import numpy as np
+from numpy.typing import NDArray
+import trimesh
+
+# The light comes from over the camera's left shoulder, so that no view of a turntable is dark.
+_LIGHT = np.array([-0.45, -0.65, -0.61])  # towards the light, in the optical frame
+_AMBIENT, _DIFFUSE = 0.38, 0.66
+
+
+class Renderer:
+    """
+    A mesh, ready to be seen from any camera.
+
+    The mesh stands in the object frame; its faces' colours (or, where it has vertex colours or a
+    texture, their means) are shaded flat, and both sides of a face are lit alike, because the
+    winding of models found in the wild cannot be trusted.
+    """
+
+    def __init__(self, mesh: trimesh.Trimesh) -> None:
+        self._scene = EmbreeScene()
+        # embree's wrapper drops the mesh when Python does, so it is kept
+        self._geometry = TriangleMesh(self._scene, mesh.triangles.astype(np.float32))
+        self._vertices = np.asarray(mesh.vertices)
+        self._normals = np.asarray(mesh.face_normals, np.float32)
+        self._colors = _face_colors(mesh)
+
+    def render(self, camera: Camera, samples: int = 2,
+               light: NDArray[np.float64] | None = None) -> NDArray[np.uint8]:
+        """
+        Return what the camera sees, (height, width, 4) uint8 RGBA, transparent where empty.
+
+        `samples` x `samples` rays are cast in each pixel: 1 is fastest, 2 smooths the edges.
+        `light`, (3,), points towards the light in the optical frame; None: over the shoulder.
+        """
+        lens = camera.intrinsics
+        left, top, right, bottom = self._bounds(camera)
+        image = np.zeros((lens.height, lens.width, 4), np.uint8)
+        if left >= right or top >= bottom:
+            return image
+        rays = camera.ray_directions(samples)[
+            top * samples:bottom * samples, left * samples:right * samples].astype(np.float32)
+        height, width = rays.shape[:2]
+        origins = np.broadcast_to(camera.position.astype(np.float32), (height * width, 3))
+        hit = self._scene.run(np.ascontiguousarray(origins), rays.reshape(-1, 3))
+        # The last row of the table is what a ray that hits nothing (-1) sees.
+        shaded = self._shaded(camera, _LIGHT if light is None else light)
+        seen = np.take(shaded, hit, axis=0, mode='wrap').reshape(height, width, 4)
+        if samples > 1:
+            seen = _averaged(seen, (right - left, bottom - top))
+        image[top:bottom, left:right] = seen
+        return image
+
+    def _bounds(self, camera: Camera) -> tuple[int, int, int, int]:
+        """Return left, top, right, bottom of the pixels that the mesh can touch."""
+        lens = camera.intrinsics
+        pixels, depth = camera.project(self._vertices)
+        # Where the camera stands inside, or its lens bends, nothing can be left out
+        if depth.min() <= 1e-3 or lens.distortion is not None:
+            return 0, 0, lens.width, lens.height
+        left, top = np.maximum(np.floor(pixels.min(axis=0)).astype(int), 0)
+        right, bottom = np.ceil(pixels.max(axis=0)).astype(int)
+        return left, top, min(right, lens.width), min(bottom, lens.height)
+
+    def _shaded(self, camera: Camera, light: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Return each face's RGBA under a light, (faces + 1, 4), the last empty."""
+        towards = (camera.pose[:3, :3] @ light).astype(np.float32)
+        brightness = _AMBIENT + _DIFFUSE * np.abs(self._normals @ towards)
+        shaded = np.zeros((len(brightness) + 1, 4), np.uint8)
+        np.minimum(self._colors * brightness[:, None], 255, out=shaded[:-1, :3], casting='unsafe')
+        shaded[:-1, 3] = 255
+        return shaded
+
+
+def _face_colors(mesh: trimesh.Trimesh) -> NDArray[np.float32]:
+    """Return one RGB for each face, (faces, 3) in [0, 255]; plain grey where none is given."""
+    visual: Any = mesh.visual
+    if visual is None or visual.kind is None:
+        return np.full((len(mesh.faces), 3), 178, np.float32)
+    if visual.kind != 'texture':
+        return np.asarray(visual.face_colors[:, :3], np.float32)
+    corners = visual.material.to_color(visual.uv)
+    if np.ndim(corners) != 2:  # a material without a picture
+        corners = np.tile(visual.material.main_color, (len(mesh.vertices), 1))
+    colors: NDArray[np.float32] = corners[mesh.faces, :3].mean(axis=1, dtype=np.float32)
+    return colors
+
+
+def _averaged(rgba: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Average blocks of samples down to (width, height), colours weighted by their alpha."""
+    mean = np.asarray(cv2.resize(rgba.astype(np.float32), size, interpolation=cv2.INTER_AREA))
+    # Empty samples are black, so the mean colour is already multiplied by the mean alpha.
+    mean[..., :3] *= (255 / np.maximum(mean[..., 3:], 1)).astype(np.float32)
+    averaged: NDArray[np.uint8] = np.rint(np.minimum(mean, 255)).astype(np.uint8)
+    return averaged
+
+
+def composite(rgba: NDArray[np.uint8], background: float | NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Lay an RGBA image over a background (grey in [0, 255] or an RGB image): (H, W, 3) uint8."""
+    alpha = rgba[..., 3:].astype(np.float32) / 255
+    mixed = rgba[..., :3] * alpha + np.asarray(background, np.float32) * (1 - alpha)
+    composed: NDArray[np.uint8] = np.rint(mixed).astype(np.uint8)
+    return composed

@@ -1,0 +1,31 @@
+"""Contact sheets: many objects or training images on one picture, for people to look at."""
+
+from collections.abc import Sequence
+import math
+
+from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.volumes.rendering import composite, Renderer
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+import trimesh
+
+
+def contact_sheet(meshes: Sequence[trimesh.Trimesh], columns: int = 8, azimuth: float = 0.6,
+                  tile: int = 160, background: int = 255) -> NDArray[np.uint8]:
+    """Return the meshes seen from one azimuth (radians), row by row, (rows x tile, ..., 3) RGB."""
+    camera = orbit_camera(azimuth, intrinsics=CANONICAL_INTRINSICS.resized(tile, tile))
+    rows = math.ceil(len(meshes) / columns)
+    sheet = np.full((rows * tile, columns * tile, 3), background, np.uint8)
+    for index, mesh in enumerate(meshes):
+        top, left = index // columns * tile, index % columns * tile
+        image = Renderer(mesh).render(camera)
+        sheet[top:top + tile, left:left + tile] = composite(image, background)
+    return sheet
+
+
+def sequence_sheet(images: Tensor) -> NDArray[np.uint8]:
+    """Return sequences of views (T, B, 3, S, S) in [0, 1], a row each, (B x S, T x S, 3) RGB."""
+    length, count, _, side, _ = images.shape
+    rows = images.permute(1, 3, 0, 4, 2).reshape(count * side, length * side, 3)
+    return np.asarray((rows * 255).round().byte())
