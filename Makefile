@@ -14,6 +14,9 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet
+# Live tests mostly wait, hence more workers than two cores; one thread each, so that they share.
+TEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:cacheprovider -n 4 --dist loadfile \
+	--no-loadscope-reorder
 SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell find \
 	active_recon msg_tools resource scripts launch config rviz security \
 	-type f -not -path '*/__pycache__/*' 2>/dev/null)
@@ -39,11 +42,11 @@ golden: .venv/installed  ## the golden run anew, once weights or loop have chang
 
 test: lint chromium .venv/colcon/installed  ## style, types, and every test but the long ones; ARGS go to pytest
 	@echo '== testing; the long tests run with `make test-full`'
-	@$(BIN)/python test/side_by_side.py -m 'not slow' $(ARGS)
+	@$(TEST) -m 'not slow' $(ARGS)
 
 test-full: lint chromium .venv/colcon/installed  ## every test, high counts and soak too
 	@echo '== testing everything'
-	@$(BIN)/python test/side_by_side.py $(ARGS)
+	@$(TEST) $(ARGS)
 
 # The pages are tested in Debian's Chromium, which only root can install.
 chromium:

@@ -69,6 +69,6 @@ setup(
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'test': [
             'mcap-ros2-support>=0.5.5', 'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',
-            'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
+            'pytest-xdist>=3.6', 'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

@@ -11,6 +11,8 @@ from active_recon.models.network_2d3d import Network2d3d, Network2d3dConfig
 import pytest
 import torch
 
+pytest_plugins = ['live_tests']
+
 
 @pytest.fixture(scope='session')
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -1,6 +1,7 @@
 """What the package says of itself: one version, and as dependencies what its code imports."""
 
 import ast
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 import re
@@ -18,6 +19,7 @@ MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 ROS_WHEELS = {
     'ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'}
 IMPORTED_BY_TORCH = {'tensorboard'}
+distributions = cache(packages_distributions)  # takes seconds
 
 
 def requirements() -> dict[str, Requirement]:
@@ -47,6 +49,7 @@ def setup_argument(name: str) -> ast.expr:
                 if isinstance(node, ast.keyword) and node.arg == name)
 
 
+@cache
 def imported() -> set[str]:
     """Return the top-level names that the package imports, without the standard library's."""
     trees = [ast.parse(path.read_text()) for package in ('active_recon', 'msg_tools')
@@ -65,7 +68,7 @@ def test_version_is_the_same_everywhere():
 
 def test_what_is_imported_is_declared():
     declared = requirements().keys()
-    from_pip = {name for name, owners in packages_distributions().items()
+    from_pip = {name for name, owners in distributions().items()
                 if any(canonicalize_name(owner) in declared for owner in owners)}
     from_ros = {element.text for element in MANIFEST.iter('exec_depend')}
     assert imported() <= from_pip | from_ros
@@ -73,7 +76,7 @@ def test_what_is_imported_is_declared():
 
 def test_what_is_declared_is_imported():
     used = {canonicalize_name(owner) for name in imported()
-            for owner in packages_distributions().get(name, ())}
+            for owner in distributions().get(name, ())}
     assert requirements().keys() - extras().keys() - ROS_WHEELS - IMPORTED_BY_TORCH <= used
 
 

@@ -28,6 +28,11 @@ def run():
     return recorded_run('chair', views=5)
 
 
+@pytest.fixture(scope='module')
+def page(run):
+    return page_of(run)
+
+
 def page_of(*runs):
     return report_page([Subject(letter, run, run.episodes[0],
                                 getattr(known_truth(run), 'cells', None))
@@ -59,12 +64,12 @@ def drawn_in(page):
     return json.loads(gzip.decompress(b64decode(packed)))
 
 
-def test_page_of_five_views_is_small(run):
-    assert len(page_of(run).encode()) < 6e6
+def test_page_of_five_views_is_small(page):
+    assert len(page.encode()) < 6e6
 
 
-def test_nothing_is_fetched(run):
-    elements = Elements(page_of(run))
+def test_nothing_is_fetched(page):
+    elements = Elements(page)
     for tag, attributes in elements.tags:
         for name in ('src', 'href', 'srcset', 'action', 'data'):
             assert attributes.get(name, 'data:').startswith('data:'), (tag, attributes)
@@ -74,14 +79,14 @@ def test_nothing_is_fetched(run):
     assert not any(word in policy for word in ('http', '*', 'connect-src'))
 
 
-def test_same_run_gives_the_same_bytes_in_another_process(run):
+def test_same_run_gives_the_same_bytes_in_another_process(page):
     code = ('import sys; from test_report_page import *; '
             "sys.stdout.write(page_of(recorded_run('chair', views=5)))")
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     other = subprocess.run([sys.executable, '-c', code], capture_output=True, check=True,
                            text=True, env={**os.environ, 'PYTHONPATH': paths,
                                            'PYTHONHASHSEED': '7'}).stdout
-    assert other == page_of(run)
+    assert other == page
 
 
 def test_what_comes_from_a_bag_is_text_and_never_markup(run):
@@ -101,8 +106,8 @@ def test_what_comes_from_a_bag_is_text_and_never_markup(run):
         assert scripts == honest
 
 
-def test_page_draws_just_what_was_recorded(run):
-    panel = drawn_in(page_of(run))['panels'][0]['scene']
+def test_page_draws_just_what_was_recorded(run, page):
+    panel = drawn_in(page)['panels'][0]['scene']
     for packed, view in zip(panel['grids'], run.episodes[0].views, strict=True):
         cells = np.frombuffer(b64decode(packed), '<u2').reshape([panel['side']] * 3) / 65535
         np.testing.assert_allclose(cells, view.reconstruction.occupancy, atol=1 / 65535)
@@ -111,8 +116,8 @@ def test_page_draws_just_what_was_recorded(run):
         assert ((cells > panel['threshold']) == occupied)[clear].all()
 
 
-def test_figures_known_of_a_run_stand_on_its_page(run):
-    text = Elements(page_of(run)).text
+def test_figures_known_of_a_run_stand_on_its_page(run, page):
+    text = Elements(page).text
     for word in (run.path.name, run.provenance['weights_sha256'], 'uniform', 'Chair',
                  '/camera/image_raw', 'goal_tolerance'):
         assert word in text

@@ -4,7 +4,6 @@ import signal
 
 from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.reconstructor import Reconstructor
-from conftest import LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_to_msg
@@ -12,6 +11,8 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
+
+from .conftest import LATCHED
 
 # Of the 24 views, 15 degrees apart, those nearest to 0, 18, 36, ... 342 degrees
 DEGREES = [0, 15, 30, 60, 75, 90, 105, 120, 150, 165,

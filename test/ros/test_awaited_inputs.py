@@ -1,9 +1,10 @@
 """An input that has never had a message is warned of, with what could be heard instead."""
 
-from conftest import FakeCamera, FakeReconstructor, STREAM
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+
+from .conftest import FakeCamera, FakeReconstructor, STREAM
 
 pytestmark = pytest.mark.ros
 BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -4,7 +4,6 @@ from active_recon.acquisition.background import off_color, off_reference, on_whi
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
-from conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs
 from msg_tools.images import image_from_msg, image_to_msg, mask_to_msg
@@ -14,7 +13,9 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
-from test_life_cycle import Supervisor
+
+from .conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
+from .test_life_cycle import Supervisor
 
 pytestmark = pytest.mark.ros
 CAMERA = orbit_camera(0.5)

@@ -4,12 +4,13 @@ from array import array
 import math
 import re
 
-from conftest import FakeCamera
 from geometry_msgs.msg import PoseStamped
 from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
+
+from .conftest import FakeCamera
 
 pytestmark = pytest.mark.ros
 

@@ -13,9 +13,10 @@ import subprocess
 import sys
 
 import active_recon
-from conftest import BUDGET_S, LATCHED, ROOT
 import pytest
 from sensor_msgs.msg import PointCloud2
+
+from .conftest import BUDGET_S, LATCHED, ROOT
 
 pytestmark = pytest.mark.ros
 LISTENS = '0A'

@@ -4,13 +4,14 @@ from collections import Counter
 import os
 import signal
 
-from conftest import FakeCamera
 import cv2
 from geometry_msgs.msg import PoseStamped
 from msg_tools.images import image_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 import pytest
 from sensor_msgs.msg import CameraInfo, CompressedImage, PointCloud2
+
+from .conftest import FakeCamera
 
 pytestmark = pytest.mark.ros
 

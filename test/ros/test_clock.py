@@ -4,7 +4,6 @@ import itertools
 import math
 
 from active_recon.geometry.cameras import Camera
-from conftest import FakeCamera, FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
@@ -13,8 +12,10 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
-from test_parameter_changes import change
-from test_planner_node import latent  # noqa: F401
+
+from .conftest import FakeCamera, FakeReconstructor, LATCHED
+from .test_parameter_changes import change
+from .test_planner_node import latent  # noqa: F401
 
 pytestmark = pytest.mark.ros
 S = 1_000_000_000

@@ -3,13 +3,14 @@
 from functools import partial
 import socket
 
-from conftest import FakeCamera
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
+
+from .conftest import FakeCamera
 
 pytestmark = pytest.mark.ros
 

@@ -12,10 +12,11 @@ import time
 from active_recon.models.weights_files import PAPER_MODEL
 from active_recon.simulation.faults import FAULTS
 from active_recon.simulation.shown_object import rendered_object
-from hand_listed_loop import computed, DEGREES, Loop, RECOVERED_S
 import pytest
 import torch
 import trimesh
+
+from .hand_listed_loop import computed, DEGREES, Loop, RECOVERED_S
 
 pytestmark = pytest.mark.ros
 LOG = logging.getLogger(__name__)

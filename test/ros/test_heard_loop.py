@@ -6,7 +6,6 @@ from active_recon.nodes.loop.loop_subscriber import HeardLoop
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.viewer import TOPICS
 from active_recon.volumes.voxels import VoxelGrid
-from conftest import LATCHED, STREAM
 import cv2
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_to_msg
@@ -17,7 +16,9 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
-from test_recorder import CAMERA, start_remapped
+
+from .conftest import LATCHED, STREAM
+from .test_recorder import CAMERA, start_remapped
 
 pytestmark = pytest.mark.ros
 

@@ -5,7 +5,6 @@ import signal
 import weakref
 
 from active_recon.nodes.reconstructor import ReconstructorNode
-from conftest import BUDGET_S, FakeCamera, LATCHED
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 import pytest
@@ -13,6 +12,8 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
+
+from .conftest import BUDGET_S, FakeCamera, LATCHED
 
 pytestmark = pytest.mark.ros
 NODES = {'reconstructor': {}, 'view_planner': {'policy': 'farthest'}}

@@ -7,7 +7,6 @@ from active_recon.datasets.layout import ObjectFolder, write_object
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxels import VoxelGrid
-from conftest import LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, view_goal_from_msg
@@ -19,6 +18,8 @@ import rosless
 from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
 import trimesh
+
+from .conftest import LATCHED
 
 pytestmark = pytest.mark.ros
 VIEWS = 3

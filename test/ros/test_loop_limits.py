@@ -5,9 +5,10 @@ from active_recon.bags.replay.comparison import SAME_BITS, WITHIN_TOLERANCE
 from active_recon.bags.replay.verification import verify
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.settings import recorded_settings
-from conftest import LATCHED
 import pytest
 from std_msgs.msg import Header
+
+from .conftest import LATCHED
 
 pytestmark = pytest.mark.ros
 LIMITS = {'azimuth_range': [-1.0, 2.0], 'forbidden_sectors': [0.4, 0.9]}

@@ -1,10 +1,11 @@
 """Two loops side by side on one machine, each in a namespace of its own."""
 
-from conftest import LATCHED
 from msg_tools.stamps import nanoseconds_from_stamp
 import pytest
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
+
+from .conftest import LATCHED
 
 pytestmark = pytest.mark.ros
 NODES = ['turntable_camera', 'reconstructor', 'view_planner']

@@ -4,7 +4,6 @@ import math
 
 from active_recon.geometry.cameras import Camera
 from active_recon.parameters.declaration import NEW_START
-from conftest import FakeCamera, FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
@@ -13,7 +12,9 @@ from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersA
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
-from test_planner_node import latent  # noqa: F401
+
+from .conftest import FakeCamera, FakeReconstructor, LATCHED
+from .test_planner_node import latent  # noqa: F401
 
 pytestmark = pytest.mark.ros
 

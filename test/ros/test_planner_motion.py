@@ -3,12 +3,13 @@
 import math
 
 from active_recon.geometry.cameras import azimuth_difference
-from conftest import FakeReconstructor
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
-from test_parameter_changes import change_together
+
+from .conftest import FakeReconstructor
+from .test_parameter_changes import change_together
 
 pytestmark = pytest.mark.ros
 START = 1.0

@@ -6,7 +6,6 @@ import signal
 from active_recon.geometry.cameras import azimuth_difference, orbit_camera
 from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.runtimes import load_policy_runtime
-from conftest import FakeReconstructor, LATCHED
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_to_msg
 from msg_tools.goals import scores_from_msg, view_goal_from_msg
@@ -15,6 +14,8 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
+
+from .conftest import FakeReconstructor, LATCHED
 
 pytestmark = pytest.mark.ros
 

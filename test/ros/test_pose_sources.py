@@ -8,7 +8,6 @@ from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.geometry.turntable_pose import FixedCamera
 from active_recon.nodes.camera.pose_sources import check_pose_source, TfPoses
 from active_recon.parameters.reconstructor import ReconstructorSettings
-from conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
 from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Vector3
 from msg_tools.cameras import intrinsics_to_msg, pose_from_msg, pose_to_msg
 from msg_tools.images import image_to_msg
@@ -18,6 +17,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
+
+from .conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
 
 pytestmark = pytest.mark.ros
 POSE = orbit_camera(1.2).pose

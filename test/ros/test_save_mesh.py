@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
-from conftest import FakeCamera
 import pytest
 from rclpy.qos import qos_profile_sensor_data
 import trimesh
+
+from .conftest import FakeCamera
 
 pytestmark = pytest.mark.ros
 

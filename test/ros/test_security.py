@@ -13,8 +13,9 @@ from active_recon.nodes.runtime.graph_access import (
     read_policies,
     write_policies,
 )
-from conftest import ROOT
 import pytest
+
+from .conftest import ROOT
 
 pytestmark = pytest.mark.ros
 POLICIES = ROOT / 'security' / 'policies.xml'

@@ -5,8 +5,9 @@ import os
 import subprocess
 import sys
 
-from conftest import ROOT
 import pytest
+
+from .conftest import ROOT
 
 pytestmark = pytest.mark.ros
 

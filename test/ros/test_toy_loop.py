@@ -10,12 +10,13 @@ from active_recon.bags.runs.settings import recorded_settings
 from active_recon.models.registry import NETWORKS
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.policies import POLICIES
-from conftest import LATCHED
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 import toy
+
+from .conftest import LATCHED
 
 pytestmark = pytest.mark.ros
 TOY = (str(Path(toy.__file__)),)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from active_recon.geometry.cameras import azimuth_difference, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.geometry.turntable_pose import FixedCamera
-from conftest import BUDGET_S, STREAM
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import intrinsics_to_msg, pose_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, azimuth_goal_to_msg, view_goal_from_msg
@@ -17,6 +16,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Header
+
+from .conftest import BUDGET_S, STREAM
 
 pytestmark = pytest.mark.ros
 DRIVER = str(Path(__file__).parents[2] / 'examples' / 'turntable_driver.py')

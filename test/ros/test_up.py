@@ -6,8 +6,9 @@ import signal
 import subprocess
 import sys
 
-from conftest import BUDGET_S, ROOT
 import pytest
+
+from .conftest import BUDGET_S, ROOT
 
 pytestmark = pytest.mark.ros
 

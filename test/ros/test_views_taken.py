@@ -4,11 +4,12 @@ import math
 
 from active_recon.geometry.cameras import Camera
 from active_recon.models.weights_files import PAPER_MODEL
-from conftest import FakeCamera
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 import pytest
+
+from .conftest import FakeCamera
 
 pytestmark = pytest.mark.ros
 MS = 1_000_000
