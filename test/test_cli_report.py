@@ -71,8 +71,11 @@ def test_truth_is_for_all_bags_or_for_each(bags, tmp_path):
 
     def ious(*truths):
         options = [word for truth in truths for word in ('--truth', truth)]
-        report(bags[0], bags[1], *options, '--out', page)
-        return [curve['y'] for curve in drawn_in(page)['shared']['iou']['data']]
+        said = report(bags[0], bags[1], *options, '--out', page).stdout
+        shown = [curve['y'] for curve in drawn_in(page)['shared']['iou']['data']]
+        for letter, values in zip('AB', shown, strict=True):
+            assert f'{letter}: IoU ' + ' '.join(f'{value:.2f}' for value in values) in said
+        return shown
 
     one_for_all, each = ious(chair), ious(chair, car)
     assert one_for_all[0] == one_for_all[1] == each[0]

@@ -88,10 +88,7 @@ class ObjectFolder:
 
     def voxels(self, resolution: int = RESOLUTION) -> VoxelGrid:
         """Return the true voxels; raises DataError where there are none so fine."""
-        path = self.voxels_path(resolution)
-        if resolution != RESOLUTION and not path.is_file():
-            raise DataError(f'{path}: expected voxels of {resolution} cells a side, found no '
-                            'file; make them with `--fine`')
+        path = self._voxels_file(resolution)
         grid = read_binvox(path)
         if grid.occupancy.shape != (resolution,) * 3:
             raise DataError(f'{path}: expected {resolution} cells a side, '
@@ -100,7 +97,15 @@ class ObjectFolder:
 
     def grid_side(self, resolution: int = RESOLUTION) -> float:
         """Return the side of the true voxels' grid, from their file's header alone."""
-        return binvox_side(self.voxels_path(resolution))
+        return binvox_side(self._voxels_file(resolution))
+
+    def _voxels_file(self, resolution: int) -> Path:
+        """Return the path of voxels that are there; raises DataError where they are not."""
+        path = self.voxels_path(resolution)
+        if resolution != RESOLUTION and not path.is_file():
+            raise DataError(f'{path}: no such file: the data have no voxels of {resolution} cells '
+                            'a side; make them by `render` or `dataset build` with `--fine`')
+        return path
 
     @property
     def complete(self) -> bool:

@@ -4,8 +4,9 @@ A node's parameters, declared as data: a frozen dataclass, each field made by `p
 The dataclass says all that is to be known of them, without a running node and without ROS.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
+from difflib import get_close_matches
 import math
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -95,6 +96,12 @@ def number_words(number: float) -> str:
 def _as(kind: type, value: object) -> object:
     """Return an integer as a float where a float is wanted, all else as it is."""
     return float(value) if kind is float and type(value) is int else value
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return a hint at what may have been meant by a name that is not known."""
+    near = get_close_matches(name, known, 1)
+    return f'did you mean {near[0]}?' if near else f'there are {", ".join(known)}'
 
 
 def declared(settings: type) -> Iterator[Declared]:

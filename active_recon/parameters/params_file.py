@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import ConfigError
-from active_recon.parameters.declaration import declared
+from active_recon.parameters.declaration import declared, nearest
 from active_recon.parameters.every_node import SETTINGS
 import yaml
 
@@ -52,6 +52,11 @@ def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
             if name in own or name not in set().union(*others)}
 
 
+def check_yaml(path: Path) -> None:
+    """Raise ConfigError, with line and reason, where a file is no YAML or cannot be read."""
+    _parsed(path)
+
+
 def _parsed(path: Path) -> object:
     try:
         return yaml.safe_load(path.read_text())
@@ -75,5 +80,4 @@ def _check(path: Path, node: str, values: Mapping[str, Any], shared: Mapping[str
             except ConfigError as error:
                 raise ConfigError(f'{path}: {node}: {error}') from None
         elif name in values and name not in _OF_ROS:
-            raise ConfigError(f'{path}: {node}: expected parameters among {", ".join(known)}, '
-                              f'got {name}')
+            raise ConfigError(f'{path}: {node} has no parameter {name}; {nearest(name, known)}')

@@ -6,6 +6,8 @@ import subprocess
 import sys
 
 from active_recon.errors import ConfigError
+from active_recon.parameters.declaration import declared
+from active_recon.parameters.every_node import SETTINGS
 from active_recon.parameters.params_file import read_params_file
 import pytest
 
@@ -54,7 +56,7 @@ def test_what_is_given_to_all_is_given_to_each_unless_it_has_its_own(tmp_path):
     ('recorder: {topics: [a]}', 'recorder: expected ros__parameters and nothing else, got topics'),
     ('recorder: {}', 'recorder: expected ros__parameters and nothing else, got nothing'),
     ('recorder: {ros__parameters: 1}', 'recorder: expected names with values, got 1'),
-    ('recorder: {ros__parameters: {output: a}}', 'among output_dir, .*, got output'),
+    ('recorder: {ros__parameters: {output: a}}', 'no parameter output; did you mean output_dir'),
     ('recorder: {ros__parameters: {max_bag_size_mb: 0}}',
      'recorder: parameter max_bag_size_mb: expected an integer from 1 to 1000000, got 0')])
 def test_a_file_that_cannot_be_used_is_refused_with_its_name(tmp_path, text, said):
@@ -77,4 +79,17 @@ def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_pat
         cwd=CONFIG.parent, capture_output=True, text=True)
     assert ended.returncode == 1
     assert 'Traceback' not in ended.stderr
-    assert str(path) in ended.stderr.splitlines()[-1]
+    said = ended.stderr.splitlines()[-1]
+    assert f'{path}: no ROS parameters file in YAML' in said and "expected ',' or '}'" in said
+
+
+@pytest.mark.parametrize('node', SETTINGS)
+def test_a_node_asked_for_help_lists_its_parameters_and_ends(node):
+    asked = subprocess.run([sys.executable, '-m', f'active_recon.nodes.{node}', '--help'],
+                           cwd=CONFIG.parent, capture_output=True, text=True, timeout=60)
+    assert asked.returncode == 0 and not asked.stderr
+    lines = asked.stdout.splitlines()
+    assert lines[0].startswith(f'usage: {node} ')
+    assert max(map(len, lines)) <= 80
+    for each in declared(SETTINGS[node]):
+        assert any(line.startswith(f'  {each.name} (default: ') for line in lines)

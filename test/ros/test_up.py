@@ -76,5 +76,6 @@ def test_where_one_node_ends_the_others_are_stopped_and_the_command_fails(up, be
 
 
 def test_a_file_that_cannot_be_used_starts_nothing(up, tmp_path):
-    assert up('recorder: {ros__parameters: {output: bags}}').wait(BUDGET_S) == 2
-    assert 'expected parameters among output_dir' in (tmp_path / 'up.log').read_text()
+    assert up('recorder: {ros__parameters: {output_dri: bags}}').wait(BUDGET_S) == 2
+    said = (tmp_path / 'up.log').read_text()
+    assert 'recorder has no parameter output_dri; did you mean output_dir?' in said

@@ -7,12 +7,11 @@ applies what is changed while the node runs.
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import Any, Generic, TypeVar
 
 from active_recon.errors import ActiveReconError
 from active_recon.nodes.runtime.run import one_line
-from active_recon.parameters.declaration import Declared, declared, NEW_START
+from active_recon.parameters.declaration import Declared, declared, nearest, NEW_START
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -100,10 +99,8 @@ class Parameters(Generic[Settings]):
 def _warn_of_undeclared(node: Node, known: Iterable[str]) -> None:
     for name in getattr(node, '_parameter_overrides', ()):  # rclpy tells it nowhere else
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
-            near = get_close_matches(name, known, 1)
-            hint = f'did you mean {near[0]}?' if near else f'there are {", ".join(known)}'
             node.get_logger().warning(f'parameter {name}: this node has none of that name, so it '
-                                      f'changes nothing; {hint}')
+                                      f'changes nothing; {nearest(name, known)}')
 
 
 class ReadOnlySaysWhy:

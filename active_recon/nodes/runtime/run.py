@@ -2,10 +2,15 @@
 
 from collections.abc import Callable
 import faulthandler
+from itertools import pairwise
+from pathlib import Path
 import signal
+import sys
 
 from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.nodes.runtime.shared_memory import make_room
+from active_recon.nodes.runtime.usage import is_help_wanted, usage
+from active_recon.parameters.params_file import check_yaml
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -22,7 +27,11 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
 
     A node that cannot start (a parameter out of range, a weights file that is missing) says why
     in one line and the process exits with code 1, as does one that cannot be closed in time.
+    With `--help` the executable says what the node does, and no node is made.
     """
+    if is_help_wanted(sys.argv[1:] if args is None else args):
+        sys.stdout.write(usage(Path(sys.argv[0]).stem) + '\n')
+        return
     # rclpy's own handlers tear its context down wherever the signal finds it, which while a node
     # starts or closes its files ends in a traceback, or is not heard at all.
     asked_to_stop: list[int] = []
@@ -51,6 +60,10 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
 
 def _init(args: list[str] | None) -> None:
     """Read the arguments; ConfigError where ROS cannot, as a parameters file that is no YAML."""
+    given = sys.argv[1:] if args is None else args
+    for option, file in pairwise(given):
+        if option == '--params-file':
+            check_yaml(Path(file))
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:

@@ -1,0 +1,36 @@
+"""What an executable says when it is asked for `--help`."""
+
+from collections.abc import Iterator, Sequence
+from importlib import import_module
+import textwrap
+
+from active_recon.parameters.declaration import Declared, declared, number_words
+from active_recon.parameters.every_node import SETTINGS
+
+_WIDTH, _INDENT = 79, ' ' * 6
+
+
+def is_help_wanted(arguments: Sequence[str]) -> bool:
+    """Return whether `-h` or `--help` stands among what is not for ROS."""
+    own = arguments[:arguments.index('--ros-args')] if '--ros-args' in arguments else arguments
+    return bool({'-h', '--help'} & set(own))
+
+
+def usage(node: str) -> str:
+    """Return what a node does and its parameters, in lines of 79 characters at most."""
+    about = (import_module(f'active_recon.nodes.{node}').__doc__ or '').partition('\n')[0]
+    lines = [
+        f'usage: {node} [--ros-args [-p NAME:=VALUE] [-r OLD:=NEW] ...]',
+        '', *textwrap.wrap(about, _WIDTH), '', 'parameters:']
+    for each in declared(SETTINGS[node]):
+        lines += _parameter(each)
+    return '\n'.join([*lines, '', 'A running node lists its topics: ros2 node info /' + node])
+
+
+def _parameter(each: Declared) -> Iterator[str]:
+    default = number_words(each.default) if each.kind is float else each.default
+    shown = ', '.join(map(str, default)) if each.of else str(default)
+    yield '  ' + textwrap.shorten(f'{each.name} (default: {shown or "empty"})', _WIDTH - 2,
+                                  placeholder=' ...)')
+    yield from textwrap.wrap(f'{each.description}; {each.expected}', _WIDTH,
+                             initial_indent=_INDENT, subsequent_indent=_INDENT)
