@@ -23,7 +23,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full bench soak policies chromium lint clean
+.PHONY: help venv demo golden test test-full doc html bench soak policies chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -40,11 +40,11 @@ golden: .venv/installed  ## the golden run anew, once weights or loop have chang
 	@rm -rf bags/golden/run && mkdir -p bags/golden/run
 	@mv build/golden/*/*.mcap build/golden/*/metadata.yaml bags/golden/run/
 
-test: lint chromium .venv/colcon/installed  ## style, types, and every test but the long ones; ARGS go to pytest
+test: lint html chromium .venv/colcon/installed  ## style, types, documentation, every test but the long ones; ARGS go to pytest
 	@echo '== testing; the long tests run with `make test-full`'
 	@$(TEST) -m 'not slow' $(ARGS)
 
-test-full: lint chromium .venv/colcon/installed  ## every test, high counts and soak too
+test-full: lint html chromium .venv/colcon/installed  ## every test, high counts and soak too
 	@echo '== testing everything'
 	@$(TEST) $(ARGS)
 
@@ -59,7 +59,15 @@ chromium:
 	apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install -y \
 		--no-install-recommends $$missing >/dev/null
 
-bench: .venv/installed  ## the figures of the README's table, measured here
+doc: html  ## the documentation, built and opened; ARGS=--no-open only builds
+	@$(if $(filter --no-open,$(ARGS)),echo build/doc/index.html,$(BIN)/python -m webbrowser \
+		'file://$(CURDIR)/build/doc/index.html')
+
+html: .venv/installed
+	@echo '== building the documentation'
+	@$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doc/.doctrees doc build/doc
+
+bench: .venv/installed  ## the figures of doc/benchmarks.md, measured here
 	@echo '== measuring'
 	@$(BIN)/python -m benchmarks $(ARGS)
 
@@ -94,7 +102,7 @@ clean:  ## forget .venv and what was built
 .venv/installed: .venv/torch $(SOURCES)
 	@echo '== installing active_recon and what it needs'
 	@rm -rf build
-	@$(PIP) install --no-build-isolation -c constraints.txt '.[lint,test]'
+	@$(PIP) install --no-build-isolation -c constraints.txt '.[doc,lint,test]'
 	@rm -rf build active_recon.egg-info
 	@touch $@
 

@@ -66,6 +66,9 @@ setup(
         *ROS_WHEELS,
     ],
     extras_require={
+        'doc': [
+            'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
+            'sphinx-copybutton>=0.5.2'],
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'test': [
             'mcap-ros2-support>=0.5.5', 'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',

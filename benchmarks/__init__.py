@@ -1,1 +1,1 @@
-"""The figures of the README's table, measured: `make bench`."""
+"""The figures of doc/benchmarks.md, measured: `make bench`."""

@@ -1,4 +1,4 @@
-"""Measure everything, print the README's table, and write it as JSON; or only the parts named."""
+"""Measure everything or the parts named; print the table of doc/benchmarks.md, write JSON."""
 
 from collections.abc import Callable, Mapping, Sequence
 import json

@@ -163,7 +163,7 @@ def test_faults_are_read_and_empty_entries_passed_by():
         'drop_images': 0.3, 'pose_noise': 0.01}
 
 
-def test_the_readme_has_a_row_for_each_fault_and_for_no_other():
-    readme = (Path(__file__).parents[1] / 'README.md').read_text()
-    table = readme.split('| fault |')[1].split('\n\n')[0]
+def test_the_documentation_has_a_row_for_each_fault_and_for_no_other():
+    page = (Path(__file__).parents[1] / 'doc/diagnostics.md').read_text()
+    table = page.split('| fault |')[1].split('\n\n')[0]
     assert [row.split('`')[1] for row in table.splitlines()[2:]] == list(FAULTS)

@@ -1,4 +1,8 @@
-"""The README's table of parameters: `python -m active_recon.parameters.table README.md`."""
+"""
+The documentation's tables of parameters, one for each node.
+
+    python -m active_recon.parameters.table doc/interfaces.md
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,29 +16,31 @@ BEGIN, END = '<!-- parameters: begin -->\n', '<!-- parameters: end -->\n'
 _SHOWN = 3  # elements of a list
 
 
-def parameter_table() -> str:
-    """Return the parameters of every node as a Markdown table."""
-    return '\n'.join(_rows()) + '\n'
+def parameter_tables() -> str:
+    """Return the parameters of every node in Markdown: a heading and a table for each."""
+    return '\n'.join(
+        line for node, settings in SETTINGS.items() for line in _table(node, settings))
 
 
-def with_table(text: str) -> str:
-    """Return a text with the table where it belongs; DataError where its place is not marked."""
+def with_tables(text: str) -> str:
+    """Return a text with the tables between their marks; DataError where these are missing."""
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise DataError(f'expected the lines {BEGIN.strip()} and {END.strip()}, between which the '
-                        'table belongs; they are not there')
-    return f'{before}{BEGIN}{parameter_table()}{END}{after}'
+        raise DataError(f'expected the lines {BEGIN.strip()} and {END.strip()} around the '
+                        'parameter tables, found no such lines')
+    return f'{before}{BEGIN}{parameter_tables()}{END}{after}'
 
 
-def _rows() -> Iterator[str]:
-    yield '| node | parameter | default | may be | while it runs | meaning |'
-    yield '|---|---|---|---|---|---|'
-    for node, settings in SETTINGS.items():
-        for number, each in enumerate(declared(settings)):
-            yield (f'| {node if number == 0 else ""} | `{each.name}` | {_default(each)} '
-                   f'| {_may_be(each)} | {"changes" if each.changeable else ""} '
-                   f'| {each.description} |')
+def _table(node: str, settings: type) -> Iterator[str]:
+    yield f'### {node}'
+    yield ''
+    yield '| parameter | default | allowed values | dynamic | meaning |'
+    yield '|---|---|---|---|---|'
+    for each in declared(settings):
+        yield (f'| `{each.name}` | {_default(each)} | {_allowed(each)} '
+               f'| {"yes" if each.changeable else ""} | {each.description} |')
+    yield ''
 
 
 def _default(each: Declared) -> str:
@@ -47,7 +53,7 @@ def _default(each: Declared) -> str:
     return number_words(each.default) if each.kind is float else str(each.default)
 
 
-def _may_be(each: Declared) -> str:
+def _allowed(each: Declared) -> str:
     if each.choices:
         return ', '.join(f'`{choice}`' for choice in each.choices)
     if each.low is not None and each.high is not None:
@@ -57,4 +63,4 @@ def _may_be(each: Declared) -> str:
 
 if __name__ == '__main__':
     path = Path(sys.argv[1])
-    path.write_text(with_table(path.read_text()))
+    path.write_text(with_tables(path.read_text()))
