@@ -60,12 +60,20 @@ class Decision:
 
 
 @dataclass(frozen=True, eq=False)
-class _SeenView:
-    """A view that the planner was told of."""
+class PlannerView:
+    """
+    A view and the reconstruction after it, as a policy needs them.
+
+    - latent: (C, h, w), the network's after that view
+    - camera: of the view that was really taken, in the object frame
+    - entropy: of the reconstruction, nats
+    - volume: the published probabilities, for a policy that wants them
+    """
 
     latent: NDArray[np.float32]
     camera: Camera
-    volume: VoxelGrid | None
+    entropy: float
+    volume: VoxelGrid | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +140,7 @@ class Planner:
 
     def reset(self) -> None:
         """Forget the episode."""
-        self._views: list[_SeenView] = []
-        self._entropies: list[float] = []
+        self._views: list[PlannerView] = []
         self._state = self._policy.initial_state(1)
         self._choice: Choice | None = None
         self._wanted: _Wanted | None = None
@@ -148,7 +155,7 @@ class Planner:
 
         Raises ViewError where this planner's policy cannot use it, and then is good for nothing.
         """
-        self._views, self._entropies = list(other._views), list(other._entropies)
+        self._views = list(other._views)
         self._failed, self._stopped = list(other._failed), other._stopped
         if self._views:
             self._look_from(self._views[-1].camera)
@@ -175,26 +182,20 @@ class Planner:
         """
         Take in a view and decide.
 
-        - latent: (C, h, w), the network's after that view
-        - camera: of the view that was really taken, in the object frame
-        - entropy: of the reconstruction after that view, nats
-        - volume: the published probabilities, for a policy that wants them
-
-        Raises ViewError, and then nothing has changed.
+        The arguments are those of `PlannerView`. Raises ViewError, and then nothing has changed.
         """
         if not (math.isfinite(entropy) and np.isfinite(latent).all()):
             raise ViewError(f'expected a finite latent and entropy, got entropy {entropy}',
                             'latent')
         before = self._ring
         self._look_from(camera)
-        views = [*self._views, _SeenView(latent, camera, volume)]
+        views = [*self._views, PlannerView(latent, camera, entropy, volume)]
         try:
             self._choose(views)
         except ViewError:
             self._ring = before
             raise
         self._views = views
-        self._entropies.append(entropy)
         self._aim(camera)
         if self._stopped:
             return self.stop()
@@ -255,7 +256,7 @@ class Planner:
         return (self._elevation == other._elevation and self._yaw == other._yaw
                 and np.array_equal(self._azimuths, other._azimuths))
 
-    def _choose(self, views: Sequence[_SeenView]) -> None:
+    def _choose(self, views: Sequence[PlannerView]) -> None:
         """Let the policy choose after the last of some views."""
         last = views[-1]
         if last.volume is None and self._policy.wants_volume:
@@ -310,8 +311,8 @@ class Planner:
 
     def _settled(self) -> bool:
         """Whether the last two views each changed the entropy by no more than the tolerance."""
-        if self._entropy_tolerance == 0 or len(self._entropies) < 3:
+        if self._entropy_tolerance == 0 or len(self._views) < 3:
             return False
-        recent = np.array(self._entropies[-3:])
+        recent = np.array([view.entropy for view in self._views[-3:]])
         change = np.abs(np.diff(recent)) / np.maximum(recent[:-1], 1e-9)
         return bool((change <= self._entropy_tolerance).all())

@@ -72,8 +72,8 @@ def reconstructor_process() -> Iterator[tuple[float, int]]:
 
 def _latencies_ms() -> list[float]:
     """Publish views one by one as a camera would; return how long each occupancy took."""
-    from active_recon.launching.loop_watch import joined_domain
-    from active_recon.nodes.runtime.qos import LATCHED
+    from active_recon.launching.loop_client import joined_domain
+    from active_recon.nodes.runtime.qos import LATCHED_QOS
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import intrinsics_to_msg, pose_to_msg
     from msg_tools.images import image_to_msg
@@ -83,7 +83,7 @@ def _latencies_ms() -> list[float]:
     with joined_domain('benchmark') as (node, executor):
         arrived: list[float] = []
         node.create_subscription(
-            PointCloud2, 'occupancy', lambda _: arrived.append(time.perf_counter()), LATCHED)
+            PointCloud2, 'occupancy', lambda _: arrived.append(time.perf_counter()), LATCHED_QOS)
         publishers = [node.create_publisher(kind, topic, 10) for kind, topic in (
             (CameraInfo, 'camera/camera_info'), (PoseStamped, 'camera/pose'),
             (Image, 'camera/image_raw'))]

@@ -106,8 +106,8 @@ def moving_camera() -> Iterator[Callable[[], float]]:
 @contextmanager
 def _joined() -> Iterator[tuple[Any, Any, Any, Any]]:
     """Yield what hears poses, what publishes an image from an azimuth, what spins, what asks."""
-    from active_recon.launching.loop_watch import joined_domain, LoopWatch
-    from active_recon.nodes.runtime.qos import LATCHED
+    from active_recon.launching.loop_client import joined_domain, LoopClient
+    from active_recon.nodes.runtime.qos import LATCHED_QOS
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import camera_to_msgs
     from msg_tools.goals import view_goal_from_msg
@@ -126,7 +126,7 @@ def _joined() -> Iterator[tuple[Any, Any, Any, Any]]:
         def hear(topic: str, then: Callable[[int, float], object]) -> None:
             node.create_subscription(PoseStamped, topic, lambda msg: then(
                 nanoseconds_from_stamp(msg.header.stamp),
-                view_goal_from_msg(msg).azimuth), LATCHED)
+                view_goal_from_msg(msg).azimuth), LATCHED_QOS)
 
         def publish(azimuth: float) -> int:
             header = Header(stamp=node.get_clock().now().to_msg(), frame_id='camera')
@@ -138,4 +138,4 @@ def _joined() -> Iterator[tuple[Any, Any, Any, Any]]:
             return nanoseconds_from_stamp(header.stamp)
 
         yield (hear, publish, lambda: executor.spin_once(timeout_sec=0.001),
-               LoopWatch(node, executor).ask)
+               LoopClient(node, executor).trigger)

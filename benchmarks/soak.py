@@ -22,7 +22,7 @@ from active_recon.errors import ActiveReconError
 from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.nodes.runtime.run import one_line
 from benchmarks.memory import Memory, MemoryUse
-from benchmarks.soak_watch import soak_watch, SoakWatch
+from benchmarks.soak_monitor import soak_monitor, SoakMonitor
 
 VIEWS = 5
 IMAGES_PER_S = 5.0
@@ -81,7 +81,7 @@ def soak(minutes: float) -> Soak:
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
     with (TemporaryDirectory() as folder,
-          NodeProcesses(Path(folder), environment) as nodes, soak_watch(nodes.check) as watch):
+          NodeProcesses(Path(folder), environment) as nodes, soak_monitor(nodes.check) as watch):
         bags = _start(nodes, Path(folder))
         memory = Memory({name: nodes.pid(name) for name in (
             'recorder', 'turntable_camera', 'reconstructor', 'view_planner')})
@@ -109,7 +109,7 @@ def _start(nodes: NodeProcesses, folder: Path) -> Path:
     return bags
 
 
-def _follow(watch: SoakWatch, memory: Memory, seconds: float) -> tuple[str, float]:
+def _follow(watch: SoakMonitor, memory: Memory, seconds: float) -> tuple[str, float]:
     """
     Show the next object after each.
 

@@ -38,8 +38,8 @@ def stream_figures() -> list[Figure]:
 @contextmanager
 def _camera() -> Iterator[Callable[[str, tuple[int, int], int], list[float]]]:
     """Yield what sends images at a rate and returns the seconds to each occupancy, 0: none."""
-    from active_recon.launching.loop_watch import joined_domain
-    from active_recon.nodes.runtime.qos import LATCHED
+    from active_recon.launching.loop_client import joined_domain
+    from active_recon.nodes.runtime.qos import LATCHED_QOS
     from geometry_msgs.msg import PoseStamped
     from msg_tools.cameras import camera_to_msgs
     from msg_tools.images import image_to_msg
@@ -51,7 +51,7 @@ def _camera() -> Iterator[Callable[[str, tuple[int, int], int], list[float]]]:
         arrived: dict[int, float] = {}
         node.create_subscription(
             PointCloud2, 'occupancy', lambda msg: arrived.setdefault(
-                nanoseconds_from_stamp(msg.header.stamp), time.perf_counter()), LATCHED)
+                nanoseconds_from_stamp(msg.header.stamp), time.perf_counter()), LATCHED_QOS)
         publishers = {kind: node.create_publisher(kind, f'camera/{topic}', 10) for kind, topic in (
             (CameraInfo, 'camera_info'), (PoseStamped, 'pose'), (Image, 'image_raw'),
             (CompressedImage, 'image_raw/compressed'))}

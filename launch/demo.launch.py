@@ -1,4 +1,4 @@
-"""The whole loop on a simulated turntable, recorded; `ros2 launch ... --show-args`."""
+"""The loop on a simulated turntable, recorded; `--show-args` lists the arguments."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
@@ -10,9 +10,10 @@ from launch_ros.substitutions import FindPackageShare
 
 SHARE = FindPackageShare('active_recon')
 ARGUMENTS = {
-    'namespace': ('', 'the namespace of the nodes and of all their topics'),
-    'params_file': (PathJoinSubstitution([SHARE, 'config', 'demo.yaml']), "the nodes' parameters"),
-    'use_sim_time': ('false', 'whether the time is that of /clock'),
+    'namespace': ('', 'namespace of the nodes and their topics'),
+    'params_file': (
+        PathJoinSubstitution([SHARE, 'config', 'demo.yaml']), 'parameters file of the nodes'),
+    'use_sim_time': ('false', 'whether to use the time on /clock'),
     'autostart': ('true', 'whether reconstructor and view planner activate themselves'),
     'log_level': ('info', 'debug, info, warn, error or fatal'),
 }

@@ -1,4 +1,4 @@
-"""Reconstructor, view planner and recorder for a camera of yours; see `--show-args`."""
+"""Reconstructor, view planner and recorder for a camera; `--show-args` lists the arguments."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -9,17 +9,17 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 ARGUMENTS = {
-    'namespace': ('', 'the namespace of the nodes and of all their topics'),
+    'namespace': ('', 'namespace of the nodes and their topics'),
     'params_file': (
         PathJoinSubstitution([FindPackageShare('active_recon'), 'config', 'arm.yaml']),
-        "the nodes' parameters"),
-    'use_sim_time': ('false', 'whether the time is that of /clock'),
+        'parameters file of the nodes'),
+    'use_sim_time': ('false', 'whether to use the time on /clock'),
     'autostart': ('true', 'whether the nodes configure and activate themselves'),
     'record': ('true', 'whether to record a bag'),
     'log_level': ('info', 'debug, info, warn, error or fatal'),
-    'image': ('camera/image_raw', "the camera's images"),
-    'camera_info': ('camera/camera_info', "the camera's calibration"),
-    'pose': ('camera/pose', "the camera's pose in the object's frame"),
+    'image': ('camera/image_raw', "topic of the camera's images"),
+    'camera_info': ('camera/camera_info', "topic of the camera's calibration"),
+    'pose': ('camera/pose', "topic of the camera's pose in the object's frame"),
 }
 
 

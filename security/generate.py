@@ -1,10 +1,10 @@
 """
-Write the SROS2 policies of the nodes as they really are, or check those that stand here.
+Write the SROS2 policies of the running nodes, or check the existing file against them.
 
     python security/generate.py             # writes security/policies.xml
-    python security/generate.py --check     # exit code 1, and the differences, where it is not so
+    python security/generate.py --check     # prints the differences, exit code 1 if there are any
 
-Every node is started, with each parameter that changes what it talks to, on a domain of its own.
+Starts every node, with each parameter that changes its topics or services, on a free domain.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import time
 
 from active_recon.geometry.cameras import orbit_camera
-from active_recon.launching.loop_watch import joined_domain
+from active_recon.launching.loop_client import joined_domain
 from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.nodes.runtime.graph_access import (
     Access,
@@ -35,17 +35,17 @@ from std_msgs.msg import Header
 POLICIES = Path(__file__).with_name('policies.xml')
 LOOP = '/policies_0'
 RECORDED = '/policies_2'
-"""Here somebody publishes each topic that is recorded; a recorder hears no others."""
+"""Every recorded topic has a publisher here: the recorder subscribes to no others."""
 OBSERVER = 'policies'
 MESH = Path(__file__).parents[1] / 'active_recon' / 'objects' / 'chair.glb'
 SETTLED_S = 5.0
-"""Where nothing is new for so long after all are ready, nothing more comes."""
+"""Discovery is complete when all are ready and nothing has changed for so long."""
 BUDGET_S = 150.0
 _POLL_S = 0.25
 
 
 def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
-    """Return by namespace the nodes to start and their parameters; the first is a whole loop."""
+    """Return the nodes to start and their parameters, by namespace; the first is a whole loop."""
     pose = pose_to_msg(orbit_camera(0.0).pose, Header()).pose
     position, turn = pose.position, pose.orientation
     return {
@@ -60,9 +60,9 @@ def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
 
 def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
     """
-    Start all and yield, again and again, whether all are ready, and what each node has by now.
+    Start all nodes; yield repeatedly whether all are ready, and each node's access so far.
 
-    It ends after BUDGET_S.
+    Ends after BUDGET_S.
     """
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
@@ -100,10 +100,10 @@ def _access(observer: Node, name: str, namespace: str) -> Iterator[Access]:
 
 
 def main() -> None:
-    """Write, or check."""
+    """Write the policies, or check them."""
     parser = argparse.ArgumentParser(description='The SROS2 policies of the nodes.')
-    parser.add_argument('--check', action='store_true', help='compare, and write nothing')
-    parser.add_argument('--namespace', default='/', help="the loop's, for which they are written")
+    parser.add_argument('--check', action='store_true', help='compare without writing')
+    parser.add_argument('--namespace', default='/', help='namespace of the loop in the policies')
     parser.add_argument('--file', type=Path, default=POLICIES)
     options = parser.parse_args()
     wanted = read_policies(options.file) if options.check else None
@@ -115,8 +115,8 @@ def main() -> None:
             break
     if wanted is None:
         write_policies(options.file, last, options.namespace)
-    elif told := differences(wanted, last):
-        print('\n'.join(told))  # noqa: T201
+    elif found := differences(wanted, last):
+        print('\n'.join(found))  # noqa: T201
         raise SystemExit(1)
 
 

@@ -14,7 +14,7 @@ ROWS: tuple[set[str], ...] = (
     {'errors'},
     {'config', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting', 'view_colors'},
     {'volumes'},
-    {'acquisition', 'calibration', 'models', 'seen_view', 'shapes'},
+    {'acquisition', 'calibration', 'models', 'shapes'},
     {'datasets', 'runtimes'},
     {'environment', 'policies', 'simulation'},
     {'parameters', 'planner', 'reconstructor'},
@@ -107,7 +107,7 @@ def test_every_room_has_its_row():
     ('active_recon.bags.runs.run', 'from active_recon.evaluation.metrics import iou'),
     ('active_recon.training.loop', 'from active_recon.bags.runs.run import RecordedRun'),
     ('msg_tools.images', 'from active_recon.bags.storage.writer import BagWriter'),
-    ('msg_tools.images', 'from active_recon.nodes.runtime.qos import LATCHED'),
+    ('msg_tools.images', 'from active_recon.nodes.runtime.qos import LATCHED_QOS'),
 ])
 def test_import_against_the_direction_is_noticed(module, code):
     assert len(wrong_imports(module, code)) == 1

@@ -5,8 +5,8 @@ import math
 from active_recon.demo.drawing import PAPER
 from active_recon.demo.picture import COLUMNS, run_picture, TILE, turntable_plan
 from active_recon.geometry.cameras import orbit_camera
-from active_recon.seen_view import SeenView
 from active_recon.view_colors import view_color
+from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.boxes import height_range, voxel_boxes
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxelisation import voxelise
@@ -19,9 +19,9 @@ CONE = trimesh.creation.cone(radius=0.3, height=0.9).apply_translation([0, 0, -0
 TRUTH = voxelise(CONE)
 
 
-def seen(number, azimuth=0.0, occupied=TRUTH):
+def seen(azimuth=0.0, occupied=TRUTH):
     image = composite(Renderer(CONE).render(orbit_camera(azimuth)), 255)
-    return SeenView(number, azimuth, image, occupied, 100.0, 1.0, 0.01)
+    return ViewResult(0, orbit_camera(azimuth), image, 100.0, 0.01, occupied, 1.0)
 
 
 def center_of(picture, color):
@@ -33,7 +33,7 @@ def center_of(picture, color):
 @pytest.mark.parametrize(('azimuth_deg', 'right', 'down'), [
     (0, 0, 1), (90, 1, 0), (180, 0, -1), (270, -1, 0)])
 def test_plan_puts_the_front_below_and_turns_counter_clockwise(azimuth_deg, right, down):
-    plan = turntable_plan([seen(1, math.radians(azimuth_deg))], CONE)
+    plan = turntable_plan([seen(math.radians(azimuth_deg))], CONE)
     x, y = center_of(plan, view_color(1))
     middle = plan.shape[0] / 2
     direction = np.array([x - middle, y - middle]) / np.hypot(x - middle, y - middle)
@@ -41,20 +41,20 @@ def test_plan_puts_the_front_below_and_turns_counter_clockwise(azimuth_deg, righ
 
 
 def test_views_that_came_back_to_a_place_are_all_seen():
-    plan = turntable_plan([seen(1), seen(2), seen(3)], CONE)
+    plan = turntable_plan([seen(), seen(), seen()], CONE)
     assert all((plan == view_color(number)).all(axis=2).sum() > 30 for number in (1, 2, 3))
 
 
 @pytest.mark.parametrize(('views', 'rows'), [(1, 1), (COLUMNS - 1, 1), (COLUMNS, 2), (24, 5)])
 def test_picture_has_room_for_every_view_and_the_truth(views, rows):
-    picture = run_picture('a run', [seen(n + 1, n / 4) for n in range(views)], CONE, TRUTH)
+    picture = run_picture('a run', [seen(n / 4) for n in range(views)], CONE, TRUTH)
     assert picture.dtype == np.uint8
     assert rows * 2 * TILE < picture.shape[0] < (rows + 1) * 2 * TILE + 200
 
 
 def test_empty_occupancy_and_an_image_not_heard_leave_their_tiles_empty():
     empty = VoxelGrid(np.zeros_like(TRUTH.occupancy))
-    view = SeenView(1, 0.0, None, empty, 0.0, 0.0, 0.01)
+    view = ViewResult(0, orbit_camera(0.0), None, 0.0, 0.01, empty, 0.0)
     picture = run_picture('a run', [view], CONE, TRUTH)
     tile = picture[-TILE - 60:-80, 600:600 + TILE - 60]
     assert (tile == PAPER).all()

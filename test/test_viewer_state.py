@@ -11,7 +11,7 @@ from active_recon.bags.runs.run import (
     RecordedView,
 )
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
-from active_recon.viewer.link import ago, link_words, TopicLink
+from active_recon.viewer.link import ago, status_lines, TopicLink
 from active_recon.viewer.playback import recorded_states
 from active_recon.viewer.scene import certainty_colors, relative_scores, shown_cells
 from active_recon.viewer.state import (
@@ -20,14 +20,15 @@ from active_recon.viewer.state import (
     Observer,
     own_threshold,
     Scores,
-    TakenView,
     thumbnail,
 )
+from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 
 GRID = VoxelGrid(np.random.default_rng(0).random((8, 8, 8), np.float32))
+OCCUPIED = VoxelGrid(np.full((8, 8, 8), 0.405, np.float32))
 LATER_GRID = VoxelGrid(np.ones((8, 8, 8), np.float32))
 SCORES = Scores(AZIMUTHS, np.arange(24.0))
 TOPICS = {'image': '/camera/image_raw', 'view': '/view', 'occupancy': '/occupancy',
@@ -35,7 +36,7 @@ TOPICS = {'image': '/camera/image_raw', 'view': '/view', 'occupancy': '/occupanc
 
 
 def view(stamp, entropy=1.0):
-    return TakenView(stamp, orbit_camera(0.1 * stamp), None, entropy)
+    return ViewResult(stamp, orbit_camera(0.1 * stamp), None, entropy)
 
 
 def links(publishers=1, ago_s=None, **changed):
@@ -50,16 +51,16 @@ def summary(state):
 
 
 GOAL, FIRST, SECOND = orbit_camera(1.0), view(110), view(130)
-HEARD = (
+MESSAGES = (
     lambda observer: observer.begin_episode('b', 100),
-    lambda observer: observer.take_view(FIRST, GRID, 0.4),
+    lambda observer: observer.add_view(FIRST, GRID, OCCUPIED),
     lambda observer: observer.set_goal(120, GOAL),
     lambda observer: observer.set_scores(120, SCORES),
-    lambda observer: observer.take_view(SECOND, LATER_GRID, 0.4),
+    lambda observer: observer.add_view(SECOND, LATER_GRID, OCCUPIED),
     lambda observer: observer.set_done(130, 'max_views'))
 
 
-def heard_in(order):
+def state_after(order):
     observer = Observer()
     observer.begin_episode('a', 10)
     for hear in order:
@@ -68,15 +69,16 @@ def heard_in(order):
 
 
 def test_the_order_in_which_latched_messages_come_makes_no_difference():
-    assert {heard_in(order) == heard_in(HEARD) for order in permutations(HEARD)} == {True}
-    assert heard_in(HEARD) == (
+    expected = state_after(MESSAGES)
+    assert all(state_after(order) == expected for order in permutations(MESSAGES))
+    assert expected == (
         'b', [110, 130], LATER_GRID, 0.4, None, SCORES, 'max_views')
 
 
 def test_what_is_stamped_before_the_episode_is_left_out():
     observer = Observer()
     observer.begin_episode('b', 100)
-    observer.take_view(view(99), GRID, 0.4)
+    observer.add_view(view(99), GRID, OCCUPIED)
     observer.set_goal(98, GOAL)
     observer.set_scores(98, SCORES)
     observer.set_done(99, 'max_views')
@@ -87,8 +89,8 @@ def test_a_new_episode_forgets_the_last_but_not_where_the_camera_is():
     observer = Observer()
     camera, picture = orbit_camera(2.0), np.zeros((4, 4, 3), np.uint8)
     observer.begin_episode('a', 0)
-    observer.see(camera, picture)
-    observer.take_view(view(1), GRID, 0.4)
+    observer.set_camera(camera, picture)
+    observer.add_view(view(1), GRID, OCCUPIED)
     observer.set_goal(2, GOAL)
     observer.set_scores(2, SCORES)
     observer.begin_episode('b', 100)
@@ -100,7 +102,7 @@ def test_a_new_episode_forgets_the_last_but_not_where_the_camera_is():
 def test_an_episode_of_a_time_before_the_last_begins_with_nothing():
     observer = Observer()
     observer.begin_episode('a', 100)
-    observer.take_view(FIRST, GRID, 0.4)
+    observer.add_view(FIRST, GRID, OCCUPIED)
     observer.set_goal(120, GOAL)
     observer.set_done(130, 'max_views')
     observer.begin_episode('b', 10)
@@ -113,7 +115,7 @@ def test_an_episode_or_a_view_or_a_goal_heard_again_changes_nothing():
     observer = Observer()
     for _ in range(2):
         observer.begin_episode('a', 0)
-        observer.take_view(FIRST, GRID, 0.4)
+        observer.add_view(FIRST, GRID, OCCUPIED)
         observer.set_goal(120, GOAL)
         state = observer.state
     observer.set_goal(120, orbit_camera(3.0))
@@ -123,7 +125,7 @@ def test_an_episode_or_a_view_or_a_goal_heard_again_changes_nothing():
 
 def test_a_goal_after_the_end_takes_the_end_back():
     observer = Observer()
-    observer.take_view(FIRST, GRID, 0.4)
+    observer.add_view(FIRST, GRID, OCCUPIED)
     observer.set_done(110, 'max_views')
     observer.set_goal(120, GOAL)
     assert (observer.state.done, observer.state.goal) == ('', GOAL)
@@ -182,13 +184,13 @@ def test_bars_keep_the_order_of_the_scores_whatever_their_unit(scores):
 
 
 def test_a_link_to_nobody_says_what_it_waits_for():
-    assert link_words(links(publishers=0), LoopState()) == [
-        'Waiting for a loop: nobody publishes on /camera/image_raw, /view, /occupancy, '
-        '/next_view yet.']
+    assert status_lines(links(publishers=0), LoopState()) == [
+        'Waiting for a loop: no publisher yet on /camera/image_raw, /view, /occupancy, '
+        '/next_view.']
 
 
 def test_a_missing_publisher_is_named_and_whether_it_was_ever_there():
-    words = link_words(links(
+    words = status_lines(links(
         occupancy=TopicLink('/occupancy', 0), goal=TopicLink('/next_view', 0, 4.0)), LoopState())
     assert words == ['No view in this episode yet.', 'No publisher on /occupancy yet.',
                      'No publisher on /next_view any more.']
@@ -196,13 +198,13 @@ def test_a_missing_publisher_is_named_and_whether_it_was_ever_there():
 
 def test_the_last_view_the_end_and_a_silent_camera_are_told():
     state = LoopState(views=(view(1), view(2)))
-    assert link_words(links(ago_s=1.2), state) == ['2 views, the last 1 s ago.']
-    assert link_words(links(ago_s=1.2), LoopState(views=(view(1),))) == [
+    assert status_lines(links(ago_s=1.2), state) == ['2 views, the last 1 s ago.']
+    assert status_lines(links(ago_s=1.2), LoopState(views=(view(1),))) == [
         '1 view, the last 1 s ago.']
     done = LoopState('1f', (view(1), view(2)), done='entropy_settled')
-    assert link_words(links(ago_s=130), done) == [
+    assert status_lines(links(ago_s=130), done) == [
         'Done (entropy settled): 2 views, the last 2 min ago.',
-        'The camera has been silent for 2 min.', 'Episode 1f.']
+        'No image for 2 min.', 'Episode 1f.']
 
 
 @pytest.mark.parametrize(('seconds', 'words'), [
@@ -226,9 +228,9 @@ def test_a_recorded_goal_is_shown_where_its_own_camera_stands():
 
 def test_what_nodes_warn_of_stands_right_after_how_far_the_loop_is():
     problems = {'view_planner': 'no episode', 'reconstructor': 'no image'}
-    told = ['reconstructor warns: no image', 'view_planner warns: no episode']
-    assert link_words(links(), LoopState(), problems)[1:3] == told
-    assert link_words(links(publishers=0), LoopState(), problems)[1:] == told
+    told = ['reconstructor: no image', 'view_planner: no episode']
+    assert status_lines(links(), LoopState(), problems)[1:3] == told
+    assert status_lines(links(publishers=0), LoopState(), problems)[1:] == told
 
 
 def test_an_image_of_the_last_episode_is_not_that_of_the_next():

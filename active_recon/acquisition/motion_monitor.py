@@ -1,4 +1,4 @@
-"""What a camera's poses show over time: that they jump, or that it does not go to its goal."""
+"""Faults of a camera's motion: its poses jump, or it does not move to its goal."""
 
 from active_recon.acquisition.stillness import Stillness
 from active_recon.acquisition.stream_monitor import CLOCK_BACK_S
@@ -8,11 +8,11 @@ import numpy as np
 _JUMPS, _JUMPS_S = 3, 1.0
 
 
-class MotionWatch:
+class MotionMonitor:
     """
-    Told of every pose, tells what is wrong with the camera's motion; stamps are nanoseconds.
+    Finds faults in a camera's motion from its poses; stamps are nanoseconds.
 
-    A camera has stalled that stands for `stall_timeout` seconds while an open goal is more than
+    A camera has stalled if it rests for `stall_timeout` seconds while an open goal is more than
     `goal_tolerance` radians away.
     """
 
@@ -22,15 +22,15 @@ class MotionWatch:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew, as if no pose had come yet."""
+        """Forget all poses."""
         self._stillness = Stillness()
         self._last = 0
         self._goal: Camera | None = None
         self._goal_since = 0
         self._away = 0.0
 
-    def heard(self, camera: Camera, stamp: int, goal: Camera | None) -> None:
-        """Note where the camera is, and its open goal; older poses are passed by."""
+    def add(self, camera: Camera, stamp: int, goal: Camera | None) -> None:
+        """Note where the camera is, and its open goal; poses out of order are ignored."""
         if stamp < self._last - CLOCK_BACK_S * 1e9:
             self.clear()
         if stamp <= self._last:
@@ -41,17 +41,17 @@ class MotionWatch:
             self._goal, self._goal_since = goal, stamp
         self._away = 0.0 if goal is None else view_distance(camera, goal)
 
-    def found(self) -> dict[str, str]:
-        """Return what is wrong since the last pose: a short word of each fault, and a sentence."""
-        found = {}
+    def faults(self) -> dict[str, str]:
+        """Return the faults as of the last pose: a description of each, by its kind."""
+        faults = {}
         jumps = self._stillness.jumps(_JUMPS_S)
         if jumps >= _JUMPS:
-            found['noisy_poses'] = (
+            faults['noisy_poses'] = (
                 f'expected poses of a camera that moves and rests, they jumped {jumps} times in '
                 f'{_JUMPS_S:g} s; no view is taken until they are steady')
         stood = min(self._stillness.rested, (self._last - self._goal_since) / 1e9)
         if self._away > self.goal_tolerance and stood >= self.stall_timeout:
-            found['stalled'] = (
+            faults['stalled'] = (
                 f'expected the camera to move to its goal, {np.degrees(self._away):.0f} degrees '
                 f'away, it has stood still for {stood:.1f} s; does the motor turn?')
-        return found
+        return faults

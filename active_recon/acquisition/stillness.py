@@ -1,4 +1,4 @@
-"""Whether a camera stands still, and whether its poses can be believed."""
+"""Detects whether a camera is at rest, and whether its poses are reliable."""
 
 from collections import deque
 
@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 STILL_ANGLE = 0.01
-"""A still camera has not moved by more, radians as seen from the object or turned in place."""
+"""Largest motion of a camera at rest, radians as seen from the object or turned in place."""
 STILL_TIME = 0.08
-"""For so long, seconds: two images of a stream of 10 Hz."""
+"""Time without motion until a camera is at rest, seconds: two images at 10 Hz."""
 UNSURE_TIME = 0.5
-"""For so long, seconds, no rest is believed after poses that turned back without one."""
+"""Time after a jump of the poses for which the camera is not at rest, seconds."""
 _KEPT = 16
 
 
 class Stillness:
     """
-    Told of a camera's poses in the order of their stamps, nanoseconds.
+    Follows a camera's poses in the order of their stamps, nanoseconds.
 
-    A camera that goes somewhere comes to rest before it goes back. Poses that turn back from one
-    to the next, each time by more than `STILL_ANGLE`, are not those of a motion: they jump.
+    A moving camera comes to rest before it reverses. Poses that reverse from one to the next,
+    each step larger than `STILL_ANGLE`, are no motion but jumps.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class Stillness:
         self._stamp = 0
 
     def add(self, camera: Camera, stamp: int) -> None:
-        """Take in the next pose."""
+        """Add the next pose."""
         if self._last is not None:
             step = np.array([azimuth_difference(camera.azimuth, self._last.azimuth),
                              camera.elevation - self._last.elevation])
@@ -50,11 +50,11 @@ class Stillness:
         return 0.0 if self._rest is None else (self._stamp - self._rest[0]) / 1e9
 
     def is_still(self, settle_time: float = STILL_TIME) -> bool:
-        """Whether it has stayed for so many seconds, and its poses did not jump just before."""
+        """Whether it has rested for `settle_time` seconds, and its poses did not jump recently."""
         return self.rested >= settle_time and not self.jumps(UNSURE_TIME)
 
     def jumps(self, seconds: float) -> int:
-        """Return how often, in the time before the last pose, the poses jumped."""
+        """Return the number of jumps in the given seconds before the last pose."""
         return sum(stamp > self._stamp - seconds * 1e9 for stamp in self._jumps)
 
 

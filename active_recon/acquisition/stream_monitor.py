@@ -1,4 +1,4 @@
-"""What no single message of a camera shows: that others are missing, late, or come no more."""
+"""Faults of a camera's streams: messages that are missing, late, or no longer arrive."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -12,47 +12,47 @@ STREAMS = ('images', 'camera_info', 'poses')
 SILENT_S = 0.5
 """A stream is silent after this time without a message, or after three of its periods."""
 LATE_S = 0.15
-"""An image is late that comes so long after the camera info or the pose of its stamp."""
+"""An image is late if it arrives so long after the camera info or the pose of its stamp."""
 CLOCK_BACK_S = 1.0
-"""A stamp so much older than the last is of a clock that went back, not of a message too late."""
+"""A stamp older than the last by so much means that the clock jumped back."""
 WINDOW_S = 1.0
-"""What is missing or late is counted over this time."""
+"""Missing and late messages are counted over this time."""
 _KEPT_S = 3.0
-_LONGEST_LOOK_S = 0.2
+_LONGEST_STEP_S = 0.2
 _STAMPS = 21
 _REGULAR, _NO_LONGER = 0.85, 0.6
-"""This share of periods is near the median: of what becomes a stream, of what still is one."""
+"""Fraction of periods near the median at which a stream becomes regular, and ceases to be."""
 _AT_LEAST, _SHARE = 2, 0.1
 _QUEUE = 10
-"""So many images wait for who is busy; what comes then is lost."""
+"""Images that are queued for a busy node; further ones are lost."""
 
 _NAMES = {'images': 'images', 'camera_info': 'camera infos', 'poses': 'poses'}
-_Moments = dict[int, dict[str, float]]  # by stamp, when each stream's message came
+_Moments = dict[int, dict[str, float]]  # by stamp, when each stream's message arrived
 
 
-class StreamWatch:
+class StreamMonitor:
     """
-    Told of every message that comes, tells what is wrong with the streams as a whole.
+    Finds faults of a camera's streams from the stamps and arrival times of its messages.
 
-    Stamps are nanoseconds, `now` is any clock in seconds that never runs backwards. What comes
-    irregularly, for example now and then by hand, is no stream and never missed.
+    Stamps are nanoseconds, `now` is a monotonic clock in seconds. Messages that arrive
+    irregularly, for example published by hand, are no stream and never missing.
     """
 
     def __init__(self) -> None:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew, as if nothing had come yet."""
+        """Forget all messages."""
         self._quiet: dict[str, float] = {}
-        self._looked = math.inf
+        self._checked = math.inf
         self._stamps: dict[str, deque[int]] = {
             stream: deque(maxlen=_STAMPS) for stream in STREAMS}
         self._periods: dict[str, float] = {}
         self._moments: _Moments = {}
-        self._held_up: deque[tuple[float, float]] = deque()  # when, and for how long
+        self._busy: deque[tuple[float, float]] = deque()  # when, and for how long
         self._lost_at: float | None = None
 
-    def heard(self, stream: str, stamp: int, now: float) -> None:
+    def add(self, stream: str, stamp: int, now: float) -> None:
         """Note a message of one of STREAMS, whether or not it can be used."""
         self._moments.setdefault(stamp, {}).setdefault(stream, now)
         self._quiet[stream] = 0.0
@@ -62,43 +62,43 @@ class StreamWatch:
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
 
-    def lost(self, now: float) -> None:
-        """Note that images were published, by their numbers, that did not come."""
+    def add_lost(self, now: float) -> None:
+        """Note that images were published, by their sequence numbers, and not received."""
         self._lost_at = now
 
-    def found(self, now: float) -> dict[str, str]:
+    def faults(self, now: float) -> dict[str, str]:
         """
-        Return what is wrong now: a short word of each fault, and a sentence.
+        Return the faults now: a description of each, by its kind.
 
-        To be called several times a second: silence is counted from one call to the next.
+        To be called several times a second: silence is measured from one call to the next.
         """
         self._moments = self._since(now - _KEPT_S)
         for stream, stamps in self._stamps.items():
             if len(stamps) == _STAMPS:
                 self._note_period(stream, np.diff(stamps) / 1e9)
         recent = self._since(now - WINDOW_S)
-        # Of the time before: who was held up hears only then of what it has missed
-        self._held_up.append((now, now - min(self._looked, now)))
-        while self._held_up[0][0] < now - _KEPT_S:
-            self._held_up.popleft()
+        # Of the past: a node that was busy receives only afterwards what was queued meanwhile
+        self._busy.append((now, now - min(self._checked, now)))
+        while self._busy[0][0] < now - _KEPT_S:
+            self._busy.popleft()
         missing = {f'missing_{stream}': f'{words}; {self._cause(stream, now)}'
                    for stream, words in _missing(recent)}
         return {**self._silent(now), **missing, **dict(_late(recent))}
 
     def _cause(self, stream: str, now: float) -> str:
-        """Return in words where what is missing of a stream was lost."""
-        busy = max(time for _, time in self._held_up)
+        """Describe where the missing messages of a stream were lost."""
+        busy = max(time for _, time in self._busy)
         period = self._periods.get('images', 0.0)
-        if stream == 'images' and period and busy > max(_QUEUE * period, _LONGEST_LOOK_S):
-            return (f'lost in processing: this node was busy for {busy:.1f} s, and no more than '
-                    f'{_QUEUE} images wait')
+        if stream == 'images' and period and busy > max(_QUEUE * period, _LONGEST_STEP_S):
+            return (f'lost in processing: this node was busy for {busy:.1f} s, and its queue '
+                    f'holds {_QUEUE} images')
         if stream == 'images' and self._lost_at is not None and now - self._lost_at < _KEPT_S:
             return ('lost in transport: they were published and did not arrive; is the connection '
                     "too slow, or the middleware's buffer too small for such images?")
         return 'lost in transport, or never published'
 
     def _note_period(self, stream: str, periods: NDArray[np.float64]) -> None:
-        """Keep the period of a stream that comes regularly; one that no longer does has none."""
+        """Keep the period of a stream while it is regular."""
         typical = float(np.median(periods))
         regular = float(np.mean((periods >= typical / 3) & (periods <= 3 * typical)))
         if regular >= (_NO_LONGER if stream in self._periods else _REGULAR):
@@ -107,9 +107,9 @@ class StreamWatch:
             self._periods.pop(stream, None)
 
     def _silent(self, now: float) -> dict[str, str]:
-        # Whoever was held up between two looks may have messages that it has not read yet
-        step = min(max(now - self._looked, 0.0), _LONGEST_LOOK_S)
-        self._looked = now
+        # A node that was busy between two calls may have messages queued
+        step = min(max(now - self._checked, 0.0), _LONGEST_STEP_S)
+        self._checked = now
         for stream in self._quiet:
             self._quiet[stream] += step
         silent = {stream: self._quiet[stream] for stream, period in self._periods.items()
@@ -117,25 +117,25 @@ class StreamWatch:
         if len(silent) == len(STREAMS):
             return {'silent_camera': (
                 'expected images, camera info and poses of a camera that streamed so far, nothing '
-                f'has come for {min(silent.values()):.1f} s; is it running and connected?')}
+                f'has arrived for {min(silent.values()):.1f} s; is it running and connected?')}
         return {f'silent_{stream}': (
-            f'expected {_NAMES[stream]} every {self._periods[stream]:.2g} s as before, none came '
-            f'for {time:.1f} s; is what sends them still running?')
+            f'expected {_NAMES[stream]} every {self._periods[stream]:.2g} s as before, none '
+            f'arrived for {time:.1f} s; is what sends them still running?')
             for stream, time in silent.items()}
 
     def _since(self, begin: float) -> _Moments:
-        """Return the moments of which something came since then."""
+        """Return the stamps of which a message arrived since then."""
         return {stamp: came for stamp, came in self._moments.items()
                 if max(came.values()) >= begin}
 
 
 def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
-    """Yield the streams of which stamps are missing, and how many, in words."""
+    """Yield the streams with missing stamps, and how many, as a description."""
     stamps = {stream: {stamp for stamp, came in moments.items() if stream in came}
               for stream in STREAMS}
     of_camera = stamps['images'] | stamps['camera_info']
     expected = {'images': stamps['camera_info']}
-    # A tracker's poses have stamps of their own, and then none belongs to an image
+    # Poses of a tracker have stamps of their own, which match no image
     if 2 * len(stamps['poses'] & of_camera) >= len(stamps['poses']):
         expected['poses'] = of_camera
     for stream, awaited in expected.items():
@@ -145,7 +145,7 @@ def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
         if lost >= max(_AT_LEAST, _SHARE * len(due)):
             yield stream, (
                 f'expected {_NAMES[stream]} of the same stamps as the rest that the camera '
-                f'sends, {lost} of the last {len(due)} did not come')
+                f'sends, {lost} of the last {len(due)} did not arrive')
 
 
 def _late(moments: _Moments) -> Iterator[tuple[str, str]]:

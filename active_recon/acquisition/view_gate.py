@@ -1,4 +1,4 @@
-"""Which images of a camera's stream become views: the camera is still, and where it should be."""
+"""Selects the images of a camera's stream that become views."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from active_recon.geometry.cameras import Camera, view_distance
 
 TAKE_VIEWS = ('auto', 'at_goal', 'by_separation', 'all')
 GOAL_TOLERANCE = 0.14
-"""A view this near to a goal reaches it, radians: 24 rendered views can be 7.5 degrees off."""
+"""Largest distance of a view from its goal, radians: 24 rendered views can be 7.5 degrees off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,13 +19,13 @@ class _Goal:
 
 class ViewGate:
     """
-    Decides image by image; it knows the current goal and the view taken last.
+    Decides for each image whether it becomes a view, from the goal and the last view.
 
-    `take_views` is `at_goal` (once for each goal, the camera still and within `goal_tolerance`
-    radians of it), `by_separation` (the camera still and at least `min_view_separation` radians
-    from the last view), `all`, or `auto`: at_goal where goals are
-    given or expected, else by_separation. A camera is still when it has rested for `settle_time`
-    seconds. All four may be changed in mid-episode. Distances are those of `view_distance`.
+    `take_views` is `at_goal` (once for each goal, the camera at rest and within `goal_tolerance`
+    radians of it), `by_separation` (the camera at rest and at least `min_view_separation` radians
+    from the last view), `all`, or `auto`: at_goal if there are goals or they are expected, else
+    by_separation. A camera is at rest after `settle_time` seconds without motion. All four can be
+    changed during an episode. Distances are those of `view_distance`.
     """
 
     def __init__(self, take_views: str = 'auto', goal_tolerance: float = GOAL_TOLERANCE,
@@ -52,7 +52,7 @@ class ViewGate:
         return None if self._goal is None or self._goal_taken else self._goal.camera
 
     def set_goal(self, camera: Camera, stamp: int) -> None:
-        """Ask for a view from a camera; the stamp (nanoseconds) tells goals apart."""
+        """Set the camera of the goal; its stamp in nanoseconds identifies it."""
         if self._goal is None or self._goal.stamp != stamp:
             self._goal = _Goal(camera, stamp)
             self._goal_taken = False
@@ -61,8 +61,8 @@ class ViewGate:
         """
         Return whether the image of this camera, at this stamp in nanoseconds, is to be a view.
 
-        It is to be told of every image, and of each that became a view by `took`.
-        `goals_expected` tells `auto` that someone is there who gives goals.
+        To be called for every image, and `took` for each that became a view. `goals_expected`
+        means for `auto` that goals have a publisher.
         """
         self._stillness.add(camera, stamp)
         if self.take_views == 'all':

@@ -12,24 +12,24 @@ import typer
 def demo(
     object_name: Annotated[str, typer.Option(
         '--object', help='bed, car, chair, sofa, table, or the path of a mesh file.')] = 'chair',
-    views: Annotated[int, typer.Option(min=1, max=24, help='Views to take.')] = 5,
+    views: Annotated[int, typer.Option(min=1, max=24, help='Number of views.')] = 5,
     policy: Annotated[str, policy_option('How the next view is chosen.')] = DEFAULT_POLICY,
     model: Annotated[str | None, typer.Option(
-        help='A model whose weights ship, or a weights file; attention takes 2d3d-attention.')
+        help='A model whose weights ship, or a weights file; attention needs 2d3d-attention.')
     ] = None,
     seed: Annotated[int, typer.Option(
-        min=0, help='Of the first view and of the policy random.')] = 0,
+        min=0, help='Seed of the first view and of the policy random.')] = 0,
     output_dir: Annotated[Path, typer.Option(
-        help='The folder in which the run gets its own.')] = Path('bags'),
+        help='Folder in which a folder for the run is created.')] = Path('bags'),
     view: Annotated[bool, typer.Option(
-        '--view', help='Show the loop in the browser too; it then goes on until Ctrl-C.')] = False,
+        '--view', help='Show the loop in the browser, too; it then runs until Ctrl-C.')] = False,
 ) -> None:
-    """Watch a camera reconstruct an object and decide by itself where to look next."""
+    """Reconstruct an object with a simulated camera that chooses its own next view."""
     from rich.console import Console
 
     console = Console()
     try:
-        with held_interrupts():  # some libraries swallow what interrupts their import
+        with held_interrupts():  # some libraries swallow an interrupt of their import
             from active_recon.demo.run import Demo, run_demo
             from active_recon.objects import find_object
 

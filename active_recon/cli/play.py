@@ -1,4 +1,4 @@
-"""`active-recon play`: a bag's messages to nodes that are live."""
+"""`active-recon play`: publish a bag's messages to running nodes."""
 
 import os
 from pathlib import Path
@@ -12,16 +12,16 @@ import typer
 def play(
     bag: Annotated[Path, typer.Argument(help="A bag's folder, or one of its MCAP files.")],
     rate: Annotated[float, typer.Option(
-        help='How much faster than it was recorded: above 0.')] = 1.0,
+        help='Playback speed, above 0; 1 is the speed of the recording.')] = 1.0,
     topics: Annotated[str, typer.Option(
-        metavar='NAME,NAME,...', help='Those to play. Default: all of the bag.')] = '',
+        metavar='NAME,NAME,...', help='Topics to play. Default: all of the bag.')] = '',
 ) -> None:
     """
-    Publish a bag's messages to live nodes, as and when they were received.
+    Publish a bag's messages to running nodes, at the times at which they were received.
 
-    Topics are offered with the QoS they were recorded with, and the bag's time goes out on
-    /clock. Nodes that hear the recording need `use_sim_time`, since its images are older than
-    they are; give them the inputs alone, and they do not know it from a camera.
+    Topics are published with their recorded QoS, and the bag's time on /clock. The nodes need
+    `use_sim_time`, since the recording is older than they are. Play only the camera's topics to
+    run the nodes as with a live camera.
 
     Example: active-recon play bags/2026-11-21_14-30-00 --rate 2
     --topics camera/image_raw,camera/camera_info,camera/pose
@@ -29,7 +29,7 @@ def play(
     from active_recon.bags.runs.playing import played_topics
 
     played_topics(bag, rate, topics, bag_progress(bag))
-    # The node takes this process's place, and so hears its Ctrl-C
+    # The node replaces this process and receives its Ctrl-C
     os.execv(sys.executable, [
         sys.executable, '-m', 'active_recon.nodes.player', '--ros-args', '-p', f'bag:="{bag}"',
         '-p', f'rate:={rate}', '-p', f'topics:="{topics}"'])

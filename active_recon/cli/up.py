@@ -1,4 +1,4 @@
-"""`active-recon up`: the nodes of a parameters file, where launch is missing."""
+"""`active-recon up`: start the nodes of a parameters file, without ros2 launch."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -8,7 +8,7 @@ import typer
 
 
 class LogLevel(StrEnum):
-    """From how grave on a node says what it does."""
+    """The lowest severity that nodes log."""
 
     debug = 'debug'
     info = 'info'
@@ -19,20 +19,20 @@ class LogLevel(StrEnum):
 
 def up(
     params: Annotated[Path, typer.Option(
-        help='A ROS parameters file; the nodes that it names are started.')],
+        help='A ROS parameters file; its nodes are started.')],
     namespace: Annotated[str, typer.Option(
-        help='The namespace of the nodes and of all their topics.')] = '',
+        help='Namespace of the nodes and their topics.')] = '',
     remap: Annotated[list[str] | None, typer.Option(
-        '--remap', '-r', metavar='FROM:=TO', help='Another name for a topic; may be repeated.',
+        '--remap', '-r', metavar='FROM:=TO', help='Remap a topic; may be repeated.',
     )] = None,
     log_level: Annotated[LogLevel, typer.Option(
-        help='From how grave on the nodes say what they do.')] = LogLevel.info,
+        help='The lowest severity that the nodes log.')] = LogLevel.info,
 ) -> None:
     """
-    Start the nodes of a parameters file together, and stop them together on Ctrl-C.
+    Start the nodes of a parameters file, and stop them on Ctrl-C.
 
-    It does what the launch files do, on a machine without ros2 launch. Where a node ends by
-    itself, the others are stopped and the command ends with an error.
+    Replaces the launch files on a machine without ros2 launch. When a node ends by itself, the
+    others are stopped and the command fails.
 
     Example: active-recon up --params config/arm.yaml -r camera/image_raw:=/wrist/image_raw
     """

@@ -21,26 +21,26 @@ def view(
     topics: 'Topics',
     scene: 'Scene',
     bag: Annotated[Path | None, typer.Argument(
-        help='A bag to step through; without one, the loop that runs on this ROS domain.')] = None,
+        help='A bag to step through. Default: the loop that runs on this ROS domain.')] = None,
     port: Annotated[int, typer.Option(
-        min=0, max=HIGHEST_PORT, help='Where the page is served, or at the next port that is '
-                                      'free, which is told; 0 for any.')] = DEFAULT_PORT,
+        min=0, max=HIGHEST_PORT, help='Port of the page, or the next free one, which is '
+                                      'printed; 0 for any.')] = DEFAULT_PORT,
     remap: Annotated[list[str] | None, typer.Option(
         '--remap', '-r', metavar='FROM:=TO',
-        help='Another name for a topic of the loop that runs, or __ns:=/NAME for its namespace; '
+        help='Remap a topic of the running loop, or set its namespace with __ns:=/NAME; '
              'may be repeated.')] = None,
 ) -> None:
     """
-    Show the loop in the browser, on a page of this machine alone.
+    Show the loop in the browser, on a page that only this machine can open.
 
-    The object as it takes shape, the views taken, where the camera goes next and why. The page
-    may be opened late, twice, or closed: the loop does not notice. Ctrl-C ends it. How large the
-    object is, its frame and what its topics are called is asked of the nodes that run.
+    It shows the reconstruction, the views taken, the next view and the scores of the candidates.
+    The page can be opened late, several times, or closed without any effect on the loop. Ctrl-C
+    ends it. The object's size, its frame and the names of topics are read from the running nodes.
 
     For example: active-recon view, or active-recon view bags/2026-11-21_10-00-00
     """
     if bag is None:
-        # The node takes this process's place, and so hears its Ctrl-C
+        # The node replaces this process and receives its Ctrl-C
         size = [] if scene.object_size is None else ['-p', f'object_size:={scene.object_size}']
         names = [word for each in remap or () for word in ('-r', each)]
         os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.viewer', '--ros-args',
@@ -57,7 +57,8 @@ def _step_through(bag: Path, topics: 'Topics', scene: 'Scene', port: int) -> Non
 
     run, made_by = rebuilt(read_run(bag, topics, scene), scene)
     if made_by:
-        typer.echo(f'the bag holds no shapes: those shown are from its images, by {made_by}')
+        typer.echo('the bag has no reconstructions: those shown are computed from its images by '
+                   f'{made_by}')
     playback = Playback(run, port)
     try:
         typer.echo(f'{bag} is shown at {playback.page.url} until Ctrl-C')

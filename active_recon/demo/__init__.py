@@ -1,1 +1,1 @@
-"""The loop on one machine, for people to watch: four nodes, an observer, a bag, a picture."""
+"""A demonstration of the loop on one machine: four nodes, an observer, a bag, a picture."""

@@ -11,8 +11,8 @@ from active_recon.geometry.cameras import (
     CANONICAL_INTRINSICS,
     orbit_camera,
 )
-from active_recon.seen_view import SeenView
 from active_recon.view_colors import view_color
+from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.boxes import height_range, voxel_picture
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import VoxelGrid
@@ -30,7 +30,7 @@ _HEADER = 84
 _LOOK_FROM = math.radians(35)  # azimuth from which the occupancies are drawn
 
 
-def run_picture(title: str, views: Sequence[SeenView], mesh: trimesh.Trimesh,
+def run_picture(title: str, views: Sequence[ViewResult], mesh: trimesh.Trimesh,
                 truth: VoxelGrid) -> NDArray[np.uint8]:
     """
     Return the picture, (H, W, 3) uint8 RGB: left the turntable from above, right the views.
@@ -48,13 +48,13 @@ def run_picture(title: str, views: Sequence[SeenView], mesh: trimesh.Trimesh,
         left = _PLAN + 2 * _MARGIN + index % COLUMNS * TILE
         top = _HEADER + index // COLUMNS * _BLOCK
         if index < len(views):
-            _draw_view(picture, left, top, views[index], heights)
+            _draw_view(picture, left, top, index + 1, views[index], heights)
         else:
             _draw_truth(picture, left, top, mesh, truth, heights)
     return picture
 
 
-def turntable_plan(views: Sequence[SeenView], mesh: trimesh.Trimesh) -> NDArray[np.uint8]:
+def turntable_plan(views: Sequence[ViewResult], mesh: trimesh.Trimesh) -> NDArray[np.uint8]:
     """Return the object from above amid the numbered cameras, (500, 500, 3) uint8 RGB."""
     plan = np.full((_PLAN, _PLAN, 3), PAPER, np.uint8)
     center, radius = _PLAN // 2, 156
@@ -67,27 +67,27 @@ def turntable_plan(views: Sequence[SeenView], mesh: trimesh.Trimesh) -> NDArray[
     for azimuth in AZIMUTHS:
         cv2.circle(plan, _around(azimuth, radius), 2, QUIET, -1, cv2.LINE_AA)
     for before, after in zip(views, views[1:], strict=False):
-        cv2.arrowedLine(plan, _around(before.azimuth, radius - 26),
-                        _around(after.azimuth, radius - 26), (150, 156, 168), 1, cv2.LINE_AA,
-                        tipLength=0.05)
-    for view in reversed(views):  # the first at a place stands before those that came back
-        again = sum(_together(view, earlier) for earlier in views[:view.number - 1])
-        _draw_camera(plan, view, radius + 34 + 14 * min(again, 3))
+        start, end = (_around(view.camera.azimuth, radius - 26) for view in (before, after))
+        cv2.arrowedLine(plan, start, end, (150, 156, 168), 1, cv2.LINE_AA, tipLength=0.05)
+    for number, view in reversed(list(enumerate(views, 1))):  # the first at a place is on top
+        others = sum(_at_same_place(view, earlier) for earlier in views[:number - 1])
+        _draw_camera(plan, number, view.camera.azimuth, radius + 34 + 14 * min(others, 3))
     return plan
 
 
-def _together(view: SeenView, other: SeenView) -> bool:
-    return bool(abs(azimuth_difference(view.azimuth, other.azimuth)) < math.radians(7))
+def _at_same_place(view: ViewResult, other: ViewResult) -> bool:
+    away = azimuth_difference(view.camera.azimuth, other.camera.azimuth)
+    return bool(abs(away) < math.radians(7))
 
 
-def _draw_camera(plan: NDArray[np.uint8], view: SeenView, distance: float) -> None:
-    spot, color = _around(view.azimuth, distance), view_color(view.number)
-    toward = [_around(view.azimuth + side, distance - 38) for side in (-0.11, 0.11)]
+def _draw_camera(plan: NDArray[np.uint8], number: int, azimuth: float, distance: float) -> None:
+    spot, color = _around(azimuth, distance), view_color(number)
+    toward = [_around(azimuth + side, distance - 38) for side in (-0.11, 0.11)]
     cone = np.array([spot, *toward], np.int32)
     faint = tuple(int(0.35 * c + 0.65 * p) for c, p in zip(color, PAPER, strict=True))
     cv2.fillConvexPoly(plan, cone, faint, cv2.LINE_AA)
     cv2.circle(plan, spot, 18, color, -1, cv2.LINE_AA)
-    centred(plan, str(view.number), spot[0], spot[1] + 7, 20, (255, 255, 255))
+    centred(plan, str(number), spot[0], spot[1] + 7, 20, (255, 255, 255))
 
 
 def _around(azimuth: float, radius: float) -> tuple[int, int]:
@@ -96,7 +96,7 @@ def _around(azimuth: float, radius: float) -> tuple[int, int]:
             round(_PLAN / 2 + radius * math.cos(azimuth)))
 
 
-def _draw_view(picture: NDArray[np.uint8], left: int, top: int, view: SeenView,
+def _draw_view(picture: NDArray[np.uint8], left: int, top: int, number: int, view: ViewResult,
                heights: tuple[int, int]) -> None:
     middle = left + TILE // 2
     if view.image is not None:
@@ -104,11 +104,13 @@ def _draw_view(picture: NDArray[np.uint8], left: int, top: int, view: SeenView,
         image = cv2.resize(view.image, (side, side), interpolation=cv2.INTER_CUBIC)
         paste(picture, np.asarray(image, np.uint8), left + 10, top + 10)
     cv2.rectangle(picture, (left + 10, top + 10), (left + TILE - 10, top + TILE - 10),
-                  view_color(view.number), 3, cv2.LINE_AA)
-    caption = f'{view.number}   {math.degrees(view.azimuth):.0f}°'
-    centred(picture, caption, middle, top + TILE + 18, 19, view_color(view.number))
-    paste(picture, _seen_voxels(view.occupied, heights), left, top + TILE + 26)
-    centred(picture, f'IoU {view.iou:.2f}', middle, top + _BLOCK - 32, 19)
+                  view_color(number), 3, cv2.LINE_AA)
+    caption = f'{number}   {math.degrees(view.camera.azimuth):.0f}°'
+    centred(picture, caption, middle, top + TILE + 18, 19, view_color(number))
+    if view.occupied is not None:
+        paste(picture, _voxel_tile(view.occupied, heights), left, top + TILE + 26)
+    if view.iou is not None:
+        centred(picture, f'IoU {view.iou:.2f}', middle, top + _BLOCK - 32, 19)
 
 
 def _draw_truth(picture: NDArray[np.uint8], left: int, top: int, mesh: trimesh.Trimesh,
@@ -116,11 +118,11 @@ def _draw_truth(picture: NDArray[np.uint8], left: int, top: int, mesh: trimesh.T
     middle = left + TILE // 2
     paste(picture, _rendered(mesh), left, top)
     centred(picture, 'the object', middle, top + TILE + 18, 19)
-    paste(picture, _seen_voxels(truth, heights), left, top + TILE + 26)
+    paste(picture, _voxel_tile(truth, heights), left, top + TILE + 26)
     centred(picture, 'its voxels', middle, top + _BLOCK - 32, 19)
 
 
-def _seen_voxels(grid: VoxelGrid, heights: tuple[int, int]) -> NDArray[np.uint8]:
+def _voxel_tile(grid: VoxelGrid, heights: tuple[int, int]) -> NDArray[np.uint8]:
     return voxel_picture(grid, heights, _tile_camera(), PAPER)
 
 

@@ -1,4 +1,4 @@
-"""The demo from start to end: start the nodes, watch the loop, keep what came of it."""
+"""The demo from start to end: start the nodes, observe the loop, save the results."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 import time
 
 from active_recon.demo.picture import run_picture
-from active_recon.demo.table import loop_table, turning
+from active_recon.demo.table import loop_table, motion_line
 from active_recon.geometry.cameras import wrap_azimuth
 from active_recon.interrupts import held_interrupts
-from active_recon.launching.demo_watch import DemoWatch, watching
+from active_recon.launching.demo_monitor import demo_monitor, DemoMonitor
 from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.models.weights_files import find_weights
 from active_recon.policies import DEFAULT_POLICY
@@ -34,11 +34,10 @@ _ANSWER_S = 10.0
 @dataclass(frozen=True)
 class Demo:
     """
-    What to show: a mesh file, how many views, which policy chooses them, and its seed.
+    What to show: a mesh file, the number of views, the policy that chooses them, and its seed.
 
-    `model` is a weights file, or a model whose weights ship; None: the default.
-
-    With `view` the loop is shown in the browser too, and goes on until Ctrl-C.
+    `model` is a weights file, or a model whose weights ship; None: the default. With `view` the
+    loop is shown in the browser, too, and runs until Ctrl-C.
     """
 
     mesh: Path
@@ -52,21 +51,21 @@ class Demo:
 
 def run_demo(demo: Demo, console: Console) -> Path:
     """
-    Run the loop and return the folder that holds its bag, its mesh and its picture.
+    Run the loop and return the folder with its bag, its mesh and its picture.
 
-    Raises MeshError on what is no mesh, NodeError where a node dies, ActiveReconError where the
-    loop does not go on. However it ends, the nodes are stopped and the bag is closed.
+    Raises MeshError where the file is no mesh, NodeError where a node ends, ActiveReconError
+    where the loop stalls. The nodes are stopped and the bag is closed in any case.
     """
-    find_weights(demo.model)  # refused here rather than by two nodes
+    find_weights(demo.model)  # an error here is clearer than one in two nodes
     mesh = load_mesh(demo.mesh)
     truth = cache(partial(voxelise, mesh))
-    truth(_LIKELY_RESOLUTION)  # later it would keep the loop's messages waiting
+    truth(_LIKELY_RESOLUTION)  # later it would delay the loop's messages
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
     title = f'{demo.mesh.stem}: {demo.views} views, policy {demo.policy}'
     with (held_interrupts() as raise_if_asked, TemporaryDirectory() as logs,
           NodeProcesses(Path(logs), environment) as nodes,
-          watching(lambda resolution: truth(resolution).occupied(0.5)) as watch):
+          demo_monitor(lambda resolution: truth(resolution).occupied(0.5)) as monitor):
         def check() -> None:
             raise_if_asked()
             nodes.check()
@@ -75,37 +74,38 @@ def run_demo(demo: Demo, console: Console) -> Path:
                       f'view planner on ROS domain {environment["ROS_DOMAIN_ID"]}')
         nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
                                  'record_at_start': False})
-        folder = Path(watch.ask('start', _START_S, check))
+        folder = Path(monitor.trigger('start', _START_S, check))
         if demo.view:
-            _open_page(nodes, watch, console, check)
+            _open_page(nodes, monitor, console, check)
         try:
             _start_loop(nodes, demo, folder)
-            _follow(watch, demo, title, console, check)
-            saved = Path(watch.ask('save_mesh', _ANSWER_S, check))
+            _follow(monitor, demo, title, console, check)
+            saved = Path(monitor.trigger('save_mesh', _ANSWER_S, check))
             saved.replace(folder / f'{demo.mesh.stem}{saved.suffix}')
-            watch.ask('stop', _ANSWER_S, check)
+            monitor.trigger('stop', _ANSWER_S, check)
         finally:
-            if watch.views:
-                side = len(watch.views[-1].occupied.occupancy)
-                picture = run_picture(f'active_recon: {title}', watch.views, mesh, truth(side))
+            views = monitor.state.views
+            if views and views[-1].occupied is not None:
+                side = len(views[-1].occupied.occupancy)
+                picture = run_picture(f'active_recon: {title}', views, mesh, truth(side))
                 cv2.imwrite(str(folder / 'run.png'), picture[..., ::-1])
         if demo.view:
-            _go_on(nodes, console)
+            _keep_running(nodes, console)
     return demo.output_dir / folder.name
 
 
-def _open_page(nodes: NodeProcesses, watch: DemoWatch, console: Console,
+def _open_page(nodes: NodeProcesses, monitor: DemoMonitor, console: Console,
                check: Callable[[], None]) -> None:
-    """Wait for the page, for views taken before it is there would be missing on it."""
+    """Wait for the page: views taken before would be missing on it."""
     port = free_port()
     nodes.start('viewer', {'port': port})
-    watch.until(lambda: is_served(port), _START_S, 'the page', check)
-    console.print(f'watch it at http://{HOST}:{port}')
+    monitor.until(lambda: is_served(port), _START_S, 'the page', check)
+    console.print(f'the page is at http://{HOST}:{port}')
 
 
-def _go_on(nodes: NodeProcesses, console: Console) -> None:
-    """Leave the loop and its page to who watches, until Ctrl-C."""
-    console.print('the bag is closed; the loop and its page go on until Ctrl-C')
+def _keep_running(nodes: NodeProcesses, console: Console) -> None:
+    """Keep the loop and its page running until Ctrl-C."""
+    console.print('the bag is closed; the loop and its page run until Ctrl-C')
     with suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked:
         while True:
             raise_if_asked()
@@ -115,32 +115,33 @@ def _go_on(nodes: NodeProcesses, console: Console) -> None:
 
 def _start_loop(nodes: NodeProcesses, demo: Demo, folder: Path) -> None:
     nodes.start('turntable_camera', {'mesh': demo.mesh, 'start_azimuth': _start_azimuth(demo)})
-    # Goals only: `auto` takes views of its own accord while it has not yet met the planner.
+    # Goals only: `auto` takes views by separation until it has discovered the planner.
     weights = {'weights': demo.model} if demo.model else {}
     nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal', **weights})
-    # A tolerance of 0 keeps an early end away: as many views as were asked for are shown.
+    # A tolerance of 0 prevents an early end: all requested views are taken.
     nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
                                  'max_views': demo.views, 'entropy_tolerance': 0.0, **weights})
 
 
 def _start_azimuth(demo: Demo) -> float:
-    """Return where the camera stands at first: anywhere, by the seed."""
+    """Return the camera's first azimuth, drawn with the seed."""
     return wrap_azimuth(np.random.default_rng(demo.seed).uniform(0, 2 * np.pi))
 
 
-def _follow(watch: DemoWatch, demo: Demo, title: str, console: Console,
+def _follow(monitor: DemoMonitor, demo: Demo, title: str, console: Console,
             check: Callable[[], None]) -> None:
-    """Show each view as it comes, until the planner is done and its last view is there."""
+    """Show each view as it is taken, until the planner is done."""
     began = time.monotonic()
 
     def table() -> RenderableType:
-        now = (f'done ({watch.done}) after {time.monotonic() - began:.0f} s' if watch.done
-               else turning(watch.azimuth, watch.goal))
-        return loop_table(title, watch.views, now)
+        state = monitor.state
+        now = (f'done ({state.done}) after {time.monotonic() - began:.0f} s' if state.done
+               else motion_line(state.camera, state.goal))
+        return loop_table(title, state.views, now)
 
     with Live(console=console, get_renderable=table, refresh_per_second=10):
         for number in range(1, demo.views + 1):
-            watch.until(partial(watch.has_views, number), _VIEW_S, f'view {number}', check)
-        watch.until(lambda: watch.done != '', _ANSWER_S, "the planner's end", check)
-    if not console.is_terminal:  # where `Live` leaves its last line open
+            monitor.until(partial(monitor.has_views, number), _VIEW_S, f'view {number}', check)
+        monitor.until(lambda: monitor.state.done != '', _ANSWER_S, 'the planner to be done', check)
+    if not console.is_terminal:  # there `Live` does not end its last line
         console.line()

@@ -1,29 +1,34 @@
-"""The loop in the terminal: one row for each view, and what happens now."""
+"""The loop in the terminal: one row for each view, and a line with the camera's motion."""
 
 from collections.abc import Sequence
 import math
 
 from active_recon.geometry.cameras import Camera
-from active_recon.seen_view import SeenView
+from active_recon.viewer.view_result import ViewResult
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 
-def loop_table(title: str, views: Sequence[SeenView], now: str) -> Group:
-    """Return the rows so far with the line `now` beneath."""
+def loop_table(title: str, views: Sequence[ViewResult], now: str) -> Group:
+    """Return the table of the views so far, with the line `now` below."""
     table = Table(title=title, title_justify='left', title_style='bold')
     for heading in ('view', 'azimuth, deg', 'entropy, nats', 'IoU', 'image to occupancy, ms'):
         table.add_column(heading, justify='right')
-    for view in views:
-        table.add_row(str(view.number), f'{math.degrees(view.azimuth):.0f}',
-                      f'{view.entropy:.0f}', f'{view.iou:.3f}', f'{1000 * view.latency:.0f}')
+    for number, view in enumerate(views, 1):
+        table.add_row(str(number), f'{math.degrees(view.camera.azimuth):.0f}',
+                      _figure(view.entropy, '.0f'), _figure(view.iou, '.3f'),
+                      _figure(view.latency and 1000 * view.latency, '.0f'))
     return Group(table, Text(now, style='dim'))
 
 
-def turning(azimuth: float | None, goal: Camera | None) -> str:
-    """Return where the camera is (radians) and where it goes as a line for people."""
-    if azimuth is None:
+def motion_line(camera: Camera | None, goal: Camera | None) -> str:
+    """Return a line that says where the camera is and where its goal is."""
+    if camera is None:
         return 'waiting for the camera'
-    here = f'the camera is at {math.degrees(azimuth):.0f} deg'
+    here = f'the camera is at {math.degrees(camera.azimuth):.0f} deg'
     return here if goal is None else f'{here}, its goal is {math.degrees(goal.azimuth):.0f} deg'
+
+
+def _figure(value: float | None, form: str) -> str:
+    return '' if value is None else format(value, form)

@@ -1,1 +1,1 @@
-"""The nodes as processes: started, watched and stopped together."""
+"""Nodes as processes: started, monitored and stopped together."""

@@ -16,9 +16,9 @@ from active_recon.errors import ActiveReconError
 from active_recon.nodes.runtime.shared_memory import PROFILE
 
 _LAST_LINES = 8
-_STOP_S = 5.0  # for a node to close what it holds open
-_ASK_AGAIN_S = 1.0
-_DOMAINS = range(41, 102)  # people choose low numbers by hand, as the tests do
+_STOP_S = 5.0  # for a node to close its files
+_SIGNAL_AGAIN_S = 1.0
+_DOMAINS = range(41, 102)  # low numbers are for users and the tests
 
 
 class NodeError(ActiveReconError):
@@ -26,7 +26,7 @@ class NodeError(ActiveReconError):
 
 
 def private_environment() -> dict[str, str]:
-    """Return the variables under which nodes hear this machine alone, on a domain of their own."""
+    """Return environment variables for a free ROS domain that is limited to this machine."""
     return {
         'ROS_DOMAIN_ID': str(_free_domain_id()),
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
@@ -36,7 +36,7 @@ def private_environment() -> dict[str, str]:
 
 
 def _free_domain_id() -> int:
-    """Return a domain id whose first participant's port nobody holds."""
+    """Return a domain id whose first participant's port is free."""
     for domain in random.sample(_DOMAINS, len(_DOMAINS)):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
@@ -50,10 +50,10 @@ def _free_domain_id() -> int:
 
 class NodeProcesses:
     """
-    Starts nodes by their module's name, tells which has died, and stops them, the last first.
+    Starts nodes by their module's name, detects when one ends, and stops them, the last first.
 
-    A node's output goes to a log in `log_folder`, or, without one, to where this process's own
-    goes. `environment` is added to this process's.
+    A node's output goes to a log in `log_folder`, or, without one, to this process's output.
+    `environment` is added to this process's.
     """
 
     def __init__(self, log_folder: Path | None = None,
@@ -72,18 +72,18 @@ class NodeProcesses:
 
         In a namespace, for example '/cell_1', it is known here as 'cell_1.<node>'.
         """
-        settings = [*arguments, *(word for name, value in parameters.items()
+        words = [*arguments, *(word for name, value in parameters.items()
                                   for word in ('-p', f'{name}:={_as_yaml(value)}'))]
-        known_as = node
+        full_name = node
         if namespace:
-            settings += ['-r', f'__ns:={namespace}']
-            known_as = f'{namespace.strip("/").replace("/", ".")}.{node}'
+            words += ['-r', f'__ns:={namespace}']
+            full_name = f'{namespace.strip("/").replace("/", ".")}.{node}'
         with ExitStack() as opened:
-            log = self._log(known_as)
+            log = self._log(full_name)
             output = None if log is None else opened.enter_context(log.open('wb'))
-            # A session of its own keeps the terminal's Ctrl-C from it: we stop the nodes.
-            self._running[known_as] = subprocess.Popen(
-                [sys.executable, '-m', f'active_recon.nodes.{node}', '--ros-args', *settings],
+            # In its own session it does not receive the terminal's Ctrl-C: `stop` stops it
+            self._running[full_name] = subprocess.Popen(
+                [sys.executable, '-m', f'active_recon.nodes.{node}', '--ros-args', *words],
                 stdin=subprocess.DEVNULL, stdout=output, stderr=output and subprocess.STDOUT,
                 env=self._environment, start_new_session=True)
 
@@ -101,20 +101,20 @@ class NodeProcesses:
             if log is None:
                 raise NodeError(f'{node} ended with code {code}')
             lines = log.read_text(errors='replace').splitlines()[-_LAST_LINES:]
-            said = '\n  '.join(lines) or '(it said nothing)'
-            raise NodeError(f'{node} ended with code {code}. It said last:\n  {said}')
+            log_lines = '\n  '.join(lines) or '(its log is empty)'
+            raise NodeError(f'{node} ended with code {code}. The end of its log:\n  {log_lines}')
 
     def stop(self) -> None:
-        """Ask the nodes to end, the last started first, and wait; kill what does not."""
+        """Interrupt the nodes, the last started first, and wait; kill those that do not end."""
         deadline = time.monotonic() + _STOP_S
         while alive := [process for process in reversed(self._running.values())
                         if process.poll() is None]:
             late = time.monotonic() > deadline
             for process in alive:
                 process.send_signal(signal.SIGKILL if late else signal.SIGINT)
-            # Some libraries swallow what interrupts their import, so it is said again.
+            # Some libraries swallow an interrupt of their import, so it is sent again.
             with suppress(subprocess.TimeoutExpired):
-                alive[-1].wait(_ASK_AGAIN_S)
+                alive[-1].wait(_SIGNAL_AGAIN_S)
         self._running.clear()
 
     def _log(self, node: str) -> Path | None:

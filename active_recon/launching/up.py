@@ -1,4 +1,4 @@
-"""The nodes of a parameters file, started and stopped together, where launch is missing."""
+"""Starts and stops the nodes of a parameters file, without ros2 launch."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -10,13 +10,13 @@ from active_recon.interrupts import held_interrupts
 from active_recon.launching.processes import NodeProcesses
 from active_recon.parameters.params_file import read_params_file
 
-_LOOK_EVERY_S = 0.1
+_CHECK_EVERY_S = 0.1
 
 
 @dataclass(frozen=True)
 class Start:
     """
-    What to start: a file that names the nodes, and what holds for all of them.
+    The nodes to start: a parameters file that names them, and options that hold for all.
 
     `remaps` are of the form `from:=to`.
     """
@@ -27,16 +27,16 @@ class Start:
     log_level: str = 'info'
 
     def arguments(self) -> list[str]:
-        """Return what every node is told on its command line."""
+        """Return the command-line arguments of every node."""
         return ['--params-file', str(self.params_file.absolute()), '--log-level', self.log_level,
                 *(word for rule in self.remaps for word in ('-r', rule))]
 
 
 def run_up(start: Start, say: Callable[[str], None]) -> None:
     """
-    Start the nodes and wait for Ctrl-C; however it ends, they are stopped.
+    Start the nodes and wait for Ctrl-C; they are stopped in any case.
 
-    Raises ConfigError on a file that cannot be used, NodeError where a node ends by itself.
+    Raises ConfigError on an invalid file, NodeError where a node ends by itself.
     """
     namespace = f'/{start.namespace.strip("/")}' if start.namespace else ''
     names = list(read_params_file(start.params_file))
@@ -48,5 +48,5 @@ def run_up(start: Start, say: Callable[[str], None]) -> None:
         while True:
             raise_if_asked()
             nodes.check()
-            time.sleep(_LOOK_EVERY_S)
+            time.sleep(_CHECK_EVERY_S)
     say('the nodes are stopped')

@@ -1,18 +1,18 @@
-"""ROS shell of the simulated turntable: a stream of the views around an object."""
+"""ROS node of the simulated turntable: a camera stream of an object that turns."""
 
 from functools import partial
 from pathlib import Path
 
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import DataError
-from active_recon.nodes.runtime.clock import ClockWatch
+from active_recon.nodes.runtime.clock import ClockMonitor
 from active_recon.nodes.runtime.diagnostics import Diagnostics
-from active_recon.nodes.runtime.parameters import Commit, Parameters, ReadOnlySaysWhy, tell
-from active_recon.nodes.runtime.qos import HEARD, STREAM
+from active_recon.nodes.runtime.parameters import Commit, Parameters, set_read_only_parameter
+from active_recon.nodes.runtime.qos import SENSOR_QOS, STREAM_QOS
 from active_recon.nodes.runtime.qos_warnings import QosWarnings
 from active_recon.nodes.runtime.run import one_line, run_node
 from active_recon.objects import find_object
-from active_recon.parameters.turntable_camera import TurntableCameraSettings
+from active_recon.parameters.turntable_camera import TurntableCameraParameters
 from active_recon.simulation.faults import CameraFaults, read_faults, Sent, Shot
 from active_recon.simulation.shown_object import rendered_object, ShownObject, stored_object
 from active_recon.simulation.turntable import Turntable
@@ -28,52 +28,52 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 ANSWER_S = 2.0
-"""For so long the reconstructor may take to begin an episode."""
+"""Time to wait for the reconstructor to begin an episode."""
 
 
-class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
-    """Stream image, camera info and pose, also while it turns to a goal."""
+class TurntableCameraNode(QosWarnings):
+    """Publish images, camera info and poses, also while the turntable turns to a goal."""
 
     def __init__(self) -> None:
         super().__init__('turntable_camera')
-        self._settings = Parameters(self, TurntableCameraSettings)
-        self._settings.on_change(self._change)
-        settings = self._settings.now
-        self._turntable = _at_start(settings)
-        self._faults = CameraFaults(read_faults(settings.faults), settings.faults_seed)
-        self._objects = _objects(settings)
+        self._params = Parameters(self, TurntableCameraParameters)
+        self._params.on_change(self._change)
+        params = self._params.values
+        self._turntable = _at_start(params)
+        self._faults = CameraFaults(read_faults(params.faults), params.faults_seed)
+        self._objects = _objects(params)
         self._index = 0
         first = self._objects[0]()
         self._shown: ShownObject | None = first
-        tell(self, 'object', first.name, 'the first that is shown')
+        set_read_only_parameter(self, 'object', first.name, 'name of the first object')
         self._diagnostics = Diagnostics(self)
-        self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM)
-        self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM)
-        self._pose_pub = self.create_publisher(PoseStamped, 'camera/pose', STREAM)
-        self.create_subscription(JointState, 'next_azimuth', self._on_goal, HEARD)
+        self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM_QOS)
+        self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM_QOS)
+        self._pose_pub = self.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
+        self.create_subscription(JointState, 'next_azimuth', self._on_goal, SENSOR_QOS)
         self._start_episode = self.create_client(Trigger, 'start_episode')
-        # In a group of its own: while it waits for an answer, that answer must be let in.
+        # In a group of its own: the answer must arrive while the service waits for it.
         self.create_service(Trigger, 'next_object', self._on_next_object,
                             callback_group=MutuallyExclusiveCallbackGroup())
-        self._timer = self.create_timer(1 / settings.rate, self._show)
-        self._clock_watch = ClockWatch(self, self._clock_went_back)
+        self._timer = self.create_timer(1 / params.rate, self._show)
+        self._clock_monitor = ClockMonitor(self, self._clock_went_back)
         self.get_logger().info('ready')
 
-    def _change(self, settings: TurntableCameraSettings) -> Commit:
-        """Return what puts settings into effect that changed while the node runs."""
-        faults = read_faults(settings.faults)
+    def _change(self, params: TurntableCameraParameters) -> Commit:
+        """Return a function that applies a change of parameters."""
+        faults = read_faults(params.faults)
 
         def commit() -> None:
-            self._turntable.set_speed(settings.speed, settings.time_scale, self._motor_s())
+            self._turntable.set_speed(params.speed, params.time_scale, self._motor_s())
             self._faults.change(faults)
-            self._timer.timer_period_ns = round(1e9 / settings.rate)
+            self._timer.timer_period_ns = round(1e9 / params.rate)
             self._timer.reset()
 
         return commit
 
     def _clock_went_back(self, how: str) -> None:
-        self._turntable = _at_start(self._settings.now)
-        self.get_logger().warning(f'{how}: the turntable is where it was at start')
+        self._turntable = _at_start(self._params.values)
+        self.get_logger().warning(f'{how}: the turntable is back at its start')
 
     def _now_s(self) -> float:
         return self.get_clock().now().nanoseconds / 1e9
@@ -86,24 +86,24 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
             return
         now = self.get_clock().now().nanoseconds
         if not self._faults.is_there(now / 1e9):
-            self._turntable = _at_start(self._settings.now)
+            self._turntable = _at_start(self._params.values)
             return
         image, camera = self._shown.seen_from(
             self._turntable.azimuth_at(self._faults.motor_time(now / 1e9)))
-        # The image comes last: whoever hears it has what belongs to it.
+        # The image is last: by then its camera info and pose have been published.
         for sent in self._faults.sent(Shot(now, image, camera), now / 1e9):
             self._send(sent)
 
     def _send(self, sent: Sent) -> None:
-        settings, shot = self._settings.now, sent.shot
-        header = Header(stamp=stamp_from_nanoseconds(shot.stamp), frame_id=settings.camera_frame)
+        params, shot = self._params.values, sent.shot
+        header = Header(stamp=stamp_from_nanoseconds(shot.stamp), frame_id=params.camera_frame)
         if sent.part == 'image':
             msg = image_to_msg(shot.image, header)
             del msg.data[round(sent.kept * len(msg.data)):]
             self._image_pub.publish(msg)
             self._diagnostics.count('images')
             return
-        info, pose = camera_to_msgs(shot.camera, header, settings.object_frame)
+        info, pose = camera_to_msgs(shot.camera, header, params.object_frame)
         if sent.part == 'pose':
             self._pose_pub.publish(pose)
         else:
@@ -112,21 +112,21 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
     def _on_goal(self, msg: JointState) -> None:
         if not self._faults.is_there(self._now_s()):
             return
-        with self._diagnostics.refusing():
+        with self._diagnostics.rejecting():
             self._turntable.turn_to(azimuth_goal_from_msg(msg), self._motor_s())
             self._diagnostics.count('goals')
 
     async def _on_next_object(self, _request: Trigger.Request,
                               response: Trigger.Response) -> Trigger.Response:
-        """Begin an episode, then show the next object; the first follows the last."""
+        """Begin an episode, then show the next object; after the last comes the first."""
         index = (self._index + 1) % len(self._objects)
         try:
             following = self._objects[index]()
         except DataError as error:
-            self._diagnostics.refuse(error)
+            self._diagnostics.reject(error)
             response.message = one_line(error)
             return response
-        shown, self._shown = self._shown, None  # nothing of the old object in the new episode
+        shown, self._shown = self._shown, None  # no image of the old object in the new episode
         begun = await self._begin_episode()
         if not begun:
             self._shown = shown
@@ -139,7 +139,7 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
         return response
 
     async def _begin_episode(self) -> bool:
-        """Ask the reconstructor for a new episode; return whether it began one in time."""
+        """Request a new episode of the reconstructor; return whether it began one in time."""
         answered = Future()
         late = self.create_timer(ANSWER_S, lambda: answered.done() or answered.set_result(None))
         request = self._start_episode.call_async(Trigger.Request())
@@ -150,19 +150,19 @@ class TurntableCameraNode(ReadOnlySaysWhy, QosWarnings):
         return answer is not None and answer.success
 
 
-def _at_start(settings: TurntableCameraSettings) -> Turntable:
-    return Turntable(settings.start_azimuth, settings.speed, settings.time_scale)
+def _at_start(params: TurntableCameraParameters) -> Turntable:
+    return Turntable(params.start_azimuth, params.speed, params.time_scale)
 
 
-def _objects(settings: TurntableCameraSettings) -> list[partial[ShownObject]]:
-    """Return what makes each object, for only one of them is held at a time."""
-    size, background = settings.object_size, settings.background
-    if settings.mesh:
-        return [partial(rendered_object, find_object(settings.mesh), size, background,
-                        settings.up or None, settings.front or None)]
-    folders = list_objects(Path(settings.dataset))
+def _objects(params: TurntableCameraParameters) -> list[partial[ShownObject]]:
+    """Return functions that load each object: only one is in memory at a time."""
+    size, background = params.object_size, params.background
+    if params.mesh:
+        return [partial(rendered_object, find_object(params.mesh), size, background,
+                        params.up or None, params.front or None)]
+    folders = list_objects(Path(params.dataset))
     if not folders:
-        raise DataError(f'{settings.dataset}: expected a dataset with objects, got none')
+        raise DataError(f'{params.dataset}: expected a dataset with objects, got none')
     return [partial(stored_object, folder, size, background) for folder in folders]
 
 

@@ -1,4 +1,4 @@
-"""ROS shell of the planner: after every view, where to look next, or that it is enough."""
+"""ROS node of the planner: publishes the next view after each view, or that it is done."""
 
 import math
 import time
@@ -12,16 +12,16 @@ from active_recon.geometry.cameras import (
 )
 from active_recon.models.weights_files import find_weights
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
-from active_recon.nodes.loop.view_synchronizer import HeardView, HeardViews
+from active_recon.nodes.loop.view_synchronizer import ViewSynchronizer
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.clock import AHEAD_S, STEADY
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.runtime.parameters import Commit, Parameters
-from active_recon.nodes.runtime.qos import HEARD, LATCHED
+from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
 from active_recon.nodes.runtime.run import one_line
-from active_recon.nodes.runtime.topic_names import tell_names
-from active_recon.parameters.view_planner import ViewPlannerSettings
-from active_recon.planner import Decision, Goal, Planner
+from active_recon.nodes.runtime.topic_names import publish_topic_names
+from active_recon.parameters.view_planner import ViewPlannerParameters
+from active_recon.planner import Decision, Goal, Planner, PlannerView
 from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
@@ -32,76 +32,80 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 REPEAT_S = 1.0
-"""So often a goal whose view has not come is sent again."""
+"""Period at which an open goal is published again."""
 FIND_CAMERA_S = 1.0
-"""So long after an episode was heard, nobody who publishes the camera's pose is waited for."""
+"""Time to wait for a publisher of the camera's pose after an episode began."""
 _STEEPEST = 1.5  # rad, of a first view
 TOPICS = ('camera/pose', 'view', 'latent', 'entropy', 'probabilities', 'episode', 'next_view',
           'next_azimuth', 'azimuth_scores', 'done')
-"""What the node hears and publishes."""
+"""Topics that the node subscribes to and publishes."""
 
 
 class ViewPlannerNode(ManagedNode):
-    """Ask for the first view of an episode, then for the next after each one, until done."""
+    """Publish the first view of an episode, then the next after each view, until done."""
 
     def __init__(self) -> None:
         super().__init__('view_planner')
-        self._settings = Parameters(self, ViewPlannerSettings)
-        self._settings.on_change(self._change)
+        self._params = Parameters(self, ViewPlannerParameters)
+        self._params.on_change(self._change)
 
     def configure(self) -> None:
-        """Load the policy, and offer its goals."""
-        settings = self._settings.now
-        self._frame = settings.object_frame
-        tell_names(self, TOPICS)
-        self._policy = self._load(settings)
-        self._planner = self._planner_of(settings, self._policy)
+        """Load the policy, create publishers and services."""
+        params = self._params.values
+        self._frame = params.object_frame
+        publish_topic_names(self, TOPICS)
+        self._policy = self._load(params)
+        self._planner = self._planner_of(params, self._policy)
+        self.add_cleanup(self._free_policy)
         self._goals = GoalPublisher(self, self._frame)
-        self._done_pub = self.create_publisher(Header, 'done', LATCHED)
-        self._diagnostics.measure('views', 'goals')
+        self._done_pub = self.create_publisher(Header, 'done', LATCHED_QOS)
+        self._diagnostics.measure_rates('views', 'goals')
         self.create_service(Trigger, 'plan', self._on_plan)
         self.create_service(Trigger, 'stop_episode', self._on_stop)
 
     def activate(self) -> None:
-        """Hear the reconstructor, and go on from what is latched."""
+        """Subscribe to the reconstructor, and continue from its latched messages."""
         self._episode: Episode | None = None
         self._begun_at = self.get_clock().now().nanoseconds
-        self._forget()
+        self._reset_episode()
         inputs = AwaitedInputs(self, self._diagnostics)
-        self.on_undo(inputs.forget)
-        hear_camera = (inputs.hear if math.isnan(self._settings.now.start_azimuth)
-                       else self.create_subscription)
-        self._cameras = hear_camera(PoseStamped, 'camera/pose', self._on_camera, HEARD)
-        self._views = HeardViews(self, self._frame, self._diagnostics, self._decide)
+        self.add_cleanup(inputs.clear)
+        subscribe_camera = (inputs.subscribe if math.isnan(self._params.values.start_azimuth)
+                            else self.create_subscription)
+        self._cameras = subscribe_camera(PoseStamped, 'camera/pose', self._on_camera, SENSOR_QOS)
+        self._views = ViewSynchronizer(self, self._frame, self._diagnostics, self._decide)
         if self._planner.wants_volume:
-            self._views.hear_volume(self._settings.now.object_size)
-        inputs.hear(Header, 'episode', self._on_episode, LATCHED)
-        self.create_timer(0.1, self._ask_first, clock=STEADY)
-        self.create_timer(0.1, self._give_up_late, clock=STEADY)
+            self._views.subscribe_volume(self._params.values.object_size)
+        inputs.subscribe(Header, 'episode', self._on_episode, LATCHED_QOS)
+        self.create_timer(0.1, self._publish_first_goal, clock=STEADY)
+        self.create_timer(0.1, self._give_up_timed_out, clock=STEADY)
         self.create_timer(REPEAT_S, self._goals.repeat, clock=STEADY)
 
-    def _load(self, settings: ViewPlannerSettings) -> Policy:
-        return load_policy(settings.policy, PolicyOptions(
-            np.random.default_rng(settings.seed), settings.max_views,
-            find_weights(settings.weights or None), threads=settings.threads))
+    def _free_policy(self) -> None:
+        del self._policy, self._planner
 
-    def _planner_of(self, settings: ViewPlannerSettings, policy: Policy) -> Planner:
+    def _load(self, params: ViewPlannerParameters) -> Policy:
+        return load_policy(params.policy, PolicyOptions(
+            np.random.default_rng(params.seed), params.max_views,
+            find_weights(params.weights or None), threads=params.threads))
+
+    def _planner_of(self, params: ViewPlannerParameters, policy: Policy) -> Planner:
         return Planner(
-            policy, settings.max_views, settings.entropy_tolerance, settings.object_yaw,
-            settings.limits(), settings.motion_weight,
-            None if math.isnan(settings.elevation) else settings.elevation,
-            CANONICAL_DISTANCE * settings.object_size if math.isnan(settings.distance)
-            else settings.distance)
+            policy, params.max_views, params.entropy_tolerance, params.object_yaw,
+            params.limits(), params.motion_weight,
+            None if math.isnan(params.elevation) else params.elevation,
+            CANONICAL_DISTANCE * params.object_size if math.isnan(params.distance)
+            else params.distance)
 
-    def _change(self, settings: ViewPlannerSettings) -> Commit | None:
-        """Return what puts settings into effect that changed while the node runs."""
+    def _change(self, params: ViewPlannerParameters) -> Commit | None:
+        """Return a function that applies a change of parameters."""
         if not self.is_configured:
             return None
-        before = self._settings.now
-        is_same = all(getattr(before, name) == getattr(settings, name)
-                      for name in ('policy', *POLICIES[settings.policy].parameters))
-        policy = self._policy if is_same else self._load(settings)
-        planner = self._planner_of(settings, policy)
+        before = self._params.values
+        is_same = all(getattr(before, name) == getattr(params, name)
+                      for name in ('policy', *POLICIES[params.policy].parameters))
+        policy = self._policy if is_same else self._load(params)
+        planner = self._planner_of(params, policy)
         planner.go_on_from(self._planner)
 
         def commit() -> None:
@@ -109,15 +113,15 @@ class ViewPlannerNode(ManagedNode):
             if not self.is_active:
                 return
             if planner.wants_volume:
-                self._views.hear_volume(settings.object_size)
-            asked = self._goals.camera
-            if asked is not None and not settings.limits().allows(asked.azimuth):
+                self._views.subscribe_volume(params.object_size)
+            goal = self._goals.camera
+            if goal is not None and not params.limits().allows(goal.azimuth):
                 self._follow(planner.next_goal(), self.get_clock().now().nanoseconds)
 
         return commit
 
-    def _forget(self) -> None:
-        """Begin with no camera, no goal and no view."""
+    def _reset_episode(self) -> None:
+        """Forget the camera, the goal and the views."""
         self._planner.reset()
         self._goals.close()
         self._camera: Camera | None = None
@@ -125,111 +129,111 @@ class ViewPlannerNode(ManagedNode):
         self._done = False
 
     def _on_episode(self, msg: Header) -> None:
-        with self._diagnostics.refusing():
+        with self._diagnostics.rejecting():
             episode = episode_from_msg(msg)
             if self._episode is not None and episode.id == self._episode.id:
                 return
-            self._forget()
-            self._views.begin(episode.begin)
-            self._episode, self._heard_at = episode, time.monotonic()
+            self._reset_episode()
+            self._views.begin_episode(episode.begin)
+            self._episode, self._episode_received_at = episode, time.monotonic()
             self._diagnostics.count('episodes')
-            self._diagnostics.tell('Episode', episode.id)
-            self._tell_done(episode.begin, '')
+            self._diagnostics.set_value('Episode', episode.id)
+            self._publish_done(episode.begin, '')
             if self._views.last is not None:
-                self._decide(self._views.last)
+                self._decide(*self._views.last)
 
     def clock_went_back(self, how: str) -> None:
-        """Wait for the episode of the new time, unless it came before the new time was heard."""
+        """Wait for an episode of the new time, unless it has already arrived."""
         now = self.get_clock().now().nanoseconds
         self._begun_at = min(self._begun_at, now)
-        self._goals.forget_stamps()
+        self._goals.reset_stamps()
         self._diagnostics.count('clock_jumps')
-        self.get_logger().warning(f'{how}: a new episode is awaited')
+        self.get_logger().warning(f'{how}: waiting for a new episode')
         if self._episode is not None and self._episode.begin > now + AHEAD_S * 1e9:
             self._episode = None
-            self._views.forget()
-            self._forget()
+            self._views.clear()
+            self._reset_episode()
         elif self._goals.camera is not None:
-            self._ask(self._planner.plan())  # under a stamp of the new time
+            self._publish_goal(self._planner.plan())  # with a stamp of the new time
 
     def _on_camera(self, msg: PoseStamped) -> None:
-        with self._diagnostics.refusing():
+        with self._diagnostics.rejecting():
             camera = Camera(pose_from_msg(msg, self._frame))
             if self._episode and nanoseconds_from_stamp(msg.header.stamp) >= self._episode.begin:
                 self._camera = camera
-        self._ask_first()
+        self._publish_first_goal()
 
-    def _ask_first(self) -> None:
-        """Ask for the first view, once, where the camera or the parameter says."""
+    def _publish_first_goal(self) -> None:
+        """Publish the goal of the first view, once the camera's pose or the parameter gives it."""
         if self._episode is None or self._started:
             return
-        if self._episode.begin < self._begun_at and not self._views.would_be_here():
-            return  # an episode older than this node may have views already
+        if self._episode.begin < self._begun_at and not self._views.is_caught_up():
+            return  # an episode older than this node may already have views
         first = self._first_camera()
         if first is not None:
-            self._ask(self._planner.first_goal(first))
+            self._publish_goal(self._planner.first_goal(first))
 
     def _first_camera(self) -> Camera | None:
-        """Return where the first view is to be taken, None while that is not known yet."""
-        settings = self._settings.now
-        if math.isnan(settings.start_azimuth):
+        """Return the camera of the first view, None while it is not known."""
+        params = self._params.values
+        if math.isnan(params.start_azimuth):
             return self._camera
-        elevation = settings.elevation
+        elevation = params.elevation
         if math.isnan(elevation) and self._camera is not None:
             elevation = min(max(self._camera.elevation, -_STEEPEST), _STEEPEST)
-        if math.isnan(elevation):  # it is the camera's, where there is one
-            if (time.monotonic() - self._heard_at < FIND_CAMERA_S
+        if math.isnan(elevation):  # then it is the camera's, if one publishes its pose
+            if (time.monotonic() - self._episode_received_at < FIND_CAMERA_S
                     or self.count_publishers(self._cameras.topic_name)):
                 return None
             elevation = CANONICAL_ELEVATION
-        return orbit_camera(settings.start_azimuth, elevation)
+        return orbit_camera(params.start_azimuth, elevation)
 
-    def _decide(self, view: HeardView) -> None:
+    def _decide(self, stamp: int, view: PlannerView) -> None:
         if self._episode is None:
             return
         decision = self._planner.add_view(view.latent, view.camera, view.entropy, view.volume)
         self._started = True
         self._diagnostics.count('views')
-        self._follow(decision, view.stamp)
+        self._follow(decision, stamp)
         if decision.goal is not None:
-            self._diagnostics.took_since(view.stamp)
+            self._diagnostics.record_latency(stamp)
 
     def _follow(self, decision: Decision, stamp: int) -> None:
-        """Ask for the goal, or say that the episode is done, at a stamp in nanoseconds."""
+        """Publish the goal, or that the episode is done, at a stamp in nanoseconds."""
         if decision.goal is not None:
-            self._ask(decision.goal)
+            self._publish_goal(decision.goal)
             return
         self._goals.close()
         self._started = True
         self._done = True
-        self._tell_done(stamp, decision.reason)
+        self._publish_done(stamp, decision.reason)
         self.get_logger().info(f'done: {decision.reason}')
 
-    def _tell_done(self, stamp: int, reason: str) -> None:
-        """Say why the episode is done, as of the stamp of a view; '' that it is not yet."""
+    def _publish_done(self, stamp: int, reason: str) -> None:
+        """Publish why the episode is done, at the stamp of a view; '' while it is not."""
         self._done_pub.publish(done_to_msg(stamp, reason))
-        self._diagnostics.tell('Done', reason or 'not yet')
+        self._diagnostics.set_value('Done', reason or 'not yet')
 
-    def _ask(self, goal: Goal) -> None:
-        self._goals.ask(goal)
+    def _publish_goal(self, goal: Goal) -> None:
+        self._goals.publish(goal)
         self._started = True
         self._diagnostics.count('goals')
 
-    def _give_up_late(self) -> None:
-        """Ask for the next best goal where one has been open for too long."""
-        timeout, failed = self._settings.now.goal_timeout, self._goals.camera
-        if timeout == 0 or failed is None or not self._goals.waited > timeout:
+    def _give_up_timed_out(self) -> None:
+        """Publish the next best goal where one has been open for too long."""
+        timeout, failed = self._params.values.goal_timeout, self._goals.camera
+        if timeout == 0 or failed is None or not self._goals.open_for > timeout:
             return
         decision = self._planner.give_up(failed, self._camera)
-        instead = ('nothing that can be reached is left' if decision.goal is None else
+        instead = ('no reachable goal is left' if decision.goal is None else
                    f'the next best is {math.degrees(decision.goal.camera.azimuth):.1f} degrees')
         self._diagnostics.warn('goal_timeout', (
             f'expected a view from {math.degrees(failed.azimuth):.1f} degrees within '
-            f'{timeout:g} s, got none: left out for this episode, {instead}'))
+            f'{timeout:g} s, got none; it is left out of this episode, {instead}'))
         self._follow(decision, self.get_clock().now().nanoseconds)
 
     def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Ask for the goal after the views so far under a new stamp; answer with its azimuth."""
+        """Publish the goal after the views so far with a new stamp; answer with its azimuth."""
         if not self.is_active:
             response.message = 'expected an active node to plan; this one is inactive'
             return response
@@ -240,8 +244,8 @@ class ViewPlannerNode(ManagedNode):
             return response
         if self._done and self._episode is not None:
             self._done = False
-            self._tell_done(self._episode.begin, '')
-        self._ask(goal)
+            self._publish_done(self._episode.begin, '')
+        self._publish_goal(goal)
         response.success = True
         response.message = f'{goal.camera.azimuth:.6f}'
         return response

@@ -1,1 +1,1 @@
-"""The parameters of each node, as data that nodes, bags, commands and tables read."""
+"""The nodes' parameters, declared as data for nodes, bags, commands and tables."""

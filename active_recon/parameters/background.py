@@ -1,4 +1,4 @@
-"""The parameters that tell the object from the room behind it."""
+"""The parameters of the background's removal."""
 
 from dataclasses import dataclass
 
@@ -12,19 +12,19 @@ from active_recon.parameters.declaration import parameter
 
 
 @dataclass(frozen=True)
-class BackgroundSettings:
-    """Of a node that takes the background away."""
+class BackgroundParameters:
+    """Parameters of a node that removes the background."""
 
     background: str = parameter(
-        'as_is', 'what becomes white behind the object: nothing, what camera/mask says, what was '
-        'there when capture_background was called, or what is of background_color',
+        'as_is', 'which pixels become white: none (as_is), those outside camera/mask, those that '
+        'equal the image of capture_background, or those of background_color',
         choices=BACKGROUNDS)
     background_color: tuple[int, ...] = parameter(
-        GREEN_SCREEN, "the background's red, green and blue", low=0, high=255, changeable=True)
+        GREEN_SCREEN, 'RGB color of the background', low=0, high=255, dynamic=True)
     background_tolerance: float = parameter(
-        COLOR_TOLERANCE, 'CIE Lab distance of colors that still are the background', low=0.1,
-        high=200.0, changeable=True)
+        COLOR_TOLERANCE, 'largest CIE Lab distance from the color of the background', low=0.1,
+        high=200.0, dynamic=True)
 
     def as_background(self) -> Background:
-        """Return them as the core knows them; raises ConfigError as it does."""
+        """Return the background as the core takes it; raises ConfigError as `Background` does."""
         return Background(self.background, self.background_color, self.background_tolerance)

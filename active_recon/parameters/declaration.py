@@ -1,7 +1,7 @@
 """
-A node's parameters, declared as data: a frozen dataclass, each field made by `parameter`.
+Declares a node's parameters as data: a frozen dataclass, each field made by `parameter`.
 
-The dataclass says all that is to be known of them, without a running node and without ROS.
+The dataclass describes them completely, without a running node and without ROS.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,28 +12,27 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from active_recon.errors import ConfigError
 
-NEW_START = 'a change needs a new start'
+NEW_START = 'a change requires a restart'
 
 
 def parameter(default: object, description: str, *, low: float | None = None,
               high: float | None = None, choices: Sequence[str] = (),
-              changeable: bool = False) -> Any:
+              dynamic: bool = False) -> Any:
     """
     Return the field of a parameter: bool, int, float, str, or a tuple of floats or strings.
 
-    `low` and `high` are the ends of its range, both inside it and given together; of a tuple they
-    are those of its elements. `choices` are the words that a string may be. A default of NaN
-    stands for 'not given' and may be passed as such. One that is `changeable` may change while
-    the node runs.
+    `low` and `high` are the inclusive ends of its range, given together; for a tuple they hold
+    for each element. `choices` are the allowed strings. A default of NaN means 'not given', and
+    NaN is then an allowed value. A `dynamic` parameter can change while the node runs.
     """
     return field(default=default, metadata={
         'description': description, 'low': low, 'high': high, 'choices': tuple(choices),
-        'changeable': changeable})
+        'dynamic': dynamic})
 
 
 @dataclass(frozen=True)
 class Declared:
-    """What is declared of one parameter: its field, read."""
+    """The declaration of one parameter, read from its field."""
 
     name: str
     kind: type
@@ -43,11 +42,11 @@ class Declared:
     low: float | None
     high: float | None
     choices: tuple[str, ...]
-    changeable: bool
+    dynamic: bool
 
     @property
     def expected(self) -> str:
-        """What a value has to be, in words."""
+        """A description of the allowed values."""
         kind = self.of or self.kind
         if self.choices:
             one = f'one of {", ".join(self.choices)}'
@@ -61,7 +60,7 @@ class Declared:
         return f'a list, each {one}' if self.of else one
 
     def checked(self, value: Any) -> Any:
-        """Return the value as its kind; ConfigError where it is another or out of range."""
+        """Return the value as its kind; ConfigError where it is not allowed."""
         if self.of is not None and (value is None or isinstance(value, Sequence)):
             # An empty list has no type in ROS
             elements = tuple(_as(self.of, element) for element in value or ())
@@ -73,7 +72,7 @@ class Declared:
 
     @property
     def may_be_nan(self) -> bool:
-        """Whether a value that is not given is told by NaN."""
+        """Whether NaN is allowed and means 'not given'."""
         return isinstance(self.default, float) and math.isnan(self.default)
 
     def _allows(self, value: object) -> bool:
@@ -89,12 +88,12 @@ class Declared:
 
 
 def number_words(number: float) -> str:
-    """Return a number as it is told to people."""
+    """Format a number for messages and tables."""
     return str(int(number)) if number == number // 1 else f'{number:.4g}'
 
 
 def _as(kind: type, value: object) -> object:
-    """Return an integer as a float where a float is wanted, all else as it is."""
+    """Return an integer as a float where a float is expected, anything else unchanged."""
     return float(value) if kind is float and type(value) is int else value
 
 
@@ -104,10 +103,10 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f'did you mean {near[0]}?' if near else f'there are {", ".join(known)}'
 
 
-def declared(settings: type) -> Iterator[Declared]:
-    """Yield the parameters of a dataclass of settings, in their order."""
-    kinds = get_type_hints(settings)
-    for each in fields(settings):
+def declared(parameters: type) -> Iterator[Declared]:
+    """Yield the declarations of a dataclass of parameters, in their order."""
+    kinds = get_type_hints(parameters)
+    for each in fields(parameters):
         kind = kinds[each.name]
         of = get_args(kind)[0] if get_origin(kind) is tuple else None
         yield Declared(each.name, kind, of, each.default, **each.metadata)

@@ -6,21 +6,21 @@ from typing import Any
 
 from active_recon.errors import ConfigError
 from active_recon.parameters.declaration import declared, nearest
-from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.node_parameters import NODE_PARAMETERS
 import yaml
 
 _OF_ROS = {'use_sim_time'}
-"""Parameters that every node has without declaring them."""
+"""Parameters that every ROS node declares."""
 
 
 def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
     """
-    Return the parameters that a file gives to each node that it names, in the file's order.
+    Return the parameters that a file sets for each node that it names, in the file's order.
 
-    A node may be named in a namespace (`/cell/recorder`) or in any (`/**/recorder`); what `/**`
-    gives, it gives to all but those that leave it to another node. Raises ConfigError on what is
-    no such file, on a node that is not the package's, and on a parameter that the node does not
-    have or that may not be so.
+    A node may be named in a namespace (`/cell/recorder`) or in any (`/**/recorder`). Parameters
+    under `/**` are set for every node, except those that only other nodes have. Raises
+    ConfigError where the file is no parameters file, on a node that is not the package's, on an
+    unknown parameter, and on a value that is not allowed.
     """
     given: dict[str, dict[str, Any]] = {}
     shared: dict[str, Any] = {}
@@ -33,21 +33,22 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
         values = _mapping(path, str(key), values['ros__parameters'])
         if name == '**':
             shared.update(values)
-        elif name not in SETTINGS:
-            raise ConfigError(f'{path}: expected nodes among {", ".join(SETTINGS)}, got {key}')
+        elif name not in NODE_PARAMETERS:
+            raise ConfigError(
+                f'{path}: expected nodes among {", ".join(NODE_PARAMETERS)}, got {key}')
         else:
             given.setdefault(name, {}).update(values)
     if not given:
-        raise ConfigError(f'{path}: expected a node among {", ".join(SETTINGS)}, got none')
+        raise ConfigError(f'{path}: expected a node among {", ".join(NODE_PARAMETERS)}, got none')
     for node, values in given.items():
         _check(path, node, values, shared)
     return {node: {**_own(node, shared), **values} for node, values in given.items()}
 
 
 def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what all are given without what only other nodes have."""
-    own, *others = ({each.name for each in declared(settings)}
-                    for settings in (SETTINGS[node], *SETTINGS.values()))
+    """Return the shared parameters without those that only other nodes have."""
+    own, *others = ({each.name for each in declared(parameters)}
+                    for parameters in (NODE_PARAMETERS[node], *NODE_PARAMETERS.values()))
     return {name: value for name, value in shared.items()
             if name in own or name not in set().union(*others)}
 
@@ -72,7 +73,7 @@ def _mapping(path: Path, where: str, value: object) -> Mapping[Any, Any]:
 
 
 def _check(path: Path, node: str, values: Mapping[str, Any], shared: Mapping[str, Any]) -> None:
-    known = {each.name: each for each in declared(SETTINGS[node])}
+    known = {each.name: each for each in declared(NODE_PARAMETERS[node])}
     for name, value in {**shared, **values}.items():
         if name in known:
             try:

@@ -6,9 +6,9 @@ from active_recon.parameters.declaration import parameter
 
 
 @dataclass(frozen=True)
-class PlayerSettings:
-    """What the player is told."""
+class PlayerParameters:
+    """Parameters of the player."""
 
-    bag: str = parameter('', 'the bag to play')
-    rate: float = parameter(1.0, 'how much faster than it was recorded')
-    topics: str = parameter('', 'those to play, with commas between; empty for all')
+    bag: str = parameter('', 'bag to play')
+    rate: float = parameter(1.0, 'playback speed; 1 is that of the recording')
+    topics: str = parameter('', 'topics to play, separated by commas; empty for all')

@@ -5,43 +5,44 @@ import math
 
 from active_recon.acquisition.stillness import STILL_TIME
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE, TAKE_VIEWS
-from active_recon.parameters.background import BackgroundSettings
-from active_recon.parameters.camera_pose import CameraPoseSettings
+from active_recon.parameters.background import BackgroundParameters
+from active_recon.parameters.camera_pose import CameraPoseParameters
 from active_recon.parameters.declaration import parameter
 from active_recon.parameters.shared import (
-    CubeSettings,
-    FrontSettings,
-    ManagedSettings,
-    NetworkSettings,
+    CubeParameters,
+    FrontParameters,
+    ManagedParameters,
+    NetworkParameters,
 )
 from active_recon.volumes.voxels import MESH_FORMATS
 
 
 @dataclass(frozen=True)
-class ReconstructorSettings(BackgroundSettings, CameraPoseSettings, FrontSettings, CubeSettings,
-                            NetworkSettings, ManagedSettings):
-    """What the reconstructor is told."""
+class ReconstructorParameters(BackgroundParameters, CameraPoseParameters, FrontParameters,
+                              CubeParameters, NetworkParameters, ManagedParameters):
+    """Parameters of the reconstructor."""
 
-    device: str = parameter('cpu', 'where the network runs', choices=('cpu', 'cuda'))
+    device: str = parameter('cpu', 'device of the network', choices=('cpu', 'cuda'))
     threshold: float = parameter(
-        math.nan, "occupancy above which a cell is occupied; nan for the weights' own",
-        low=0.01, high=0.99, changeable=True)
+        math.nan, 'probability above which a cell is occupied; nan for that of the weights',
+        low=0.01, high=0.99, dynamic=True)
     take_views: str = parameter(
-        'auto', 'which images become views', choices=TAKE_VIEWS, changeable=True)
+        'auto', 'which images become views', choices=TAKE_VIEWS, dynamic=True)
     goal_tolerance: float = parameter(
-        GOAL_TOLERANCE, 'rad from a goal that still reach it', low=0.0, high=math.pi,
-        changeable=True)
+        GOAL_TOLERANCE, 'largest distance of a view from its goal, rad', low=0.0, high=math.pi,
+        dynamic=True)
     min_view_separation: float = parameter(
-        0.2, 'rad between views while there are no goals', low=0.0, high=math.pi, changeable=True)
+        0.2, 'smallest distance between views without goals, rad', low=0.0, high=math.pi,
+        dynamic=True)
     settle_time: float = parameter(
-        STILL_TIME, 's that the camera stands still before an image may be a view', low=0.0,
-        high=60.0, changeable=True)
+        STILL_TIME, 'time that the camera rests before an image can be a view, s', low=0.0,
+        high=60.0, dynamic=True)
     max_pose_gap: float = parameter(
-        0.1, 's from an image to a pose that is interpolated', low=0.0, high=10.0,
-        changeable=True)
+        0.1, 'largest time from an image to the poses it is interpolated from, s', low=0.0,
+        high=10.0, dynamic=True)
     stall_timeout: float = parameter(
-        1.0, 's for which a camera may stand away from its goal before the motion is called '
-        'stalled', low=0.1, high=3600.0, changeable=True)
-    output_dir: str = parameter('.', 'where meshes are saved')
+        1.0, 'time that the camera may rest away from its goal before a warning that it has '
+        'stalled, s', low=0.1, high=3600.0, dynamic=True)
+    output_dir: str = parameter('.', 'folder of saved meshes')
     mesh_format: str = parameter(
-        'ply', 'the format of saved meshes', choices=MESH_FORMATS, changeable=True)
+        'ply', 'format of saved meshes', choices=MESH_FORMATS, dynamic=True)

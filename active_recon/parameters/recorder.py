@@ -11,13 +11,13 @@ TOPICS = ('camera/image_raw', 'camera/image_raw/compressed', 'camera/camera_info
 
 
 @dataclass(frozen=True)
-class RecorderSettings:
-    """What the recorder is told."""
+class RecorderParameters:
+    """Parameters of the recorder."""
 
-    output_dir: str = parameter('bags', 'the folder in which each recording gets its own')
-    record_at_start: bool = parameter(True, 'whether to record without being asked')
+    output_dir: str = parameter('bags', 'folder in which each recording creates its own')
+    record_at_start: bool = parameter(True, 'whether to record from the start')
     stop_when_done: bool = parameter(
-        False, 'whether a recording ends by itself once an episode is done')
-    topics: tuple[str, ...] = parameter(TOPICS, 'the topics to record')
+        False, 'whether a recording ends when an episode is done')
+    topics: tuple[str, ...] = parameter(TOPICS, 'topics to record')
     max_bag_size_mb: int = parameter(
-        1000, 'a longer recording goes on in a second file, a third, ...', low=1, high=1_000_000)
+        1000, 'largest size of a file, MB; a longer recording is split', low=1, high=1_000_000)

@@ -1,4 +1,4 @@
-"""Parameters that several nodes have, and that mean the same in each."""
+"""Parameters that several nodes share, with the same meaning."""
 
 from dataclasses import dataclass
 import math
@@ -8,34 +8,34 @@ from active_recon.parameters.declaration import parameter
 
 
 @dataclass(frozen=True)
-class ManagedSettings:
-    """Of a life-cycle node."""
+class ManagedParameters:
+    """Parameters of a lifecycle node."""
 
     autostart: bool = parameter(
-        True, 'whether the node configures and activates itself; else it waits to be told')
+        True, 'whether the node configures and activates itself')
 
 
 @dataclass(frozen=True)
-class NetworkSettings:
-    """Of a node that runs a network."""
+class NetworkParameters:
+    """Parameters of a node that runs a network."""
 
     weights: str = parameter(
-        '', 'a weights file, or a model whose weights ship; empty for those of the default')
-    threads: int = parameter(1, 'CPU threads of the network', low=1, high=256)
+        '', 'weights file, or a model whose weights ship; empty for the default model')
+    threads: int = parameter(1, 'number of CPU threads of the network', low=1, high=256)
 
 
 @dataclass(frozen=True)
-class CubeSettings:
-    """Of a node that knows the cube in which the object stands."""
+class CubeParameters:
+    """Parameters of a node that uses the voxel grid."""
 
     object_size: float = parameter(1.0, 'side of the voxel grid, m', low=0.001, high=1000.0)
     object_frame: str = parameter(
-        OBJECT_FRAME, 'the frame of the object, in which poses count')
+        OBJECT_FRAME, 'frame of the object, in which poses are given')
 
 
 @dataclass(frozen=True)
-class FrontSettings:
-    """Of a node that knows where the object's front stands."""
+class FrontParameters:
+    """Parameters of a node that uses the object's front."""
 
     object_yaw: float = parameter(
         0.0, "azimuth of the object's front, rad", low=-2 * math.pi, high=2 * math.pi)

@@ -10,7 +10,7 @@ import sys
 
 from active_recon.errors import DataError
 from active_recon.parameters.declaration import Declared, declared, number_words
-from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.node_parameters import NODE_PARAMETERS
 
 BEGIN, END = '<!-- parameters: begin -->\n', '<!-- parameters: end -->\n'
 _SHOWN = 3  # elements of a list
@@ -19,7 +19,8 @@ _SHOWN = 3  # elements of a list
 def parameter_tables() -> str:
     """Return the parameters of every node in Markdown: a heading and a table for each."""
     return '\n'.join(
-        line for node, settings in SETTINGS.items() for line in _table(node, settings))
+        line for node, parameters in NODE_PARAMETERS.items()
+        for line in _table(node, parameters))
 
 
 def with_tables(text: str) -> str:
@@ -32,14 +33,14 @@ def with_tables(text: str) -> str:
     return f'{before}{BEGIN}{parameter_tables()}{END}{after}'
 
 
-def _table(node: str, settings: type) -> Iterator[str]:
+def _table(node: str, parameters: type) -> Iterator[str]:
     yield f'### {node}'
     yield ''
     yield '| parameter | default | allowed values | dynamic | meaning |'
     yield '|---|---|---|---|---|'
-    for each in declared(settings):
+    for each in declared(parameters):
         yield (f'| `{each.name}` | {_default(each)} | {_allowed(each)} '
-               f'| {"yes" if each.changeable else ""} | {each.description} |')
+               f'| {"yes" if each.dynamic else ""} | {each.description} |')
     yield ''
 
 

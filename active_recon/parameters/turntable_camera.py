@@ -5,33 +5,33 @@ import math
 
 from active_recon.errors import ConfigError
 from active_recon.parameters.declaration import parameter
-from active_recon.parameters.shared import CubeSettings
+from active_recon.parameters.shared import CubeParameters
 
 
 @dataclass(frozen=True)
-class TurntableCameraSettings(CubeSettings):
-    """What the simulated turntable is told; ConfigError where its object is not clear."""
+class TurntableCameraParameters(CubeParameters):
+    """Parameters of the simulated turntable; ConfigError where its object is ambiguous."""
 
-    mesh: str = parameter('', 'what to show: the name of a model that ships, or a mesh file')
-    dataset: str = parameter('', 'a folder of rendered objects to show, instead of a mesh')
-    up: str = parameter('', "the mesh file's axis that is up; empty for its format's")
-    front: str = parameter('', "the mesh file's axis of the front; empty for its format's")
-    background: float = parameter(255.0, 'grey behind the object', low=0.0, high=255.0)
+    mesh: str = parameter('', 'mesh to show: the name of a model that ships, or a mesh file')
+    dataset: str = parameter('', 'folder of rendered objects to show instead of a mesh')
+    up: str = parameter('', 'up axis of the mesh file; empty for that of its format')
+    front: str = parameter('', 'front axis of the mesh file; empty for that of its format')
+    background: float = parameter(255.0, 'gray value of the background', low=0.0, high=255.0)
     start_azimuth: float = parameter(
-        0.0, 'of the camera at start, rad', low=-2 * math.pi, high=2 * math.pi)
+        0.0, 'azimuth of the camera at the start, rad', low=-2 * math.pi, high=2 * math.pi)
     speed: float = parameter(
-        1.0, 'of the turntable, rad/s', low=0.001, high=100.0, changeable=True)
+        1.0, 'speed of the turntable, rad/s', low=0.001, high=100.0, dynamic=True)
     time_scale: float = parameter(
-        1.0, 'how much faster than the clock it turns', low=0.001, high=1000.0, changeable=True)
-    rate: float = parameter(10.0, 'of the stream, Hz', low=0.1, high=1000.0, changeable=True)
-    camera_frame: str = parameter('camera_optical_frame', 'the frame of the images')
+        1.0, 'how many times faster than the clock it turns', low=0.001, high=1000.0, dynamic=True)
+    rate: float = parameter(10.0, 'image rate, Hz', low=0.1, high=1000.0, dynamic=True)
+    camera_frame: str = parameter('camera_optical_frame', 'frame of the images')
     faults: tuple[str, ...] = parameter(
-        (), 'what goes wrong, each as NAME:AMOUNT, such as drop_images:0.3', changeable=True)
+        (), 'simulated faults, each as NAME:AMOUNT, such as drop_images:0.3', dynamic=True)
     faults_seed: int = parameter(
-        0, 'of what goes wrong by chance', low=0, high=2**32 - 1)
+        0, 'seed of random faults', low=0, high=2**32 - 1)
 
     def __post_init__(self) -> None:
-        """Refuse what contradicts itself."""
+        """Reject contradictory parameters."""
         if bool(self.mesh) == bool(self.dataset):
             raise ConfigError('parameters mesh, dataset: expected one of them, got '
                               f'{"both" if self.mesh else "neither"}')

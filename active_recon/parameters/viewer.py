@@ -10,13 +10,13 @@ HIGHEST_PORT = 65000  # with room for the next free one
 
 
 @dataclass(frozen=True)
-class ViewerSettings:
-    """What the viewer is told."""
+class ViewerParameters:
+    """Parameters of the viewer."""
 
     object_size: float = parameter(
-        math.nan, 'side of the voxel grid, m; nan for what the loop says', low=0.001, high=1000.0)
+        math.nan, 'side of the voxel grid, m; nan for that of the loop', low=0.001, high=1000.0)
     object_frame: str = parameter(
-        '', 'the frame of the object, in which poses count; empty for what the loop says')
+        '', 'frame of the object, in which poses are given; empty for that of the loop')
     port: int = parameter(
-        DEFAULT_PORT, 'where the page is served, if it is free; 0 for any that is',
+        DEFAULT_PORT, 'port of the page, or the next free one; 0 for any',
         low=0, high=HIGHEST_PORT)

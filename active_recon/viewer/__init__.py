@@ -1,1 +1,1 @@
-"""A run in the browser, live or from a bag: what is known of the loop, and the page showing it."""
+"""The loop in the browser, live or from a bag: its state, and the page that shows it."""

@@ -1,4 +1,4 @@
-"""Where the page is served: on this machine, for this machine."""
+"""The page's address, on this machine only."""
 
 import socket
 
@@ -9,13 +9,13 @@ HOST = '127.0.0.1'
 
 
 def is_served(port: int) -> bool:
-    """Return whether somebody answers on a port of this machine."""
+    """Return whether a server answers on a port of this machine."""
     with socket.socket() as probe:
         return probe.connect_ex((HOST, port)) == 0
 
 
 def free_port(first: int = DEFAULT_PORT) -> int:
-    """Return the first port from there on that nobody holds; raises ConfigError if none is."""
+    """Return the first free port from `first` on; raises ConfigError if there is none."""
     for port in range(first, HIGHEST_PORT + 1):
         with socket.socket() as probe:
             try:

@@ -1,4 +1,4 @@
-"""The page: the loop in three dimensions, and beside it a panel of words, figures and controls."""
+"""The page: the loop as a 3D scene, and a panel of text, charts and controls."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -16,25 +16,25 @@ import rich
 from viser import ClientHandle, uplot, ViserServer
 
 UPDATES_PER_S = 30.0
-_LOWEST, _HIGHEST = 0.02, 0.98  # below, nothing is published
+_LOWEST, _HIGHEST = 0.02, 0.98  # smaller probabilities are not published
 _FALLBACK_THRESHOLD = 0.5
 _NO_IMAGE = np.zeros((1, 1, 3), np.uint8)
 _LOOK_FROM = (2.1, -1.7, 2.5)  # sides of the voxel grid
 _LOOK_AT = (0.0, 0.0, -0.05)
 _LEGEND = """
-The blocks are what is held for occupied, the darker the surer. A coloured camera with a picture
-is a view that was taken, the grey one is where the camera is now, the yellow one where it shall
-look next. The bars around the turntable are what the planner expects of each direction, the best
-one yellow.
+The blocks are the occupied cells; darker blocks are more certain. A coloured camera with a
+picture is a view that was taken, the grey camera is where the camera is now, and the yellow one
+is the next view. The bars around the turntable are the planner's scores of the candidate views;
+the best one is yellow.
 """
 
 
 def _entropy_scales(count: int) -> dict[str, uplot.Scale]:
-    """Return the axes' scales for so many views: room for one more on either side."""
+    """Return the axes' scales for `count` views, with a margin on either side."""
     return {'x': uplot.Scale(time=False, range=(0.0, count + 1.0))}
 
 
-def _step_back_from_a_narrow_window(client: ClientHandle) -> None:
+def _zoom_out_in_narrow_window(client: ClientHandle) -> None:
     if client.camera.aspect < 1:
         with client.atomic():
             client.camera.position = 1.5 * np.array(_LOOK_FROM)
@@ -43,16 +43,16 @@ def _step_back_from_a_narrow_window(client: ClientHandle) -> None:
 
 class Page:
     """
-    A page on 127.0.0.1 that shows one state of the loop after the other.
+    A page on 127.0.0.1 that shows the state of the loop.
 
-    It is drawn, and asked for what was clicked, from one thread. `object_size` is the side of
-    the voxel grid in metres. Where the port is taken the next free one is used: `url` tells.
+    All methods are to be called from one thread. `object_size` is the side of the voxel grid in
+    metres. Where the port is in use the page is served at the next free one, see `url`.
     """
 
     def __init__(self, title: str, object_size: float = 1.0, port: int = 0) -> None:
         if not 0 <= port <= HIGHEST_PORT:
             raise ConfigError(f'port: expected 0 (any) to {HIGHEST_PORT}, got {port}')
-        # viser tells its address on rich's own console, which nothing else here uses
+        # viser prints its address on rich's global console, which is not used otherwise
         rich.get_console().quiet = True
         self._server = ViserServer(HOST, port, label=title, verbose=False)
         self.url = f'http://{HOST}:{self._server.get_port()}'
@@ -64,13 +64,13 @@ class Page:
         self._server.gui.main_panel.dock_right()
         self._server.initial_camera.position = _LOOK_FROM
         self._server.initial_camera.look_at = _LOOK_AT
-        self._server.on_client_connect(_step_back_from_a_narrow_window)
+        self._server.on_client_connect(_zoom_out_in_narrow_window)
         self._scene = Scene(self._server.scene, object_size)
-        self._words = self._server.gui.add_markdown('')
+        self._text = self._server.gui.add_markdown('')
         self._controls = self._server.gui.add_folder('Controls')
         self._build_figures()
         self._buttons: dict[str, Any] = {}
-        self._told: Sequence[str] = ()
+        self._shown_text: Sequence[str] = ()
         self._own_threshold = _FALLBACK_THRESHOLD
         self._shown_views: object = None
         self._shown_image: object = None
@@ -80,12 +80,12 @@ class Page:
         with self._controls:
             self._threshold: Any = gui.add_slider(
                 'Threshold', _LOWEST, _HIGHEST, 0.01, _FALLBACK_THRESHOLD,
-                hint='Cells that are occupied more probably than this are shown.')
-        # On a phone this panel begins as a bar to tap on, and leaves the room to the object
+                hint='Cells with a higher probability of occupancy are shown.')
+        # On a phone this panel is collapsed at first and leaves the space to the object
         panel = gui.add_panel()
         panel.dock_below(gui.main_panel)
         with panel.add_tab('Entropy, nats'):
-            self._no_entropy = gui.add_markdown('How unsure the reconstruction is, view by view.')
+            self._no_entropy = gui.add_markdown('The uncertainty after each view.')
             self._entropy = gui.add_uplot(
                 (*entropy_lines(()),), ({'label': 'view'}, {
                     'label': 'entropy', 'stroke': 'rgb(37, 99, 168)', 'width': 2,
@@ -93,28 +93,28 @@ class Page:
                 scales=_entropy_scales(0), legend={'show': False}, height=170, visible=False,
                 axes=({'incrs': (1.0, 2.0, 5.0)}, {'size': 60.0}), padding=(12, 24, 0, 0))
         with panel.add_tab('Network image'):
-            self._no_image = gui.add_markdown('The last view as the network saw it.')
+            self._no_image = gui.add_markdown('The last view as the network received it.')
             self._image: Any = gui.add_image(_NO_IMAGE, visible=False)
-        with panel.add_tab('What is shown'):
+        with panel.add_tab('Legend'):
             gui.add_markdown(_LEGEND)
 
     def add_button(self, label: str, hint: str) -> None:
-        """Add a button, whose clicks `clicks` returns by its label."""
+        """Add a button; `clicks` returns its clicks by its label."""
         with self._controls:
             button = self._server.gui.add_button(label, hint=hint)
         button.on_click(lambda _: self._clicked.append(label))
         self._buttons[label] = button
 
     def enable(self, label: str, possible: bool) -> None:
-        """Let a button be clicked, or not."""
+        """Enable a button, or disable it."""
         if self._buttons[label].disabled is possible:
             self._buttons[label].disabled = not possible
 
-    def add_steps(self, count: int, what: str) -> Any:
-        """Add a slider from 1 to `count` and return it; its `value` is where it stands."""
+    def add_steps(self, count: int, label: str) -> Any:
+        """Add a slider from 1 to `count` and return it; `value` is its position."""
         with self._controls:
             return self._server.gui.add_slider(
-                what, 1, max(count, 1), 1, 1, disabled=count < 2, order=-1)
+                label, 1, max(count, 1), 1, 1, disabled=count < 2, order=-1)
 
     def clicks(self) -> list[str]:
         """Return the labels of the buttons clicked since the last call, in their order."""
@@ -124,19 +124,19 @@ class Page:
                 clicked.append(self._clicked.popleft())
         return clicked
 
-    def tell(self, words: Sequence[str]) -> None:
-        """Show lines of words at the top of the panel."""
-        if words != self._told:
-            self._told = words
-            first, *rest = words
-            self._words.content = '\n\n'.join([f'**{first}**', *rest])
+    def set_text(self, lines: Sequence[str]) -> None:
+        """Show lines of text at the top of the panel, the first one in bold."""
+        if lines != self._shown_text:
+            self._shown_text = lines
+            first, *rest = lines
+            self._text.content = '\n\n'.join([f'**{first}**', *rest])
 
     def draw(self, state: LoopState) -> None:
         """Show a state; only what has changed since the last is sent."""
-        if not self._server.get_clients():  # nobody looks: whoever comes is shown what is then
+        if not self._server.get_clients():  # a later client is shown the state of its time
             return
         if state.threshold is not None and self._threshold.value == self._own_threshold:
-            # The loop's own, until somebody moves the slider
+            # The loop's own threshold, until the slider is moved
             self._own_threshold = min(max(state.threshold, _LOWEST), _HIGHEST)
             self._threshold.value = self._own_threshold
         with self._server.atomic():
@@ -162,13 +162,13 @@ class Page:
             self._image.image = image
 
     def set_object_size(self, object_size: float) -> None:
-        """Show a voxel grid of another side, metres."""
+        """Set the side of the voxel grid, metres."""
         self._scene.set_object_size(object_size)
 
-    def notify(self, title: str, words: str) -> None:
-        """Show a note for some seconds to whoever looks."""
+    def notify(self, title: str, text: str) -> None:
+        """Show a notification for some seconds on every client."""
         for client in self._server.get_clients().values():
-            client.add_notification(title, words, auto_close_seconds=12.0)
+            client.add_notification(title, text, auto_close_seconds=12.0)
 
     def close(self) -> None:
         """Stop serving."""

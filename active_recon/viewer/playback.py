@@ -1,4 +1,4 @@
-"""A recorded run on the page: its views one after the other, at will."""
+"""A recorded run on the page: step through its views, or play them."""
 
 from collections.abc import Iterator
 
@@ -8,18 +8,17 @@ from active_recon.viewer.page import Page
 from active_recon.viewer.state import (
     LoopState,
     Observer,
-    own_threshold,
     Scores,
-    TakenView,
     thumbnail,
 )
+from active_recon.viewer.view_result import ViewResult
 
 PLAY = 'Play'
-_STEP_S = 1.0  # while it plays
+_STEP_S = 1.0  # seconds for each view
 
 
 def recorded_states(run: RecordedRun) -> list[LoopState]:
-    """Return what was known after each view of a run, all episodes in their order."""
+    """Return the state after each view of a run, all episodes in their order."""
     return [state for episode in run.episodes for state in _episode_states(episode)]
 
 
@@ -28,9 +27,9 @@ def _episode_states(episode: RecordedEpisode) -> Iterator[LoopState]:
     observer.begin_episode(episode.id, episode.begin)
     for view in episode.views:
         grid = view.occupied if view.reconstruction is None else view.reconstruction
-        observer.take_view(
-            TakenView(view.stamp, view.camera, thumbnail(view.image), view.entropy), grid,
-            None if view.occupied is None else own_threshold(view.occupied))
+        observer.add_view(
+            ViewResult(view.stamp, view.camera, thumbnail(view.image), view.entropy), grid,
+            view.occupied)
         end = view.stamp
         if view.goal is not None:
             _set_goal(observer, view.goal.followed)
@@ -48,7 +47,7 @@ def _set_goal(observer: Observer, goal: RecordedGoal) -> None:
 
 class Playback:
     """
-    A page through which a run is stepped, or played, view by view; `draw` it again and again.
+    A page on which a run is stepped through or played; call `draw` repeatedly.
 
     Raises DataError where the run has no view.
     """
@@ -56,21 +55,21 @@ class Playback:
     def __init__(self, run: RecordedRun, port: int = 0) -> None:
         self._states = recorded_states(run)
         if not self._states:
-            raise DataError(f'{run.path}: no view was taken in it')
+            raise DataError(f'{run.path}: expected a view, the run has none')
         grid = self._states[-1].grid
         self.page = Page(run.path.name, grid.size if grid is not None else 1.0, port)
         self._step = self.page.add_steps(len(self._states), 'View')
-        self.page.add_button(PLAY, 'Show one view after the other, from here or from the first.')
+        self.page.add_button(PLAY, 'Play the views from here, or from the first.')
         self._stepped_at: float | None = None
-        self.told: list[str] = []
+        self.shown_text: list[str] = []
 
     @property
     def playing(self) -> bool:
-        """Whether one view follows the other by itself."""
+        """Whether the run is playing."""
         return self._stepped_at is not None
 
     def draw(self, now: float) -> None:
-        """Show the view that is chosen; `now` is any clock in seconds."""
+        """Draw the selected view; `now` is any clock in seconds."""
         if PLAY in self.page.clicks():
             self._stepped_at = now
             if self._step.value == len(self._states):
@@ -79,16 +78,16 @@ class Playback:
             self._stepped_at = now if self._step.value < len(self._states) else None
             self._step.value = min(self._step.value + 1, len(self._states))
         state = self._states[self._step.value - 1]
-        self.told = self._words(state)
-        self.page.tell(self.told)
+        self.shown_text = self._text(state)
+        self.page.set_text(self.shown_text)
         self.page.draw(state)
 
-    def _words(self, state: LoopState) -> list[str]:
+    def _text(self, state: LoopState) -> list[str]:
         episodes = list(dict.fromkeys(known.episode for known in self._states))
         words = [f'View {len(state.views)} of '
                  f'{sum(known.episode == state.episode for known in self._states)}']
         if len(episodes) > 1:
             words[0] += f', episode {episodes.index(state.episode) + 1} of {len(episodes)}'
         if state.done:
-            words.append(f'The last one: {state.done.replace("_", " ")}.')
+            words.append(f'Done: {state.done.replace("_", " ")}.')
         return words

@@ -1,11 +1,12 @@
-"""The loop in three dimensions; lengths are sides of the voxel grid, whatever its size."""
+"""The loop as a 3D scene; lengths are in sides of the voxel grid, whatever its size."""
 
 import math
 from typing import Any
 
 from active_recon.geometry.cameras import Camera, view_distance
 from active_recon.view_colors import Color, view_color
-from active_recon.viewer.state import LoopState, Scores, TakenView
+from active_recon.viewer.state import LoopState, Scores
+from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
@@ -26,11 +27,11 @@ _FRUSTUM = 0.22
 _BOX: Any = trimesh.creation.box()
 _COLORS: NDArray[np.uint8] = np.asarray(cv2.applyColorMap(
     np.arange(256, dtype=np.uint8), cv2.COLORMAP_VIRIDIS), np.uint8).reshape(-1, 3)[:, ::-1]
-_GAP = 0.93  # of a cell: the seams let the single voxels be told apart
+_GAP = 0.93  # of a cell: the gaps make single voxels visible
 
 
 class Scene:
-    """What viser shows of a state; only what has changed since the last is sent."""
+    """The viser scene of a state; only what has changed since the last is sent."""
 
     def __init__(self, scene: SceneApi, object_size: float) -> None:
         self._scene = scene
@@ -38,8 +39,8 @@ class Scene:
         self._shown = LoopState()
         self._threshold = math.nan
         self._views: list[Any] = []
-        # What changes is changed where it stands: to make a thing anew costs several times that
-        self._known: dict[str, Any] = {}
+        # Updating an object costs a fraction of creating it anew
+        self._objects: dict[str, Any] = {}
         self._cell_side = math.nan
         scene.configure_environment_map('studio', environment_intensity=0.1)
         scene.add_cylinder('/turntable', 0.78, 0.02, (226, 229, 236), radial_segments=64,
@@ -48,13 +49,13 @@ class Scene:
                         font_screen_scale=0.8)
 
     def set_object_size(self, object_size: float) -> None:
-        """Forget what was drawn, and show a voxel grid of another side, metres."""
+        """Clear the scene and set the side of the voxel grid, metres."""
         self.draw(LoopState(), self._threshold)
         self._remove('/camera')
         self._size = object_size
 
     def draw(self, state: LoopState, threshold: float) -> None:
-        """Show a state, its cells above the threshold."""
+        """Draw a state, with the cells above the threshold."""
         before, self._shown = self._shown, state
         if state.grid is not before.grid or threshold != self._threshold:
             self._threshold = threshold
@@ -75,7 +76,7 @@ class Scene:
             return
         assert grid is not None
         side = _GAP * grid.cell_size / grid.size
-        if side != self._cell_side:  # another network's
+        if side != self._cell_side:  # of another network
             self._cell_side = side
             self._remove('/occupancy')
         self._boxes('/occupancy', side, cells[:, :3], certainty_colors(cells[:, 3]))
@@ -93,16 +94,16 @@ class Scene:
         self._boxes('/scores', _BAR_WIDTH, centers, colors,
                     np.column_stack([np.ones((len(heights), 2)), heights / _BAR_WIDTH]))
 
-    def _draw_views(self, before: tuple[TakenView, ...], views: tuple[TakenView, ...]) -> None:
+    def _draw_views(self, before: tuple[ViewResult, ...], views: tuple[ViewResult, ...]) -> None:
         kept = before == views[:len(before)]
         if not kept:
             for handle in self._views:
-                handle.remove()  # and with it its label
+                handle.remove()  # with its label
             self._views.clear()
         first = len(before) if kept else 0
         for number, view in enumerate(views[first:], first + 1):
             name, color = f'/views/{number}', view_color(number)
-            again = _together(view, views[:number - 1])
+            again = _at_same_place(view, views[:number - 1])
             self._views.append(self._frustum(name, view.camera, color, view.image))
             self._label(f'{name}/label', f'{number} · {math.degrees(view.camera.azimuth):.0f}°',
                         again)
@@ -113,21 +114,21 @@ class Scene:
             self._remove('/goal')
             return
         words = f'next · {math.degrees(goal.azimuth):.0f}°'
-        if '/goal' in self._known:
-            self._place(self._known['/goal'], goal)
-            self._known['/goal/label'].text = words
+        if '/goal' in self._objects:
+            self._place(self._objects['/goal'], goal)
+            self._objects['/goal/label'].text = words
             return
-        self._known['/goal'] = self._frustum('/goal', goal, _NEXT_COLOR, None)
-        self._known['/goal/label'] = self._label('/goal/label', words)
+        self._objects['/goal'] = self._frustum('/goal', goal, _NEXT_COLOR, None)
+        self._objects['/goal/label'] = self._label('/goal/label', words)
 
     def _draw_camera(self, camera: Camera | None, picture: NDArray[np.uint8] | None) -> None:
         if camera is None:
             return
-        if '/camera' not in self._known:
-            self._known['/camera'] = self._frustum(
+        if '/camera' not in self._objects:
+            self._objects['/camera'] = self._frustum(
                 '/camera', camera, _NOW_COLOR, picture, 0.8 * _FRUSTUM)
             return
-        known = self._known['/camera']
+        known = self._objects['/camera']
         self._place(known, camera)
         if picture is not None and picture is not known.image:
             known.image = picture
@@ -145,20 +146,20 @@ class Scene:
         frustum.wxyz = SO3.from_matrix(camera.pose[:3, :3]).wxyz
 
     def _label(self, name: str, words: str, others: int = 0) -> Any:
-        # Above the camera, and above others' labels there: y is down in its optical frame
+        # Above the camera and the labels of others there: y points down in the optical frame
         return self._scene.add_label(
             name, words, position=(0, -0.62 * _FRUSTUM - 0.1 * others, _FRUSTUM),
             anchor='bottom-center', font_screen_scale=0.9)
 
     def _boxes(self, name: str, side: float, centers: NDArray[np.floating],
                colors: NDArray[np.uint8], scales: NDArray[np.floating] | None = None) -> None:
-        """Show cubes of a side that stays, (N, 3) times as long by `scales`."""
-        # Scales go to the browser with as many bits as they have, and it reads 32
+        """Draw cubes of a fixed side at `centers` (N, 3), stretched by `scales` (N, 3)."""
+        # The browser reads scales as 32 bits, whatever their type
         lengths = None if scales is None else np.asarray(scales, np.float32)
         upright = np.tile(np.array([1, 0, 0, 0], np.float32), (len(centers), 1))
-        known = self._known.get(name)
+        known = self._objects.get(name)
         if known is None:
-            self._known[name] = self._scene.add_batched_meshes_simple(
+            self._objects[name] = self._scene.add_batched_meshes_simple(
                 name, side * _BOX.vertices, _BOX.faces, upright, centers, batched_scales=lengths,
                 batched_colors=colors, flat_shading=True, lod='off', cast_shadow=False,
                 receive_shadow=False)
@@ -171,19 +172,19 @@ class Scene:
             known.batched_scales = lengths
 
     def _remove(self, name: str) -> None:
-        known = self._known.pop(name, None)
+        known = self._objects.pop(name, None)
         if known is not None:
             known.remove()
 
 
-def _together(view: TakenView, others: tuple[TakenView, ...]) -> int:
-    """Return how many of the others stand where a view does."""
+def _at_same_place(view: ViewResult, others: tuple[ViewResult, ...]) -> int:
+    """Return how many other views were taken from the same place."""
     return sum(view_distance(other.camera, view.camera) < math.radians(7) for other in others)
 
 
 def shown_cells(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
     """
-    Return the cells above the threshold that can be seen from outside, (N, 4).
+    Return the cells above the threshold that are visible from outside, (N, 4).
 
     Each is x, y, z in sides of the grid, and its occupancy.
     """
@@ -193,12 +194,12 @@ def shown_cells(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
 
 
 def certainty_colors(occupancy: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return colours, (N, 3) RGB, from light (0, hardly occupied) to dark (1, certainly so)."""
+    """Return colours, (N, 3) RGB, from light (probability 0) to dark (probability 1)."""
     return _COLORS[np.rint(235 - 195 * occupancy).astype(np.uint8)]
 
 
 def relative_scores(scores: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return scores between 0.05 (the least) and 1 (the best), for scores know no unit."""
+    """Return scores mapped to 0.05 (the lowest) to 1 (the best): they have no unit."""
     low, high = float(scores.min()), float(scores.max())
     share = (np.asarray(scores, np.float64) - low) / (high - low) if high > low else np.zeros(
         len(scores))

@@ -74,7 +74,7 @@ def demo(tmp_path_factory):
 @pytest.fixture
 def late_view(demo, tmp_path):
     """Return a second viewer, started when the loop has come to rest."""
-    demo.said('(go on until Ctrl-C)')
+    demo.said('(run until Ctrl-C)')
     command = Command(
         tmp_path / 'view', 'view', ROS_DOMAIN_ID=demo.said(r'domain\s+(\d+)'),
         ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
@@ -84,10 +84,10 @@ def late_view(demo, tmp_path):
 
 
 def test_the_page_follows_the_loop_and_begins_a_new_episode_when_asked(demo, chromium):
-    url = demo.said(r'watch it at (http://127\.0\.0\.1:\d+)')
+    url = demo.said(r'the page is at (http://127\.0\.0\.1:\d+)')
     chromium.open(url)
     chromium.until(lambda: 'Done (max views): 2 views' in chromium.text(), 'the end', BUDGET_S)
-    demo.said('(go on until Ctrl-C)')
+    demo.said('(run until Ctrl-C)')
     first = episode(chromium.text())
     chromium.run(_CLICK, 'New episode')
     chromium.until(lambda: episode(chromium.text()) not in ('', first), 'another', BUDGET_S)
@@ -98,7 +98,7 @@ def test_the_page_follows_the_loop_and_begins_a_new_episode_when_asked(demo, chr
 
 
 def test_who_comes_late_is_shown_what_is_latched_at_another_port(demo, late_view, chromium):
-    first = demo.said(r'watch it at (http://127\.0\.0\.1:\d+)')
+    first = demo.said(r'the page is at (http://127\.0\.0\.1:\d+)')
     url = late_view.said(r'the page is at (http://127\.0\.0\.1:\d+)')
     assert url != first
     chromium.open(url)
@@ -135,8 +135,8 @@ def test_a_loop_of_other_size_and_names_is_shown_without_being_told(
 
 
 def test_ctrl_c_ends_the_demo_its_nodes_and_its_page(demo):
-    demo.said('(go on until Ctrl-C)')
-    port = int(demo.said(r'watch it at http://127\.0\.0\.1:(\d+)'))
+    demo.said('(run until Ctrl-C)')
+    port = int(demo.said(r'the page is at http://127\.0\.0\.1:(\d+)'))
     assert is_served(port)
     code, said = demo.interrupt()
     assert code == 0

@@ -11,7 +11,8 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.viewer.page import Page
 from active_recon.viewer.playback import PLAY, Playback
-from active_recon.viewer.state import LoopState, Observer, Scores, TakenView
+from active_recon.viewer.state import LoopState, Observer, Scores
+from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def picture(number):
 
 
 def taken(number):
-    return TakenView(100 * number, orbit_camera(1.3 * number), picture(number),
+    return ViewResult(100 * number, orbit_camera(1.3 * number), picture(number),
                      1000.0 / number)
 
 
@@ -98,14 +99,15 @@ def observed(views):
     observer = Observer()
     observer.begin_episode('a', 0)
     for number in range(1, views + 1):
-        observer.take_view(taken(number), ball(0.1 + 0.1 * number), 0.5)
+        grid = ball(0.1 + 0.1 * number)
+        observer.add_view(taken(number), grid, grid.above(0.5))
     observer.set_goal(1000, orbit_camera(5.5))
     observer.set_scores(1000, Scores(AZIMUTHS, np.arange(24.0)))
     return observer.state
 
 
 def test_a_new_view_changes_what_is_shown_and_nothing_complains(page, chromium):
-    page.tell(['1 view, the last 3 s ago.', 'No publisher on /next_view yet.'])
+    page.set_text(['1 view, the last 3 s ago.', 'No publisher on /next_view yet.'])
     opened(chromium, page.url)
     empty = shown(chromium, lambda: page.draw(LoopState()), lambda picture: apart(
         np.full_like(picture, 255), picture) > 0.01, 'the turntable')
@@ -169,7 +171,7 @@ def test_the_last_view_is_shown_as_the_network_saw_it(page, chromium):
 @pytest.mark.parametrize('size', [LAPTOP, PHONE])
 def test_words_and_controls_lie_within_the_window(page, chromium, size):
     page.add_button('New episode', 'begin again')
-    page.tell(['Waiting for a loop.'])
+    page.set_text(['Waiting for a loop.'])
     opened(chromium, page.url, size)
     right, bottom = chromium.run(f"""
         const box = (() => {{{_BUTTON}}})(arguments[0]).getBoundingClientRect();
@@ -229,7 +231,7 @@ def test_a_bag_is_stepped_through_view_by_view(playback, chromium):
     slider = chromium.driver.find_elements('css selector', '[role=slider]')[0]
     slider.send_keys('\ue014\ue014')  # arrows to the right
     told('View 3 of 3, episode 1 of 2')
-    told('The last one: max views.')
+    told('Done: max views.')
     shown(chromium, lambda: playback.draw(0.0),
           lambda picture: apart(first, picture) > 0.01, 'the third view')
     slider.send_keys('\ue012\ue012')
@@ -247,7 +249,7 @@ def test_a_bag_plays_to_its_end_and_then_from_the_first_view(playback, chromium)
         chromium.until(lambda begin=begin: (playback.draw(begin), playback.playing)[1], PLAY)
         for second in range(begin, begin + 10):
             playback.draw(float(second))
-            words.append(playback.told[0])
+            words.append(playback.shown_text[0])
     seen = list(dict.fromkeys(words))
     assert seen == ['View 1 of 3, episode 1 of 2', 'View 2 of 3, episode 1 of 2',
                     'View 3 of 3, episode 1 of 2', 'View 1 of 1, episode 2 of 2']

@@ -33,8 +33,8 @@ from std_srvs.srv import Trigger
 import trimesh
 
 ROOT = Path(__file__).parents[2]
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-STREAM = QoSProfile(depth=100)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM_QOS = QoSProfile(depth=100)
 BUDGET_S = 60.0  # for what takes a second on an idle machine
 SEND_AGAIN_S = 5.0
 _ENTROPY = 100.0  # nats
@@ -106,8 +106,8 @@ class Bench:
 
     def __init__(self) -> None:
         self.node = rclpy.create_node('bench')
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self.node)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
         self._states: dict[str, NodeStatus] = {}
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
 
@@ -122,13 +122,13 @@ class Bench:
         """Return the counters that a node published last."""
         return self.state(name).counts
 
-    def hear(self, kind: type, topic: str, qos: QoSProfile = STREAM) -> list[Any]:
+    def subscribe(self, kind: type, topic: str, qos: QoSProfile = STREAM_QOS) -> list[Any]:
         """Return a list that grows by what is heard."""
         heard: list[Any] = []
         self.node.create_subscription(kind, topic, heard.append, qos)
         return heard
 
-    def advertise(self, kind: type, topic: str, qos: QoSProfile = STREAM) -> Any:
+    def advertise(self, kind: type, topic: str, qos: QoSProfile = STREAM_QOS) -> Any:
         """Return a publisher that somebody is about to hear."""
         publisher = self.node.create_publisher(kind, topic, qos)
         self.until(lambda: publisher.get_subscription_count() > 0, f'a listener on {topic}')
@@ -144,7 +144,7 @@ class Bench:
         """Spin until the condition holds or the time is over; return what it returned last."""
         deadline = time.monotonic() + budget_s
         while not (value := condition()) and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=0.02)
+            self.executor.spin_once(timeout_sec=0.02)
         return value
 
     def call(self, service: str) -> Trigger.Response:
@@ -171,7 +171,7 @@ class Bench:
         return self.node.get_clock().now().nanoseconds
 
     def close(self) -> None:
-        self._executor.shutdown()
+        self.executor.shutdown()
         self.node.destroy_node()
 
 
@@ -215,11 +215,11 @@ def ros(ros_domain: int) -> Iterator[None]:
 class FakeCamera:
     """A camera in the bench's hand, whose messages can be spoilt one by one."""
 
-    def __init__(self, bench: Bench, qos: QoSProfile = STREAM) -> None:
+    def __init__(self, bench: Bench, qos: QoSProfile = STREAM_QOS) -> None:
         self._bench = bench
         self._publishers = [bench.advertise(kind, f'camera/{topic}', qos) for kind, topic in (
             (PoseStamped, 'pose'), (CameraInfo, 'camera_info'), (Image, 'image_raw'))]
-        self.occupancy = bench.hear(PointCloud2, 'occupancy')
+        self.occupancy = bench.subscribe(PointCloud2, 'occupancy')
         bench.until(lambda: bench.node.count_publishers('occupancy'), 'a publisher of occupancy')
 
     def messages(self, stamp: int | None = None, azimuth: float = 0.5,
@@ -263,8 +263,8 @@ class FakeReconstructor:
     def __init__(self, bench: Bench, topics: Sequence[str] = tuple(TOPICS),
                  heard: bool = True) -> None:
         self.bench = bench
-        self.goals = bench.hear(PoseStamped, 'next_view', LATCHED)
-        self.done = bench.hear(Header, 'done', LATCHED)
+        self.goals = bench.subscribe(PoseStamped, 'next_view', LATCHED_QOS)
+        self.done = bench.subscribe(Header, 'done', LATCHED_QOS)
         self._publishers: dict[str, Any] = {}
         for topic in topics:
             self.publish_on(topic, heard)
@@ -272,7 +272,7 @@ class FakeReconstructor:
     def publish_on(self, topic: str, heard: bool = True) -> None:
         """Offer a topic; `heard` waits for a listener."""
         make = self.bench.advertise if heard else self.bench.node.create_publisher
-        self._publishers[topic] = make(self.TOPICS[topic], topic, LATCHED)
+        self._publishers[topic] = make(self.TOPICS[topic], topic, LATCHED_QOS)
 
     def begin(self, name: str, stamp: int | None = None) -> None:
         """Begin an episode, now if no stamp in nanoseconds is given."""

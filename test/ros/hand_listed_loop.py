@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import LATCHED
+from .conftest import LATCHED_QOS
 
 # Of the 24 views, 15 degrees apart, those nearest to 0, 18, 36, ... 342 degrees
 DEGREES = [0, 15, 30, 60, 75, 90, 105, 120, 150, 165,
@@ -45,11 +45,11 @@ class Loop:
         self._degrees = {image.tobytes(): 15 * index for index, image in enumerate(shown.images)}
         self._seen = {}
         bench.node.create_subscription(Image, 'camera/image_raw', self._on_image, 400)
-        self._views = bench.hear(PoseStamped, 'view')
-        self._occupancy = bench.hear(PointCloud2, 'occupancy')
-        self._episodes = bench.hear(Header, 'episode', LATCHED)
-        self._ends = bench.hear(Header, 'done', LATCHED)
-        self._goals = bench.hear(PoseStamped, 'next_view', LATCHED)
+        self._views = bench.subscribe(PoseStamped, 'view')
+        self._occupancy = bench.subscribe(PointCloud2, 'occupancy')
+        self._episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
+        self._ends = bench.subscribe(Header, 'done', LATCHED_QOS)
+        self._goals = bench.subscribe(PoseStamped, 'next_view', LATCHED_QOS)
         self._clients = {
             name: bench.node.create_client(SetParameters, f'{name}/set_parameters')
             for name in nodes}

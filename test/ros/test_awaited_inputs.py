@@ -4,7 +4,7 @@ import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from .conftest import FakeCamera, FakeReconstructor, STREAM
+from .conftest import FakeCamera, FakeReconstructor, STREAM_QOS
 
 pytestmark = pytest.mark.ros
 BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -29,12 +29,12 @@ def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
         start_node, bench, said):
     for kind, topic in ((Image, 'usb_cam/image_raw'), (CompressedImage, 'front/color/compressed'),
                         (CompressedImage, 'thermal')):
-        bench.node.create_publisher(kind, topic, STREAM)
+        bench.node.create_publisher(kind, topic, STREAM_QOS)
     reconstructor = start_node('reconstructor')
     problem = said(
         'reconstructor', 'camera/image_raw', '/usb_cam/image_raw has', '/thermal has', '/front')
-    assert ('/camera/image_raw or /camera/image_raw/compressed: expected messages, none has ever '
-            'come; nobody publishes there') in problem
+    assert ('/camera/image_raw or /camera/image_raw/compressed: expected messages, none has '
+            'arrived; nothing publishes there') in problem
     for topic, name, other in (
             ('/usb_cam/image_raw', 'camera/image_raw', '/usb_cam/image_raw'),
             ('/front/color/compressed', 'camera/image_raw', '/front/color'),
@@ -43,18 +43,18 @@ def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
     assert '/latent has' not in problem  # its own
     for name in ('camera/camera_info', 'camera/pose'):
         assert f'/{name}: expected messages' in said('reconstructor', name)
-    assert len(reconstructor.log('WARN.*none has ever come')) == 3
+    assert len(reconstructor.log('WARN.*none has arrived')) == 3
 
 
 def test_a_publisher_that_is_silent_or_of_another_type_is_named_with_its_qos(
         start_node, bench, said):
     start_node('reconstructor')
     bench.node.create_publisher(Image, 'camera/image_raw', BEST_EFFORT)
-    bench.node.create_publisher(Image, 'camera/camera_info', STREAM)
+    bench.node.create_publisher(Image, 'camera/camera_info', STREAM_QOS)
     said('reconstructor', 'camera/image_raw',
-         '/bench publishes there (best effort, volatile) and has sent nothing yet',
-         '/bench publishes there (reliable, volatile) and sends sensor_msgs/msg/Image instead of '
-         'sensor_msgs/msg/CameraInfo')
+         '/bench publishes there (best effort, volatile) and has published nothing yet',
+         '/bench publishes there (reliable, volatile) and publishes sensor_msgs/msg/Image instead '
+         'of sensor_msgs/msg/CameraInfo')
 
 
 def test_the_first_message_takes_the_warning_back_for_good(start_node, bench, said):
@@ -62,7 +62,7 @@ def test_the_first_message_takes_the_warning_back_for_good(start_node, bench, sa
     said('reconstructor', 'camera/pose', 'camera/camera_info', 'camera/image_raw')
     FakeCamera(bench).show()
     bench.until(lambda: not bench.state('reconstructor').problem, 'the end of the warnings')
-    bench.until(lambda: len(reconstructor.log('INFO.*over: .*none has ever')) == 3, 'their end')
+    bench.until(lambda: len(reconstructor.log('INFO.*over: .*none has arrived')) == 3, 'their end')
 
 
 def test_a_compressed_image_is_an_image_that_was_heard(start_node, bench, said):
@@ -80,7 +80,7 @@ def test_a_compressed_image_is_an_image_that_was_heard(start_node, bench, said):
 
 def test_a_planner_without_a_reconstructor_says_so(start_node, bench, said):
     start_node('view_planner', policy='farthest')
-    said('view_planner', 'episode', '/episode: expected messages, none has ever come')
+    said('view_planner', 'episode', '/episode: expected messages, none has arrived')
     assert '/camera/pose: expected' in said('view_planner', 'camera/pose')
     FakeReconstructor(bench).begin('first')
     bench.until(lambda: '/episode' not in bench.state('view_planner').problem, 'no warning')

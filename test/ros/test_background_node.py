@@ -14,7 +14,7 @@ import pytest
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
+from .conftest import BUDGET_S, LATCHED_QOS, SEND_AGAIN_S
 from .test_life_cycle import Supervisor
 
 pytestmark = pytest.mark.ros
@@ -36,8 +36,8 @@ class Room:
         kinds = [(PoseStamped, 'pose'), (CameraInfo, 'camera_info'), (Image, 'image_raw')]
         self._publishers = [bench.advertise(kind, f'camera/{topic}') for kind, topic in kinds]
         self._masks = bench.advertise(Image, 'camera/mask') if masked else None
-        self.cleared = bench.hear(Image, 'view_image', LATCHED)
-        self.probabilities = bench.hear(PointCloud2, 'probabilities', LATCHED)
+        self.cleared = bench.subscribe(Image, 'view_image', LATCHED_QOS)
+        self.probabilities = bench.subscribe(PointCloud2, 'probabilities', LATCHED_QOS)
 
     def show(self, image, mask=None, camera=CAMERA):
         """Send one image with all that belongs to it; return its stamp."""

@@ -181,7 +181,7 @@ def test_a_stream_of_bad_input_is_no_stream_of_lines(bench, turntable, ask):
 @pytest.mark.parametrize('azimuth', [math.nan, math.inf, -math.inf])
 def test_a_goal_that_is_not_finite_is_said_once_counted_and_survived(
         bench, turntable, ask, azimuth):
-    poses = bench.hear(PoseStamped, 'camera/pose')
+    poses = bench.subscribe(PoseStamped, 'camera/pose')
     ask(azimuth)
     bench.until(lambda: bench.counts('turntable_camera').get('refused/goal') == 1,
                 'the goal to be refused')

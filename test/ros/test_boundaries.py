@@ -16,7 +16,7 @@ import active_recon
 import pytest
 from sensor_msgs.msg import PointCloud2
 
-from .conftest import BUDGET_S, LATCHED, ROOT
+from .conftest import BUDGET_S, LATCHED_QOS, ROOT
 
 pytestmark = pytest.mark.ros
 LISTENS = '0A'
@@ -122,7 +122,7 @@ def test_files_that_parameters_name_are_only_read_and_all_else_goes_under_output
           witnessed('turntable_camera', run, mesh=mesh) as by_camera,
           witnessed('reconstructor', run, weights=given / '2d3d-attention.safetensors',
                     take_views='all', threshold=0.01, output_dir=out / 'meshes') as by_network):
-        occupancy = bench.hear(PointCloud2, 'occupancy', LATCHED)
+        occupancy = bench.subscribe(PointCloud2, 'occupancy', LATCHED_QOS)
         bench.until(lambda: occupancy, 'a view of what the camera shows', 3 * BUDGET_S)
         mesh_file = Path(bench.call('save_mesh').message)
         bag = Path(bench.call('stop').message)

@@ -4,7 +4,7 @@ from active_recon.calibration.board import Detection
 from active_recon.calibration.fit import ImageFit
 from active_recon.calibration.outcome import Calibration
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS
-from active_recon.parameters.camera_pose import CameraPoseSettings
+from active_recon.parameters.camera_pose import CameraPoseParameters
 import numpy as np
 import pytest
 import rclpy
@@ -33,4 +33,4 @@ def test_ros_reads_what_a_calibration_writes(ros, tmp_path, namespace):
     lists = {name: list(value) for name, value in given.items() if name.startswith('camera_')}
     assert {**given, **lists} == PARAMETERS
     names = given.keys() - {'object_size'}
-    CameraPoseSettings(**{name: given[name] for name in names}).as_fixed_camera()
+    CameraPoseParameters(**{name: given[name] for name in names}).as_fixed_camera()

@@ -98,7 +98,7 @@ def test_of_images_that_came_too_fast_the_newest_is_a_view_and_the_others_are_co
 
 
 def test_who_sends_both_forms_is_heard_once(shared_bench, camera, compressed):
-    views = shared_bench.hear(PoseStamped, 'view')
+    views = shared_bench.subscribe(PoseStamped, 'view')
 
     def send():
         image, info, pose = camera.messages()
@@ -119,7 +119,7 @@ def test_who_sends_both_forms_is_heard_once(shared_bench, camera, compressed):
 
 
 def test_a_compressed_image_gives_what_the_raw_one_does(shared_bench, camera, compressed):
-    clouds = shared_bench.hear(PointCloud2, 'probabilities')
+    clouds = shared_bench.subscribe(PointCloud2, 'probabilities')
 
     def send(form):
         assert shared_bench.call('start_episode').success
@@ -196,7 +196,7 @@ def flood(bench, camera, size):
 
 def test_of_images_faster_than_views_the_newest_win_and_the_others_are_counted(
         shared_bench, camera):
-    views = shared_bench.hear(PoseStamped, 'view')
+    views = shared_bench.subscribe(PoseStamped, 'view')
     newest, since = next(filter(None, (flood(shared_bench, camera, 8) for _ in range(30))))
     assert since['images'] == 8 + 1
     assert (since['views'], since['dropped/overtaken'], since['refused/duplicate']) == (1, 7, 1)

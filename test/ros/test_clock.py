@@ -13,7 +13,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from .conftest import FakeCamera, FakeReconstructor, LATCHED
+from .conftest import FakeCamera, FakeReconstructor, LATCHED_QOS
 from .test_parameter_changes import change
 from .test_planner_node import latent  # noqa: F401
 
@@ -48,7 +48,7 @@ def begin_of(episode):
 def test_a_reconstructor_begins_an_episode_where_its_clock_goes_back(start_node, bench):
     node = start_node('reconstructor', take_views='all', use_sim_time=True)
     clock = FakeClock(bench)
-    episodes = bench.hear(Header, 'episode', LATCHED)
+    episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
     bench.until(lambda: episodes, 'the first episode')
     camera = FakeCamera(bench)
 
@@ -77,7 +77,7 @@ def test_a_reconstructor_begins_an_episode_where_its_clock_goes_back(start_node,
 
 def test_a_node_that_changes_to_the_clock_of_a_simulation_begins_an_episode(start_node, bench):
     start_node('reconstructor')
-    episodes = bench.hear(Header, 'episode', LATCHED)
+    episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
     bench.until(lambda: episodes, 'the first episode')
     assert change(bench, 'reconstructor', use_sim_time=True)['use_sim_time'].successful
     bench.until(lambda: len(episodes) == 2, 'an episode of the simulation')
@@ -134,8 +134,8 @@ def test_a_planner_keeps_an_episode_that_came_before_it_heard_the_new_time(
 def test_a_turntable_begins_anew_where_its_clock_goes_back(start_node, bench, box):
     start_node('turntable_camera', mesh=box, start_azimuth=1.0, use_sim_time=True)
     clock = FakeClock(bench)
-    poses = bench.hear(PoseStamped, 'camera/pose')
-    goals = bench.advertise(JointState, 'next_azimuth', LATCHED)
+    poses = bench.subscribe(PoseStamped, 'camera/pose')
+    goals = bench.advertise(JointState, 'next_azimuth', LATCHED_QOS)
 
     def was_at(azimuth, low, high):
         """Return whether a pose of that time, seconds, is near an azimuth."""

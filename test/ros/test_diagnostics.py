@@ -46,7 +46,7 @@ def test_what_is_refused_is_told_at_once_but_not_in_a_flood_and_its_warning_ends
         start_node, bench):
     start_node('reconstructor', take_views='all')
     camera = FakeCamera(bench)
-    told = bench.hear(DiagnosticArray, '/diagnostics')
+    told = bench.subscribe(DiagnosticArray, '/diagnostics')
 
     def refused():
         _, _, pose = camera.messages()

@@ -31,14 +31,14 @@ def said(monkeypatch, bench):
 def test_a_trouble_that_comes_and_goes_is_said_with_its_end_once_in_a_while(bench, clock, said):
     diagnostics = Diagnostics(bench.node)
     for _ in range(50):
-        diagnostics.begin_trouble('silent', 'nothing comes')
+        diagnostics.raise_warning('silent', 'nothing comes')
         clock.now += 0.1
-        diagnostics.end_trouble('silent')
+        diagnostics.clear_warning('silent')
         clock.now += 0.05
     assert said == ['WARN nothing comes', 'INFO over: nothing comes']
     clock.now += LOG_EVERY_S
-    diagnostics.begin_trouble('silent', 'nothing comes')
-    diagnostics.end_trouble('silent')
+    diagnostics.raise_warning('silent', 'nothing comes')
+    diagnostics.clear_warning('silent')
     assert said[2:] == ['WARN nothing comes (and 49 more of this kind before)',
                         'INFO over: nothing comes']
 
@@ -46,12 +46,12 @@ def test_a_trouble_that_comes_and_goes_is_said_with_its_end_once_in_a_while(benc
 def test_a_trouble_that_stays_is_said_although_one_of_its_kind_was_said_just_before(
         bench, clock, said):
     diagnostics = Diagnostics(bench.node)
-    diagnostics.begin_trouble('silent', 'nothing comes')
-    diagnostics.end_trouble('silent')
+    diagnostics.raise_warning('silent', 'nothing comes')
+    diagnostics.clear_warning('silent')
     for _ in range(3):
-        diagnostics.begin_trouble('silent', 'still nothing')
+        diagnostics.raise_warning('silent', 'still nothing')
         clock.now += 0.6 * LOG_EVERY_S
     assert said == ['WARN nothing comes', 'INFO over: nothing comes', 'WARN still nothing']
-    diagnostics.end_trouble('silent')
-    diagnostics.end_trouble('silent')
+    diagnostics.clear_warning('silent')
+    diagnostics.clear_warning('silent')
     assert said[3:] == ['INFO over: still nothing']

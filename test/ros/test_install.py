@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 COLCON = Path(sys.prefix, 'colcon')  # where `make test` puts it
 NODES = {'reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer'}
 PUBLISHED = {f'/diagnostics of /{node}' for node in NODES} | {'/episode', '/camera/image_raw'}
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 START_BUDGET_S = 60.0
 STOP_BUDGET_S = 20.0
 
@@ -175,7 +175,7 @@ def listener() -> Iterator[Callable[[], set[str]]]:
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     heard = set()
-    node.create_subscription(Header, '/episode', lambda _: heard.add('/episode'), LATCHED)
+    node.create_subscription(Header, '/episode', lambda _: heard.add('/episode'), LATCHED_QOS)
     node.create_subscription(
         Image, '/camera/image_raw', lambda _: heard.add('/camera/image_raw'), 1)
     node.create_subscription(DiagnosticArray, '/diagnostics', lambda msg: heard.update(

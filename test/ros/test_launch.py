@@ -7,7 +7,7 @@ import sys
 from types import ModuleType
 
 from active_recon.parameters.declaration import declared
-from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from active_recon.parameters.recorder import TOPICS
 import pytest
 
@@ -107,7 +107,7 @@ def test_every_file_that_is_named_exists_and_is_installed(described, name):
 @pytest.mark.parametrize('name', FILES)
 def test_every_parameter_that_is_set_is_one_of_its_node(described, name):
     for node in described(name).find('Node'):
-        known = {each.name for each in declared(SETTINGS[node.kwargs['executable']])}
+        known = {each.name for each in declared(NODE_PARAMETERS[node.kwargs['executable']])}
         for parameters in node.kwargs['parameters']:
             if isinstance(parameters, dict):
                 assert parameters.keys() <= known | {'use_sim_time'}

@@ -13,7 +13,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from .conftest import BUDGET_S, FakeCamera, LATCHED
+from .conftest import BUDGET_S, FakeCamera, LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 NODES = {'reconstructor': {}, 'view_planner': {'policy': 'farthest'}}
@@ -123,7 +123,7 @@ def test_a_reconstructor_hears_nothing_while_inactive_and_then_begins_an_episode
         start_node, bench):
     start_node('reconstructor', take_views='all')
     supervisor = Supervisor(bench, 'reconstructor')
-    episodes = bench.hear(Header, 'episode', LATCHED)
+    episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
     camera = FakeCamera(bench)
     camera.show()
     assert supervisor.set('deactivate')
@@ -133,7 +133,7 @@ def test_a_reconstructor_hears_nothing_while_inactive_and_then_begins_an_episode
     camera.send(*camera.messages())
     refused = bench.ask(Trigger, 'start_episode')
     assert not refused.success and 'inactive' in refused.message
-    late = bench.hear(PointCloud2, 'occupancy', LATCHED)
+    late = bench.subscribe(PointCloud2, 'occupancy', LATCHED_QOS)
     bench.until(lambda: late, 'what is latched')
     assert len(camera.occupancy) == heard
     assert supervisor.set('activate')

@@ -19,7 +19,7 @@ from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
 import trimesh
 
-from .conftest import LATCHED
+from .conftest import LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 VIEWS = 3
@@ -64,11 +64,11 @@ class Watch:
 
     def __init__(self, bench):
         self.bench = bench
-        self.episodes = bench.hear(Header, 'episode', LATCHED)
-        self.done = bench.hear(Header, 'done', LATCHED)
-        self.views = bench.hear(PoseStamped, 'view')
-        self.occupancy = bench.hear(PointCloud2, 'occupancy')
-        self.goals = bench.hear(JointState, 'next_azimuth')
+        self.episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
+        self.done = bench.subscribe(Header, 'done', LATCHED_QOS)
+        self.views = bench.subscribe(PoseStamped, 'view')
+        self.occupancy = bench.subscribe(PointCloud2, 'occupancy')
+        self.goals = bench.subscribe(JointState, 'next_azimuth')
 
     def episode(self):
         return self.bench.until(lambda: self.episodes and self.episodes[-1], 'an episode')
@@ -130,7 +130,7 @@ def test_someone_without_ros_receives_occupancy_and_next_azimuth(bench, watch, r
 
 def test_who_comes_late_finds_what_is_latched(bench, watch):
     end = watch.wait_done()
-    heard = {topic: bench.hear(kind, topic, LATCHED) for kind, topic in (
+    heard = {topic: bench.subscribe(kind, topic, LATCHED_QOS) for kind, topic in (
         (Header, 'episode'), (PoseStamped, 'next_view'), (Header, 'done'),
         (PointCloud2, 'occupancy'), (PointCloud2, 'probabilities'))}
     bench.until(lambda: all(heard.values()), 'all latched topics')
@@ -141,7 +141,7 @@ def test_who_comes_late_finds_what_is_latched(bench, watch):
 
 
 def test_next_object_begins_an_episode_and_shows_another_object(bench, watch):
-    images = bench.hear(Image, 'camera/image_raw')
+    images = bench.subscribe(Image, 'camera/image_raw')
     before = bench.until(lambda: images and images[-1], 'an image')
     episode = watch.episode().frame_id
     answer = bench.call('next_object')
@@ -191,7 +191,7 @@ def test_a_reconstructor_that_comes_back_begins_a_new_episode(
 
 
 def test_every_pose_is_of_a_camera_that_looks_at_the_object(bench, watch):
-    poses = bench.hear(PoseStamped, 'camera/pose')
+    poses = bench.subscribe(PoseStamped, 'camera/pose')
     pose = pose_from_msg(bench.until(lambda: poses and poses[-1], 'a pose'))
     forward = pose[:3, 2]
     np.testing.assert_allclose(-pose[:3, 3] / np.linalg.norm(pose[:3, 3]), forward, atol=1e-6)

@@ -8,7 +8,7 @@ from active_recon.bags.runs.settings import recorded_settings
 import pytest
 from std_msgs.msg import Header
 
-from .conftest import LATCHED
+from .conftest import LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 LIMITS = {'azimuth_range': [-1.0, 2.0], 'forbidden_sectors': [0.4, 0.9]}
@@ -17,7 +17,7 @@ LIMITS = {'azimuth_range': [-1.0, 2.0], 'forbidden_sectors': [0.4, 0.9]}
 def test_a_loop_keeps_to_its_limits_and_its_bag_replays_under_them(
         start_node, bench, box, tmp_path):
     recorder = start_node('recorder', output_dir=tmp_path / 'bags')
-    done = bench.hear(Header, 'done', LATCHED)
+    done = bench.subscribe(Header, 'done', LATCHED_QOS)
     start_node('turntable_camera', mesh=box, start_azimuth=3.3, time_scale=20.0, rate=20.0)
     start_node('reconstructor', take_views='at_goal', settle_time=0.2)
     start_node('view_planner', policy='random', max_views=4, entropy_tolerance=0.0,

@@ -5,7 +5,7 @@ import pytest
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from .conftest import LATCHED
+from .conftest import LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 NODES = ['turntable_camera', 'reconstructor', 'view_planner']
@@ -27,9 +27,9 @@ class Loop:
         start_node('turntable_camera', namespace=name, mesh=mesh, rate=20.0, time_scale=20.0)
         start_node('view_planner', namespace=name, policy='farthest', max_views=VIEWS,
                    entropy_tolerance=0.0)
-        self.images = bench.hear(Image, f'{name}/camera/image_raw')
-        self.episodes = bench.hear(Header, f'{name}/episode', LATCHED)
-        self.done = bench.hear(Header, f'{name}/done', LATCHED)
+        self.images = bench.subscribe(Image, f'{name}/camera/image_raw')
+        self.episodes = bench.subscribe(Header, f'{name}/episode', LATCHED_QOS)
+        self.done = bench.subscribe(Header, f'{name}/done', LATCHED_QOS)
 
     def wait_done(self, episode=None):
         """Wait for the end of the episode of that id, of any if none is given."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from active_recon.errors import DataError
 from active_recon.parameters.declaration import declared
-from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from active_recon.parameters.table import BEGIN, END, parameter_tables, with_tables
 import pytest
 
@@ -19,7 +19,7 @@ def test_the_documentation_has_the_parameters_of_the_code():
 def test_every_parameter_has_a_row_with_its_default():
     rows = [row.split(' | ') for row in parameter_tables().splitlines() if row.startswith('| `')]
     assert [row[0] for row in rows] == [
-        f'| `{each.name}`' for settings in SETTINGS.values() for each in declared(settings)]
+        f'| `{each.name}`' for settings in NODE_PARAMETERS.values() for each in declared(settings)]
     assert all(len(row) == 5 for row in rows)
 
 

@@ -5,7 +5,7 @@ import math
 from types import SimpleNamespace
 
 from active_recon.errors import ConfigError
-from active_recon.nodes.runtime.parameters import Parameters, ReadOnlySaysWhy, tell
+from active_recon.nodes.runtime.parameters import Parameters, set_read_only_parameter
 from active_recon.parameters.declaration import NEW_START, parameter
 import pytest
 from rclpy.node import Node
@@ -14,20 +14,20 @@ from rclpy.parameter import Parameter
 pytestmark = pytest.mark.ros
 
 
-class ToldNode(ReadOnlySaysWhy, Node):
+class GivenNode(Node):
     """A node that is given values for its parameters at start."""
 
     def __init__(self, **given):
-        super().__init__('told', parameter_overrides=[
+        super().__init__('given', parameter_overrides=[
             Parameter(name, value=value) for name, value in given.items()])
 
 
 @pytest.fixture
-def told(ros):
+def make_node(ros):
     nodes = []
 
     def make(**given):
-        nodes.append(ToldNode(**given))
+        nodes.append(GivenNode(**given))
         return nodes[-1]
 
     yield make
@@ -35,10 +35,10 @@ def told(ros):
         node.destroy_node()
 
 
-def settings_of(**declared):
-    """Return a dataclass of settings, from pairs of a type and a parameter."""
+def parameters_of(**declared):
+    """Return a dataclass of parameters, from pairs of a type and a parameter."""
     return make_dataclass(
-        'Settings', [(name, *each) for name, each in declared.items()], frozen=True)
+        'Declared', [(name, *each) for name, each in declared.items()], frozen=True)
 
 
 NUMBER = float, parameter(1.0, 'a number', low=0.0, high=2.0)
@@ -62,9 +62,9 @@ WORDS = tuple[str, ...], parameter(('a',), 'words')
     ([0.5, 2.0], NUMBERS, r'a list, each a number from -1 to 1, got \[0.5, 2.0\]'),
     ('abc', WORDS, "a list, each a string, got 'abc'"),
     ([1, 2], WORDS, r'a list, each a string, got \[1, 2\]')])
-def test_a_value_of_another_kind_or_out_of_range_is_refused(told, given, declared, said):
+def test_a_value_of_another_kind_or_out_of_range_is_refused(make_node, given, declared, said):
     with pytest.raises(ConfigError, match=f'parameter it: expected {said}'):
-        Parameters(told(it=given), settings_of(it=declared))
+        Parameters(make_node(it=given), parameters_of(it=declared))
 
 
 @pytest.mark.parametrize(('given', 'declared', 'value'), [
@@ -72,21 +72,21 @@ def test_a_value_of_another_kind_or_out_of_range_is_refused(told, given, declare
     ([0, 1], NUMBERS, (0.0, 1.0)), ([], NUMBERS, ()), (['x', 'y'], WORDS, ('x', 'y')),
     ([], WORDS, ())])
 def test_the_ends_of_a_range_are_inside_and_an_integer_may_stand_for_a_number(
-        told, given, declared, value):
-    settings = Parameters(told(it=given), settings_of(it=declared)).now
-    assert settings.it == value
-    assert type(settings.it) is type(value)
+        make_node, given, declared, value):
+    values = Parameters(make_node(it=given), parameters_of(it=declared)).values
+    assert values.it == value
+    assert type(values.it) is type(value)
 
 
-def test_a_number_that_is_not_given_is_nan(told):
-    assert math.isnan(Parameters(told(), settings_of(it=NOT_GIVEN)).now.it)
-    assert math.isnan(Parameters(told(it=math.nan), settings_of(it=NOT_GIVEN)).now.it)
+def test_a_number_that_is_not_given_is_nan(make_node):
+    assert math.isnan(Parameters(make_node(), parameters_of(it=NOT_GIVEN)).values.it)
+    assert math.isnan(Parameters(make_node(it=math.nan), parameters_of(it=NOT_GIVEN)).values.it)
 
 
-def test_ros_is_told_the_range_the_choices_and_what_needs_a_new_start(told):
-    node = told()
-    changing = int, parameter(3, 'changes', low=1, high=5, changeable=True)
-    Parameters(node, settings_of(number=NUMBER, word=WORD, changing=changing))
+def test_ros_is_told_the_range_the_choices_and_what_needs_a_new_start(make_node):
+    node = make_node()
+    changing = int, parameter(3, 'changes', low=1, high=5, dynamic=True)
+    Parameters(node, parameters_of(number=NUMBER, word=WORD, changing=changing))
     number, word, count = node.describe_parameters(['number', 'word', 'changing'])
     assert (number.floating_point_range[0].from_value,
             number.floating_point_range[0].to_value) == (0.0, 2.0)
@@ -96,31 +96,31 @@ def test_ros_is_told_the_range_the_choices_and_what_needs_a_new_start(told):
     assert word.additional_constraints == f'expected one of a, b; {NEW_START}'
 
 
-def changeable(node):
+def dynamic(node):
     """Declare two parameters that may change; return them and what was put into effect."""
     applied = []
 
-    def prepare(settings):
-        if settings.low > settings.high:
+    def prepare(values):
+        if values.low > values.high:
             raise ConfigError('expected low below high')
-        return lambda: applied.append((settings.low, settings.high))
+        return lambda: applied.append((values.low, values.high))
 
-    parameters = Parameters(node, settings_of(
-        low=(int, parameter(1, 'the low end', low=0, high=9, changeable=True)),
-        high=(int, parameter(2, 'the high end', low=0, high=9, changeable=True)),
+    parameters = Parameters(node, parameters_of(
+        low=(int, parameter(1, 'the low end', low=0, high=9, dynamic=True)),
+        high=(int, parameter(2, 'the high end', low=0, high=9, dynamic=True)),
         fixed=(int, parameter(0, 'fixed'))))
     parameters.on_change(prepare)
     return parameters, applied
 
 
-def test_changes_that_come_together_are_checked_together_and_applied_as_one(told):
-    node = told()
-    parameters, applied = changeable(node)
+def test_changes_that_come_together_are_checked_together_and_applied_as_one(make_node):
+    node = make_node()
+    parameters, applied = dynamic(node)
     assert not node.set_parameters_atomically([Parameter('low', value=5)]).successful
     assert node.set_parameters_atomically(
         [Parameter('low', value=5), Parameter('high', value=6)]).successful
     assert applied == [(5, 6)]
-    assert (parameters.now.low, parameters.now.high) == (5, 6)
+    assert (parameters.values.low, parameters.values.high) == (5, 6)
 
 
 @pytest.mark.parametrize(('changes', 'said'), [
@@ -128,35 +128,35 @@ def test_changes_that_come_together_are_checked_together_and_applied_as_one(told
     ({'low': 'x'}, "parameter low: expected an integer from 0 to 9, got 'x'"),
     ({'low': None}, 'parameter low: expected an integer from 0 to 9, got None'),
     ({'high': 10}, 'out of range'),
-    ({'low': 2, 'fixed': 1}, NEW_START)])
-def test_a_change_that_is_refused_says_why_and_changes_nothing(told, changes, said):
-    node = told()
-    parameters, applied = changeable(node)
-    before = parameters.now
+    ({'low': 2, 'fixed': 1}, 'read-only')])
+def test_a_change_that_is_refused_says_why_and_changes_nothing(make_node, changes, said):
+    node = make_node()
+    parameters, applied = dynamic(node)
+    before = parameters.values
     result = node.set_parameters_atomically(
         [Parameter(name, value=value) for name, value in changes.items()])
     assert not result.successful
     assert said in result.reason
     assert not applied
-    assert parameters.now == before
+    assert parameters.values == before
     assert [each.value for each in node.get_parameters(['low', 'high', 'fixed'])] == [1, 2, 0]
 
 
-def test_a_fact_is_told_anew_and_set_by_nobody(told):
-    node = told(fact='mine')
-    tell(node, 'fact', 'first', 'a fact')
-    tell(node, 'fact', 'second', 'a fact')
+def test_a_read_only_parameter_is_replaced_by_its_node_alone(make_node):
+    node = make_node(fact='mine')
+    set_read_only_parameter(node, 'fact', 'first', 'a fact')
+    set_read_only_parameter(node, 'fact', 'second', 'a fact')
     assert not node.set_parameters_atomically([Parameter('fact', value='mine')]).successful
     assert node.get_parameter('fact').value == 'second'
 
 
 def test_a_parameter_that_a_node_does_not_have_is_a_warning_with_the_nearest_name(
-        told, monkeypatch):
-    node = told(object_siez=0.3, seed=7, rate=2.0, use_sim_time=False)
+        make_node, monkeypatch):
+    node = make_node(object_siez=0.3, seed=7, rate=2.0, use_sim_time=False)
     said = []
     monkeypatch.setattr(node, 'get_logger', lambda: SimpleNamespace(warning=said.append))
-    now = Parameters(node, settings_of(
-        object_size=(float, parameter(1.0, 'm')), rate=(float, parameter(1.0, 'Hz')))).now
+    now = Parameters(node, parameters_of(
+        object_size=(float, parameter(1.0, 'm')), rate=(float, parameter(1.0, 'Hz')))).values
     assert (now.object_size, now.rate) == (1.0, 2.0)
     assert said == [
         'parameter object_siez: this node has none of that name, so it changes nothing; '

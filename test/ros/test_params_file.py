@@ -7,7 +7,7 @@ import sys
 
 from active_recon.errors import ConfigError
 from active_recon.parameters.declaration import declared
-from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from active_recon.parameters.params_file import read_params_file
 import pytest
 
@@ -83,7 +83,7 @@ def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_pat
     assert f'{path}: no ROS parameters file in YAML' in said and "expected ',' or '}'" in said
 
 
-@pytest.mark.parametrize('node', SETTINGS)
+@pytest.mark.parametrize('node', NODE_PARAMETERS)
 def test_a_node_asked_for_help_lists_its_parameters_and_ends(node):
     asked = subprocess.run([sys.executable, '-m', f'active_recon.nodes.{node}', '--help'],
                            cwd=CONFIG.parent, capture_output=True, text=True, timeout=60)
@@ -91,5 +91,5 @@ def test_a_node_asked_for_help_lists_its_parameters_and_ends(node):
     lines = asked.stdout.splitlines()
     assert lines[0].startswith(f'usage: {node} ')
     assert max(map(len, lines)) <= 80
-    for each in declared(SETTINGS[node]):
+    for each in declared(NODE_PARAMETERS[node]):
         assert any(line.startswith(f'  {each.name} (default: ') for line in lines)

@@ -15,7 +15,7 @@ import pytest
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import FakeReconstructor, LATCHED
+from .conftest import FakeReconstructor, LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 
@@ -30,7 +30,7 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
     planner = start_node('view_planner', policy='attention', weights=PAPER_MODEL, max_views=2,
                          entropy_tolerance=0.0, start_azimuth=2.0)
     fake = FakeReconstructor(bench)
-    scores = bench.hear(PointCloud2, 'azimuth_scores', LATCHED)
+    scores = bench.subscribe(PointCloud2, 'azimuth_scores', LATCHED_QOS)
     begin = bench.now()
     fake.begin('first')
     first = fake.wait_goal(begin)
@@ -61,7 +61,7 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
 def test_a_goal_is_repeated_under_its_stamp_until_its_view_comes(start_node, bench, latent):
     start_node('view_planner', policy='farthest', start_azimuth=1.0)
     fake = FakeReconstructor(bench)
-    azimuths = bench.hear(JointState, 'next_azimuth')
+    azimuths = bench.subscribe(JointState, 'next_azimuth')
     fake.begin('only')
     bench.until(lambda: len(azimuths) >= 2, 'the goal again')
     assert len({nanoseconds_from_stamp(msg.header.stamp) for msg in azimuths}) == 1
@@ -108,7 +108,7 @@ def test_goals_stand_at_the_camera_s_elevation_unless_another_is_given(
     start_node('view_planner', policy='farthest', distance=0.7, **parameters)
     fake = FakeReconstructor(bench)
     poses = bench.advertise(PoseStamped, 'camera/pose')
-    scores = bench.hear(PointCloud2, 'azimuth_scores', LATCHED)
+    scores = bench.subscribe(PointCloud2, 'azimuth_scores', LATCHED_QOS)
     begin = bench.now()
     fake.begin('only', begin)
     camera = orbit_camera(1.0, math.pi / 4)

@@ -12,8 +12,8 @@ from rosbags.highlevel import AnyReader
 from std_msgs.msg import Header
 
 pytestmark = pytest.mark.ros
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-STREAM = QoSProfile(depth=1000)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM_QOS = QoSProfile(depth=1000)
 CAMERA = 'camera/image_raw,camera/camera_info,camera/pose'
 VIEWS = 3
 PLAYED_WITHIN_S = 120.0  # two processes to start, and a bag as long as it took to record
@@ -42,7 +42,7 @@ def bag(shared_bench, start_shared_node, box, tmp_path_factory):
              start_shared_node('reconstructor'),
              start_shared_node('view_planner', policy='farthest', max_views=VIEWS,
                                entropy_tolerance=0.0)]
-    done = shared_bench.hear(Header, 'done', LATCHED)
+    done = shared_bench.subscribe(Header, 'done', LATCHED_QOS)
     shared_bench.until(lambda: done and done[-1].frame_id, 'the end of the loop')
     shared_bench.within(1.0, lambda: False)  # the camera streams on
     for node in nodes:
@@ -75,8 +75,8 @@ def bench(shared_bench):
 
 def test_every_message_is_heard_in_order_at_the_rate(bench, play, bag):
     recorded, seconds = read(bag)
-    poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
-    episodes = bench.hear(Header, 'episode', LATCHED)
+    poses = bench.subscribe(PoseStamped, 'camera/pose', STREAM_QOS)
+    episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
     began = time.monotonic()
     process = play(bag, '--rate', '2', '--topics', 'camera/pose,/episode')
     bench.until(lambda: process.poll() is not None, 'the end of the playing', PLAYED_WITHIN_S)
@@ -88,9 +88,9 @@ def test_every_message_is_heard_in_order_at_the_rate(bench, play, bag):
 
 def test_latched_topics_are_latched_again(bench, play, bag):
     process = play(bag, '--topics', 'episode,camera/pose', '--rate', '0.5')
-    poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
+    poses = bench.subscribe(PoseStamped, 'camera/pose', STREAM_QOS)
     bench.until(lambda: poses, 'the first pose, which follows the episode', PLAYED_WITHIN_S)
-    late = bench.hear(Header, 'episode', LATCHED)
+    late = bench.subscribe(Header, 'episode', LATCHED_QOS)
     bench.until(lambda: late, 'the episode, which was said before')
     process.terminate()
     assert process.wait(30) == 0
@@ -101,8 +101,8 @@ def test_live_nodes_take_the_recorded_camera_for_one(bench, play, start_node, ba
     start_node('reconstructor', use_sim_time='true')
     start_node('view_planner', use_sim_time='true', policy='farthest', max_views=VIEWS,
                entropy_tolerance=0.0)
-    views = bench.hear(PoseStamped, 'view', LATCHED)
-    done = bench.hear(Header, 'done', LATCHED)
+    views = bench.subscribe(PoseStamped, 'view', LATCHED_QOS)
+    done = bench.subscribe(Header, 'done', LATCHED_QOS)
     play(bag, '--topics', CAMERA)
     bench.until(lambda: done and done[-1].frame_id, 'the end of the loop', PLAYED_WITHIN_S)
     assert done[-1].frame_id == 'max_views'
@@ -130,7 +130,7 @@ def test_a_bag_that_is_damaged_inside_is_refused_and_not_played_in_part(
     content = bytearray((bag / f'{bag.name}_0.mcap').read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    poses = bench.hear(PoseStamped, 'camera/pose', STREAM)
+    poses = bench.subscribe(PoseStamped, 'camera/pose', STREAM_QOS)
     assert play(path).wait(60) == 2
     (line,) = (tmp_path / 'said').read_text().splitlines()
     assert line.startswith(f'active-recon: {path}: ')

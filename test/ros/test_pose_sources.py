@@ -7,7 +7,7 @@ from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.geometry.turntable_pose import FixedCamera
 from active_recon.nodes.camera.pose_sources import check_pose_source, TfPoses
-from active_recon.parameters.reconstructor import ReconstructorSettings
+from active_recon.parameters.reconstructor import ReconstructorParameters
 from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Vector3
 from msg_tools.cameras import intrinsics_to_msg, pose_from_msg, pose_to_msg
 from msg_tools.images import image_to_msg
@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import BUDGET_S, LATCHED, SEND_AGAIN_S
+from .conftest import BUDGET_S, LATCHED_QOS, SEND_AGAIN_S
 
 pytestmark = pytest.mark.ros
 POSE = orbit_camera(1.2).pose
@@ -58,7 +58,7 @@ def fake_tf(monkeypatch):
 def tf_poses(bench, fake_tf):
     """Return the source, what it handed on, and what it refused."""
     taken, refused = [], []
-    source = TfPoses(bench.node, taken.append, SimpleNamespace(refuse=refused.append), 'object')
+    source = TfPoses(bench.node, taken.append, SimpleNamespace(reject=refused.append), 'object')
     return source, taken, refused
 
 
@@ -68,16 +68,16 @@ def image_header(stamp, frame='camera'):
 
 def test_the_pose_of_an_image_is_what_tf_says_at_its_stamp(bench, tf_poses, fake_tf):
     source, taken, refused = tf_poses
-    heard = bench.hear(PoseStamped, 'camera/pose')
+    heard = bench.subscribe(PoseStamped, 'camera/pose')
     bench.until(lambda: bench.node.count_publishers('camera/pose'), 'a publisher of poses')
     fake_tf.known.add(5)
-    source.image_came(image_header(5))
+    source.on_image(image_header(5))
     pose, = taken
     assert pose.header == Header(stamp=stamp_from_nanoseconds(5), frame_id='object')
     np.testing.assert_allclose(pose_from_msg(pose), POSE, atol=1e-12)
 
     def told_again():
-        source.image_came(image_header(5))
+        source.on_image(image_header(5))
         return heard
 
     assert bench.until(told_again, 'the pose on camera/pose')[0] == pose
@@ -86,7 +86,7 @@ def test_the_pose_of_an_image_is_what_tf_says_at_its_stamp(bench, tf_poses, fake
 
 def test_an_image_waits_for_a_transform_that_comes_after_it(bench, tf_poses, fake_tf):
     source, taken, refused = tf_poses
-    source.image_came(image_header(5))
+    source.on_image(image_header(5))
     assert not taken
     fake_tf.known.add(5)
     bench.until(lambda: taken, 'the pose')
@@ -96,12 +96,12 @@ def test_an_image_waits_for_a_transform_that_comes_after_it(bench, tf_poses, fak
 def test_an_image_whose_transform_does_not_come_is_refused_once_with_tf_s_reason(
         bench, tf_poses, fake_tf):
     source, taken, refused = tf_poses
-    source.image_came(image_header(5))
+    source.on_image(image_header(5))
     error, = bench.until(lambda: refused, 'a refusal')
     assert error.kind == 'tf'
     assert "the image's frame 'camera' in 'object' at its stamp: nothing known at 5" in str(error)
     fake_tf.known.add(6)
-    source.image_came(image_header(6))
+    source.on_image(image_header(6))
     assert len(taken) == len(refused) == 1
 
 
@@ -119,7 +119,7 @@ class Eye:
         self._place = bench.advertise(kind, topic) if topic else None
         self._publishers = [bench.advertise(each, f'camera/{name}') for each, name in (
             (CameraInfo, 'camera_info'), (Image, 'image_raw'))]
-        self.cells = bench.hear(PointCloud2, 'probabilities', LATCHED)
+        self.cells = bench.subscribe(PointCloud2, 'probabilities', LATCHED_QOS)
 
     def show(self, place):
         """Show the image until there is a view of it; return the cells of the first."""
@@ -153,7 +153,7 @@ def test_a_turntable_s_joint_gives_the_occupancy_that_the_poses_give(bench, star
     start(start_node, pose_source='turntable_joint', joint_name='table', turntable_direction=-1,
           camera_position=POSE[:3, 3].tolist(),
           camera_orientation=Rotation.from_matrix(POSE[:3, :3]).as_quat().tolist())
-    poses = bench.hear(PoseStamped, 'camera/pose')
+    poses = bench.subscribe(PoseStamped, 'camera/pose')
     eye = Eye(bench, JointState, 'turntable/joint_states')
     bench.until(lambda: bench.node.count_publishers('camera/pose') == 2, 'a publisher of poses')
     cells = eye.show(lambda stamp: JointState(
@@ -168,13 +168,18 @@ def test_a_joint_that_is_not_there_or_nowhere_is_refused_and_said(bench, start_n
                  camera_position=[1.0, 0.0, 1.0], camera_orientation=[0.0, 0.0, 0.0, 1.0])
     joints = bench.advertise(JointState, 'turntable/joint_states')
 
-    def refused():
-        joints.publish(JointState(name=['arm'], position=[1.0]))
-        joints.publish(JointState(name=['table'], position=[float('nan')]))
-        return bench.counts('reconstructor').get('refused/joint', 0) > 1
+    def refused(name, position):
+        before = bench.counts('reconstructor').get('refused/joint', 0)
 
-    bench.until(refused, 'both to be refused')
+        def counted():
+            joints.publish(JointState(name=[name], position=[position]))
+            return bench.counts('reconstructor').get('refused/joint', 0) > before
+
+        return counted
+
+    bench.until(refused('arm', 1.0), 'the other joint to be refused')
     assert node.log('refused: expected a position of table, got 1 of arm')
+    bench.until(refused('table', float('nan')), 'the position to be refused')
 
 
 TF = """
@@ -211,7 +216,7 @@ def test_a_view_is_taken_from_where_tf_says(bench, start_node, put_tf):
     place, turn = told.position, told.orientation
     put_tf(TF.format(place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
     start(start_node, pose_source='tf')
-    views = bench.hear(PoseStamped, 'view', LATCHED)
+    views = bench.subscribe(PoseStamped, 'view', LATCHED_QOS)
     Eye(bench, None, '').show(None)
     view = bench.until(lambda: views, 'a view')[0]
     np.testing.assert_allclose(pose_from_msg(view), TURNED, atol=1e-9)
@@ -232,4 +237,4 @@ def test_a_node_that_is_to_ask_a_tf2_that_is_missing_does_not_start(start_node, 
 ])
 def test_a_turntable_whose_camera_nobody_placed_is_refused(parameters, said):
     with pytest.raises(ConfigError, match=said):
-        check_pose_source(ReconstructorSettings(pose_source='turntable_joint', **parameters))
+        check_pose_source(ReconstructorParameters(pose_source='turntable_joint', **parameters))

@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image, JointState
 
 pytestmark = pytest.mark.ros
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PLAIN = QoSProfile(depth=1)
 HASTY = QoSProfile(depth=1, deadline=Duration(seconds=0.25))
 
@@ -30,10 +30,10 @@ def spoil(bench, kind, topic, profile, listens):
 
 
 @pytest.mark.parametrize(('name', 'kind', 'topic', 'profile', 'listens', 'theirs', 'ours'), [
-    ('turntable_camera', Image, 'camera/image_raw', LATCHED, True,
-     'asks for (reliable, transient local)', '(reliable, volatile)'),
+    ('turntable_camera', Image, 'camera/image_raw', LATCHED_QOS, True,
+     'requests (reliable, transient local)', '(reliable, volatile)'),
     ('turntable_camera', PoseStamped, 'camera/pose', HASTY, True,
-     'asks for (reliable, volatile, deadline 0.25 s)', '(reliable, volatile)'),
+     'requests (reliable, volatile, deadline 0.25 s)', '(reliable, volatile)'),
     ('view_planner', PoseStamped, 'view', PLAIN, False,
      'offers (reliable, volatile)', '(reliable, transient local)'),
 ])
@@ -45,24 +45,26 @@ def test_an_endpoint_that_does_not_fit_is_named_with_both_profiles_while_it_is_t
     def told():
         """Return what is said of QoS; a node that is alone misses its inputs, too."""
         return next((part for part in bench.state(name).problem.split('; ')
-                     if part.startswith(f'/{topic}: expected who')), '')
+                     if part.startswith((f'/{topic}: expected subscribers',
+                                         f'/{topic}: expected publishers'))), '')
 
     said = bench.until(told, 'the warning')
     assert f'/bench {theirs}' in said
     assert ours in said.partition('but')[0]
     assert bench.counts(name)[f'warned/qos/{topic}'] == 1
-    line, = node.log('WARN.*expected who')
+    line, = node.log('WARN.*expected (subscribers|publishers) to')
     assert said in line
     take_away()
     bench.until(lambda: not told(), 'the warning to be taken back')
-    bench.until(lambda: node.log('over: .*expected who'), 'the end of the mismatch in the log')
+    bench.until(lambda: node.log('over: .*expected (subscribers|publishers) to'),
+                'the end of the mismatch in the log')
 
 
 def test_a_best_effort_publisher_and_a_late_listener_fit(start, bench):
     node = start('turntable_camera')
     best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     goals = bench.advertise(JointState, 'next_azimuth', best_effort)
-    images = bench.hear(Image, 'camera/image_raw', best_effort)
+    images = bench.subscribe(Image, 'camera/image_raw', best_effort)
 
     def heard():
         goals.publish(JointState(position=[1.0]))

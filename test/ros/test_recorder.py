@@ -24,8 +24,8 @@ from std_msgs.msg import Header, String
 import yaml
 
 pytestmark = pytest.mark.ros
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-STREAM = QoSProfile(depth=100)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM_QOS = QoSProfile(depth=100)
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -89,7 +89,7 @@ def test_what_passes_is_recorded_byte_for_byte_with_its_times(bench, recorder, t
 
 def test_latched_messages_from_before_the_recording_begin_every_bag(bench, start_node, tmp_path):
     episode = serialize_message(Header(frame_id='one'))
-    bench.node.create_publisher(Header, 'episode', LATCHED).publish(episode)
+    bench.node.create_publisher(Header, 'episode', LATCHED_QOS).publish(episode)
     start_node('recorder', output_dir=tmp_path / 'bags', topics="['episode']")
     recorded(bench, 1)
     assert bench.call('stop').success
@@ -104,7 +104,7 @@ def test_latched_messages_from_before_the_recording_begin_every_bag(bench, start
 
 
 def test_publishers_that_offer_less_than_those_before_are_heard_too(bench, recorder, tmp_path):
-    publish(bench, PoseStamped, 'view', STREAM, poses(1))
+    publish(bench, PoseStamped, 'view', STREAM_QOS, poses(1))
     recorded(bench, 1)
     second = publish(bench, PoseStamped, 'view', BEST_EFFORT)
     second.publish(*poses(1))
@@ -115,7 +115,7 @@ def test_publishers_that_offer_less_than_those_before_are_heard_too(bench, recor
 def test_a_user_may_name_topics_of_any_installed_type(bench, start_node, tmp_path):
     start_node('recorder', output_dir=tmp_path / 'bags', topics="['chatter']")
     goodbye = serialize_message(String(data='goodbye'))
-    publish(bench, String, 'chatter', STREAM, [goodbye])
+    publish(bench, String, 'chatter', STREAM_QOS, [goodbye])
     recorded(bench, 1)
     assert bench.call('stop').success
     assert read(*bags(tmp_path / 'bags')) == {'/chatter': [goodbye]}
@@ -149,7 +149,7 @@ def test_a_recorder_told_to_wait_records_when_it_is_asked(bench, start_node, tmp
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
 def test_a_recorder_that_is_stopped_completes_its_bag(bench, recorder, tmp_path, how):
-    publish(bench, PoseStamped, 'view', STREAM, poses(3))
+    publish(bench, PoseStamped, 'view', STREAM_QOS, poses(3))
     recorded(bench, 3)
     assert recorder.stop(how) == 0
     assert len(read(*bags(tmp_path / 'bags'))['/view']) == 3
@@ -157,7 +157,7 @@ def test_a_recorder_that_is_stopped_completes_its_bag(bench, recorder, tmp_path,
 
 def test_a_killed_recorder_leaves_what_it_had_on_the_disk(bench, recorder, tmp_path):
     sent = poses(3)
-    publish(bench, PoseStamped, 'view', STREAM, sent)
+    publish(bench, PoseStamped, 'view', STREAM_QOS, sent)
     recorded(bench, 3)
     (path,) = (tmp_path / 'bags').glob('*/*.mcap')
     bench.until(lambda: list(whole_messages(path)) == sent, 'the messages on the disk')
@@ -179,8 +179,8 @@ def test_a_full_disk_stops_the_recording_and_not_the_node(bench, start_node, tmp
     resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (300_000, resource.RLIM_INFINITY))
     image = serialize_message(
         Image(height=100, width=300, step=900, encoding='rgb8', data=noise(90_000)))
-    publisher = publish(bench, Image, 'camera/image_raw', STREAM)
-    diagnostics = bench.hear(DiagnosticArray, '/diagnostics')
+    publisher = publish(bench, Image, 'camera/image_raw', STREAM_QOS)
+    diagnostics = bench.subscribe(DiagnosticArray, '/diagnostics')
     while not recorder.log('ERROR'):
         publisher.publish(image)
         heard = bench.counts('recorder').get('messages', 0)
@@ -267,7 +267,7 @@ def test_the_loop_goes_on_where_the_recording_has_stopped(bench, start_node, box
     start_node('reconstructor')
     bench.until(lambda: recorder.log('recording stopped'), 'the end of the recording')
     start_node('view_planner', policy='farthest', max_views=2, entropy_tolerance=0.0)
-    done = bench.hear(Header, 'done', LATCHED)
+    done = bench.subscribe(Header, 'done', LATCHED_QOS)
     bench.until(lambda: done and done[-1].frame_id == 'max_views', 'the end of the loop')
     assert recorder.running and len(recorder.log('recording stopped')) == 1
 
@@ -331,17 +331,17 @@ def test_what_has_no_publisher_is_told_until_it_has_one(bench, start_node, tmp_p
             in said)
     for kind, topic in ((CompressedImage, 'camera/image_raw/compressed'),
                         (CameraInfo, 'camera/camera_info'), (PoseStamped, 'camera/pose')):
-        bench.node.create_publisher(kind, topic, STREAM)
+        bench.node.create_publisher(kind, topic, STREAM_QOS)
     bench.until(lambda: not bench.state('recorder').problem, 'the end of the warning')
 
 
 def test_a_recording_that_shall_stop_by_itself_ends_with_its_episode(bench, start_node, tmp_path):
-    old = bench.node.create_publisher(Header, 'done', LATCHED)
+    old = bench.node.create_publisher(Header, 'done', LATCHED_QOS)
     old.publish(Header(frame_id='stopped'))  # of an episode before the recording
     recorder = start_node('recorder', output_dir=tmp_path / 'bags', stop_when_done=True,
                           topics="['done', 'view']")
     recorded(bench, 1)
-    views = publish(bench, PoseStamped, 'view', STREAM, poses(1))
+    views = publish(bench, PoseStamped, 'view', STREAM_QOS, poses(1))
     recorded(bench, 2)
     old.publish(Header(frame_id='abcd'))
     old.publish(Header(frame_id=''))  # taken back
@@ -359,7 +359,7 @@ def test_a_recording_that_shall_stop_by_itself_ends_with_its_episode(bench, star
 
 def test_the_recorder_tells_how_fast_it_fills_the_disk(bench, start_node, tmp_path):
     start_node('recorder', output_dir=tmp_path / 'bags', topics="['camera/image_raw']")
-    publisher = publish(bench, Image, 'camera/image_raw', STREAM)
+    publisher = publish(bench, Image, 'camera/image_raw', STREAM_QOS)
     image = serialize_message(
         Image(height=100, width=300, step=900, encoding='rgb8', data=noise(90_000)))
 

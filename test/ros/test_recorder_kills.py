@@ -18,7 +18,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 pytestmark = pytest.mark.ros
-STREAM = QoSProfile(depth=1000)
+STREAM_QOS = QoSProfile(depth=1000)
 KILLS, IN_EVERY_RUN = 50, 5
 ON_DISK_WITHIN_S = 1.0
 PERIOD_S = 0.01
@@ -49,7 +49,7 @@ def stream(bench, publisher, seconds):
 def test_what_came_a_second_before_a_kill_is_on_the_disk(bench, start_node, tmp_path, seed):
     topic = f'view_{seed}'  # one that was killed before is thought to listen for a while
     recorder = start_node('recorder', output_dir=tmp_path / 'bags', topics=f"['{topic}']")
-    publisher = bench.advertise(PoseStamped, topic, STREAM)
+    publisher = bench.advertise(PoseStamped, topic, STREAM_QOS)
     sent = stream(bench, publisher, 0.5 + 2 * random.Random(seed).random())
     killed = time.monotonic()
     recorder.stop(signal.SIGKILL)
@@ -67,7 +67,7 @@ def test_what_came_a_second_before_a_kill_is_on_the_disk(bench, start_node, tmp_
 def test_the_recorders_memory_stays_flat_over_10_000_messages(bench, start_node, tmp_path):
     recorder = start_node('recorder', output_dir=tmp_path / 'bags', max_bag_size_mb=20)
     image = serialize_message(Image(height=64, width=64, step=192, data=bytes(64 * 192)))
-    publisher = bench.advertise(Image, 'camera/image_raw', STREAM)
+    publisher = bench.advertise(Image, 'camera/image_raw', STREAM_QOS)
 
     def publish(count):
         for number in range(count):

@@ -23,7 +23,7 @@ def asked(bench, capture):
     bench.until(client.service_is_ready, 'the service')
     answer = client.call_async(Trigger.Request())
     looked = []
-    bench.until(lambda: capture.image_came(0, lambda: OLD) or looked.append(0) or len(looked) > 20,
+    bench.until(lambda: capture.on_image(0, lambda: OLD) or looked.append(0) or len(looked) > 20,
                 'some turns of the executor')
     return answer
 
@@ -31,13 +31,13 @@ def asked(bench, capture):
 def test_an_image_from_before_the_call_is_not_taken_and_one_from_after_it_is(
         bench, capture, asked):
     assert not asked.done() and capture.reference is None
-    bench.until(lambda: capture.image_came(bench.now(), lambda: NEW) or asked.done(), 'the answer')
+    bench.until(lambda: capture.on_image(bench.now(), lambda: NEW) or asked.done(), 'the answer')
     assert asked.result().success
     assert asked.result().message == 'captured 4 x 5 pixels'
     assert capture.reference is NEW
-    capture.image_came(bench.now(), lambda: OLD)
+    capture.on_image(bench.now(), lambda: OLD)
     assert capture.reference is NEW
-    capture.forget()
+    capture.clear()
     assert capture.reference is None
 
 
@@ -47,13 +47,13 @@ def test_bytes_that_are_no_image_are_passed_over(bench, capture, asked):
 
     def refused():
         try:
-            capture.image_came(bench.now() + S, spoilt)
+            capture.on_image(bench.now() + S, spoilt)
         except MessageError:
             return True
         return False
 
     bench.until(refused, 'the call to be known')
-    bench.until(lambda: capture.image_came(bench.now(), lambda: NEW) or asked.done(), 'the answer')
+    bench.until(lambda: capture.on_image(bench.now(), lambda: NEW) or asked.done(), 'the answer')
     assert capture.reference is NEW
 
 

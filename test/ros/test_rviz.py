@@ -9,20 +9,21 @@ import yaml
 
 _PATH = Path(__file__).parents[2] / 'rviz' / 'active_recon.rviz'
 CONFIG = yaml.safe_load(_PATH.read_text())['Visualization Manager']
-HEARD = {display['Name']: display['Topic'] for display in CONFIG['Displays'] if 'Topic' in display}
+DISPLAYED = {display['Name']: display['Topic'] for display in CONFIG['Displays']
+             if 'Topic' in display}
 STREAMED = {'/camera/image_raw', '/camera/pose'}
 
 
 def test_all_that_rviz_hears_is_published_by_the_loop():
     published = {'/' + name.lstrip('/') for name in TOPICS}
-    assert {topic['Value'] for topic in HEARD.values()} <= published
+    assert {topic['Value'] for topic in DISPLAYED.values()} <= published
     assert {'/occupancy', '/probabilities', '/view', '/next_view', '/azimuth_scores',
-            '/camera/image_raw'} <= {topic['Value'] for topic in HEARD.values()}
+            '/camera/image_raw'} <= {topic['Value'] for topic in DISPLAYED.values()}
 
 
-@pytest.mark.parametrize('name', HEARD)
+@pytest.mark.parametrize('name', DISPLAYED)
 def test_rviz_finds_what_is_latched_and_asks_a_stream_for_no_more_than_it_has(name):
-    topic = HEARD[name]
+    topic = DISPLAYED[name]
     streamed = topic['Value'] in STREAMED
     assert topic['Durability Policy'] == ('Volatile' if streamed else 'Transient Local')
     assert topic['Reliability Policy'] == ('Best Effort' if streamed else 'Reliable')

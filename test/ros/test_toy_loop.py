@@ -16,7 +16,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 import toy
 
-from .conftest import LATCHED
+from .conftest import LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 TOY = (str(Path(toy.__file__)),)
@@ -45,8 +45,8 @@ def test_toys_run_the_loop_and_their_bag_replays_to_the_same_bits(
                take_views='at_goal', object_yaw=1.0)
     start_node('view_planner', program=(*TOY, 'view_planner'), policy='opposite',
                max_views=VIEWS, entropy_tolerance=0.0)
-    done = bench.hear(Header, 'done', LATCHED)
-    latents = bench.hear(Image, 'latent', LATCHED)
+    done = bench.subscribe(Header, 'done', LATCHED_QOS)
+    latents = bench.subscribe(Image, 'latent', LATCHED_QOS)
     bench.until(lambda: done and done[-1].frame_id, 'the end of the episode')
     bench.until(lambda: len(latents) >= VIEWS, 'all latents')
     assert bench.call('stop').success

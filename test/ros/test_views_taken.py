@@ -27,7 +27,7 @@ def camera(shared_bench, reconstructor):
 
 @pytest.fixture
 def views(shared_bench, camera):
-    views = shared_bench.hear(PoseStamped, 'view')
+    views = shared_bench.subscribe(PoseStamped, 'view')
     shared_bench.until(lambda: shared_bench.node.count_publishers('view'), 'a publisher of views')
     assert shared_bench.call('start_episode').success
     return views

@@ -1,1 +1,1 @@
-"""A camera as a node receives it: images, poses, faults."""
+"""Receives a camera: its images, poses and faults."""

@@ -1,4 +1,4 @@
-"""The camera's images, raw or compressed, whichever come, and how many were lost on the way."""
+"""The camera's images, raw or compressed, and how many were lost in transport."""
 
 from collections.abc import Callable
 from functools import partial
@@ -7,19 +7,19 @@ from typing import Any
 
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.diagnostics import Diagnostics
-from active_recon.nodes.runtime.one_form import OneForm
-from active_recon.nodes.runtime.qos import HEARD
-from active_recon.nodes.runtime.topic_names import FORMS
+from active_recon.nodes.runtime.qos import SENSOR_QOS
+from active_recon.nodes.runtime.topic_names import TRANSPORT_SUFFIXES
+from active_recon.nodes.runtime.transport_selector import TransportSelector
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image
 
-NAME = 'camera/image_raw'
-KINDS = dict(zip((Image, CompressedImage), FORMS[NAME], strict=True))
-"""What the topics of the same images in each type end in."""
+IMAGE_TOPIC = 'camera/image_raw'
+IMAGE_SUFFIXES = dict(zip((Image, CompressedImage), TRANSPORT_SUFFIXES[IMAGE_TOPIC], strict=True))
+"""The topic's suffix for each message type of the same images."""
 
 
 class CameraImages:
-    """Hears `camera/image_raw`, and the topic beside it on which the same images come as JPEG."""
+    """Subscribes to `camera/image_raw` and to the compressed topic of the same images."""
 
     def __init__(self, node: Node, diagnostics: Diagnostics, inputs: AwaitedInputs,
                  on_image: Callable[[Image | CompressedImage], None],
@@ -29,24 +29,24 @@ class CameraImages:
         self._inputs = inputs
         self._on_image = on_image
         self._on_lost = on_lost
-        self._form = OneForm()
+        self._selector = TransportSelector()
         self._number = 0
-        inputs.expect(NAME, KINDS)
-        # Where image_transport has it, also under another name of the raw one
-        raw = node.resolve_topic_name(NAME)
-        for kind, suffix in KINDS.items():
+        inputs.expect(IMAGE_TOPIC, IMAGE_SUFFIXES)
+        # As in image_transport, the suffix follows the remapped name of the raw topic
+        raw = node.resolve_topic_name(IMAGE_TOPIC)
+        for kind, suffix in IMAGE_SUFFIXES.items():
             topic = f'{raw}{suffix}'
-            node.create_subscription(kind, topic, partial(self._on_message, topic), HEARD)
+            node.create_subscription(kind, topic, partial(self._on_message, topic), SENSOR_QOS)
 
     def _on_message(self, topic: str, msg: Image | CompressedImage, info: dict[str, Any]) -> None:
-        self._inputs.heard(NAME)
-        before = self._form.used
-        if not self._form.takes(topic, time.monotonic()):
+        self._inputs.received(IMAGE_TOPIC)
+        selected_before = self._selector.selected
+        if not self._selector.accepts(topic, time.monotonic()):
             self._diagnostics.count('images_in_the_other_form')
             return
         number = info['publication_sequence_number']
-        lost = number - self._number - 1 if topic == before and self._number else 0
-        # Each publisher counts for itself: with two of them the gaps say nothing
+        lost = number - self._number - 1 if topic == selected_before and self._number else 0
+        # Each publisher numbers its own messages: with two of them gaps mean nothing
         if lost > 0 and self._node.count_publishers(topic) == 1:
             self._diagnostics.count('dropped/unheard', lost)
             self._on_lost()

@@ -1,4 +1,4 @@
-"""Where the camera's poses come from: a topic, the joint of a turntable, or tf2."""
+"""Sources of the camera's poses: a topic, the joint of a turntable, or tf2."""
 
 from collections import deque
 from collections.abc import Callable
@@ -11,8 +11,8 @@ from active_recon.geometry.turntable_pose import FixedCamera
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.diagnostics import Diagnostics
-from active_recon.nodes.runtime.qos import HEARD_OFTEN, STREAM
-from active_recon.parameters.camera_pose import CameraPoseSettings
+from active_recon.nodes.runtime.qos import HIGH_RATE_QOS, STREAM_QOS
+from active_recon.parameters.camera_pose import CameraPoseParameters
 from geometry_msgs.msg import Point, Pose, PoseStamped
 from msg_tools.cameras import pose_to_msg
 from msg_tools.goals import joint_position_from_msg
@@ -21,101 +21,102 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-LOOK_UP_EVERY_S = 0.02
-TF_PATIENCE_S = 0.5
-"""For so long an image waits for its transform."""
+LOOKUP_EVERY_S = 0.02
+TF_TIMEOUT_S = 0.5
+"""Time to wait for an image's transform."""
 _WAITING = 32  # images
 
-Take = Callable[[PoseStamped], None]
+OnPose = Callable[[PoseStamped], None]
 
 
 class PoseSource(Protocol):
     """
-    What hands on the camera's poses in the object frame.
+    A source of the camera's poses in the object frame.
 
-    Every pose but those of the topic itself is published on `camera/pose` as well, for the
-    planner, the viewer and the bags.
+    Poses that do not come from `camera/pose` are published there, for the planner, the viewer
+    and the bags.
     """
 
-    def image_came(self, header: Header) -> None:
-        """Hear of an image, by its stamp and the frame of its camera."""
+    def on_image(self, header: Header) -> None:
+        """Note an image, by its stamp and the frame of its camera."""
 
 
-def check_pose_source(settings: CameraPoseSettings) -> None:
-    """Raise ConfigError where the poses could not be had."""
-    if settings.pose_source == 'turntable_joint':
-        settings.as_fixed_camera()
-    elif settings.pose_source == 'tf':
+def check_pose_source(params: CameraPoseParameters) -> None:
+    """Raise ConfigError where the poses cannot be obtained."""
+    if params.pose_source == 'turntable_joint':
+        params.as_fixed_camera()
+    elif params.pose_source == 'tf':
         _tf2_ros()
 
 
-def hear_poses(node: Node, settings: CameraPoseSettings, object_frame: str, take: Take,
-               diagnostics: Diagnostics, inputs: AwaitedInputs) -> PoseSource:
-    """Return what hands the poses to `take` from now on; raises as `check_pose_source`."""
-    if settings.pose_source == 'turntable_joint':
-        return TurntablePoses(node, take, diagnostics, inputs, settings.as_fixed_camera(),
-                              settings.joint_name, object_frame)
-    if settings.pose_source == 'tf':
-        return TfPoses(node, take, diagnostics, object_frame)
-    return TopicPoses(take, inputs)
+def subscribe_poses(node: Node, params: CameraPoseParameters, object_frame: str, on_pose: OnPose,
+                    diagnostics: Diagnostics, inputs: AwaitedInputs) -> PoseSource:
+    """Return a source that calls `on_pose` for each pose; raises as `check_pose_source`."""
+    if params.pose_source == 'turntable_joint':
+        return TurntablePoses(node, on_pose, diagnostics, inputs, params.as_fixed_camera(),
+                              params.joint_name, object_frame)
+    if params.pose_source == 'tf':
+        return TfPoses(node, on_pose, diagnostics, object_frame)
+    return TopicPoses(on_pose, inputs)
 
 
 class TopicPoses:
-    """The poses that others publish on `camera/pose`."""
+    """Poses that another node publishes on `camera/pose`."""
 
-    def __init__(self, take: Take, inputs: AwaitedInputs) -> None:
-        inputs.hear(PoseStamped, 'camera/pose', take, HEARD_OFTEN)
+    def __init__(self, on_pose: OnPose, inputs: AwaitedInputs) -> None:
+        inputs.subscribe(PoseStamped, 'camera/pose', on_pose, HIGH_RATE_QOS)
 
-    def image_came(self, header: Header) -> None:
-        """Leave it to the joiner, which interpolates."""
+    def on_image(self, header: Header) -> None:
+        """Do nothing: the joiner interpolates."""
 
 
 class TurntablePoses:
-    """The poses of a fixed camera around an object that `turntable/joint_states` turns."""
+    """Poses of a fixed camera in the frame of an object that `turntable/joint_states` turns."""
 
-    def __init__(self, node: Node, take: Take, diagnostics: Diagnostics, inputs: AwaitedInputs,
-                 camera: FixedCamera, joint: str, object_frame: str) -> None:
-        self._take = take
+    def __init__(self, node: Node, on_pose: OnPose, diagnostics: Diagnostics,
+                 inputs: AwaitedInputs, camera: FixedCamera, joint: str,
+                 object_frame: str) -> None:
+        self._on_pose = on_pose
         self._diagnostics = diagnostics
         self._camera = camera
         self._joint = joint
         self._object_frame = object_frame
-        self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
-        inputs.hear(JointState, 'turntable/joint_states', self._on_joint, HEARD_OFTEN)
+        self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
+        inputs.subscribe(JointState, 'turntable/joint_states', self._on_joint, HIGH_RATE_QOS)
 
     def _on_joint(self, msg: JointState) -> None:
-        with self._diagnostics.refusing():
+        with self._diagnostics.rejecting():
             pose = self._camera.pose_at(joint_position_from_msg(msg, self._joint))
             header = Header(stamp=msg.header.stamp, frame_id=self._object_frame)
-            told = pose_to_msg(pose, header)
-            self._publisher.publish(told)
-            self._take(told)
+            camera_pose = pose_to_msg(pose, header)
+            self._publisher.publish(camera_pose)
+            self._on_pose(camera_pose)
 
-    def image_came(self, header: Header) -> None:
-        """Leave it to the joiner, which interpolates."""
+    def on_image(self, header: Header) -> None:
+        """Do nothing: the joiner interpolates."""
 
 
 class TfPoses:
     """
-    The poses that tf2 tells at each image's stamp, of the frame that the image names.
+    Poses from tf2, of the frame of each image at its stamp.
 
-    tf2 interpolates by itself. Raises ConfigError where it is not installed.
+    tf2 interpolates. Raises ConfigError where it is not installed.
     """
 
-    def __init__(self, node: Node, take: Take, diagnostics: Diagnostics,
+    def __init__(self, node: Node, on_pose: OnPose, diagnostics: Diagnostics,
                  object_frame: str) -> None:
         self._tf = _tf2_ros()
-        self._take = take
+        self._on_pose = on_pose
         self._diagnostics = diagnostics
         self._object_frame = object_frame
         self._waiting: deque[tuple[Header, float]] = deque(maxlen=_WAITING)
-        self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM)
+        self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
         self._buffer = self._tf.Buffer()
         self._listener = self._tf.TransformListener(self._buffer, node)
-        node.create_timer(LOOK_UP_EVERY_S, self._look_up, clock=STEADY)
+        node.create_timer(LOOKUP_EVERY_S, self._look_up, clock=STEADY)
 
-    def image_came(self, header: Header) -> None:
-        """Look the image's pose up, now or when its transform has come."""
+    def on_image(self, header: Header) -> None:
+        """Look up the image's pose, now or when its transform has arrived."""
         self._waiting.append((header, time.monotonic()))
         self._look_up()
 
@@ -127,28 +128,28 @@ class TfPoses:
                 found = self._buffer.lookup_transform(
                     self._object_frame, header.frame_id, Time.from_msg(header.stamp))
             except self._tf.TransformException as error:
-                if now - since < TF_PATIENCE_S:
+                if now - since < TF_TIMEOUT_S:
                     self._waiting.append((header, since))
                 else:
-                    self._diagnostics.refuse(MessageError(
-                        f"expected tf to tell the pose of the image's frame {header.frame_id!r} "
+                    self._diagnostics.reject(MessageError(
+                        f"expected tf to have the pose of the image's frame {header.frame_id!r} "
                         f'in {self._object_frame!r} at its stamp: {error}', 'tf'))
             else:
-                self._tell(found.transform, header)
+                self._publish(found.transform, header)
 
-    def _tell(self, transform: Any, header: Header) -> None:
+    def _publish(self, transform: Any, header: Header) -> None:
         place = transform.translation
-        told = PoseStamped(
+        msg = PoseStamped(
             header=Header(stamp=header.stamp, frame_id=self._object_frame),
             pose=Pose(position=Point(x=place.x, y=place.y, z=place.z),
                       orientation=transform.rotation))
-        self._publisher.publish(told)
-        self._take(told)
+        self._publisher.publish(msg)
+        self._on_pose(msg)
 
 
 def _tf2_ros() -> Any:
     try:
-        return import_module('tf2_ros')  # a full ROS has it, the wheels have not
+        return import_module('tf2_ros')  # part of a full ROS, but not of the wheels
     except ImportError as error:
         raise ConfigError(
             'parameter pose_source: expected tf2_ros to be installed where it is tf, but there is '

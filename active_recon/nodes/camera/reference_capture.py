@@ -10,53 +10,53 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-IMAGE_WITHIN_S = 2.0
-"""For so long the service waits for an image that was taken after the call."""
+IMAGE_TIMEOUT_S = 2.0
+"""Time to wait for an image that was taken after the call."""
 
 
 class ReferenceCapture:
     """
-    Holds the image of the empty scene, once it was asked for.
+    Serves `capture_background` and holds the image of the empty scene.
 
-    It lives as long as its node: a service that is destroyed while it waits could not answer.
+    It lives as long as its node: a service that is destroyed while it waits cannot answer.
     """
 
     def __init__(self, node: Node) -> None:
         self.reference: NDArray[np.uint8] | None = None
         self._node = node
-        self._asked_at = 0
+        self._called_at = 0
         self._image: Future | None = None
-        # In a group of its own: while it waits for an image, that image must be let in.
+        # In a group of its own: images must arrive while the service waits for one.
         node.create_service(Trigger, 'capture_background', self._on_capture,
                             callback_group=MutuallyExclusiveCallbackGroup())
 
-    def forget(self) -> None:
-        """Have no image of the empty scene."""
+    def clear(self) -> None:
+        """Forget the image of the empty scene."""
         self.reference = None
 
-    def image_came(self, stamp: int, read: Callable[[], NDArray[np.uint8]]) -> None:
+    def on_image(self, stamp: int, read: Callable[[], NDArray[np.uint8]]) -> None:
         """
-        Keep an image, at its stamp in nanoseconds, if one is waited for and it is new enough.
+        Keep an image, at its stamp in nanoseconds, if the service waits for one and it is new.
 
-        What `read` raises where it is no image is passed on, and the next one is waited for.
+        Passes on what `read` raises; the service then waits for the next image.
         """
-        if self._image is not None and not self._image.done() and stamp >= self._asked_at:
+        if self._image is not None and not self._image.done() and stamp >= self._called_at:
             self._image.set_result(read())
 
     async def _on_capture(self, _request: Trigger.Request,
                           response: Trigger.Response) -> Trigger.Response:
-        """Answer when the image has come, or could not be waited for any longer."""
-        self._asked_at = self._node.get_clock().now().nanoseconds
+        """Answer when the image has arrived, or after the timeout."""
+        self._called_at = self._node.get_clock().now().nanoseconds
         image = self._image = Future()
         late = self._node.create_timer(
-            IMAGE_WITHIN_S, lambda: image.done() or image.set_result(None),
+            IMAGE_TIMEOUT_S, lambda: image.done() or image.set_result(None),
             clock=STEADY)
         captured = await image
         self._node.destroy_timer(late)
         self._image = None
         if captured is None:
             response.message = ('expected an image of the empty scene that was taken after the '
-                                f'call, none came within {IMAGE_WITHIN_S:g} s; is the camera '
+                                f'call, none came within {IMAGE_TIMEOUT_S:g} s; is the camera '
                                 'running and the node active?')
             return response
         self.reference = captured

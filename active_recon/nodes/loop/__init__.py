@@ -1,1 +1,1 @@
-"""The loop as its nodes and its observers receive it."""
+"""Topics of the loop, as its nodes and its observers publish and receive them."""

@@ -1,9 +1,9 @@
-"""The planner's goals on their topics, each under a stamp of its own, until its view comes."""
+"""Publishes the planner's goals, each with a unique stamp, until its view has been taken."""
 
 import math
 
 from active_recon.geometry.cameras import Camera
-from active_recon.nodes.runtime.qos import LATCHED
+from active_recon.nodes.runtime.qos import LATCHED_QOS
 from active_recon.planner import Goal
 from geometry_msgs.msg import PoseStamped
 from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
@@ -24,43 +24,43 @@ class GoalPublisher:
         self._node = node
         self._frame = frame
         self._last_stamp = 0
-        self._asked: tuple[PoseStamped, JointState] | None = None
+        self._open: tuple[PoseStamped, JointState] | None = None
         self._since = 0
         self.camera: Camera | None = None
-        self._next_view_pub = node.create_publisher(PoseStamped, 'next_view', LATCHED)
-        self._next_azimuth_pub = node.create_publisher(JointState, 'next_azimuth', LATCHED)
-        self._scores_pub = node.create_publisher(PointCloud2, 'azimuth_scores', LATCHED)
+        self._next_view_pub = node.create_publisher(PoseStamped, 'next_view', LATCHED_QOS)
+        self._next_azimuth_pub = node.create_publisher(JointState, 'next_azimuth', LATCHED_QOS)
+        self._scores_pub = node.create_publisher(PointCloud2, 'azimuth_scores', LATCHED_QOS)
 
     @property
-    def waited(self) -> float:
-        """Seconds for which the goal is open, by the node's clock; NaN where none is."""
+    def open_for(self) -> float:
+        """Seconds for which the goal has been open, by the node's clock; NaN if none is."""
         if self.camera is None:
             return math.nan
         return (self._node.get_clock().now().nanoseconds - self._since) / 1e9
 
-    def ask(self, goal: Goal) -> None:
-        """Publish a goal under a stamp of its own, its identity."""
+    def publish(self, goal: Goal) -> None:
+        """Publish a goal with a unique stamp, its identity."""
         self.camera = goal.camera
         self._since = self._node.get_clock().now().nanoseconds
         # A paused clock would give two goals one identity
         self._last_stamp = max(self._since, self._last_stamp + 1)
         header = Header(stamp=stamp_from_nanoseconds(self._last_stamp), frame_id=self._frame)
-        self._asked = (view_goal_to_msg(goal.camera, header),
+        self._open = (view_goal_to_msg(goal.camera, header),
                        azimuth_goal_to_msg(goal.camera.azimuth, header))
         self._scores_pub.publish(scores_to_msg(goal.candidates, goal.scores, header))
         self.repeat()
 
     def repeat(self) -> None:
-        """Send the open goal again, with its stamp: it may not have been heard."""
-        if self._asked is not None:
-            next_view, next_azimuth = self._asked
+        """Publish the open goal again, with the same stamp: it may have been lost."""
+        if self._open is not None:
+            next_view, next_azimuth = self._open
             self._next_view_pub.publish(next_view)
             self._next_azimuth_pub.publish(next_azimuth)
 
-    def forget_stamps(self) -> None:
-        """Let the next stamp be earlier than the last one was: the clock went back."""
+    def reset_stamps(self) -> None:
+        """Allow the next stamp to be earlier than the last: the clock jumped back."""
         self._last_stamp = 0
 
     def close(self) -> None:
-        """Send the goal no more."""
-        self._asked = self.camera = None
+        """Close the goal: it is not published again."""
+        self._open = self.camera = None

@@ -1,4 +1,4 @@
-"""All that is heard of one loop, read into what a page shows."""
+"""Subscribes to all topics of a loop, and keeps the state that the page and the demo show."""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,15 +6,16 @@ import time
 from typing import Any
 
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS
-from active_recon.nodes.camera.images import KINDS, NAME
+from active_recon.nodes.camera.images import IMAGE_SUFFIXES, IMAGE_TOPIC
 from active_recon.nodes.loop.followed_loop import Loop
-from active_recon.nodes.loop.problems import HeardProblems
+from active_recon.nodes.loop.problem_monitor import ProblemMonitor
 from active_recon.nodes.runtime.diagnostics import Diagnostics
-from active_recon.nodes.runtime.one_form import OneForm
-from active_recon.nodes.runtime.polled import Polled, taken
-from active_recon.nodes.runtime.qos import HEARD, LATCHED_HEARD_LATE
+from active_recon.nodes.runtime.polled import PolledCallbackGroup, take_messages
+from active_recon.nodes.runtime.qos import LATCHED_POLLED_QOS, SENSOR_QOS
+from active_recon.nodes.runtime.transport_selector import TransportSelector
 from active_recon.viewer.link import TopicLink
-from active_recon.viewer.state import Observer, own_threshold, Scores, TakenView, thumbnail
+from active_recon.viewer.state import Observer, Scores, thumbnail
+from active_recon.viewer.view_result import ViewResult
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import pixels_from_msg
@@ -32,35 +33,38 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
-_ROLES = {'image': NAME, 'view': 'view', 'occupancy': 'occupancy', 'goal': 'next_view'}
+_ROLES = {'image': IMAGE_TOPIC, 'view': 'view', 'occupancy': 'occupancy', 'goal': 'next_view'}
 _IMAGES_KEPT = 64
 
 
-class HeardLoop:
+class LoopSubscriber:
     """
-    Hears a loop, and keeps what is known of it in `observer`; nothing is read until `take`.
+    Subscribes to a loop and keeps its state in `observer`; messages are read by `update` only.
 
-    Where the nodes of the loop are others than was thought, it is closed, and another is made.
+    A message that cannot be read is rejected in the node's diagnostics.
     """
 
-    def __init__(self, node: Node, loop: Loop, diagnostics: Diagnostics) -> None:
+    def __init__(self, node: Node, loop: Loop, diagnostics: Diagnostics,
+                 observer: Observer | None = None) -> None:
         self._node = node
         self._loop = loop
         self._diagnostics = diagnostics
-        self.observer = Observer()
-        self._problems = HeardProblems(node.get_fully_qualified_name())
+        self.observer = observer or Observer()
+        self._problems = ProblemMonitor(node.get_fully_qualified_name())
         self._joiner = StampJoiner(('view', 'occupancy', 'probabilities'))
         self._images: dict[int, NDArray[np.uint8]] = {}
-        self._form = OneForm()
+        self._selector = TransportSelector()
         self._intrinsics = CANONICAL_INTRINSICS
-        self._heard_at: dict[str, float] = {}
-        self._polled = Polled()
-        self._heard: list[tuple[str, Subscription]] = []
-        for image, form in KINDS.items():
-            self._hear(image, NAME, partial(self._on_image, image.__name__), HEARD, form)
-        self._hear(CameraInfo, 'camera/camera_info', self._on_camera_info, HEARD)
-        self._hear(PoseStamped, 'camera/pose', self._on_camera, HEARD)
-        self._hear(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
+        self._received_at: dict[str, float] = {}
+        self._message_received = 0  # nanoseconds
+        self._polled = PolledCallbackGroup()
+        self._subscriptions: list[tuple[str, Subscription]] = []
+        for image, suffix in IMAGE_SUFFIXES.items():
+            self._subscribe(image, IMAGE_TOPIC, partial(self._on_image, suffix), SENSOR_QOS,
+                            suffix)
+        self._subscribe(CameraInfo, 'camera/camera_info', self._on_camera_info, SENSOR_QOS)
+        self._subscribe(PoseStamped, 'camera/pose', self._on_camera, SENSOR_QOS)
+        self._subscribe(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         for kind, name, callback in (
                 (PoseStamped, 'view', self._on_view),
                 (PointCloud2, 'occupancy', self._on_occupancy),
@@ -69,61 +73,61 @@ class HeardLoop:
                 (PoseStamped, 'next_view', self._on_goal),
                 (PointCloud2, 'azimuth_scores', self._on_scores),
                 (Header, 'done', self._on_done), (Header, 'episode', self._on_episode)):
-            self._hear(kind, name, callback, LATCHED_HEARD_LATE)
+            self._subscribe(kind, name, callback, LATCHED_POLLED_QOS)
 
-    def take(self) -> None:
-        """Read what came since the last time."""
-        for name, subscription in self._heard:
-            for msg in taken(subscription):
-                self._heard_at[name] = time.monotonic()
+    def update(self) -> None:
+        """Read the messages received since the last call."""
+        for name, subscription in self._subscriptions:
+            for msg, self._message_received in take_messages(subscription):
+                self._received_at[name] = time.monotonic()
                 self._diagnostics.count(name)
-                with self._diagnostics.refusing():
+                with self._diagnostics.rejecting():
                     subscription.callback(msg)
 
     def links(self) -> dict[str, TopicLink]:
-        """Return how things stand with the topics that matter, by their role."""
+        """Return the state of the topics that matter, by their role."""
         now = time.monotonic()
         return {role: TopicLink(
             self._loop.full_name(name), self._publishers(name),
-            now - self._heard_at[name] if name in self._heard_at else None)
+            now - self._received_at[name] if name in self._received_at else None)
             for role, name in _ROLES.items()}
 
     def problems(self) -> dict[str, str]:
-        """Return what the nodes say is wrong, by their names."""
-        return self._problems.now(time.monotonic())
+        """Return the problems that nodes report, by their names."""
+        return self._problems.current(time.monotonic())
 
     def close(self) -> None:
-        """Hear nothing more."""
-        for _, subscription in self._heard:
+        """Unsubscribe from all topics."""
+        for _, subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
 
-    def _hear(self, kind: type, name: str, callback: Callable[[Any], None], qos: Any,
-              form: str = '') -> None:
-        """Hear a topic, by its name in the loop, in one of its forms."""
-        self._heard.append((name, self._node.create_subscription(
-            kind, f'{self._loop.full_name(name)}{form}', callback, qos,
+    def _subscribe(self, kind: type, name: str, callback: Callable[[Any], None], qos: Any,
+                   suffix: str = '') -> None:
+        """Subscribe to a topic by its name in the loop, with the suffix of its transport."""
+        self._subscriptions.append((name, self._node.create_subscription(
+            kind, f'{self._loop.full_name(name)}{suffix}', callback, qos,
             callback_group=self._polled)))
 
     def _publishers(self, name: str) -> int:
-        """Return how many publish a topic, in any of its forms."""
+        """Return the number of publishers of a topic, on any transport."""
         return sum(self._node.count_publishers(subscription.topic_name)
-                   for heard, subscription in self._heard if heard == name)
+                   for each, subscription in self._subscriptions if each == name)
 
-    def _on_image(self, form: str, msg: Image | CompressedImage) -> None:
-        if not self._form.takes(form, time.monotonic()):
+    def _on_image(self, suffix: str, msg: Image | CompressedImage) -> None:
+        if not self._selector.accepts(suffix or 'raw', time.monotonic()):
             return
         picture = thumbnail(pixels_from_msg(msg))
         self._images[nanoseconds_from_stamp(msg.header.stamp)] = picture
         while len(self._images) > _IMAGES_KEPT:
             del self._images[min(self._images)]
-        self.observer.see(picture=picture)
+        self.observer.set_camera(picture=picture)
 
     def _on_network_image(self, msg: Image) -> None:
         self.observer.set_network_image(
             nanoseconds_from_stamp(msg.header.stamp), image_from_msg(msg))
 
     def _on_diagnostics(self, msg: DiagnosticArray) -> None:
-        self._problems.hear(msg, self._loop.namespace, time.monotonic())
+        self._problems.add(msg, self._loop.namespace, time.monotonic())
 
     def _on_camera_info(self, msg: CameraInfo) -> None:
         self._intrinsics = intrinsics_from_msg(msg)
@@ -132,14 +136,15 @@ class HeardLoop:
         return Camera(pose_from_msg(msg, self._loop.object_frame), self._intrinsics)
 
     def _on_camera(self, msg: PoseStamped) -> None:
-        self.observer.see(self._camera(msg))
+        self.observer.set_camera(self._camera(msg))
 
     def _on_view(self, msg: PoseStamped) -> None:
         self._join('view', msg.header, self._camera(msg))
 
     def _on_occupancy(self, msg: PointCloud2) -> None:
+        latency = (self._message_received - nanoseconds_from_stamp(msg.header.stamp)) / 1e9
         grid = voxel_grid_from_msg(msg, self._loop.object_size)
-        self._join('occupancy', msg.header, own_threshold(grid))
+        self._join('occupancy', msg.header, (grid, latency))
 
     def _on_probabilities(self, msg: PointCloud2) -> None:
         self._join('probabilities', msg.header, voxel_grid_from_msg(msg, self._loop.object_size))
@@ -149,8 +154,10 @@ class HeardLoop:
         parts = self._joiner.add(name, stamp, part)
         if parts is not None:
             grid = parts['probabilities']
-            view = TakenView(stamp, parts['view'], self._images.get(stamp), grid.entropy())
-            self.observer.take_view(view, grid, parts['occupancy'])
+            occupied, latency = parts['occupancy']
+            view = ViewResult(
+                stamp, parts['view'], self._images.get(stamp), grid.entropy(), latency)
+            self.observer.add_view(view, grid, occupied)
 
     def _on_goal(self, msg: PoseStamped) -> None:
         self.observer.set_goal(nanoseconds_from_stamp(msg.header.stamp), self._camera(msg))

@@ -1,1 +1,1 @@
-"""What a recorder records, and what it notices while it does."""
+"""What the recorder records, and what it monitors while it records."""

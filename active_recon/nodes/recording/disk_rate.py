@@ -7,18 +7,18 @@ WINDOW_S = 5.0
 
 
 class DiskRate:
-    """The bytes of a folder's files, and how many come per second, over the last WINDOW_S."""
+    """The size of a folder's files, and its rate of growth over the last WINDOW_S."""
 
     def __init__(self, folder: Path, now: float) -> None:
         self._folder = folder
         self._sizes = deque([(now, 0)])
         self._began = now
 
-    def look(self, now: float) -> None:
-        """Note the size at a time, seconds of a clock that never runs backwards."""
+    def update(self, now: float) -> None:
+        """Measure the size at a time, seconds of a monotonic clock."""
         try:
             size = sum(path.stat().st_size for path in self._folder.iterdir())
-        except FileNotFoundError:  # one was renamed meanwhile
+        except FileNotFoundError:  # a file was renamed meanwhile
             return
         self._sizes.append((now, size))
         while len(self._sizes) > 2 and self._sizes[1][0] <= now - WINDOW_S:
@@ -26,16 +26,16 @@ class DiskRate:
 
     @property
     def megabytes(self) -> float:
-        """The size when it was last looked at."""
+        """The size when it was last measured."""
         return self._sizes[-1][1] / 1e6
 
     @property
     def megabytes_per_s(self) -> float:
-        """How fast it has grown lately."""
+        """The rate of growth."""
         (begin, first), (end, last) = self._sizes[0], self._sizes[-1]
         return (last - first) / 1e6 / (end - begin) if end > begin else 0.0
 
     @property
     def seconds(self) -> float:
-        """From the beginning to the last look."""
+        """Time from the beginning to the last measurement."""
         return self._sizes[-1][0] - self._began

@@ -1,23 +1,23 @@
-"""Which topics are recorded: those that are named, wherever the loop's nodes say they are."""
+"""The topics to record, with the full names that the loop's nodes have for them."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
 from active_recon.nodes.runtime.diagnostics import Diagnostics
-from active_recon.nodes.runtime.topic_names import FORMS
+from active_recon.nodes.runtime.topic_names import TRANSPORT_SUFFIXES
 from active_recon.parameters.recorder import TOPICS
 from rclpy.node import Node
 
 NEEDED = ('camera/image_raw', 'camera/camera_info', 'camera/pose')
-"""Of the default topics, those without which a recording cannot be replayed."""
-_LOOKS = 50  # without a publisher, before that is told
+"""The default topics without which a recording cannot be replayed."""
+_CHECKS = 50  # without a publisher, before the warning
 
 
 class RecordedTopics:
     """
-    The full names of the topics, which may grow as nodes tell the names they have for them.
+    The full names of the recorded topics; nodes may add the names they have for them.
 
-    In the diagnostics what nobody publishes is the trouble `no_publisher`: of the default topics
-    only what every loop has, of others all.
+    In the diagnostics, topics without a publisher are the warning `no_publisher`: of the default
+    topics only those that every loop has, else all.
     """
 
     def __init__(self, node: Node, names: tuple[str, ...], diagnostics: Diagnostics) -> None:
@@ -28,8 +28,8 @@ class RecordedTopics:
         self.begin()
 
     def begin(self) -> None:
-        """Await publishers anew."""
-        self._looks = 0
+        """Expect publishers again."""
+        self._checks = 0
         self._published: set[str] = set()
 
     def __iter__(self) -> Iterator[str]:
@@ -40,30 +40,31 @@ class RecordedTopics:
         """Return the full names that a topic has; none where it is not recorded."""
         return self._full.get(name, set())
 
-    def learn(self, told: Mapping[str, str]) -> dict[str, str]:
+    def add_names(self, names: Mapping[str, str]) -> dict[str, str]:
         """
-        Take in what a node of the loop tells of its topics: the full names by its own.
+        Add the full names that a node of the loop has for its topics, by its own names.
 
-        Returns those that are recorded and that were remapped.
+        Returns those that are recorded and remapped.
         """
-        learnt = {}
-        for name, full in told.items():
+        remapped = {}
+        for name, full in names.items():
             if name in self._full:
                 self._full[name].add(full)
                 if full != f'{self._node.get_namespace().rstrip("/")}/{name.lstrip("/")}':
-                    learnt[name] = full
-        return learnt
+                    remapped[name] = full
+        return remapped
 
-    def look(self, published: Iterable[str]) -> None:
-        """Be told again and again which of the topics have publishers."""
-        self._looks += 1
+    def update(self, published: Iterable[str]) -> None:
+        """Note which of the topics have publishers; to be called repeatedly."""
+        self._checks += 1
         self._published.update(published)
         silent = [name for name in self._needed if not any(
-            self.named(f'{name}{form}') & self._published for form in FORMS.get(name, ('',)))]
-        if silent and self._looks > _LOOKS:
+            self.named(f'{name}{suffix}') & self._published
+            for suffix in TRANSPORT_SUFFIXES.get(name, ('',)))]
+        if silent and self._checks > _CHECKS:
             topics = sorted(full for name in silent for full in self.named(name))
-            self._diagnostics.begin_trouble('no_publisher', (
-                f'expected publishers on {", ".join(topics)}, none was there yet, so nothing of '
+            self._diagnostics.raise_warning('no_publisher', (
+                f'expected publishers on {", ".join(topics)}, none was found, so nothing of '
                 'them is recorded; remap with -r NAME:=TOPIC where they have other names'))
         else:
-            self._diagnostics.end_trouble('no_publisher')
+            self._diagnostics.clear_warning('no_publisher')

@@ -1,31 +1,31 @@
-"""Messages that were published and not heard, by the numbers that their publisher gives them."""
+"""Messages that were published and not received, found by gaps in sequence numbers."""
 
 from collections.abc import Set
 
 
 class SequenceGaps:
     """
-    Finds gaps in each topic's numbers, from the first message that was heard.
+    Finds gaps in the sequence numbers of each topic, from the first message received.
 
-    Each publisher counts for itself: with two of them on a topic the gaps say nothing.
+    Each publisher numbers its own messages: with two of them on a topic, gaps mean nothing.
     """
 
     def __init__(self) -> None:
         self._publishers: dict[str, Set[bytes]] = {}
         self._last: dict[str, int] = {}
 
-    def published_by(self, topic: str, publishers: Set[bytes]) -> None:
-        """Be told who publishes now, by what tells publishers apart."""
+    def set_publishers(self, topic: str, publishers: Set[bytes]) -> None:
+        """Set the ids of a topic's current publishers."""
         if self._publishers.get(topic) != publishers:
             self._publishers[topic] = publishers
             self._last.pop(topic, None)
 
-    def listened_anew(self, topic: str) -> None:
-        """Expect no number: what came meanwhile was not listened to, or is heard again."""
+    def restart(self, topic: str) -> None:
+        """Expect any number next: the topic was subscribed again."""
         self._last.pop(topic, None)
 
     def before(self, topic: str, number: int) -> int:
-        """Return how many messages are missing before that of a number."""
+        """Return how many messages are missing before that with this number."""
         last = self._last.get(topic)
         if len(self._publishers.get(topic, ())) != 1:
             return 0

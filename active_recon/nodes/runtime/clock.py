@@ -1,4 +1,4 @@
-"""A node's clock that may go back, as that of a simulation or of a bag that is played again."""
+"""Clocks that may jump back: that of a simulation, or of a bag that is played again."""
 
 from collections.abc import Callable
 
@@ -8,18 +8,18 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
-"""For what is to go on while the node's own clock stands still."""
+"""For timers that must run while the node's own clock is paused."""
 BACK_S = 0.1
-"""By so little a clock may go back without a jump: two who publish it may differ."""
+"""Steps back up to this are no jump: two publishers of a clock may differ."""
 AHEAD_S = 0.5
-"""So far ahead of the clock a stamp may be: the clock is heard a little late."""
+"""Tolerance for stamps ahead of the clock: clock messages arrive with a delay."""
 
 
-class ClockWatch:
+class ClockMonitor:
     """
-    Calls `went_back` when the node's clock has gone back, or has just become a simulation's.
+    Calls `went_back` after the node's clock has jumped back or switched to simulation time.
 
-    By then the clock tells the new time. The argument says what happened, in words.
+    The argument describes what happened.
     """
 
     def __init__(self, node: Node, went_back: Callable[[str], None]) -> None:
@@ -31,12 +31,12 @@ class ClockWatch:
             post_callback=self._jumped)
 
     def is_ahead(self, stamp: int) -> bool:
-        """Whether a stamp, nanoseconds, can only be of the time before the clock went back."""
+        """Whether a stamp in nanoseconds must be from before the clock jumped back."""
         now = self._clock.now().nanoseconds
         return self._has_gone_back and stamp > now + AHEAD_S * 1e9
 
     def close(self) -> None:
-        """Call nobody any more."""
+        """Stop monitoring."""
         self._handle.unregister()
 
     def _jumped(self, jump: TimeJump) -> None:

@@ -1,4 +1,4 @@
-"""The text of message types, as a bag carries it: found where the types are installed."""
+"""The definitions of message types as a bag stores them, read from the installed packages."""
 
 from functools import cache
 from importlib import import_module
@@ -21,8 +21,8 @@ def message_definition(type_name: str) -> str:
     """
     Return a type's definition in the ros2msg form, for example of 'std_msgs/msg/Header'.
 
-    It is the message file's own text, followed by that of every type it names, each after a line
-    of 80 '=' and 'MSG: pkg/Name'. Raises RecordingError where a message file is not installed.
+    That is the text of the message file, followed by that of every type it contains, each after
+    a line of 80 '=' and 'MSG: pkg/Name'. Raises RecordingError where one is not installed.
     """
     package, _, name = type_name.split('/')
     texts = {f'{package}/{name}': _message_file(package, name)}
@@ -46,7 +46,7 @@ def message_class(type_name: str) -> type:
 
 
 def _message_file(package: str, name: str) -> str:
-    # ROS from wheels stands in the Python environment, which nobody has sourced.
+    # ROS from wheels is in the Python environment, which needs no sourcing.
     prefixes = [*filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(':')), sys.prefix]
     for prefix in prefixes:
         path = Path(prefix, 'share', package, 'msg', f'{name}.msg')
@@ -57,7 +57,7 @@ def _message_file(package: str, name: str) -> str:
 
 
 def _named_types(package: str, text: str) -> list[str]:
-    """Return the types that a message file names, as 'pkg/Name', in their order."""
+    """Return the message types of a message file's fields, as 'pkg/Name', in their order."""
     fields = (_FIELD.match(line.split('#')[0].strip()) for line in text.splitlines())
     named = [field['type'] for field in fields if field and field['type'] not in _PRIMITIVES]
     return [name if '/' in name else f'{package}/{name}' for name in named]

@@ -1,4 +1,4 @@
-"""What a node did, refused and found wrong: counted, said in the log, told on `/diagnostics`."""
+"""A node's diagnostics: counters, values and problems, logged and published."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -18,159 +18,159 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 LOG_EVERY_S = 10.0
-TELL_EVERY_S = 1.0
-NEWS_WITHIN_S = 0.1
+PUBLISH_EVERY_S = 1.0
+CHANGES_WITHIN_S = 0.1
 
 
 class Diagnostics:
     """
-    The state of one node, on `/diagnostics`: once a second, and what is new at once.
+    Publishes a node's state on `/diagnostics`: once a second, and at once when it changes.
 
-    What is refused is counted by its kind. The first of a kind is logged at once, a stream of
-    them once in `LOG_EVERY_S` seconds, with the number of those left unsaid.
+    Rejected messages are counted by kind. The first of a kind is logged at once, further ones
+    every `LOG_EVERY_S` seconds, with the number of those that were not logged.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._counts: Counter[str] = Counter()
-        self.forget()
-        self._unsaid: Counter[str] = Counter()
-        self._said_at: dict[str, float] = {}
+        self.reset()
+        self._unlogged: Counter[str] = Counter()
+        self._logged_at: dict[str, float] = {}
         self._last_problem = ''
-        self._troubles: dict[str, str] = {}
-        self._said_troubles: set[str] = set()
+        self._warnings: dict[str, str] = {}
+        self._logged_warnings: set[str] = set()
         self._failure = ''
-        self._news = True
-        self._told_at = -math.inf
+        self._changed = True
+        self._published_at = -math.inf
         self._host = socket.gethostname()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        # By the system's clock: a clock of a simulation that stands still is worth telling too.
-        node.create_timer(NEWS_WITHIN_S, self._tell_if_due,
+        # A steady clock: diagnostics are published while simulation time is paused, too.
+        node.create_timer(CHANGES_WITHIN_S, self._publish_if_due,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def count(self, what: str, by: int = 1) -> None:
-        """Count something that is no refusal, for example a view taken in."""
+        """Increase a counter, for example that of views."""
         self._counts[what] += by
         if what in self._rates:
             self._rates[what].add(time.monotonic())
 
-    def measure(self, *counted: str) -> None:
-        """Tell per second, too, what is counted under these names."""
-        self._rates |= {name: Rate(time.monotonic()) for name in counted}
+    def measure_rates(self, *counters: str) -> None:
+        """Publish the rates per second of these counters, too."""
+        self._rates |= {name: Rate(time.monotonic()) for name in counters}
 
-    def forget(self) -> None:
-        """Forget facts, rates and latencies; what was counted stays."""
-        self._facts: dict[str, str] = {}
+    def reset(self) -> None:
+        """Forget values, rates and latencies; the counters stay."""
+        self._values: dict[str, str] = {}
         self._rates: dict[str, Rate] = {}
         self._latency = Durations()
 
-    def took_since(self, stamp: int) -> None:
-        """Note the latency of what was just published, from its stamp in nanoseconds to now."""
+    def record_latency(self, stamp: int) -> None:
+        """Record the latency of a message just published, from its stamp in nanoseconds to now."""
         self._latency.add((self._node.get_clock().now().nanoseconds - stamp) / 1e9)
 
-    def tell(self, fact: str, value: str, at_once: bool = True) -> None:
-        """Set a fact of the node's state, its name beginning with a capital."""
-        self._news = self._news or (at_once and self._facts.get(fact) != value)
-        self._facts[fact] = value
+    def set_value(self, key: str, value: str, at_once: bool = True) -> None:
+        """Set a value of the node's state; its key begins with a capital letter."""
+        self._changed = self._changed or (at_once and self._values.get(key) != value)
+        self._values[key] = value
 
-    def refuse(self, error: ActiveReconError) -> None:
-        """Count what was refused and say it in one line."""
-        self._say(f'refused/{error.kind}', f'refused: {one_line(error)}')
+    def reject(self, error: ActiveReconError) -> None:
+        """Count a rejected input by the error's kind and log the reason in one line."""
+        self._record(f'refused/{error.kind}', f'refused: {one_line(error)}')
 
     def warn(self, kind: str, message: str) -> None:
-        """Count what was used although it may do harm, and say why in one line."""
-        self._say(f'warned/{kind}', message)
+        """Count an input that was used although it may do harm, and log the reason."""
+        self._record(f'warned/{kind}', message)
 
-    def begin_trouble(self, kind: str, message: str) -> None:
+    def raise_warning(self, kind: str, message: str) -> None:
         """
-        Warn of a state that is wrong until `end_trouble`; count and say its beginning.
+        Raise a warning that stays until `clear_warning`; it is counted and logged once.
 
-        To be called again and again while it lasts: one that comes and goes is said, with its
-        end, once in `LOG_EVERY_S` seconds.
+        To be called repeatedly while the condition holds. One that comes and goes is logged,
+        with its end, at most every `LOG_EVERY_S` seconds.
         """
-        is_new = kind not in self._troubles
-        self._troubles[kind] = message
+        is_new = kind not in self._warnings
+        self._warnings[kind] = message
         if is_new:
             self._notice(f'warned/{kind}', message)
-        if kind not in self._said_troubles and self._log(f'warned/{kind}', message):
-            self._said_troubles.add(kind)
+        if kind not in self._logged_warnings and self._log(f'warned/{kind}', message):
+            self._logged_warnings.add(kind)
 
-    def end_trouble(self, kind: str) -> None:
-        """Take back the warning of a state, and say so where its beginning was said."""
-        message = self._troubles.pop(kind, None)
+    def clear_warning(self, kind: str) -> None:
+        """Clear a warning, and log that it is over if it was logged."""
+        message = self._warnings.pop(kind, None)
         if message is None:
             return
-        self._news = True
-        if kind in self._said_troubles:
-            self._said_troubles.discard(kind)
+        self._changed = True
+        if kind in self._logged_warnings:
+            self._logged_warnings.discard(kind)
             self._node.get_logger().info(f'over: {message}')
         else:
-            self._unsaid[f'warned/{kind}'] += 1
+            self._unlogged[f'warned/{kind}'] += 1
 
-    def fail(self, kind: str, message: str) -> None:
-        """Say as an error what the node does no more; it stays the state until `recover`."""
+    def raise_error(self, kind: str, message: str) -> None:
+        """Log an error, the node's state until `clear_error`."""
         self._counts[f'refused/{kind}'] += 1
         self._failure = message
-        self._news = True
+        self._changed = True
         self._node.get_logger().error(message)
 
-    def recover(self) -> None:
-        """Take back what `fail` said: the node does it again."""
-        self._news = self._news or self._failure != ''
+    def clear_error(self) -> None:
+        """Clear the error: the node works again."""
+        self._changed = self._changed or self._failure != ''
         self._failure = ''
 
     @contextmanager
-    def refusing(self) -> Iterator[None]:
-        """Refuse what the block cannot use, and go on."""
+    def rejecting(self) -> Iterator[None]:
+        """Reject the input on which the block raises ActiveReconError, and go on."""
         try:
             yield
         except ActiveReconError as error:
-            self.refuse(error)
+            self.reject(error)
 
-    def _say(self, key: str, message: str) -> None:
+    def _record(self, key: str, message: str) -> None:
         self._notice(key, message)
         if not self._log(key, message):
-            self._unsaid[key] += 1
+            self._unlogged[key] += 1
 
     def _notice(self, key: str, message: str) -> None:
         self._counts[key] += 1
         self._last_problem = message
-        self._news = True
+        self._changed = True
 
     def _log(self, key: str, message: str) -> bool:
-        """Say a message in the log, unless one of its kind was said only just; return whether."""
+        """Log a message unless one of its kind was just logged; return whether it was logged."""
         now = time.monotonic()
-        if now - self._said_at.get(key, -LOG_EVERY_S) < LOG_EVERY_S:
+        if now - self._logged_at.get(key, -LOG_EVERY_S) < LOG_EVERY_S:
             return False
-        unsaid = self._unsaid.pop(key, 0)
-        more = f' (and {unsaid} more of this kind before)' if unsaid else ''
-        self._said_at[key] = now
+        unlogged = self._unlogged.pop(key, 0)
+        more = f' (and {unlogged} more of this kind before)' if unlogged else ''
+        self._logged_at[key] = now
         self._node.get_logger().warning(f'{message}{more}')
         return True
 
-    def _tell_if_due(self) -> None:
-        """Publish what is new, and in any case once a second."""
+    def _publish_if_due(self) -> None:
+        """Publish changes, and in any case once a second."""
         now = time.monotonic()
-        regular = now - self._told_at >= TELL_EVERY_S
-        if not regular and not self._news:
+        regular = now - self._published_at >= PUBLISH_EVERY_S
+        if not regular and not self._changed:
             return
         status = self._status(now)
         self._publisher.publish(diagnostics_to_msg(
             status, stamp_from_nanoseconds(self._node.get_clock().now().nanoseconds)))
-        self._news = False
+        self._changed = False
         if regular:
-            # Not before: a warning lasts up to a second, so that who looks now and then sees it.
+            # A problem is published for up to a second, so that slow subscribers see it.
             self._last_problem = ''
-            self._told_at = now
+            self._published_at = now
 
     def _status(self, now: float) -> NodeStatus:
-        facts = dict(self._facts)
+        values = dict(self._values)
         for what, rate in self._rates.items():
-            facts[f'{what.capitalize()} per second'] = f'{rate.per_second(now):.2f}'
+            values[f'{what.capitalize()} per second'] = f'{rate.per_second(now):.2f}'
         for percent in (50, 99):
             latency = self._latency.percentile(percent)
             if not math.isnan(latency):
-                facts[f'Latency p{percent} (ms)'] = f'{1e3 * latency:.1f}'
-        problems = dict.fromkeys(filter(None, [*self._troubles.values(), self._last_problem]))
-        return NodeStatus(self._node.get_fully_qualified_name(), self._counts, facts,
+                values[f'Latency p{percent} (ms)'] = f'{1e3 * latency:.1f}'
+        problems = dict.fromkeys(filter(None, [*self._warnings.values(), self._last_problem]))
+        return NodeStatus(self._node.get_fully_qualified_name(), self._counts, values,
                           '; '.join(problems), self._failure, self._host)

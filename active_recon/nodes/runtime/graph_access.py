@@ -1,4 +1,4 @@
-"""What a live node publishes, hears, answers and asks, and the SROS2 policies for just that."""
+"""The topics and services a running node uses, and SROS2 policies that allow exactly those."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -9,13 +9,13 @@ from rclpy.node import Node
 
 Access = dict[tuple[str, str], frozenset[str]]
 """
-Of one node: names by ('topic', 'publish' or 'subscribe') and ('service', 'reply' or 'request').
+One node's names by ('topic', 'publish' or 'subscribe') and ('service', 'reply' or 'request').
 
-A name is `~/x` where it is the node's own, `x` where it is in the node's namespace, else `/x`.
+A name is `~/x` if private, `x` if in the node's namespace, else `/x`.
 """
 POLICY_VERSION = '0.2.0'
 ENCLAVES = '/active_recon'
-_ASKED_BY = {
+_QUERIES = {
     ('topic', 'publish'): Node.get_publisher_names_and_types_by_node,
     ('topic', 'subscribe'): Node.get_subscriber_names_and_types_by_node,
     ('service', 'reply'): Node.get_service_names_and_types_by_node,
@@ -24,24 +24,24 @@ _ASKED_BY = {
 
 def live_access(observer: Node, name: str, namespace: str) -> Access:
     """
-    Return what the node of that name has now, as far as the observer has discovered it.
+    Return what a node uses now, as far as the observer has discovered it.
 
     Raises rclpy's NodeNameNonExistentError while the node is not known.
     """
     return {kind: frozenset(_relative(found, name, namespace)
-                            for found, _ in ask(observer, name, namespace))
-            for kind, ask in _ASKED_BY.items()}
+                            for found, _ in query(observer, name, namespace))
+            for kind, query in _QUERIES.items()}
 
 
 def joined(accesses: Iterable[Access]) -> Access:
-    """Return all that any of them has."""
+    """Return the union of several nodes' access."""
     accesses = list(accesses)
     return {kind: frozenset().union(*(each.get(kind, frozenset()) for each in accesses))
-            for kind in _ASKED_BY}
+            for kind in _QUERIES}
 
 
 def write_policies(path: Path, nodes: Mapping[str, Access], namespace: str = '/') -> None:
-    """Write one policy file: for each node by its name an enclave that allows its access."""
+    """Write a policy file with one enclave for each node, by its name, that allows its access."""
     policy = ElementTree.Element('policy', version=POLICY_VERSION)
     enclaves = ElementTree.SubElement(policy, 'enclaves')
     for name in sorted(nodes):
@@ -59,29 +59,29 @@ def write_policies(path: Path, nodes: Mapping[str, Access], namespace: str = '/'
 
 
 def read_policies(path: Path) -> dict[str, Access]:
-    """Return each node's access, by its name; DataError on what is no policy file of ours."""
+    """Return each node's access by its name; DataError where the file is no such policy file."""
     try:
         profiles = ElementTree.parse(path).getroot().findall('enclaves/enclave/profiles/profile')
         return {profile.attrib['node']: {
             (kind, rule): frozenset(str(each.text) for each in profile.findall(
-                f"{kind}s[@{rule}='ALLOW']/{kind}")) for kind, rule in _ASKED_BY}
+                f"{kind}s[@{rule}='ALLOW']/{kind}")) for kind, rule in _QUERIES}
             for profile in profiles}
     except (OSError, ElementTree.ParseError, KeyError) as error:
         raise DataError(f'{path}: expected SROS2 policies, got: {error}') from error
 
 
 def differences(allowed: Mapping[str, Access], live: Mapping[str, Access]) -> list[str]:
-    """Return in words what is allowed and not there, and what is there and not allowed."""
-    told = []
+    """Describe what is allowed but not used, and what is used but not allowed."""
+    found = []
     for name in sorted(allowed.keys() | live.keys()):
-        for kind, rule in _ASKED_BY:
+        for kind, rule in _QUERIES:
             may = allowed.get(name, {}).get((kind, rule), frozenset())
             does = live.get(name, {}).get((kind, rule), frozenset())
-            told += [f'{name}: may {rule} the {kind} {each}, but does not'
+            found += [f'{name}: may {rule} the {kind} {each}, but does not'
                      for each in sorted(may - does)]
-            told += [f'{name}: does {rule} the {kind} {each}, but may not'
+            found += [f'{name}: does {rule} the {kind} {each}, but may not'
                      for each in sorted(does - may)]
-    return told
+    return found
 
 
 def _relative(found: str, name: str, namespace: str) -> str:

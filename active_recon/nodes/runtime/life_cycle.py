@@ -1,4 +1,4 @@
-"""Life-cycle nodes: what a transition makes is destroyed by its opposite."""
+"""Lifecycle nodes: a transition's entities are destroyed by the opposite transition."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -9,9 +9,8 @@ import traceback
 from typing import Any
 
 from active_recon.errors import ActiveReconError, ConfigError
-from active_recon.nodes.runtime.clock import ClockWatch
+from active_recon.nodes.runtime.clock import ClockMonitor
 from active_recon.nodes.runtime.diagnostics import Diagnostics
-from active_recon.nodes.runtime.parameters import ReadOnlySaysWhy
 from active_recon.nodes.runtime.qos_warnings import QosWarnings
 from active_recon.nodes.runtime.run import one_line, run_node
 from lifecycle_msgs.srv import ChangeState
@@ -21,50 +20,49 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 RCLError = rclpy_implementation.RCLError
 
 
-class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode, ABC):
+class ManagedNode(QosWarnings, LifecycleNode, ABC):
     """
     A node that is unconfigured, inactive, active or finalized.
 
-    A subclass says in `configure` what it loads and offers, and in `activate` what it hears and
-    when it works. Publishers, subscriptions, services, clients and timers that are made there are
-    destroyed by the opposite transition, and what `configure` added to the node's attributes is
-    forgotten: unconfigured, the node holds nothing. Either may raise ActiveReconError: the
-    transition then fails and says why in the log and the diagnostics, and the state stays.
+    A subclass loads its network and creates publishers and services in `configure`, and creates
+    subscriptions and timers in `activate`. Publishers, subscriptions, services, clients and
+    timers created there are destroyed by the opposite transition, which also calls what was
+    given to `add_cleanup`. Either may raise ActiveReconError: the transition then fails, with the
+    reason in the log and the diagnostics, and the state stays.
     """
 
     def __init__(self, name: str) -> None:
         self._configured, self._activated = ExitStack(), ExitStack()
-        self._being_made: ExitStack | None = None
-        self._before: frozenset[str] | None = None
+        self._cleanups: ExitStack | None = None
         self._failure: Exception | None = None
         self._is_starting = False
         self.is_configured = False
         self.is_active = False
         super().__init__(name)
         self._service_change_state.callback = partial(
-            self._refuse_impossible, self._service_change_state.callback)
+            self._reject_impossible, self._service_change_state.callback)
         self._diagnostics = Diagnostics(self)
-        self._tell_state()
+        self._publish_state()
 
     @abstractmethod
     def configure(self) -> None:
-        """Load, and offer topics and services."""
+        """Load what the node needs, create publishers and services."""
 
     @abstractmethod
     def activate(self) -> None:
-        """Begin to hear and to work."""
+        """Create subscriptions and timers."""
 
     @abstractmethod
     def clock_went_back(self, how: str) -> None:
-        """Begin anew while active; `how` says in words what the clock did."""
+        """Start over after a jump of the clock while active; `how` describes it."""
 
-    def on_undo(self, undo: Callable[[], Any]) -> None:
-        """Let the opposite of the transition that is being made call `undo`."""
-        assert self._being_made is not None
-        self._being_made.callback(undo)
+    def add_cleanup(self, cleanup: Callable[[], Any]) -> None:
+        """Let the opposite of the current transition call `cleanup`."""
+        assert self._cleanups is not None
+        self._cleanups.callback(cleanup)
 
     def start(self) -> None:
-        """Become active without being told; raises what kept the node from it."""
+        """Configure and activate the node itself; raises the error that prevents it."""
         self._is_starting = True
         for trigger in (self.trigger_configure, self.trigger_activate):
             trigger()
@@ -73,122 +71,117 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode, ABC):
         self._is_starting = False
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Configure, or hold nothing."""
-        self._before = frozenset(vars(self))
+        """Configure; where that fails, free everything again."""
         result = self._transit('configure', self.configure, self._configured)
         self.is_configured = result == TransitionCallbackReturn.SUCCESS
         if not self.is_configured:
             self._free()
-        self._tell_state()
+        self._publish_state()
         return result
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Activate, or hear nothing."""
+        """Activate; where that fails, end all subscriptions again."""
         result = self._transit('activate', self._activate, self._activated)
         self.is_active = result == TransitionCallbackReturn.SUCCESS
         if self.is_active:
             self.get_logger().info('ready')
-        self._tell_state()
+        self._publish_state()
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Hear nothing more."""
+        """Destroy what `activate` created."""
         self.is_active = False
         self._activated.close()
-        self._tell_state()
+        self._publish_state()
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Free what configuring took."""
+        """Destroy what `configure` created."""
         self.on_deactivate(state)
         self.is_configured = False
         self._free()
-        self._tell_state()
+        self._publish_state()
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Free everything; what is left is a node that waits to be ended."""
+        """Destroy everything; the node can no longer be configured."""
         result = self.on_cleanup(state)
-        self._diagnostics.tell('State', 'finalized')
+        self._diagnostics.set_value('State', 'finalized')
         return result
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Free everything; the node can be configured again."""
+        """Destroy everything; the node can be configured again."""
         return self.on_cleanup(state)
 
     def _activate(self) -> None:
-        self.clock_watch = ClockWatch(self, self.clock_went_back)
-        self.on_undo(self.clock_watch.close)
+        self.clock_monitor = ClockMonitor(self, self.clock_went_back)
+        self.add_cleanup(self.clock_monitor.close)
         self.activate()
 
     def _transit(self, name: str, make: Callable[[], None],
                  undo: ExitStack) -> TransitionCallbackReturn:
-        self._being_made, self._failure = undo, None
+        self._cleanups, self._failure = undo, None
         try:
             make()
         except ActiveReconError as error:
-            self._tell_failure(error, f'{name} failed: {one_line(error)}')
+            self._report_failure(error, f'{name} failed: {one_line(error)}')
             undo.close()
             return TransitionCallbackReturn.FAILURE
-        except Exception as error:  # rclpy would pass over it in silence
-            self._tell_failure(error, f'{name} failed: {traceback.format_exc()}')
+        except Exception as error:  # rclpy would ignore it silently
+            self._report_failure(error, f'{name} failed: {traceback.format_exc()}')
             undo.close()
             return TransitionCallbackReturn.ERROR
         finally:
-            self._being_made = None
-        self._diagnostics.recover()
+            self._cleanups = None
+        self._diagnostics.clear_error()
         return TransitionCallbackReturn.SUCCESS
 
-    def _tell_failure(self, error: Exception, message: str) -> None:
+    def _report_failure(self, error: Exception, message: str) -> None:
         self._failure = error
-        if not self._is_starting:  # then the process ends with it
-            self._diagnostics.fail('transition', message)
+        if not self._is_starting:  # else the process ends with it
+            self._diagnostics.raise_error('transition', message)
 
-    def _tell_state(self) -> None:
-        self._diagnostics.tell('State', 'active' if self.is_active else
+    def _publish_state(self) -> None:
+        self._diagnostics.set_value('State', 'active' if self.is_active else
                                'inactive' if self.is_configured else 'unconfigured')
 
     def _free(self) -> None:
         self._configured.close()
-        self._diagnostics.forget()
-        if self._before is not None:
-            for name in vars(self).keys() - self._before:
-                delattr(self, name)
-            self._before = None
+        self._diagnostics.reset()
         gc.collect()
 
-    def _refuse_impossible(self, change: Callable[..., ChangeState.Response],
+    def _reject_impossible(self, change: Callable[..., ChangeState.Response],
                            request: ChangeState.Request,
                            response: ChangeState.Response) -> ChangeState.Response:
-        """Answer that a transition failed which rclpy, asked by its number, would not survive."""
+        """Answer failure to a transition that does not exist, on which rclpy would raise."""
         try:
             return change(request, response)
         except RCLError as error:
-            self._diagnostics.refuse(ConfigError(one_line(error), 'transition'))
+            self._diagnostics.reject(ConfigError(one_line(error), 'transition'))
             return response
 
-    def _undone_later(self, made: Any, destroy: Callable[[Any], Any]) -> Any:
-        if self._being_made is not None:
-            self._being_made.callback(destroy, made)
-        return made
+    def _destroyed_later(self, entity: Any, destroy: Callable[[Any], Any]) -> Any:
+        if self._cleanups is not None:
+            self._cleanups.callback(destroy, entity)
+        return entity
 
     def create_publisher(self, *args: Any, **kwargs: Any) -> Any:
         """See rclpy's Node, as for all that follow."""
-        return self._undone_later(
+        return self._destroyed_later(
             super().create_publisher(*args, **kwargs), self.destroy_publisher)
 
     def create_subscription(self, *args: Any, **kwargs: Any) -> Any:
-        return self._undone_later(
+        return self._destroyed_later(
             super().create_subscription(*args, **kwargs), self.destroy_subscription)
 
     def create_service(self, *args: Any, **kwargs: Any) -> Any:
-        return self._undone_later(super().create_service(*args, **kwargs), self.destroy_service)
+        return self._destroyed_later(super().create_service(*args, **kwargs), self.destroy_service)
 
     def create_client(self, *args: Any, **kwargs: Any) -> Any:
-        return self._undone_later(super().create_client(*args, **kwargs), self.destroy_client)
+        return self._destroyed_later(super().create_client(*args, **kwargs), self.destroy_client)
 
     def create_timer(self, *args: Any, **kwargs: Any) -> Any:
-        return self._undone_later(super().create_timer(*args, **kwargs), self.destroy_timer)
+        return self._destroyed_later(super().create_timer(*args, **kwargs), self.destroy_timer)
 
     def destroy_node(self) -> None:
         """Free everything, then the node itself."""
@@ -200,9 +193,9 @@ class ManagedNode(ReadOnlySaysWhy, QosWarnings, LifecycleNode, ABC):
 def run_managed_node(make_node: Callable[[], ManagedNode],
                      args: list[str] | None = None) -> None:
     """
-    Run a life-cycle node as `run_node` runs any; where its parameter says so, it starts itself.
+    Run a lifecycle node with `run_node`; with `autostart` it configures and activates itself.
 
-    A node that starts itself and cannot ends the process; one that is told to later does not.
+    An autostart that fails ends the process; a transition that is requested and fails does not.
     """
     def started() -> ManagedNode:
         node = make_node()
@@ -210,7 +203,7 @@ def run_managed_node(make_node: Callable[[], ManagedNode],
             if node.get_parameter('autostart').value:
                 node.start()
             else:
-                node.get_logger().info('unconfigured; waits to be configured and activated')
+                node.get_logger().info('unconfigured; waiting to be configured and activated')
         except BaseException:
             node.destroy_node()
             raise

@@ -1,4 +1,4 @@
-"""Where nodes may write: under their `output_dir`, and nowhere else."""
+"""Output paths: nodes write below their `output_dir` only."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ def output_path(output_dir: Path, name: str) -> Path:
     """
     Return the absolute path of a file or folder of that relative name under `output_dir`.
 
-    Raises ConfigError where the name leads out of it: absolute, with '..', or by a link.
+    Raises ConfigError where the path would leave it: absolute, with '..', or by a link.
     """
     parts = Path(name).parts
     root = output_dir.absolute()

@@ -1,4 +1,4 @@
-"""The parameters of other nodes, asked for as the nodes appear."""
+"""Collects the parameters of other nodes as they appear."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -13,13 +13,13 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
-ASK_AGAIN_S = 2.0
-"""A request may go to a node that has just ended; after that time it is sent again."""
+REQUEST_AGAIN_S = 2.0
+"""A request may be lost where its node has just ended; it is then repeated."""
 
 
 @dataclass(frozen=True)
 class _Clients:
-    """What reads the parameters of one node; rclpy's own client could set them as well."""
+    """Clients that read one node's parameters; rclpy's own client could set them as well."""
 
     names: Client
     types: Client
@@ -36,54 +36,56 @@ class _Clients:
         return all(each.service_is_ready() for each in (self.names, self.types, self.values))
 
 
-class AskedParameters:
+class ParameterCollector:
     """
-    Asks each node for all its parameters, and hands them on once they are known.
+    Requests all parameters of each node, and passes them on when they have arrived.
 
-    `on_known` is called with the node's full name and a mapping of parameter to value. Nothing
-    waits: a node that never answers costs a request every `ASK_AGAIN_S` seconds.
+    `on_parameters` is called with the node's full name and a mapping of parameter to value.
+    Nothing blocks: a node that never answers costs a request every `REQUEST_AGAIN_S` seconds.
     """
 
-    def __init__(self, node: Node, on_known: Callable[[str, dict[str, object]], None]) -> None:
+    def __init__(self, node: Node,
+                 on_parameters: Callable[[str, dict[str, object]], None]) -> None:
         self._node = node
-        self._on_known = on_known
+        self._on_parameters = on_parameters
         self._clients: dict[str, _Clients] = {}
-        self._asked_at: dict[str, float] = {}
+        self._requested_at: dict[str, float] = {}
         self._known: set[str] = set()
         self._forgotten: Counter[str] = Counter()
 
     def forget(self, name: str | None = None) -> None:
-        """Ask a node anew, or every node."""
+        """Request the parameters of a node again, or of every node."""
         for each in set(self._clients) if name is None else {name}:
             self._known.discard(each)
-            self._asked_at.pop(each, None)
-            self._forgotten[each] += 1  # an answer that is on its way tells what was
+            self._requested_at.pop(each, None)
+            self._forgotten[each] += 1  # a pending answer is out of date
 
-    def ask(self, names: Iterable[str]) -> None:
-        """Ask those of the nodes that are there now and not yet known; called again and again."""
-        there = set(names)
-        self._known &= there  # who goes and comes back may have changed
-        for name in there - self._known:
+    def request(self, names: Iterable[str]) -> None:
+        """Request the parameters of nodes that are running and not known; call repeatedly."""
+        running = set(names)
+        self._known &= running  # a node that restarts may have other parameters
+        for name in running - self._known:
             now = time.monotonic()
-            if now - self._asked_at.get(name, -ASK_AGAIN_S) < ASK_AGAIN_S:
+            if now - self._requested_at.get(name, -REQUEST_AGAIN_S) < REQUEST_AGAIN_S:
                 continue
             if name not in self._clients:
                 self._clients[name] = _Clients.of(self._node, name)
             clients = self._clients[name]
             if clients.are_ready:
-                self._asked_at[name] = now
+                self._requested_at[name] = now
                 clients.names.call_async(ListParameters.Request()).add_done_callback(
-                    partial(self._ask_types, name, self._forgotten[name]))
+                    partial(self._request_types, name, self._forgotten[name]))
 
-    def _ask_types(self, name: str, forgotten: int, listed: Future) -> None:
+    def _request_types(self, name: str, forgotten: int, listed: Future) -> None:
         answer = listed.result()
         if answer is not None and self._is_awaited(name, forgotten):
             names = list(answer.result.names)
-            self._clients[name].types.call_async(GetParameterTypes.Request(
-                names=names)).add_done_callback(partial(self._ask_values, name, forgotten, names))
+            request = GetParameterTypes.Request(names=names)
+            self._clients[name].types.call_async(request).add_done_callback(
+                partial(self._request_values, name, forgotten, names))
 
-    def _ask_values(self, name: str, forgotten: int, names: list[str], typed: Future) -> None:
-        """Ask for those that have a value: one without keeps a node from telling any."""
+    def _request_values(self, name: str, forgotten: int, names: list[str], typed: Future) -> None:
+        """Request the parameters that are set: one that is not makes a node return none."""
         answer = typed.result()
         if answer is None or len(answer.types) != len(names) or not self._is_awaited(
                 name, forgotten):
@@ -99,11 +101,11 @@ class AskedParameters:
             return
         if not self._is_awaited(name, forgotten):
             return
-        del self._asked_at[name]
+        del self._requested_at[name]
         self._known.add(name)
-        self._on_known(name, dict(zip(
+        self._on_parameters(name, dict(zip(
             names, map(parameter_value_to_python, answer.values), strict=True)))
 
     def _is_awaited(self, name: str, forgotten: int) -> bool:
-        """Return whether an answer to what was asked after so many times of forgetting counts."""
-        return name in self._asked_at and self._forgotten[name] == forgotten
+        """Return whether an answer is to the last request: none was forgotten since."""
+        return name in self._requested_at and self._forgotten[name] == forgotten

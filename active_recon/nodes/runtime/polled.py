@@ -1,4 +1,4 @@
-"""Subscriptions that wake nobody: what came is taken when their node has the time for it."""
+"""Polled subscriptions: they do not wake the executor, and messages are taken on request."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,17 +7,17 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.subscription import Subscription
 
 
-class Polled(ReentrantCallbackGroup):
-    """A callback group of which no executor waits for a message, or hands one to a callback."""
+class PolledCallbackGroup(ReentrantCallbackGroup):
+    """A callback group that no executor waits on; `take_messages` reads its subscriptions."""
 
     def can_execute(self, entity: Any) -> bool:
-        """Return that there is nothing to wait for."""
+        """Return False: the executor never runs these callbacks."""
         return False
 
 
-def taken(subscription: Subscription) -> Iterator[Any]:
-    """Take the messages that have come, the first that came first."""
+def take_messages(subscription: Subscription) -> Iterator[tuple[Any, int]]:
+    """Take the messages since the last call, oldest first, with their reception time in ns."""
     with subscription.handle:
         while (message := subscription.handle.take_message(
                 subscription.msg_type, subscription.raw)) is not None:
-            yield message[0]
+            yield message[0], message[1]['received_timestamp']

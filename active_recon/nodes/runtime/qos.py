@@ -1,4 +1,4 @@
-"""How the nodes publish and hear, and how a topic's QoS is recorded and offered again."""
+"""QoS profiles of the nodes, and how a topic's QoS is recorded and offered again."""
 
 from collections.abc import Iterable
 
@@ -7,34 +7,34 @@ from rclpy.duration import Infinite
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Reliable, and the last one is kept for whoever comes late."""
-LATCHED_HEARD_LATE = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Hears the latched, and who takes what came only now and then misses none of it."""
-STREAM = QoSProfile(depth=5)
-"""Reliable; who listens best effort is served as well."""
-HEARD = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Best effort, which hears reliable and best-effort publishers alike."""
-HEARD_OFTEN = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""The same for poses, of which a fast tracker sends many while the network runs."""
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Reliable and transient local: late subscribers receive the last message."""
+LATCHED_POLLED_QOS = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For latched topics that are polled: a deeper queue, so that nothing is lost between polls."""
+STREAM_QOS = QoSProfile(depth=5)
+"""Publishes streams: reliable, which is compatible with best-effort subscribers."""
+SENSOR_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Subscribes best effort: compatible with reliable and best-effort publishers."""
+HIGH_RATE_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""As `SENSOR_QOS`, with room for the poses that arrive while the network runs."""
 _UNKNOWN_NODE = '_NODE_NAME_UNKNOWN_'  # an endpoint may be discovered before its node's name
 
 
 def endpoint_node(endpoint: TopicEndpointInfo) -> str | None:
-    """Return the full name of the node that has the endpoint; None while it is not known."""
+    """Return the full name of the endpoint's node; None while it is not known."""
     if endpoint.node_name == _UNKNOWN_NODE:
         return None
     return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
 
 
 def offered_profile(publisher: TopicEndpointInfo) -> QosProfile:
-    """Return what a publisher offers, as a bag says it."""
+    """Return the QoS that a publisher offers, as a bag records it."""
     profile = publisher.qos_profile
     return QosProfile(profile.reliability.name.lower(), profile.durability.name.lower())
 
 
 def common_profile(offered: Iterable[QosProfile], depth: int) -> QoSProfile:
-    """Return the strictest request that hears all of the publishers."""
+    """Return the strictest profile that is compatible with all of the publishers."""
     offered = list(offered)
     reliable = all(profile.reliability == 'reliable' for profile in offered)
     latched = bool(offered) and all(
@@ -46,7 +46,7 @@ def common_profile(offered: Iterable[QosProfile], depth: int) -> QoSProfile:
 
 
 def profile_words(profile: QoSProfile) -> str:
-    """Return what decides whether two profiles fit, in words."""
+    """Describe the policies that decide whether two profiles are compatible."""
     words = [profile.reliability.name, profile.durability.name]
     if 0 < profile.deadline.nanoseconds < Infinite.nanoseconds:
         words.append(f'deadline {profile.deadline.nanoseconds / 1e9:g} s')

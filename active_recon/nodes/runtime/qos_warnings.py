@@ -1,4 +1,4 @@
-"""A node that warns of whoever is on its topics, but so that nothing passes."""
+"""A node that warns of endpoints on its topics with incompatible QoS."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -15,76 +15,76 @@ from rclpy.publisher import Publisher
 from rclpy.qos import qos_check_compatible, QoSCompatibility, QoSProfile
 from rclpy.subscription import Subscription
 
-LOOK_EVERY_S = 0.4
-_UNKNOWN = 'a node without a name'
+CHECK_EVERY_S = 0.4
+_UNKNOWN = 'an unknown node'
 
 
 class QosWarnings(Node):
     """
-    Warns, naming both sides, while a topic of the node has an endpoint that does not fit.
+    Warns, naming both nodes, while a topic has an endpoint with an incompatible QoS.
 
-    It stands before the node's class among the bases, and the node's diagnostics are its
-    `_diagnostics`. There each mismatch is a trouble `qos/<topic>` until the endpoint is gone.
+    List it before the node's class among the bases; the node's diagnostics are its
+    `_diagnostics`, where each mismatch is the warning `qos/<topic>` until the endpoint is gone.
 
-    The endpoints are looked at now and then. The middleware would tell of a mismatch, too, but
-    who waits for that is woken by every message as well, for nothing.
+    The endpoints are polled. The middleware has an event for a mismatch, but waiting for it
+    would wake the executor on every message as well.
     """
 
     _diagnostics: Diagnostics
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self._unfit: set[str] = set()
-        self.create_timer(LOOK_EVERY_S, self._look_at_endpoints,
+        self._mismatched: set[str] = set()
+        self.create_timer(CHECK_EVERY_S, self._check_endpoints,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def create_publisher(self, *args: Any, **options: Any) -> Publisher:
-        """Create a publisher, as rclpy does, that waits for no event of the middleware."""
+        """Create a publisher as rclpy does, without event callbacks."""
         events = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(*args, **{'event_callbacks': events, **options})
 
     def create_subscription(self, msg_type: Any, topic: str, callback: Callable[[Any], None],
                             *args: Any, **options: Any) -> Subscription:
-        """Create a subscription, as rclpy does, that waits for no event of the middleware."""
+        """Create a subscription as rclpy does, without event callbacks."""
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
         return super().create_subscription(
             msg_type, topic, callback, *args, **{'event_callbacks': events, **options})
 
-    def _look_at_endpoints(self) -> None:
-        """Tell which endpoints do not fit now, and forget the topics on which all do."""
+    def _check_endpoints(self) -> None:
+        """Raise a warning for each topic with a mismatch, clear those that have none any more."""
         found: defaultdict[str, list[str]] = defaultdict(list)
         for topic, mismatch in self._mismatches():
             found[topic].append(mismatch)
-        # Two looks must agree: an endpoint is found before its node, and lost after it
-        for topic in found.keys() & self._unfit:
-            self._diagnostics.begin_trouble(
-                self._trouble(topic), f'{topic}: {"; ".join(found[topic])}')
-        for topic in self._unfit - found.keys():
-            self._diagnostics.end_trouble(self._trouble(topic))
-        self._unfit = set(found)
+        # Two checks must agree: an endpoint is discovered before its node, and lost after it
+        for topic in found.keys() & self._mismatched:
+            self._diagnostics.raise_warning(
+                self._warning_kind(topic), f'{topic}: {"; ".join(found[topic])}')
+        for topic in self._mismatched - found.keys():
+            self._diagnostics.clear_warning(self._warning_kind(topic))
+        self._mismatched = set(found)
 
-    def _trouble(self, topic: str) -> str:
+    def _warning_kind(self, topic: str) -> str:
         inside = self.get_namespace().rstrip('/') + '/'
         return f'qos/{topic.removeprefix(inside).lstrip("/")}'
 
     def _mismatches(self) -> Iterator[tuple[str, str]]:
-        """Yield topics and what does not fit there, in words."""
+        """Yield topics and a description of each mismatch there."""
         me = self.get_fully_qualified_name()
         topics = {own.topic_name for own in self.publishers}
         for topic in topics | {own.topic_name for own in self.subscriptions}:
-            for offered, asked in product(self.get_publishers_info_by_topic(topic),
-                                          self.get_subscriptions_info_by_topic(topic)):
-                names = endpoint_node(offered) or _UNKNOWN, endpoint_node(asked) or _UNKNOWN
-                if me not in names or _fit(offered.qos_profile, asked.qos_profile):
+            for offered, requested in product(self.get_publishers_info_by_topic(topic),
+                                              self.get_subscriptions_info_by_topic(topic)):
+                names = endpoint_node(offered) or _UNKNOWN, endpoint_node(requested) or _UNKNOWN
+                if me not in names or _is_compatible(offered.qos_profile, requested.qos_profile):
                     continue
-                profiles = profile_words(offered.qos_profile), profile_words(asked.qos_profile)
+                profiles = profile_words(offered.qos_profile), profile_words(requested.qos_profile)
                 yield topic, (
-                    'expected who listens to ask for no more than this node offers '
-                    f'({profiles[0]}), but {names[1]} asks for ({profiles[1]}) and hears nothing'
+                    'expected subscribers to request no more than this node offers '
+                    f'({profiles[0]}), but {names[1]} requests ({profiles[1]}), so nothing arrives'
                     if names[0] == me else
-                    'expected who publishes to offer at least what this node asks for '
-                    f'({profiles[1]}), but {names[0]} offers ({profiles[0]}) and is not heard')
+                    'expected publishers to offer at least what this node requests '
+                    f'({profiles[1]}), but {names[0]} offers ({profiles[0]}), so nothing arrives')
 
 
-def _fit(offered: QoSProfile, requested: QoSProfile) -> bool:
+def _is_compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
     return bool(qos_check_compatible(offered, requested)[0] != QoSCompatibility.ERROR)

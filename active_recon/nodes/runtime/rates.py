@@ -1,4 +1,4 @@
-"""How often something happens and how long it takes: over a window, in bounded memory."""
+"""Rates and durations over a window, in bounded memory."""
 
 from collections import deque
 import math
@@ -6,17 +6,17 @@ import math
 import numpy as np
 
 WINDOW_S = 5.0
-"""A rate is that of the last so many seconds."""
+"""Window over which a rate is measured."""
 _BUCKETS = 20
 _SAMPLES = 200
 
 
 class Rate:
     """
-    Events per second over the last `WINDOW_S` seconds, or since the beginning where that is later.
+    Events per second over the last `WINDOW_S` seconds, or since the beginning if that is later.
 
-    Times are seconds of one clock that never runs backwards. However many events there are, the
-    memory is that of a few numbers: the window's edge is only as sharp as 0.25 s.
+    Times are seconds of a monotonic clock. Events are counted in buckets of 0.25 s, so memory is
+    bounded and the window is accurate to a bucket.
     """
 
     def __init__(self, began: float) -> None:
@@ -24,14 +24,14 @@ class Rate:
         self._buckets: deque[list[int]] = deque(maxlen=_BUCKETS)
 
     def add(self, at: float) -> None:
-        """Note one event."""
+        """Count an event."""
         bucket = _bucket(at)
         if not self._buckets or self._buckets[-1][0] != bucket:
             self._buckets.append([bucket, 0])
         self._buckets[-1][1] += 1
 
     def per_second(self, at: float) -> float:
-        """Return the rate at a time, 0 where nothing happened in the window."""
+        """Return the rate at a time, 0 without events in the window."""
         first = _bucket(at) - _BUCKETS + 1
         since = max(self._began, first * WINDOW_S / _BUCKETS)
         events = sum(count for bucket, count in self._buckets if bucket >= first)
@@ -45,7 +45,7 @@ class Durations:
         self._samples: deque[float] = deque(maxlen=_SAMPLES)
 
     def add(self, seconds: float) -> None:
-        """Note one duration; the oldest is forgotten for it."""
+        """Add a duration; it replaces the oldest one."""
         self._samples.append(seconds)
 
     def percentile(self, percent: float) -> float:

@@ -1,4 +1,4 @@
-"""Start, spin and stop a node: the part every executable shares."""
+"""Start, spin and stop a node: shared by every executable."""
 
 from collections.abc import Callable
 import faulthandler
@@ -17,26 +17,26 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-_NOTICED_WITHIN_S = 0.1
-_CLOSED_WITHIN_S = 15.0
+_STOP_CHECK_S = 0.1
+_CLOSE_TIMEOUT_S = 15.0
 
 
 def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> None:
     """
     Spin the node until the process is asked to stop, by SIGINT or SIGTERM.
 
-    A node that cannot start (a parameter out of range, a weights file that is missing) says why
-    in one line and the process exits with code 1, as does one that cannot be closed in time.
-    With `--help` the executable says what the node does, and no node is made.
+    Where a node cannot start (a parameter out of range, a missing weights file) the process logs
+    the reason in one line and exits with code 1, as it does where a node does not close in time.
+    With `--help` the executable prints what the node does and its parameters, and no node starts.
     """
     if is_help_wanted(sys.argv[1:] if args is None else args):
         sys.stdout.write(usage(Path(sys.argv[0]).stem) + '\n')
         return
-    # rclpy's own handlers tear its context down wherever the signal finds it, which while a node
-    # starts or closes its files ends in a traceback, or is not heard at all.
-    asked_to_stop: list[int] = []
+    # rclpy's own handlers shut its context down at any time: while a node starts or closes its
+    # files that ends in a traceback, or the signal is lost.
+    stop_requests: list[int] = []
     for request in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(request, lambda number, _frame: asked_to_stop.append(number))
+        signal.signal(request, lambda number, _frame: stop_requests.append(number))
     make_room()
     node = None
     try:
@@ -44,22 +44,22 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        while not asked_to_stop:
-            executor.spin_once(timeout_sec=_NOTICED_WITHIN_S)
+        while not stop_requests:
+            executor.spin_once(timeout_sec=_STOP_CHECK_S)
     except ActiveReconError as error:
         get_logger('active_recon').fatal(one_line(error))
         raise SystemExit(1) from None
     finally:
-        # Whoever supervises the node must not wait for ever for a middleware that does not let
-        # go: after that time the process says where each thread stands, and ends with code 1.
-        faulthandler.dump_traceback_later(_CLOSED_WITHIN_S, exit=True)
+        # A middleware that does not shut down must not block the process for ever: after the
+        # timeout it prints the stack of each thread and exits with code 1.
+        faulthandler.dump_traceback_later(_CLOSE_TIMEOUT_S, exit=True)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
 
 
 def _init(args: list[str] | None) -> None:
-    """Read the arguments; ConfigError where ROS cannot, as a parameters file that is no YAML."""
+    """Parse the arguments; ConfigError where ROS cannot, as on a params file that is no YAML."""
     given = sys.argv[1:] if args is None else args
     for option, file in pairwise(given):
         if option == '--params-file':
@@ -71,5 +71,5 @@ def _init(args: list[str] | None) -> None:
 
 
 def one_line(error: Exception) -> str:
-    """Return the error's text without line breaks, as a log line needs it."""
+    """Return the error's text without line breaks, for a log line."""
     return ' '.join(str(error).split())

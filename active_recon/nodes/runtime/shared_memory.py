@@ -1,4 +1,4 @@
-"""Room in shared memory for what the nodes send, where nobody has chosen it."""
+"""Shared memory that is large enough for the nodes' messages, unless the user chose its size."""
 
 import os
 from pathlib import Path
@@ -11,11 +11,11 @@ _CHOSEN_FILES = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
 
 def make_room() -> None:
     """
-    Have Fast DDS hold whole clouds of cells, before its first node is made.
+    Configure Fast DDS for whole point clouds; to be called before the first node is made.
 
-    By default it holds 512 KiB, and what does not fit is dropped with whatever waits beside it. A
-    latched message that is lost so can be sent again only until the next one takes its place, so
-    who records misses one now and then. A profile that the user has chosen stays.
+    Its default of 512 KiB drops larger messages, together with others in the same buffer. A
+    latched message that is lost can be resent only until the next one replaces it, so a recorder
+    would miss some. A profile that the user has chosen is kept.
     """
     if not any(map(os.environ.get, _CHOICES)) and not any(map(os.path.exists, _CHOSEN_FILES)):
         os.environ[_CHOICES[0]] = str(PROFILE)

@@ -1,26 +1,27 @@
-"""The full names of a node's topics, told as a parameter to who records or watches it."""
+"""The full names of a node's topics, as a parameter that recorder and viewer read."""
 
 from collections.abc import Iterable, Mapping
 
-from active_recon.nodes.runtime.parameters import tell
+from active_recon.nodes.runtime.parameters import set_read_only_parameter
 from rclpy.node import Node
 
-FORMS = {'camera/image_raw': ('', '/compressed')}
-"""What the topics of the same images end in, where they come in several forms."""
+TRANSPORT_SUFFIXES = {'camera/image_raw': ('', '/compressed')}
+"""Suffixes of the topics that carry the same images, one for each transport."""
 NAMES = 'names'
-"""The parameter: each as NAME:=TOPIC, what the node calls it and its full name."""
+"""The parameter: a list of NAME:=TOPIC, the node's own name and the full name."""
 
 
-def tell_names(node: Node, names: Iterable[str]) -> None:
-    """Tell the full names of topics, after all remapping; each brings its compressed form."""
-    tell(node, NAMES, [f'{name}{form}:={node.resolve_topic_name(name)}{form}'
-                       for name in names for form in FORMS.get(name, ('',))],
-         'the full names of its topics, each as NAME:=TOPIC')
+def publish_topic_names(node: Node, names: Iterable[str]) -> None:
+    """Set the parameter to the full names of topics after remapping, of every transport."""
+    set_read_only_parameter(
+        node, NAMES, [f'{name}{suffix}:={node.resolve_topic_name(name)}{suffix}'
+                      for name in names for suffix in TRANSPORT_SUFFIXES.get(name, ('',))],
+        'full names of the topics, each as NAME:=TOPIC')
 
 
 def full_names(parameters: Mapping[str, object]) -> dict[str, str]:
-    """Return the full names that a node's parameters tell, by its own."""
-    told = parameters.get(NAMES)
-    entries = told if isinstance(told, list | tuple) else ()
+    """Return the full names in a node's parameters, by the node's own names."""
+    value = parameters.get(NAMES)
+    entries = value if isinstance(value, list | tuple) else ()
     pairs = (str(entry).partition(':=') for entry in entries)
     return {name: full for name, given, full in pairs if given}

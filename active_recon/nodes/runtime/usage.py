@@ -5,7 +5,7 @@ from importlib import import_module
 import textwrap
 
 from active_recon.parameters.declaration import Declared, declared, number_words
-from active_recon.parameters.every_node import SETTINGS
+from active_recon.parameters.node_parameters import NODE_PARAMETERS
 
 _WIDTH, _INDENT = 79, ' ' * 6
 
@@ -22,7 +22,7 @@ def usage(node: str) -> str:
     lines = [
         f'usage: {node} [--ros-args [-p NAME:=VALUE] [-r OLD:=NEW] ...]',
         '', *textwrap.wrap(about, _WIDTH), '', 'parameters:']
-    for each in declared(SETTINGS[node]):
+    for each in declared(NODE_PARAMETERS[node]):
         lines += _parameter(each)
     return '\n'.join([*lines, '', 'A running node lists its topics: ros2 node info /' + node])
 

@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.acquisition.motion_monitor import MotionWatch
+from active_recon.acquisition.motion_monitor import MotionMonitor
 from active_recon.acquisition.stillness import STILL_ANGLE
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.simulation.turntable import Turntable
@@ -16,10 +16,10 @@ GOAL = orbit_camera(1.0, 0.6)
 
 
 class Motion:
-    """A stream of poses, heard by a watch."""
+    """A stream of poses, heard by a monitor."""
 
     def __init__(self, rate=30.0):
-        self.watch = MotionWatch(TOLERANCE, TIMEOUT)
+        self.monitor = MotionMonitor(TOLERANCE, TIMEOUT)
         self.rate = rate
         self.now = 100.0
 
@@ -29,8 +29,8 @@ class Motion:
         goal_camera = None if goal is None else orbit_camera(goal, HORIZON)
         for _ in range(round(seconds * self.rate)):
             camera = orbit_camera(azimuth_at(self.now), HORIZON)
-            self.watch.heard(camera, round(self.now * 1e9), goal_camera)
-            for kind in self.watch.found():
+            self.monitor.add(camera, round(self.now * 1e9), goal_camera)
+            for kind in self.monitor.faults():
                 found.setdefault(kind, self.now - began)
             self.now += 1 / self.rate
         return found
@@ -56,7 +56,7 @@ def test_poses_that_jump_are_told_within_a_second_and_no_more_a_second_after(rat
     found = motion.run(lambda now: 2.0 + sigma * rng.standard_normal(), 3.0)
     assert found['noisy_poses'] <= 1.0
     motion.run(lambda now: 2.0, 1.1)
-    assert not motion.watch.found()
+    assert not motion.monitor.faults()
 
 
 def test_poses_that_tremble_less_than_a_still_camera_may_are_not_told():
@@ -69,7 +69,7 @@ def test_a_camera_that_stands_away_from_its_goal_has_stalled_until_it_moves_on()
     motion.run(lambda now: 1.0, 5.0)
     found = motion.run(lambda now: 1.0, 2.0, goal=2.0)
     assert found == {'stalled': pytest.approx(TIMEOUT, abs=0.05)}
-    assert 'goal, 57 degrees away' in motion.watch.found()['stalled']
+    assert 'goal, 57 degrees away' in motion.monitor.faults()['stalled']
     began = motion.now - 0.1
     assert not motion.run(lambda now: min(1.0 + now - began, 2.0), 3.0, goal=2.0)
 
@@ -77,9 +77,9 @@ def test_a_camera_that_stands_away_from_its_goal_has_stalled_until_it_moves_on()
 def test_a_camera_at_the_goal_s_azimuth_below_it_has_stalled_too():
     motion = Motion()
     for _ in range(60):
-        motion.watch.heard(orbit_camera(1.0, 0.1), round(motion.now * 1e9), GOAL)
+        motion.monitor.add(orbit_camera(1.0, 0.1), round(motion.now * 1e9), GOAL)
         motion.now += 1 / motion.rate
-    assert 'goal, 29 degrees away' in motion.watch.found()['stalled']
+    assert 'goal, 29 degrees away' in motion.monitor.faults()['stalled']
 
 
 def test_a_camera_without_an_open_goal_or_near_it_may_stand_for_ever():
@@ -99,8 +99,8 @@ def test_poses_that_are_older_than_the_last_are_passed_by():
     motion.run(lambda now: 1.0, 0.5)
     before = motion.now
     for back in range(20):
-        motion.watch.heard(orbit_camera(back % 2), round((before - 0.5) * 1e9) + back, None)
-    assert not motion.watch.found()
+        motion.monitor.add(orbit_camera(back % 2), round((before - 0.5) * 1e9) + back, None)
+    assert not motion.monitor.faults()
 
 
 def test_after_the_clock_went_back_the_motion_is_watched_anew():

@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.acquisition.stream_monitor import STREAMS, StreamWatch, WINDOW_S
+from active_recon.acquisition.stream_monitor import StreamMonitor, STREAMS, WINDOW_S
 import numpy as np
 import pytest
 
@@ -11,10 +11,10 @@ RATES = [5.0, 10.0, 30.0, 100.0]
 
 
 class Streams:
-    """A camera at a rate, heard by a watch, its faults in the test's hand."""
+    """A camera at a rate, heard by a monitor, its faults in the test's hand."""
 
     def __init__(self, rate=30.0):
-        self.watch = StreamWatch()
+        self.monitor = StreamMonitor()
         self.period = 1 / rate
         self.now = 100.0
 
@@ -29,7 +29,7 @@ class Streams:
                     waiting.append((due, stream, stamp + pose_shift * (stream == 'poses')))
             for entry in [entry for entry in waiting if entry[0] <= self.now]:
                 waiting.remove(entry)
-                self.watch.heard(entry[1], entry[2], self.now)
+                self.monitor.add(entry[1], entry[2], self.now)
             self.look(self.period, began, found)
         return found
 
@@ -37,11 +37,11 @@ class Streams:
         """Look what is wrong, ten times a second at least; return what is in the end."""
         looks = math.ceil(seconds / 0.1)
         for _ in range(looks):
-            for kind in self.watch.found(self.now):
+            for kind in self.monitor.faults(self.now):
                 if found is not None:
                     found.setdefault(kind, self.now - began)
             self.now += seconds / looks
-        return self.watch.found(self.now)
+        return self.monitor.faults(self.now)
 
 
 @pytest.mark.parametrize('rate', [1.0, *RATES])
@@ -59,7 +59,7 @@ def test_a_stream_that_ends_is_told_within_a_second_by_its_name_and_no_more_when
     assert found.keys() == {f'silent_{stream}'}
     assert 0.3 < found[f'silent_{stream}'] <= 1.0
     streams.run(2 * WINDOW_S)
-    assert not streams.watch.found(streams.now)
+    assert not streams.monitor.faults(streams.now)
 
 
 def test_a_camera_that_is_gone_is_one_fault_and_not_three():
@@ -79,7 +79,7 @@ def test_a_watch_that_is_held_up_takes_no_camera_for_silent():
     streams = Streams()
     streams.run(3.0)
     streams.now += 5.0
-    assert not streams.watch.found(streams.now)
+    assert not streams.monitor.faults(streams.now)
     assert streams.look(1.0).keys() == {'silent_camera'}
 
 
@@ -88,13 +88,13 @@ def test_a_watch_that_is_held_up_takes_no_camera_for_silent():
     np.cumsum(np.tile([0.0004, 0.0006, 0.0003, 0.0005, 1.0], 8)),
     [0.0, 0.1, 0.2, 0.3], []], ids=['now and then', 'in bursts', 'a few', 'none'])
 def test_what_does_not_come_regularly_is_not_missed(arrivals):
-    watch = StreamWatch()
+    monitor = StreamMonitor()
     for now in arrivals:
         for stream in STREAMS:
-            watch.heard(stream, round(now * 1e9), now)
-        assert not watch.found(now)
+            monitor.add(stream, round(now * 1e9), now)
+        assert not monitor.faults(now)
     for later in range(50):
-        assert not watch.found(100.0 + later / 10)
+        assert not monitor.faults(100.0 + later / 10)
 
 
 @pytest.mark.parametrize('rate', [10.0, 30.0, 100.0])
@@ -107,7 +107,7 @@ def test_a_third_that_is_missing_is_told_within_a_second_or_so_and_no_more_when_
     assert found.keys() == {f'missing_{stream}'}
     assert found[f'missing_{stream}'] <= 1.2
     streams.run(2 * WINDOW_S)
-    assert not streams.watch.found(streams.now)
+    assert not streams.monitor.faults(streams.now)
 
 
 @pytest.mark.parametrize(('numbered', 'busy_s', 'said'), [
@@ -122,8 +122,8 @@ def test_missing_images_are_told_with_where_they_were_lost(numbered, busy_s, sai
     for _ in range(10):
         streams.run(0.2, lambda which, number: which == 'images' and number % 3 == 1)
         if numbered:
-            streams.watch.lost(streams.now)
-        found = streams.watch.found(streams.now).get('missing_images', found)
+            streams.monitor.add_lost(streams.now)
+        found = streams.monitor.faults(streams.now).get('missing_images', found)
     assert said in found
 
 
@@ -145,7 +145,7 @@ def test_images_that_come_late_are_told_within_a_second_or_so_of_the_first(late_
     streams.run(3.0)
     found = streams.run(5.0, late_s=late_s)
     assert found['late_images'] <= late_s + 0.5
-    assert streams.watch.found(streams.now).keys() == {'late_images'}
+    assert streams.monitor.faults(streams.now).keys() == {'late_images'}
 
 
 def test_images_a_little_behind_their_poses_are_not_late():
@@ -153,25 +153,25 @@ def test_images_a_little_behind_their_poses_are_not_late():
 
 
 def test_after_the_clock_went_back_a_stream_is_watched_anew():
-    watch = StreamWatch()
+    monitor = StreamMonitor()
     for index in range(40):
         for stream in STREAMS:
-            watch.heard(stream, (1000 if index < 10 else 0) * 10**9 + index * 33 * MS, index / 30)
-        assert not watch.found(index / 30)
-    found = [watch.found(40 / 30 + later / 10) for later in range(10)]
+            monitor.add(stream, (1000 if index < 10 else 0) * 10**9 + index * 33 * MS, index / 30)
+        assert not monitor.faults(index / 30)
+    found = [monitor.faults(40 / 30 + later / 10) for later in range(10)]
     assert found[-1].keys() == {'silent_camera'}
 
 
 def test_after_clear_nothing_is_missed_before_it_has_come_anew():
     streams = Streams()
     streams.run(3.0)
-    streams.watch.clear()
+    streams.monitor.clear()
     assert not streams.look(10.0)
 
 
 def test_memory_is_bounded_by_the_window():
     streams = Streams(100.0)
     streams.run(4.0)
-    size = len(streams.watch._moments)
+    size = len(streams.monitor._moments)
     streams.run(20.0)
-    assert len(streams.watch._moments) <= size
+    assert len(streams.monitor._moments) <= size

@@ -1,4 +1,4 @@
-"""Following the loop from outside, in the process that started its nodes."""
+"""A client of the loop, in the process that started its nodes."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,8 +15,8 @@ from std_srvs.srv import Trigger
 _SPIN_S = 0.05
 
 
-class LoopWatch:
-    """Waits for what the loop does, and asks it to do things; its node hears nothing by itself."""
+class LoopClient:
+    """Waits for conditions while its node spins, and calls the loop's services."""
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor) -> None:
         self._node = node
@@ -24,17 +24,17 @@ class LoopWatch:
 
     def until(self, condition: Callable[[], bool], budget_s: float, awaited: str,
               meanwhile: Callable[[], None]) -> None:
-        """Take in messages until the condition holds; ActiveReconError after the budget."""
+        """Spin until the condition holds; ActiveReconError after the budget."""
         deadline = time.monotonic() + budget_s
         while not condition():
             if time.monotonic() > deadline:
                 raise ActiveReconError(f'expected {awaited} within {budget_s:g} s, '
-                                       'but it did not come')
+                                       'but it did not arrive')
             self._executor.spin_once(timeout_sec=_SPIN_S)
             meanwhile()
 
-    def ask(self, service: str, budget_s: float, meanwhile: Callable[[], None]) -> str:
-        """Call a Trigger service and return its message; ActiveReconError where it refuses."""
+    def trigger(self, service: str, budget_s: float, meanwhile: Callable[[], None]) -> str:
+        """Call a Trigger service and return its message; ActiveReconError where it fails."""
         client = self._node.create_client(Trigger, service)
         self.until(client.service_is_ready, budget_s, f'the service {service}', meanwhile)
         answer = client.call_async(Trigger.Request())
@@ -48,9 +48,9 @@ class LoopWatch:
 
 @contextmanager
 def joined_domain(name: str) -> Iterator[tuple[Node, SingleThreadedExecutor]]:
-    """Join the domain that the environment names, with a node and what spins it."""
+    """Join the ROS domain of the environment with a node and its executor."""
     context = Context()
-    # Ctrl-C stays Python's own: it ends whatever waits here, and who waits cleans up.
+    # Ctrl-C raises KeyboardInterrupt here, so that the caller can clean up
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = Node(name, context=context)
     executor = SingleThreadedExecutor(context=context)

@@ -2,7 +2,7 @@
 
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.nodes.loop.followed_loop import Loop, LoopFinder
-from active_recon.nodes.loop.loop_subscriber import HeardLoop
+from active_recon.nodes.loop.loop_subscriber import LoopSubscriber
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.viewer import TOPICS
 from active_recon.volumes.voxels import VoxelGrid
@@ -17,7 +17,7 @@ import pytest
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import LATCHED, STREAM
+from .conftest import LATCHED_QOS, STREAM_QOS
 from .test_recorder import CAMERA, start_remapped
 
 pytestmark = pytest.mark.ros
@@ -29,7 +29,7 @@ def hear(bench):
     heard = []
 
     def make(loop):
-        heard.append(HeardLoop(bench.node, loop, Diagnostics(bench.node)))
+        heard.append(LoopSubscriber(bench.node, loop, Diagnostics(bench.node)))
         return heard[-1]
 
     yield make
@@ -39,13 +39,13 @@ def hear(bench):
 
 @pytest.fixture
 def found(bench):
-    """Return the loops that were found, the last one last; `found.finder` looks for them."""
+    """Return the loops that were found, the last one last; `found.finder` finds them."""
     class Found(list):
         finder = None
 
         def until(self, condition, what):
             def looked():
-                self.finder.look()
+                self.finder.update()
                 return condition(self)
 
             bench.until(looked, what)
@@ -80,10 +80,10 @@ def test_the_size_the_frame_and_the_names_of_a_running_loop_are_found(
 def test_publishers_of_a_remapped_topic_are_counted(bench, hear):
     heard = hear(Loop('/', names={'camera/image_raw': '/usb_cam/image_raw'}))
     assert heard.links()['image'].publishers == 0
-    bench.node.create_publisher(Image, 'usb_cam/image_raw', STREAM)
+    bench.node.create_publisher(Image, 'usb_cam/image_raw', STREAM_QOS)
     bench.until(lambda: heard.links()['image'].publishers == 1, 'the publisher')
     assert heard.links()['image'].topic == '/usb_cam/image_raw'
-    bench.node.create_publisher(CompressedImage, 'usb_cam/image_raw/compressed', STREAM)
+    bench.node.create_publisher(CompressedImage, 'usb_cam/image_raw/compressed', STREAM_QOS)
     bench.until(lambda: heard.links()['image'].publishers == 2, 'the other form')
 
 
@@ -95,12 +95,12 @@ def test_a_compressed_camera_is_seen(bench, hear):
 
     def seen():
         publisher.publish(CompressedImage(format='png', data=data))
-        heard.take()
+        heard.update()
         return heard.observer.state.picture is not None
 
     bench.until(seen, 'the picture')
     assert np.array_equal(heard.observer.state.picture, pixels)
-    assert heard.links()['image'].heard_ago_s is not None
+    assert heard.links()['image'].age_s is not None
 
 
 def test_the_grid_has_the_size_that_the_loop_says_and_the_network_image_is_shown(bench, hear):
@@ -113,10 +113,10 @@ def test_the_grid_has_the_size_that_the_loop_says_and_the_network_image_is_shown
             (PointCloud2, 'probabilities', voxel_grid_to_msg(grid, 0.02, header)),
             (Image, 'network_image', image_to_msg(image, header)),
             (PoseStamped, 'view', pose_to_msg(orbit_camera(0.5).pose, header))):
-        bench.node.create_publisher(kind, topic, LATCHED).publish(msg)
+        bench.node.create_publisher(kind, topic, LATCHED_QOS).publish(msg)
 
     def taken():
-        heard.take()
+        heard.update()
         return heard.observer.state.views and heard.observer.state.network_image is not None
 
     bench.until(taken, 'the view')
@@ -130,11 +130,11 @@ def test_what_nodes_warn_of_is_heard_and_forgotten_when_it_is_over(start_node, b
     node = start_node('reconstructor')
 
     def problems():
-        heard.take()
+        heard.update()
         return heard.problems()
 
     said = bench.until(lambda: problems().get('reconstructor'), 'the warning')
-    assert '/camera/' in said and 'none has ever come' in said
+    assert '/camera/' in said and 'none has arrived' in said
     node.stop()
     bench.until(lambda: not problems(), 'its end')
 
@@ -145,7 +145,7 @@ def test_warnings_of_another_loop_are_not_told(start_node, bench, hear):
     start_node('reconstructor', namespace='cell_1')
 
     def problems():
-        heard.take()
+        heard.update()
         return heard.problems()
 
     bench.until(problems, 'the warning')
@@ -155,8 +155,8 @@ def test_warnings_of_another_loop_are_not_told(start_node, bench, hear):
 def test_the_reconstructor_tells_what_its_network_saw(start_node, bench, box):
     start_node('turntable_camera', mesh=box, rate=30.0)
     start_node('reconstructor', take_views='all')
-    images = bench.hear(Image, 'network_image', LATCHED)
-    views = bench.hear(PoseStamped, 'view', LATCHED)
+    images = bench.subscribe(Image, 'network_image', LATCHED_QOS)
+    views = bench.subscribe(PoseStamped, 'view', LATCHED_QOS)
     bench.until(lambda: {str(msg.header.stamp) for msg in images}
                 & {str(msg.header.stamp) for msg in views}, 'the image of a view')
     assert images[-1].encoding == 'rgb8'

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import time
 
-from active_recon.launching.loop_watch import joined_domain, LoopWatch
+from active_recon.launching.loop_client import joined_domain, LoopClient
 from diagnostic_msgs.msg import DiagnosticArray
 from msg_tools.diagnostics import diagnostics_from_msg
 from msg_tools.episodes import done_from_msg, Episode, episode_from_msg
@@ -22,7 +22,7 @@ _ALL = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _FAULTS = ('refused/', 'warned/', 'dropped/')
 
 
-class SoakWatch(LoopWatch):
+class SoakMonitor(LoopClient):
     """
     Counts episodes, the views of each (`views`), and what the nodes complained of (`faults`).
 
@@ -71,8 +71,8 @@ class SoakWatch(LoopWatch):
         self._stamps.clear()
 
     def call(self, service: str, budget_s: float) -> str:
-        """Call a Trigger service, as `ask` does, while the nodes live."""
-        return self.ask(service, budget_s, self._check)
+        """Call a Trigger service, as `trigger` does, while the nodes live."""
+        return self.trigger(service, budget_s, self._check)
 
     def _on_occupancy(self, msg: PointCloud2) -> None:
         stamp = nanoseconds_from_stamp(msg.header.stamp)
@@ -98,7 +98,7 @@ class SoakWatch(LoopWatch):
 
 
 @contextmanager
-def soak_watch(check: Callable[[], None]) -> Iterator[SoakWatch]:
+def soak_monitor(check: Callable[[], None]) -> Iterator[SoakMonitor]:
     """Join the domain that the environment names; `check` raises where a node has died."""
     with joined_domain('soak') as (node, executor):
-        yield SoakWatch(node, executor, check)
+        yield SoakMonitor(node, executor, check)

@@ -1,0 +1,71 @@
+"""The demo's own node: it observes the loop and calls its services."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from active_recon.launching.loop_client import joined_domain, LoopClient
+from active_recon.nodes.loop.followed_loop import Loop
+from active_recon.nodes.loop.loop_subscriber import LoopSubscriber
+from active_recon.nodes.runtime.diagnostics import Diagnostics
+from active_recon.viewer.state import LoopState, Observer
+from active_recon.viewer.view_result import ViewResult
+from active_recon.volumes.voxels import iou, VoxelGrid
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+TrueCells = Callable[[int], NDArray[np.bool_]]
+"""Returns the object's true cells, (N, N, N), for N cells a side."""
+
+
+class ScoringObserver(Observer):
+    """Adds the occupied cells and their IoU with the true object to each view."""
+
+    def __init__(self, truth: TrueCells) -> None:
+        super().__init__()
+        self._truth = truth
+
+    def add_view(self, view: ViewResult, grid: VoxelGrid | None,
+                 occupied: VoxelGrid | None) -> None:
+        """Add a view with the probabilities and the occupied cells after it."""
+        if grid is not None and occupied is not None:
+            cells = occupied.as_fine_as(grid)
+            truth = self._truth(len(cells.occupancy))
+            view = replace(view, occupied=cells, iou=float(iou(cells.occupied(0), truth)))
+        super().add_view(view, grid, occupied)
+
+
+class DemoMonitor(LoopClient):
+    """Waits for the loop and calls its services; `state` is the loop's, each view with its IoU."""
+
+    def __init__(self, node: Node, executor: SingleThreadedExecutor, truth: TrueCells) -> None:
+        super().__init__(node, executor)
+        self._subscriber = LoopSubscriber(
+            node, Loop(node.get_namespace()), Diagnostics(node), ScoringObserver(truth))
+
+    @property
+    def state(self) -> LoopState:
+        """The state of the loop now."""
+        return self._subscriber.observer.state
+
+    def has_views(self, count: int) -> bool:
+        """Return whether so many views have been taken."""
+        return len(self.state.views) >= count
+
+    def until(self, condition: Callable[[], bool], budget_s: float, awaited: str,
+              meanwhile: Callable[[], None]) -> None:
+        """Read messages until the condition holds; ActiveReconError after the budget."""
+        def update() -> None:
+            self._subscriber.update()
+            meanwhile()
+
+        super().until(condition, budget_s, awaited, update)
+
+
+@contextmanager
+def demo_monitor(truth: TrueCells) -> Iterator[DemoMonitor]:
+    """Join the ROS domain of the environment as an observer that knows the true object."""
+    with joined_domain('_demo') as (node, executor):
+        yield DemoMonitor(node, executor, truth)

@@ -1,0 +1,58 @@
+"""Publishes the reconstruction after each view, all messages with the stamp of its image."""
+
+from active_recon.nodes.runtime.qos import LATCHED_QOS
+from active_recon.reconstructor import Reconstruction
+from active_recon.volumes.voxels import PUBLISHED_FLOOR
+from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import pose_to_msg
+from msg_tools.entropy import entropy_to_msg
+from msg_tools.images import image_to_msg, latent_to_msg
+from msg_tools.stamps import stamp_from_nanoseconds
+from msg_tools.voxels import voxel_grid_to_msg
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+from sensor_msgs.msg import Image, JointState, PointCloud2
+from std_msgs.msg import Header
+
+
+class ReconstructionPublisher:
+    """Publishes `occupancy`, `probabilities`, `latent`, `entropy`, `view` and its images."""
+
+    def __init__(self, node: Node, frame: str) -> None:
+        self._frame = frame
+        self._view_pub = node.create_publisher(PoseStamped, 'view', LATCHED_QOS)
+        self._view_image_pub = node.create_publisher(Image, 'view_image', LATCHED_QOS)
+        self._network_image_pub = node.create_publisher(Image, 'network_image', LATCHED_QOS)
+        self._occupancy_pub = node.create_publisher(PointCloud2, 'occupancy', LATCHED_QOS)
+        self._probabilities_pub = node.create_publisher(PointCloud2, 'probabilities', LATCHED_QOS)
+        self._latent_pub = node.create_publisher(Image, 'latent', LATCHED_QOS)
+        self._entropy_pub = node.create_publisher(JointState, 'entropy', LATCHED_QOS)
+
+    def publish_occupancy(self, stamp: int, reconstruction: Reconstruction,
+                          threshold: float) -> None:
+        """Publish the occupied cells, at the stamp of the view in nanoseconds."""
+        self._occupancy_pub.publish(
+            voxel_grid_to_msg(reconstruction.grid, threshold, self._header(stamp)))
+
+    def publish_view(self, stamp: int, pose: NDArray[np.float64], reconstruction: Reconstruction,
+                     cleared_image: NDArray[np.uint8] | None) -> None:
+        """
+        Publish all the rest, at the stamp of the view in nanoseconds.
+
+        - pose: (4, 4), of the view's camera in the object frame
+        - cleared_image: (H, W, 3) uint8 RGB, the image without its background; None: unchanged
+        """
+        header = self._header(stamp)
+        self._latent_pub.publish(latent_to_msg(reconstruction.latent, header))
+        if cleared_image is not None:
+            self._view_image_pub.publish(image_to_msg(cleared_image, header))
+        if reconstruction.image is not None:
+            self._network_image_pub.publish(image_to_msg(reconstruction.image[..., :3], header))
+        self._view_pub.publish(pose_to_msg(pose, header))
+        grid = reconstruction.grid
+        self._probabilities_pub.publish(voxel_grid_to_msg(grid, PUBLISHED_FLOOR, header))
+        self._entropy_pub.publish(entropy_to_msg(grid.entropy(), header))
+
+    def _header(self, stamp: int) -> Header:
+        return Header(stamp=stamp_from_nanoseconds(stamp), frame_id=self._frame)
