@@ -7,8 +7,8 @@ import tempfile
 import time
 
 from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.reading import read_run
-from active_recon.bags.runs.settings import recorded_settings
 from benchmarks.figures import Figure
 
 GOLDEN = Path(__file__).parents[1] / 'bags' / 'golden' / 'run'
@@ -16,7 +16,7 @@ GOLDEN = Path(__file__).parents[1] / 'bags' / 'golden' / 'run'
 
 def replay_figure() -> Figure:
     """Measure how much faster than the run the golden run is read and replayed."""
-    settings = recorded_settings(read_run(GOLDEN))
+    settings = recorded_setup(read_run(GOLDEN))
     loop = settings.load_reconstructor(), settings.load_planner()
 
     def once() -> float:

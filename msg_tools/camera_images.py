@@ -1,4 +1,4 @@
-"""What a camera sends, raw or compressed: its size told at once, its pixels when asked for."""
+"""Camera images, raw or compressed; their size is read without decoding them."""
 
 from io import BytesIO
 
@@ -10,78 +10,78 @@ from numpy.typing import NDArray
 import PIL.Image
 from sensor_msgs.msg import CompressedImage, Image
 
-MOST_PIXELS = 1 << 26
-"""Compressed images of more are refused: a small file may claim any size."""
+MAX_PIXELS = 1 << 26
+"""Larger compressed images are rejected: a small file may claim any size."""
 _UNREADABLE = (OSError, ValueError, SyntaxError, PIL.Image.DecompressionBombError,
                PIL.Image.DecompressionBombWarning)
 
 
 def pixels_from_msg(msg: Image | CompressedImage) -> NDArray[np.uint8]:
-    """Return the image, (height, width, 3) uint8 RGB; raises MessageError where it is none."""
+    """Return the image, (height, width, 3) uint8 RGB; raises MessageError if it is invalid."""
     return compressed_image_from_msg(msg) if _is_compressed(msg) else image_from_msg(msg)
 
 
 def size_from_msg(msg: Image | CompressedImage) -> tuple[int, int]:
     """
-    Return height and width of an image that is not unpacked.
+    Return the height and width of an image without decoding it.
 
-    Raises MessageError on what can be known to be no image without unpacking it.
+    Raises MessageError if its header is invalid.
     """
     if not _is_compressed(msg):
         return image_size_from_msg(msg)
-    packed = _opened(msg)
-    return packed.height, packed.width
+    header = _open(msg)
+    return header.height, header.width
 
 
 def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
     """
-    Return a camera's image, (height, width, 3) uint8 RGB; what is transparent becomes white.
+    Return a camera's image, (height, width, 3) uint8 RGB, laid on white where transparent.
 
-    Reads JPEG and PNG. Raises MessageError on anything else, and on images of more than
-    `MOST_PIXELS` before they are unpacked.
+    Reads JPEG and PNG. Raises MessageError on other formats, and on images of more than
+    `MAX_PIXELS` before they are decoded.
     """
-    packed = _opened(msg)
-    if packed.mode in ('RGB', 'L') and not packed.has_transparency_data:
-        return _unpacked(msg)
+    image = _open(msg)
+    if image.mode in ('RGB', 'L') and not image.has_transparency_data:
+        return _decoded(msg)
     try:
-        if packed.has_transparency_data:
-            rgba = np.asarray(packed.convert('RGBA'))
+        if image.has_transparency_data:
+            rgba = np.asarray(image.convert('RGBA'))
             return over_white(np.ascontiguousarray(rgba[..., :3]), rgba[..., 3])
-        return np.asarray(packed.convert('RGB'))
+        return np.asarray(image.convert('RGB'))
     except _UNREADABLE as error:
-        raise _refusal(msg, str(error)) from error
+        raise _decoding_error(msg, str(error)) from error
 
 
 def _is_compressed(msg: Image | CompressedImage) -> bool:
-    return hasattr(msg, 'format')  # out of a bag it has the fields of ROS's class alone
+    return hasattr(msg, 'format')  # messages from a bag are of another class
 
 
-def _opened(msg: CompressedImage) -> PIL.Image.Image:
-    """Return the image, its head read and checked."""
+def _open(msg: CompressedImage) -> PIL.Image.Image:
+    """Return the image with its header read and checked."""
     try:
-        packed = PIL.Image.open(BytesIO(msg.data), formats=('JPEG', 'PNG'))
+        image = PIL.Image.open(BytesIO(msg.data), formats=('JPEG', 'PNG'))
     except _UNREADABLE as error:
-        raise _refusal(msg, str(error)) from error
-    if packed.width * packed.height > MOST_PIXELS:
-        raise MessageError(f'expected an image of at most {MOST_PIXELS} pixels, got '
-                           f'{packed.height} x {packed.width}', 'image_size')
-    return packed
+        raise _decoding_error(msg, str(error)) from error
+    if image.width * image.height > MAX_PIXELS:
+        raise MessageError(f'image too large: expected at most {MAX_PIXELS} pixels, got '
+                           f'{image.height} x {image.width}', 'image_size')
+    return image
 
 
-def _unpacked(msg: CompressedImage) -> NDArray[np.uint8]:
-    """Return the pixels by OpenCV, which takes half of Pillow's time for the same bits."""
-    # A camera is calibrated for its pixels as they are, not for what a note in the file says
+def _decoded(msg: CompressedImage) -> NDArray[np.uint8]:
+    """Return the pixels by OpenCV, which gives the same bits in half of Pillow's time."""
+    # The calibration is of the pixels as they are, not as the EXIF orientation turns them
     how = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         pixels = cv2.imdecode(np.frombuffer(msg.data, np.uint8), how)
     except cv2.error as error:
-        raise _refusal(msg, str(error)) from error
+        raise _decoding_error(msg, str(error)) from error
     if pixels is None:
-        raise _refusal(msg, 'its bytes end too early or are damaged')
-    # In place; reading as RGB at once would want an OpenCV newer than a distribution's
+        raise _decoding_error(msg, 'its data is incomplete or damaged')
+    # In place; decoding to RGB directly needs an OpenCV newer than a distribution's
     return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB, pixels), np.uint8)
 
 
-def _refusal(msg: CompressedImage, why: str) -> MessageError:
-    return MessageError(
-        f'expected a compressed image as JPEG or PNG, got {msg.format!r}: {why}', 'encoding')
+def _decoding_error(msg: CompressedImage, reason: str) -> MessageError:
+    return MessageError(f'compressed image not readable: expected JPEG or PNG, got '
+                        f'{msg.format!r}: {reason}', 'encoding')

@@ -1,8 +1,8 @@
 """
 Cameras to and from CameraInfo and PoseStamped.
 
-A pose is that of the camera's optical frame in the object frame. The core counts pixels from the
-image's corner (the centre of the first pixel is 0.5), ROS from the first pixel's centre (0).
+A pose is that of the camera's optical frame in the object frame. Pixel coordinates of the core
+begin at the image's corner (the first pixel's centre is 0.5), those of ROS at that centre (0).
 """
 
 from active_recon.errors import MessageError, ViewError
@@ -15,35 +15,35 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-_LARGEST = 1e9  # metres or pixels: what is computed with more may overflow
+_LARGEST = 1e9  # metres or pixels: larger values may overflow
 
 
 def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
     """
-    Return the lens of `k` and `d` as the image has it, after `roi` and `binning`.
+    Return the lens given by `k` and `d`, for the image after `roi` and `binning`.
 
-    Coefficients of distortion that are all zero, or none, are a pinhole. Raises MessageError where
-    the size is 0, a focal length is not above 0 and finite, the distortion is of an unknown model,
-    or the region lies outside of the sensor.
+    Without distortion coefficients other than 0 it is a pinhole. Raises MessageError if the size
+    is 0, a focal length is not finite and above 0, the distortion model is unknown, or the region
+    of interest exceeds the sensor.
     """
     fx, cx, fy, cy = (float(msg.k[index]) for index in (0, 2, 4, 5))
     if msg.width == 0 or msg.height == 0:
-        raise MessageError('expected camera info with an image size above 0, '
+        raise MessageError('invalid camera info: expected an image size above 0, '
                            f'got {msg.height} x {msg.width}', 'camera_info')
     if not _sensible(fx, fy, cx, cy) or fx <= 0 or fy <= 0:
-        raise MessageError('expected camera info of a calibrated camera with finite focal lengths '
-                           f'above 0, got fx {fx}, fy {fy}, cx {cx}, cy {cy}', 'camera_info')
+        raise MessageError('uncalibrated camera info: expected finite focal lengths above 0, '
+                           f'got fx {fx}, fy {fy}, cx {cx}, cy {cy}', 'camera_info')
     left, top, width, height = _region(msg)
     across, down = max(int(msg.binning_x), 1), max(int(msg.binning_y), 1)
     if width < across or height < down:
-        raise MessageError(f'expected binning that leaves an image of {height} x {width}, got '
+        raise MessageError(f'invalid binning: expected at most {height} x {width}, got '
                            f'binning_y {down}, binning_x {across}', 'camera_info')
     return Intrinsics(fx / across, fy / down, (cx + 0.5 - left) / across, (cy + 0.5 - top) / down,
                       width // across, height // down, _distortion(msg))
 
 
 def intrinsics_to_msg(intrinsics: Intrinsics, header: Header) -> CameraInfo:
-    """Return a lens as the CameraInfo of a camera that neither crops nor bins."""
+    """Return a lens as the CameraInfo of a camera without cropping and binning."""
     fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx - 0.5, intrinsics.cy - 0.5
     bent = intrinsics.distortion
     return CameraInfo(
@@ -56,14 +56,14 @@ def intrinsics_to_msg(intrinsics: Intrinsics, header: Header) -> CameraInfo:
 
 
 def _region(msg: CameraInfo) -> tuple[int, int, int, int]:
-    """Return left, top, width and height of the sensor's part that the image shows."""
+    """Return left, top, width and height of the region of interest on the sensor."""
     roi = msg.roi
     left, top = int(roi.x_offset), int(roi.y_offset)
     width = int(roi.width) or int(msg.width) - left
     height = int(roi.height) or int(msg.height) - top
     if min(width, height) <= 0 or left + width > msg.width or top + height > msg.height:
         raise MessageError(
-            f"expected a region of interest within the sensor's {msg.height} x {msg.width}, got "
+            f'invalid region of interest: expected one within {msg.height} x {msg.width}, got '
             f'{roi.height} x {roi.width} at {top}, {left}', 'camera_info')
     return left, top, width, height
 
@@ -80,26 +80,25 @@ def _distortion(msg: CameraInfo) -> Distortion | None:
 
 def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.float64]:
     """
-    Return the pose, (4, 4), object from optical frame.
+    Return the pose, (4, 4), object from optical frame; its quaternion is normalised.
 
-    A quaternion is normalised. Raises MessageError where the pose is not in the object frame, is
-    not finite or a million kilometres away, has a quaternion of zero, or stands at the frame's
-    origin.
+    Raises MessageError if the pose is in another frame, not finite, a million kilometres away or
+    at the frame's origin, or its quaternion is zero.
     """
     if msg.header.frame_id != frame:
-        raise MessageError(f'expected a camera pose in the frame {frame!r}, '
+        raise MessageError(f'wrong frame of a camera pose: expected {frame!r}, '
                            f'got {msg.header.frame_id!r}', 'frame')
     point, turn = msg.pose.position, msg.pose.orientation
     position = np.array([point.x, point.y, point.z])
     quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
     if not _sensible(*position, *quaternion):
-        raise MessageError(f'expected a finite camera pose, got position {position.tolist()} and '
+        raise MessageError(f'camera pose not finite: got position {position.tolist()} and '
                            f'quaternion {quaternion.tolist()}', 'pose')
     if np.linalg.norm(quaternion) < 1e-6:
-        raise MessageError('expected a unit quaternion in the camera pose, '
+        raise MessageError('invalid camera pose: expected a unit quaternion, '
                            f'got {quaternion.tolist()}', 'quaternion')
     if np.linalg.norm(position) < 1e-6:
-        raise MessageError('expected a camera away from the object, got one at its centre', 'pose')
+        raise MessageError("invalid camera pose: it is at the object's centre", 'pose')
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
     pose[:3, 3] = position
@@ -115,22 +114,22 @@ def pose_to_msg(pose: NDArray[np.float64], header: Header) -> PoseStamped:
 
 
 def pose_through_msg(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what whoever reads the message of a pose, (4, 4), gets: its rotation is rounded."""
+    """Return a pose, (4, 4), converted to a message and back, which rounds its rotation."""
     return pose_from_msg(pose_to_msg(pose, Header(frame_id=OBJECT_FRAME)))
 
 
 def camera_from_msgs(info: CameraInfo, pose: PoseStamped, frame: str = OBJECT_FRAME) -> Camera:
-    """Return the camera of both messages; raises MessageError as the two readers do."""
+    """Return the camera given by both messages; raises MessageError."""
     return Camera(pose_from_msg(pose, frame), intrinsics_from_msg(info))
 
 
 def camera_to_msgs(camera: Camera, stamp: Header, frame: str = OBJECT_FRAME
                    ) -> tuple[CameraInfo, PoseStamped]:
-    """Return both messages of one camera; `stamp` bears the stamp and the camera's own frame."""
+    """Return both messages of a camera; `stamp` has the stamp and the camera's own frame."""
     return (intrinsics_to_msg(camera.intrinsics, stamp),
             pose_to_msg(camera.pose, Header(stamp=stamp.stamp, frame_id=frame)))
 
 
 def _sensible(*values: float) -> bool:
-    """Return whether all of the values are finite, and of a size that cameras have."""
+    """Return whether all values are finite and of a plausible size."""
     return all(abs(value) < _LARGEST for value in values)

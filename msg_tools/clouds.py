@@ -14,19 +14,19 @@ def cloud_from_msg(msg: PointCloud2, names: Sequence[str]) -> NDArray[np.float32
     """
     Return the named float32 fields of a cloud, (N, len(names)).
 
-    Raises MessageError where a field is missing or not float32, or bytes are.
+    Raises MessageError if a field is missing or not float32, or the data is too short.
     """
     offsets = {field.name: field.offset for field in msg.fields
                if field.datatype == PointField.FLOAT32}
     if missing := [name for name in names if name not in offsets]:
-        raise MessageError(f'expected a cloud with float32 fields {", ".join(names)}, '
+        raise MessageError(f'missing cloud fields: expected float32 fields {", ".join(names)}, '
                            f'got none named {", ".join(missing)}', 'cloud')
     count = msg.width * msg.height
     if len(msg.data) < count * msg.point_step:
-        raise MessageError(f'expected {count * msg.point_step} bytes for {count} points, '
-                           f'got {len(msg.data)}', 'cloud')
+        raise MessageError(f'cloud too short: expected {count * msg.point_step} bytes for {count} '
+                           f'points, got {len(msg.data)}', 'cloud')
     if any(offsets[name] + 4 > msg.point_step for name in names):
-        raise MessageError(f'expected fields within points of {msg.point_step} bytes, '
+        raise MessageError(f'invalid cloud fields: expected them within {msg.point_step} bytes, '
                            f'got offsets {offsets}', 'cloud')
     order = '>' if msg.is_bigendian else '<'
     row = np.dtype({'names': list(names), 'formats': [f'{order}f4'] * len(names),

@@ -1,4 +1,4 @@
-"""What a node says of itself to and from DiagnosticArray: counters, facts, and what is wrong."""
+"""The status of a node to and from DiagnosticArray: counters, facts and problems."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,11 +11,11 @@ from std_msgs.msg import Header
 @dataclass(frozen=True)
 class NodeStatus:
     """
-    One node's state: its full name, and the machine it runs on as its `hardware_id`.
+    The status of a node: its full name, and its machine as `hardware_id`.
 
-    `problem` is what was last found wrong and `failure` what the node does no more, each '' where
-    nothing was: the level is then OK, else WARN or ERROR. The keys of counts begin in lower case,
-    those of facts with a capital.
+    `problem` is the last warning and `failure` the last error, '' if there is none: the level is
+    WARN, ERROR, or OK without either. Keys of counts begin in lower case, those of facts with a
+    capital.
     """
 
     name: str
@@ -27,7 +27,7 @@ class NodeStatus:
 
 
 def diagnostics_to_msg(status: NodeStatus, stamp: Time) -> DiagnosticArray:
-    """Return one node's state as one status, the facts before the counts."""
+    """Return the status of one node, with the facts before the counts."""
     level = (DiagnosticStatus.ERROR if status.failure
              else DiagnosticStatus.WARN if status.problem else DiagnosticStatus.OK)
     values = [KeyValue(key=key, value=str(pairs[key]))
@@ -39,9 +39,9 @@ def diagnostics_to_msg(status: NodeStatus, stamp: Time) -> DiagnosticArray:
 
 def diagnostics_from_msg(msg: DiagnosticArray) -> dict[str, NodeStatus]:
     """
-    Return the state of each node in the message, by its name.
+    Return the status of each node in the message, by its name.
 
-    Of other programs' values those that are no whole numbers are facts, whatever their keys.
+    Values of other programs that are not whole numbers are facts, whatever their keys.
     """
     states = {}
     for status in msg.status:

@@ -1,4 +1,4 @@
-"""The entropy of a reconstruction to and from a message that bears the stamp of its view."""
+"""The entropy of a reconstruction to and from a message with the stamp of its view."""
 
 import math
 
@@ -13,18 +13,19 @@ def entropy_from_msg(msg: JointState) -> float:
     """
     Return the entropy in nats.
 
-    Raises MessageError where there is not just one position, or it is not finite.
+    Raises MessageError unless there is exactly one position, and it is finite.
     """
     if len(msg.position) != 1:
-        raise MessageError(f'expected one entropy, got {len(msg.position)}', 'entropy')
+        raise MessageError(f'invalid entropy: expected one position, got {len(msg.position)}',
+                           'entropy')
     entropy = float(msg.position[0])
     if not math.isfinite(entropy):
-        raise MessageError(f'expected an entropy that is finite, got {entropy}', 'entropy')
+        raise MessageError(f'entropy not finite: got {entropy}', 'entropy')
     return entropy
 
 
 def entropy_to_msg(entropy: float, header: Header) -> JointState:
     """Return an entropy in nats as the position of one joint: standard, stamped, and plotted."""
-    # Some readers outside ROS fail on an empty list of numbers, so none is left empty
+    # Some readers outside ROS fail on empty sequences, so none is left empty
     return JointState(header=header, name=[NAME], position=[entropy], velocity=[0.0],
                       effort=[0.0])

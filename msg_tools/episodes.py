@@ -16,9 +16,9 @@ class Episode:
 
 
 def episode_from_msg(msg: Header) -> Episode:
-    """Return the episode; raises MessageError where it bears no id."""
+    """Return the episode; raises MessageError if it has no id."""
     if not msg.frame_id:
-        raise MessageError('expected an episode with a unique id as its frame_id, got none',
+        raise MessageError('episode without an id: expected a unique id as its frame_id',
                            'episode')
     return Episode(msg.frame_id, nanoseconds_from_stamp(msg.stamp))
 
@@ -29,7 +29,7 @@ def episode_to_msg(episode: Episode) -> Header:
 
 
 def done_from_msg(msg: Header) -> tuple[int, str]:
-    """Return the stamp of the view that decided, nanoseconds, and the reason, '' if not done."""
+    """Return the stamp of the deciding view, nanoseconds, and the reason, '' if not done."""
     return nanoseconds_from_stamp(msg.stamp), msg.frame_id
 
 

@@ -29,36 +29,36 @@ def view_goal_to_msg(camera: Camera, header: Header) -> PoseStamped:
 
 def azimuth_goal_from_msg(msg: JointState) -> float:
     """
-    Return the goal's azimuth in [0, 2 pi), whatever its joint is called.
+    Return the goal's azimuth in [0, 2 pi); the joint may have any name.
 
-    Raises MessageError where there is not just one position, or it is not finite.
+    Raises MessageError unless there is exactly one position, and it is finite.
     """
     if len(msg.position) != 1:
-        raise MessageError('expected an azimuth goal with one position, '
+        raise MessageError('invalid azimuth goal: expected one position, '
                            f'got {len(msg.position)}', 'goal')
     azimuth = float(msg.position[0])
     if not math.isfinite(azimuth):
-        raise MessageError(f'expected an azimuth goal that is finite, got {azimuth}', 'goal')
+        raise MessageError(f'azimuth goal not finite: got {azimuth}', 'goal')
     return wrap_azimuth(azimuth)
 
 
 def joint_position_from_msg(msg: JointState, joint: str = '') -> float:
     """
-    Return the position of the joint of that name, '' for the only one, as it is.
+    Return the position of the joint of that name, or of the only joint for ''.
 
-    Raises MessageError where the message does not tell it.
+    Raises MessageError if the message does not have it.
     """
     if joint and joint in msg.name and msg.name.index(joint) < len(msg.position):
         return float(msg.position[msg.name.index(joint)])
     if joint or len(msg.position) != 1:
-        raise MessageError(f'expected a position of {joint or "one joint"}, got '
+        raise MessageError(f'no joint position: expected one of {joint or "a single joint"}, got '
                            f'{len(msg.position)} of {", ".join(msg.name)}', 'joint')
     return float(msg.position[0])
 
 
 def azimuth_goal_to_msg(azimuth: float, header: Header) -> JointState:
-    """Return an azimuth of the camera, radians, as the position of one joint, at rest there."""
-    # Some readers outside ROS fail on an empty list of numbers, so none is left empty
+    """Return an azimuth of the camera, radians, as the position of a joint at rest."""
+    # Some readers outside ROS fail on empty sequences, so none is left empty
     return JointState(
         header=header, name=[JOINT], position=[wrap_azimuth(azimuth)],
         velocity=[0.0], effort=[0.0])

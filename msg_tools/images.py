@@ -24,10 +24,10 @@ def image_from_msg(msg: Image) -> NDArray[np.uint8]:
     """
     Return a camera's image, (height, width, 3) uint8 RGB.
 
-    Reads rgb8, bgr8, mono8, rgba8 and bgra8 (what is transparent becomes white), 8UC3 as OpenCV's
-    blue, green, red, and 32FC3, RGB in [0, 1]. An image of rgb8 is the message's own memory and
-    changes with it. Raises MessageError as `image_size_from_msg` does, and on values of 32FC3
-    that are NaN or out of range.
+    Reads rgb8, bgr8, mono8, rgba8 and bgra8 (laid on white where transparent), 8UC3 as OpenCV's
+    blue, green, red, and 32FC3, RGB in [0, 1]. An image of rgb8 shares the message's memory.
+    Raises MessageError as `image_size_from_msg` does, and on values of 32FC3 that are NaN or out
+    of range.
     """
     dtype, channels = _layout(msg)
     pixels = _pixels(msg, dtype, channels)
@@ -41,10 +41,10 @@ def image_from_msg(msg: Image) -> NDArray[np.uint8]:
 
 def image_size_from_msg(msg: Image) -> tuple[int, int]:
     """
-    Return height and width of a camera's image, its pixels unread.
+    Return the height and width of a camera's image.
 
-    Raises MessageError on an encoding that `image_from_msg` does not read, an image of no size,
-    and one with fewer bytes than its size asks for.
+    Raises MessageError on an encoding that `image_from_msg` does not read, on an empty image, and
+    on too few bytes for its size.
     """
     _check_size(msg, *_layout(msg))
     return int(msg.height), int(msg.width)
@@ -56,14 +56,14 @@ def image_to_msg(image: NDArray[np.uint8], header: Header) -> Image:
 
 
 def latent_from_msg(msg: Image) -> NDArray[np.float32]:
-    """Return a latent, (C, h, w) float32; raises MessageError where it is not a finite 32FC<C>."""
+    """Return a latent, (C, h, w) float32; raises MessageError unless it is a finite 32FC<C>."""
     encoding = re.fullmatch(r'32FC([1-9]\d*)', msg.encoding)
     if encoding is None:
-        raise MessageError(f'expected a latent encoded as 32FC<channels>, got {msg.encoding!r}',
-                           'encoding')
+        raise MessageError('unknown latent encoding: expected 32FC<channels>, got '
+                           f'{msg.encoding!r}', 'encoding')
     latent = _pixels(msg, _FLOAT, int(encoding[1]))
     if not np.isfinite(latent).all():
-        raise MessageError('expected a finite latent, got NaN or infinity', 'image_values')
+        raise MessageError('latent not finite: got NaN or infinity', 'image_values')
     return np.ascontiguousarray(latent.transpose(2, 0, 1), np.float32)
 
 
@@ -74,12 +74,12 @@ def latent_to_msg(latent: NDArray[np.float32], header: Header) -> Image:
 
 def mask_from_msg(msg: Image) -> NDArray[np.bool_]:
     """
-    Return where a mask has the object, (height, width): where it is not 0.
+    Return a mask of the object, (height, width): True where the message is not 0.
 
-    Raises MessageError where it is not mono8 (8UC1 is the same), has no size, or too few bytes.
+    Raises MessageError unless it is mono8 or 8UC1, if it is empty, or has too few bytes.
     """
     if msg.encoding not in MASK_ENCODINGS:
-        raise MessageError(f'expected a mask encoded as {" or ".join(MASK_ENCODINGS)}, '
+        raise MessageError(f'unknown mask encoding: expected {" or ".join(MASK_ENCODINGS)}, '
                            f'got {msg.encoding!r}', 'mask')
     return np.asarray(_pixels(msg, _BYTE, 1)[..., 0] != 0)
 
@@ -90,7 +90,7 @@ def mask_to_msg(mask: NDArray[np.bool_], header: Header) -> Image:
 
 
 def over_white(color: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a picture, (H, W, 3), of straight alpha, (H, W), laid on white."""
+    """Return an image, (H, W, 3), of straight alpha, (H, W), laid on white."""
     if alpha.min() == 255:
         return color
     # 255 - (255 - color) alpha / 255: with odd 255 no value is halfway, so rounding is exact
@@ -102,7 +102,7 @@ def over_white(color: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> NDArray[np
 def _image_msg(pixels: NDArray[Any], encoding: str,
                header: Header) -> Image:
     height, width, channels = pixels.shape
-    # An array.array is handed over in microseconds, any other sequence is copied byte by byte.
+    # An array.array is assigned in microseconds, any other sequence is copied byte by byte.
     data = array.array('B')
     data.frombytes(np.ascontiguousarray(pixels).reshape(-1).view(np.uint8).data)
     return Image(header=header, height=height, width=width, encoding=encoding,
@@ -110,29 +110,29 @@ def _image_msg(pixels: NDArray[Any], encoding: str,
 
 
 def _layout(msg: Image) -> tuple[np.dtype[Any], int]:
-    """Return the type of the numbers and how many of them are a pixel."""
+    """Return the type of the values and their number in a pixel."""
     if msg.encoding not in ENCODINGS:
-        raise MessageError(f'expected an image encoded as one of {", ".join(ENCODINGS)}, '
+        raise MessageError(f'unknown image encoding: expected one of {", ".join(ENCODINGS)}, '
                            f'got {msg.encoding!r}', 'encoding')
     return ENCODINGS[msg.encoding]
 
 
 def _check_size(msg: Image, dtype: np.dtype[Any], channels: int) -> None:
     if msg.height == 0 or msg.width == 0:
-        raise MessageError('expected an image with a height and a width above 0, '
+        raise MessageError('empty image: expected a height and a width above 0, '
                            f'got {msg.height} x {msg.width}', 'image_size')
     row = msg.width * channels * dtype.itemsize
     if msg.step < row:
-        raise MessageError(f'expected rows of at least {row} bytes for {msg.width} pixels of '
-                           f'{msg.encoding}, got a step of {msg.step}', 'image_bytes')
+        raise MessageError(f'invalid image rows: expected at least {row} bytes for {msg.width} '
+                           f'pixels of {msg.encoding}, got a step of {msg.step}', 'image_bytes')
     expected = msg.step * msg.height
     if len(msg.data) < expected:
-        raise MessageError(f'expected {expected} bytes for {msg.height} rows of {msg.step}, '
-                           f'got {len(msg.data)}', 'image_bytes')
+        raise MessageError(f'image data too short: expected {expected} bytes for {msg.height} '
+                           f'rows of {msg.step}, got {len(msg.data)}', 'image_bytes')
 
 
 def _pixels(msg: Image, dtype: np.dtype[Any], channels: int) -> NDArray[Any]:
-    """Return the message's pixels, (height, width, channels), in its memory where that can be."""
+    """Return the pixels, (height, width, channels), in the message's memory if possible."""
     _check_size(msg, dtype, channels)
     rows = np.frombuffer(msg.data, np.uint8, msg.step * msg.height).reshape(msg.height, msg.step)
     row = rows[:, :msg.width * channels * dtype.itemsize]
@@ -145,7 +145,7 @@ def _pixels(msg: Image, dtype: np.dtype[Any], channels: int) -> NDArray[Any]:
 def _from_float(pixels: NDArray[Any]) -> NDArray[np.uint8]:
     lowest, highest = pixels.min(), pixels.max()  # NaN where any value is
     if not (lowest >= 0 and highest <= 1):
-        raise MessageError('expected values of 32FC3 in [0, 1], got '
+        raise MessageError('image values out of range: expected 32FC3 in [0, 1], got '
                            f'{lowest} to {highest}', 'image_values')
     scaled: NDArray[np.uint8] = np.rint(pixels * np.float32(255)).astype(np.uint8)
     return scaled

@@ -1,4 +1,4 @@
-"""Messages of one view, joined on their common stamp."""
+"""Joining the messages of one view on their common stamp."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,26 +7,26 @@ _KEPT = 16
 
 
 class StampJoiner:
-    """Collects named parts of one stamp, in any order, until all of them are there."""
+    """Collects the named parts of each stamp, in any order, until they are complete."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = frozenset(names)
         self._parts: dict[int, dict[str, Any]] = {}
 
     def clear(self) -> None:
-        """Forget what is not complete."""
+        """Forget all incomplete parts."""
         self._parts.clear()
 
     def forget_before(self, stamp: int) -> None:
-        """Forget what is stamped earlier."""
+        """Forget the parts with earlier stamps."""
         self._parts = {each: parts for each, parts in self._parts.items() if each >= stamp}
 
     def add(self, name: str, stamp: int, part: Any) -> dict[str, Any] | None:
-        """Take in one part; return all parts of its stamp if it was the last one missing."""
+        """Add a part; return all parts of its stamp if they are now complete, else None."""
         parts = self._parts.setdefault(stamp, {})
         parts[name] = part
         if parts.keys() == self._names:
             return self._parts.pop(stamp)
-        if len(self._parts) > _KEPT:  # what lost a part on the way makes room, the oldest first
+        if len(self._parts) > _KEPT:  # parts may be lost on the way: the oldest stamp makes room
             del self._parts[min(self._parts)]
         return None

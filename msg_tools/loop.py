@@ -1,4 +1,4 @@
-"""What the loop's nodes publish for one view and for one goal, by the topics' names."""
+"""The messages that the loop's nodes publish for one view and for one goal, by topic name."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ CAMERA_FRAME = 'camera_optical_frame'
 
 def image_to_msgs(stamp: int, image: NDArray[np.uint8], camera: Camera,
                   object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
-    """Return what a camera publishes of an image, (H, W, 3) uint8 RGB, at a stamp in ns."""
+    """Return a camera's messages for an image, (H, W, 3) uint8 RGB, at a stamp in ns."""
     header = _header(stamp, CAMERA_FRAME)
     info, pose = camera_to_msgs(camera, header, object_frame)
     return {'camera/pose': pose, 'camera/camera_info': info,
@@ -30,9 +30,9 @@ def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
                  occupied: VoxelGrid | None, latent: NDArray[np.float32] | None,
                  entropy: float | None, object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
     """
-    Return what the reconstructor publishes of a view, at the stamp of its image in ns.
+    Return the reconstructor's messages for a view, at the stamp of its image in ns.
 
-    The grids are 0 where a cell is not published; what is None is not published at all.
+    Cells that are 0 in the grids are not published; nor is anything that is None.
     """
     header = _header(stamp, object_frame)
     messages: dict[str, Any] = {}
@@ -53,9 +53,9 @@ def goal_to_msgs(
         scores: tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]] | None,
         object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
     """
-    Return what the planner publishes of a goal at a stamp in ns: its camera, and its candidates.
+    Return the planner's messages for a goal at a stamp in ns: its camera and candidates.
 
-    `scores` are the candidates' positions (N, 3), azimuths (N,) and scores (N,); None: untold.
+    `scores` are the candidates' positions (N, 3), azimuths (N,) and scores (N,); None omits them.
     """
     header = _header(stamp, object_frame)
     messages: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""Messages as the bytes that go over the wire, and as a bag keeps them."""
+"""Serialized messages, as they are published and recorded."""
 
 from typing import Any
 

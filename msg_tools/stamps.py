@@ -1,4 +1,4 @@
-"""Stamps to and from nanoseconds, in which they are compared and joined."""
+"""Stamps to and from nanoseconds, by which messages are compared and joined."""
 
 from builtin_interfaces.msg import Time
 

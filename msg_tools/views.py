@@ -1,9 +1,10 @@
-"""A view out of its streams: image, camera info, pose and mask, joined on their stamps."""
+"""Views joined from their streams: image, camera info, pose and mask of one stamp."""
 
 import bisect
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 from active_recon.errors import MessageError
@@ -14,39 +15,31 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 from sensor_msgs.msg import CompressedImage, Image
 
-_KEPT = 1024  # poses: five seconds of a fast tracker
-_KEPT_INFOS = 256  # those of a fast camera while its images are late
-_WAITING = 32  # images, as long as they are not larger than
-_WAITING_BYTES = 1 << 28  # all together
+_MAX_POSES = 1024  # five seconds of a fast tracker
+_MAX_INFOS = 256  # of a fast camera while its images are late
+_MAX_WAITING = 32  # images
+_MAX_WAITING_BYTES = 1 << 28  # of all waiting images
 Part = TypeVar('Part')
 
 
 @dataclass(frozen=True, eq=False)
 class View:
     """
-    An image, (H, W, 3) uint8 RGB, and the camera that took it, at a stamp in nanoseconds.
+    An image and the camera that took it, at a stamp in nanoseconds.
 
-    With the mask of its object, still unread, where masks are joined and one came.
+    The image is decoded when it is first asked for. `mask` is the mask message of its object, if
+    masks are joined and one was received.
     """
 
     stamp: int
-    image: NDArray[np.uint8]
+    image_msg: Image | CompressedImage
     camera: Camera
     mask: Image | None = None
 
-
-@dataclass(frozen=True, eq=False)
-class UnreadView:
-    """A view whose image is still the message that came, so that nothing is unpacked in vain."""
-
-    stamp: int
-    image: Image | CompressedImage
-    camera: Camera
-    mask: Image | None = None
-
-    def read(self) -> View:
-        """Unpack the image; raises MessageError where it cannot be."""
-        return View(self.stamp, pixels_from_msg(self.image), self.camera, self.mask)
+    @cached_property
+    def image(self) -> NDArray[np.uint8]:
+        """The image, (H, W, 3) uint8 RGB; raises MessageError if it cannot be decoded."""
+        return pixels_from_msg(self.image_msg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +52,13 @@ class _WaitingImage:
 
 class ViewJoiner:
     """
-    Joins what arrives in any order; stamps are nanoseconds, `now` any clock in seconds.
+    Joins messages that arrive in any order; stamps are nanoseconds, `now` any clock in seconds.
 
-    The camera info is that of the image's stamp. The pose is too, or is interpolated between its
-    neighbours, each at most `max_pose_gap` seconds away. An image waits for them until they can
-    no longer come: a later one is there, or `patience` seconds have passed. With `masks` it waits
-    in the same way for the mask of its stamp, without which it may still be joined.
-    `max_pose_gap` may be changed at any time.
+    An image is joined with the camera info of its stamp, and with the pose of its stamp or one
+    interpolated between two neighbours, each at most `max_pose_gap` seconds away. It waits for
+    them until a later one is there or `patience` seconds have passed. With `masks` it waits in
+    the same way for the mask of its stamp, but is joined without it too. `max_pose_gap` may be
+    changed at any time.
     """
 
     def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False) -> None:
@@ -76,33 +69,31 @@ class ViewJoiner:
 
     def clear(self, earliest: int = 0) -> None:
         """
-        Forget everything, the order of stamps included.
+        Forget everything, including the order of stamps.
 
-        What is stamped before `earliest` and still comes is of no use from now on: an image is
-        refused, the rest is left out.
+        From now on images with stamps before `earliest` are rejected, and other messages ignored.
         """
         self._earliest = earliest
         self._last_image = earliest - 1
         self._images: deque[_WaitingImage] = deque()
-        self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_KEPT_INFOS)
-        self._masks: deque[tuple[int, Image]] = deque(maxlen=_WAITING)
+        self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_MAX_INFOS)
+        self._masks: deque[tuple[int, Image]] = deque(maxlen=_MAX_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
 
     def add_image(self, stamp: int, msg: Image | CompressedImage, now: float) -> None:
         """
-        Take in an image as it came.
+        Add an image message.
 
-        Raises MessageError where `size_from_msg` does, and on an image that came before or is
-        older than the last.
+        Raises MessageError as `size_from_msg` does, and on a stamp that is not after the last.
         """
         size = size_from_msg(msg)
         if stamp == self._last_image:
-            raise MessageError(f'expected each image once, got that of {_seconds(stamp)} again',
+            raise MessageError(f'duplicate image: got that of {_seconds(stamp)} again',
                                'duplicate')
         if stamp < self._last_image:
             raise MessageError(
-                f'expected images in the order of their stamps, got {_seconds(stamp)} after '
-                f'{_seconds(self._last_image)}; a new episode forgets the order', 'out_of_order')
+                f'image out of order: expected increasing stamps, got {_seconds(stamp)} after '
+                f'{_seconds(self._last_image)}; a new episode resets the order', 'out_of_order')
         self._last_image = stamp
         self._images.append(_WaitingImage(stamp, msg, size, now))
 
@@ -111,19 +102,19 @@ class ViewJoiner:
             self._intrinsics.append((stamp, intrinsics))
 
     def add_mask(self, stamp: int, mask: Image) -> None:
-        """Take in the mask of the image of that stamp, as it came."""
+        """Add the mask message of the image of that stamp."""
         if stamp >= self._earliest:
             self._masks.append((stamp, mask))
 
     def add_pose(self, stamp: int, pose: NDArray[np.float64]) -> None:
-        """Take in a pose, (4, 4), object from optical frame."""
+        """Add a pose, (4, 4), object from optical frame."""
         if stamp < self._earliest:
             return
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
-        del self._poses[:-_KEPT]
+        del self._poses[:-_MAX_POSES]
 
-    def joined(self, now: float) -> Iterator[UnreadView | MessageError]:
-        """Yield what has been decided since the last call, in the images' order."""
+    def joined(self, now: float) -> Iterator[View | MessageError]:
+        """Yield new views, and errors of rejected images, in the order of the images."""
         while self._images:
             image = self._images[0]
             stamp = image.stamp
@@ -139,38 +130,38 @@ class ViewJoiner:
                 height, width = image.size
                 if (intrinsics.height, intrinsics.width) != (height, width):
                     raise MessageError(
-                        f"expected camera info of the image's size, {height} x {width}, "
+                        f'wrong image size in camera info: expected {height} x {width}, '
                         f'got {intrinsics.height} x {intrinsics.width}', 'camera_info')
             except MessageError as error:
                 self._drop_first()
                 yield error
                 continue
             self._drop_first()
-            yield UnreadView(stamp, image.msg, Camera(pose, intrinsics), mask)
+            yield View(stamp, image.msg, Camera(pose, intrinsics), mask)
 
     def _are_too_many(self) -> bool:
-        return len(self._images) > _WAITING or (
+        return len(self._images) > _MAX_WAITING or (
             len(self._images) > 1
-            and sum(len(image.msg.data) for image in self._images) > _WAITING_BYTES)
+            and sum(len(image.msg.data) for image in self._images) > _MAX_WAITING_BYTES)
 
     def _drop_first(self) -> None:
-        """Forget the first image, and the masks that no later one can want: they are large."""
+        """Forget the first image and its mask, as well as older masks."""
         stamp = self._images.popleft().stamp
         while self._masks and self._masks[0][0] <= stamp:
             self._masks.popleft()
 
     def _intrinsics_at(self, stamp: int, late: bool) -> Intrinsics | None:
-        """Return the camera info of that stamp, None while it may still come."""
+        """Return the camera info of that stamp, None while it may still arrive."""
         intrinsics = _of_stamp(self._intrinsics, stamp)
         if intrinsics is None and _is_past(self._intrinsics, stamp, late):
-            came = (f'the last is of {_seconds(self._intrinsics[-1][0])}' if self._intrinsics
-                    else 'none came')
-            raise MessageError("expected camera info of the image's stamp, "
-                               f'{_seconds(stamp)}, {came}', 'no_camera_info')
+            found = (f'the last is of {_seconds(self._intrinsics[-1][0])}' if self._intrinsics
+                     else 'none received')
+            raise MessageError(f"no camera info of the image's stamp, {_seconds(stamp)}: {found}",
+                               'no_camera_info')
         return intrinsics
 
     def _pose_at(self, stamp: int, late: bool) -> NDArray[np.float64] | None:
-        """Return the pose at that stamp, None while it or its later neighbour may still come."""
+        """Return the pose at that stamp, None while it or a later one may still arrive."""
         after = bisect.bisect_left(self._poses, stamp, key=lambda entry: entry[0])
         if after < len(self._poses):
             later, pose = self._poses[after]
@@ -184,10 +175,11 @@ class ViewJoiner:
         if not late:
             return None
         distances = [abs(known - stamp) for known, _ in self._poses[max(after - 1, 0):after + 1]]
-        came = f'the nearest is {min(distances) / 1e9:.3f} s away' if distances else 'none came'
+        found = (f'the nearest is {min(distances) / 1e9:.3f} s away' if distances
+                 else 'none received')
         raise MessageError(
-            f"expected a pose of the image's stamp, {_seconds(stamp)}, or one before and one "
-            f'after it within {self.max_pose_gap:g} s, {came}', 'no_pose')
+            f'no pose for the image of {_seconds(stamp)}: expected one of its stamp, or one '
+            f'before and one after it within {self.max_pose_gap:g} s, {found}', 'no_pose')
 
 
 def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
@@ -201,12 +193,12 @@ def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
 
 
 def _of_stamp(parts: Sequence[tuple[int, Part]], stamp: int) -> Part | None:
-    """Return the last part that came of that stamp, None where there is none."""
+    """Return the last part received with that stamp, None if there is none."""
     return next((part for known, part in reversed(parts) if known == stamp), None)
 
 
 def _is_past(parts: Sequence[tuple[int, object]], stamp: int, late: bool) -> bool:
-    """Return whether a part of that stamp can come no longer."""
+    """Return whether a part of that stamp can no longer arrive."""
     return late or bool(parts and parts[-1][0] > stamp)
 
 

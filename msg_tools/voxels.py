@@ -12,10 +12,10 @@ FIELDS = ('x', 'y', 'z', 'occupancy')
 def voxel_grid_from_msg(msg: PointCloud2, size: float = 1.0,
                         resolution: int = RESOLUTION) -> VoxelGrid:
     """
-    Return the grid whose cells the points name; cells without a point are 0.
+    Return the grid with the cells in a cloud; cells without a point are 0.
 
-    `size` is the grid's side in metres. The points tell its resolution; `resolution`, cells a
-    side, is that of a cloud without any. Raises MessageError of the kind 'cloud' on a cloud of
+    `size` is the grid's side in metres. The resolution follows from the points; `resolution`,
+    cells a side, is that of a cloud without points. Raises MessageError of the kind 'cloud' on
     other fields, and on points that are not cells of one grid.
     """
     points = cloud_from_msg(msg, FIELDS)

@@ -44,7 +44,7 @@ def episode_of(reconstructor, planner, begin, start, given_up=()):
             if decision.goal is None:
                 break
             goals.append(goal_of(decision.goal, stamp + len(goals)))
-        return decision.goal, replace(goals[0], instead=goals[1:]), decision.reason
+        return decision.goal, replace(goals[0], replacements=goals[1:]), decision.reason
 
     failing = iter(given_up)
     start = start if isinstance(start, Camera) else orbit_camera(start)

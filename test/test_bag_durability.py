@@ -25,7 +25,7 @@ def test_a_full_disk_ends_the_bag_after_its_last_chunk(tmp_path):
     bag = announced(tmp_path / 'run')
     flushed = 0
     with small_disk(100_000), pytest.raises(
-            RecordingError, match='the disk took no more') as refusal:
+            RecordingError, match='writing failed') as refusal:
         for number in range(100):
             bag.write('/camera/image_raw', cdr(image(number, 64)), time_of(number), 0)
             bag.flush()

@@ -54,7 +54,7 @@ def test_provenance_and_parameters_are_told(tmp_path):
         writer.attach_parameters('/view_planner', {'seed': 3})
     told = info(tmp_path / 'run')
     assert '  policy: random\n  seed: 3\n  parameters of view_planner\n' in told
-    assert 'cannot be replayed: no messages in it: the bag is empty' in told
+    assert 'cannot be replayed: no messages: the bag is empty' in told
 
 
 def test_what_is_missing_for_a_replay_is_told(tmp_path):
@@ -67,7 +67,7 @@ def test_the_topics_of_other_peoples_bags_are_options(tmp_path):
         tmp_path / 'run', images() + images('/cam/depth') + joints(names=('lift', 'turn')))
     assert 'choose one with --image' in info(folder)
     told = info(folder, '--image', '/cam/depth', '--joint', 'turn', '--turned-object')
-    assert 'with the views that its gate would take' in told
+    assert 'with the views that its view gate accepts' in told
     assert '3 views at azimuths 0, 274, 188 degrees' in told
 
 

@@ -139,7 +139,7 @@ def test_the_board_to_print_comes_with_its_size(tmp_path):
 
 @pytest.mark.parametrize(('options', 'said'), [
     ([], 'no images of the board, or no --object-size'),
-    (['--print-board', 'b.png', '--squares', '7by5'], "'7by5' is not COLUMNSxROWS"),
+    (['--print-board', 'b.png', '--squares', '7by5'], "such as 7x5, got '7by5'"),
     (['images', '--object-size', 1, '--step-deg', 15, '--angles-deg', 'a.csv'],
      'give one of them'),
     (['nowhere', '--object-size', 1], 'nowhere'),

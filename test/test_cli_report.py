@@ -80,7 +80,7 @@ def test_truth_is_for_all_bags_or_for_each(bags, tmp_path):
     one_for_all, each = ious(chair), ious(chair, car)
     assert one_for_all[0] == one_for_all[1] == each[0]
     assert each[1] != each[0]
-    with pytest.raises(ConfigError, match='3 of them for 2 bags'):
+    with pytest.raises(ConfigError, match='one for each of 2, got 3'):
         ious(chair, chair, chair)
 
 
@@ -95,7 +95,7 @@ def test_only_the_episode_that_is_asked_for_is_shown(bags, tmp_path, monkeypatch
     report(bags[0], '--out', page, '--episode', 3)
     [panel] = drawn_in(page)['panels']
     assert len(panel['scene']['grids']) == 1
-    with pytest.raises(DataError, match='no episode with views'):
+    with pytest.raises(DataError, match='no episodes with views'):
         report(bags[0], '--out', page, '--episode', 1)
 
 
@@ -105,7 +105,7 @@ def test_bag_of_images_alone_gets_its_shapes_and_the_page_says_so(bags, tmp_path
                                for view in run.episodes[0].views])
     monkeypatch.setattr(reading, 'read_run', lambda _path, _topics, _scene: bare)
     report(bags[0], '--out', tmp_path / 'page.html')
-    assert 'holds no reconstruction' in (tmp_path / 'page.html').read_text()
+    assert 'The bag has no reconstruction' in (tmp_path / 'page.html').read_text()
     assert None not in drawn_in(tmp_path / 'page.html')['panels'][0]['scene']['grids']
 
 

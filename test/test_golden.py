@@ -11,9 +11,9 @@ import sys
 from active_recon.bags.replay.comparison import NOTHING_RECORDED, SAME_BITS, WITHIN_TOLERANCE
 from active_recon.bags.replay.replay import replay, replay_hash
 from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.run_writing import write_run
-from active_recon.bags.runs.settings import recorded_settings
 from active_recon.cli.main import main
 from active_recon.geometry.cameras import view_distance
 from active_recon.models.weights_files import find_weights, PAPER_MODEL, weights_hash
@@ -48,7 +48,7 @@ def same_weights(run):
 @pytest.fixture(scope='module')
 def loop(run):
     """Return the reconstructor and the planner that the run was made with."""
-    settings = recorded_settings(run)
+    settings = recorded_setup(run)
     return settings.load_reconstructor(), settings.load_planner()
 
 
@@ -99,7 +99,7 @@ def test_another_processor_stays_within_tolerance(golden, variables, threads):
          str(threads)], capture_output=True, text=True, timeout=120,
         env={**os.environ, **variables, 'PYTHONPATH': str(ROOT)})
     assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert re.search(f'^({SAME_BITS}|{WITHIN_TOLERANCE}): what was recorded', ended.stdout, re.M)
+    assert re.search(f'^({SAME_BITS}|{WITHIN_TOLERANCE}): recording', ended.stdout, re.M)
 
 
 def test_the_command_tells_the_verdict_and_the_hash(golden, run, loop, monkeypatch, capsys):
@@ -107,7 +107,7 @@ def test_the_command_tells_the_verdict_and_the_hash(golden, run, loop, monkeypat
     code, said = command(monkeypatch, capsys, 'replay', golden)
     assert code == 0
     assert f'hash {expected.hash}' in said
-    assert f'{expected.comparison.verdict}: what was recorded' in said
+    assert f'{expected.comparison.verdict}: recording and replay' in said
     assert 'views: 4, read and replayed in' in said
 
 
@@ -119,7 +119,7 @@ def test_what_was_recorded_otherwise_is_told_and_ends_with_code_1(
     code, said = command(monkeypatch, capsys, 'replay', tmp_path / 'other')
     assert code == 1
     assert re.search('entropy +4 compared  different +0 of 4 the same, at most 0.0099 apart', said)
-    assert said.endswith('different: what was recorded and the replay\n')
+    assert said.endswith('different: recording and replay\n')
 
 
 def test_weights_that_are_nowhere_any_more_are_asked_for_by_their_hash(
@@ -128,7 +128,7 @@ def test_weights_that_are_nowhere_any_more_are_asked_for_by_their_hash(
     write_run(replace(run, provenance=lost), tmp_path / 'old')
     code, said = command(monkeypatch, capsys, 'replay', tmp_path / 'old')
     assert code == 2
-    assert 'SHA-256 0123456789ab..., but neither' in said
+    assert 'weights not found: expected those of the recording, SHA-256 0123456789ab...' in said
     code, said = command(monkeypatch, capsys, 'replay', tmp_path / 'old', '--model', '2d3d')
     assert code == 0
 
@@ -142,7 +142,7 @@ def copied(golden, tmp_path):
 @pytest.mark.parametrize(('options', 'name', 'knows_policy'), [
     (('--threshold', '0.6'), 'threshold-0.6', True), (('--model', '2d3d'), '2d3d', False),
     (('--policy',), '', True)])
-def test_a_replay_under_others_is_a_bag_that_replays_to_the_same_bits(
+def test_a_replay_with_overrides_is_a_bag_that_replays_to_the_same_bits(
         copied, run, options, name, knows_policy, monkeypatch, capsys):
     if options == ('--policy',):  # its own, which asks for views that there are
         name = run.provenance['policy']
@@ -152,7 +152,7 @@ def test_a_replay_under_others_is_a_bag_that_replays_to_the_same_bits(
     assert (code, f'wrote {beside}' in said) == (0, True)
     again = read_run(beside)
     assert again.provenance['replay_of'] == 'walk'
-    settings = recorded_settings(again)
+    settings = recorded_setup(again)
     planner = settings.load_planner()
     assert (planner is not None) == knows_policy
     verified = verify(again, settings.load_reconstructor(), planner).comparison
@@ -162,7 +162,7 @@ def test_a_replay_under_others_is_a_bag_that_replays_to_the_same_bits(
         expected = {SAME_BITS, WITHIN_TOLERANCE} if kept else {SAME_BITS}
         assert deviation.verdict in expected | {NOTHING_RECORDED}, quantity
     code, said = command(monkeypatch, capsys, 'replay', copied, *options)
-    assert (code, 'nothing is overwritten' in said) == (2, True)
+    assert (code, 'is not overwritten' in said) == (2, True)
 
 
 def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
@@ -170,7 +170,7 @@ def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
     copied = shutil.copytree(PAPER, tmp_path / 'walk')
     code, said = command(monkeypatch, capsys, 'replay', copied, '--policy', 'farthest')
     assert code == 2
-    assert 'azimuth of 45.0 degrees' in said
+    assert 'azimuth 45.0 degrees' in said
     assert 'record-sweep' in said
     assert [path.name for path in copied.parent.iterdir()] == ['walk']
 

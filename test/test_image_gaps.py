@@ -1,6 +1,6 @@
 """Images that are missing: told where a camera streams, never where it only looks so."""
 
-from active_recon.bags.runs.image_gaps import FEWEST, gaps_between, ImageGaps, unheard_images
+from active_recon.bags.runs.image_gaps import FEWEST, gaps_between, ImageGaps, uncounted_images
 import numpy as np
 import pytest
 
@@ -50,12 +50,12 @@ def counted(*images):
 
 
 def test_images_that_the_loop_did_not_count_are_those_between_the_counts():
-    assert unheard_images(stream(100), counted(0, 10, 20, 30)) == 0
-    assert unheard_images(stream(100), counted(500, 510, 511, 512)) == 18
-    assert unheard_images(stream(100), counted(0, 9, 19, 28)) == 0  # on their way
+    assert uncounted_images(stream(100), counted(0, 10, 20, 30)) == 0
+    assert uncounted_images(stream(100), counted(500, 510, 511, 512)) == 18
+    assert uncounted_images(stream(100), counted(0, 9, 19, 28)) == 0  # on their way
 
 
 def test_counts_that_cannot_be_compared_say_nothing():
-    assert unheard_images(stream(100), counted(7)) is None
-    assert unheard_images(stream(100), counted(50, 60, 3, 13)) is None
-    assert unheard_images(stream(100), [(BEGIN, {'views': 3})] * 2) is None
+    assert uncounted_images(stream(100), counted(7)) is None
+    assert uncounted_images(stream(100), counted(50, 60, 3, 13)) is None
+    assert uncounted_images(stream(100), [(BEGIN, {'views': 3})] * 2) is None

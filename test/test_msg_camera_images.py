@@ -51,7 +51,7 @@ def claiming(width, height):
     claiming(10_000, 10_000), claiming(100_000, 100_000), claiming(0, 5), packed(RGB, 'GIF'),
     CompressedImage(format='png', data=packed(RGB).data[:100])])
 def test_what_is_no_compressed_image_is_refused(msg):
-    with pytest.raises(MessageError, match='expected (a compressed|an) image'):
+    with pytest.raises(MessageError, match='not readable|too large|empty image'):
         pixels_from_msg(msg)
 
 
@@ -64,7 +64,7 @@ def test_a_jpeg_that_ends_early_is_refused_though_its_size_can_be_told(by):
     image = np.random.default_rng(0).integers(0, 256, (60, 80, 3), np.uint8)
     broken = cut(packed(image, 'JPEG'), by)
     assert size_from_msg(broken) == (60, 80)
-    with pytest.raises(MessageError, match='expected a compressed image') as caught:
+    with pytest.raises(MessageError, match='compressed image not readable') as caught:
         pixels_from_msg(broken)
     assert caught.value.kind == 'encoding'
 

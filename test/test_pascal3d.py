@@ -267,4 +267,4 @@ def test_photographs_are_evaluated_at_their_single_view(root, tmp_path, monkeypa
     monkeypatch.setattr('sys.argv', asked)
     with pytest.raises(SystemExit) as end:
         main()
-    assert end.value.code == 2 and 'photographs without their cameras' in capsys.readouterr().err
+    assert end.value.code == 2 and 'these photographs have no cameras' in capsys.readouterr().err

@@ -5,7 +5,7 @@ from contextlib import closing, contextmanager, suppress
 import sqlite3
 
 from active_recon.bags.replay.comparison import compare, NOTHING_RECORDED, SAME_BITS
-from active_recon.bags.replay.replay import ReplayedEpisode, ReplayedView
+from active_recon.bags.replay.replay import ReplayedEpisode, ReplayStep
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.storage.files import mcap_files
 from active_recon.bags.storage.writer import BagWriter
@@ -88,7 +88,7 @@ def test_grids_of_64_cells_a_side_are_read_as_such_where_none_is_occupied_too(
         assert np.array_equal(view.occupied.occupancy, grid.above(threshold).occupancy)
         assert np.array_equal(view.reconstruction.occupancy, grid.above(0.02).occupancy)
     replayed = [ReplayedEpisode(only(run), None, [
-        ReplayedView(view, Reconstruction(grid, view.latent), None)
+        ReplayStep(view, Reconstruction(grid, view.latent), None)
         for grid, view in zip(loop.grids, only(run).views, strict=True)])]
     assert compare(replayed, threshold).deviations['occupancy'].verdict == SAME_BITS
     for state in recorded_states(run):
@@ -230,7 +230,7 @@ def test_an_episode_that_began_before_the_recording_is_not_compared(loop, tmp_pa
     assert only(run).begun_before
     assert [view.stamp for view in only(run).views] == loop.stamps[1:]
     replayed = [ReplayedEpisode(only(run), None, [
-        ReplayedView(view, Reconstruction(VoxelGrid(np.zeros((32,) * 3, np.float32)),
+        ReplayStep(view, Reconstruction(VoxelGrid(np.zeros((32,) * 3, np.float32)),
                                           view.latent), None)
         for view in only(run).views])]
     assert compare(replayed, 0.5).verdict == NOTHING_RECORDED
@@ -318,7 +318,7 @@ def scaled(msg, factor):
 
 def test_a_recorded_parameter_of_another_type_is_refused(loop, tmp_path):
     folder = write_bag(tmp_path / 'run', loop.messages, parameters={'object_size': 'large'})
-    with pytest.raises(DataError, match="object_size is 'large': expected a float"):
+    with pytest.raises(DataError, match='parameter object_size: expected a number'):
         read_run(folder)
 
 
@@ -349,7 +349,7 @@ def test_reading_tells_how_far_it_is(loop, bag):
 def test_images_that_are_missing_in_the_stream_are_told(tmp_path):
     loop = LoopRun(azimuths=tuple(np.arange(6.0)))
     whole = read_run(write_bag(tmp_path / 'whole', loop.messages))
-    assert (whole.gaps.missing, whole.gaps.unheard) == (0, None)
+    assert (whole.gaps.missing, whole.gaps.uncounted) == (0, None)
     lost = [entry for entry in loop.messages if not (
         entry[1] == '/camera/image_raw' and entry[0] - 3 == loop.stamps[2] - PERIOD)]
     gaps = read_run(write_bag(tmp_path / 'lost', lost)).gaps
@@ -363,4 +363,4 @@ def test_images_that_the_loop_did_not_hear_are_told(loop, tmp_path):
         for time, images in ((loop.begin, 100), (loop.end, 102))]
     others = [entry for entry in loop.messages if entry[1] != '/diagnostics']
     run = read_run(write_bag(tmp_path / 'run', [*others, *counted]))
-    assert run.gaps.unheard == STILL * len(loop.stamps) - 2
+    assert run.gaps.uncounted == STILL * len(loop.stamps) - 2

@@ -193,9 +193,9 @@ def test_the_command_says_what_it_did_and_refuses_in_one_line(cut_off, tmp_path)
 
     done = run(cut_off)
     assert done.returncode == 0, done.stderr
-    assert 'run_0.mcap: made whole, 40 messages; kept as it was as run_0.mcap.damaged' in (
+    assert 'run_0.mcap: repaired, 40 messages; original kept as run_0.mcap.damaged' in (
         done.stdout)
-    assert 'run_0.mcap: whole, 40 messages' in run(cut_off).stdout
+    assert 'run_0.mcap: intact, 40 messages' in run(cut_off).stdout
     refused = run(tmp_path / 'nowhere')
     assert refused.returncode == 2
     assert refused.stderr.count('\n') == 1 and 'no bag there' in refused.stderr

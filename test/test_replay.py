@@ -12,7 +12,7 @@ from active_recon.bags.replay.comparison import (
     WITHIN_TOLERANCE,
 )
 from active_recon.bags.replay.replay import replay, replay_hash
-from active_recon.bags.runs.settings import recorded_settings
+from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.errors import DataError, WeightsError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.models.weights_files import FOLDER, SHIPPED, weights_hash
@@ -163,7 +163,7 @@ def test_images_alone_are_replayed_with_nothing_to_compare(run, make_loop):
     reconstructor, _ = make_loop()
     episodes = replay(bare, reconstructor)
     assert compare(episodes, THRESHOLD).verdict == NOTHING_RECORDED
-    assert all(view.decision is None for episode in episodes for view in episode.views)
+    assert all(step.decision is None for episode in episodes for step in episode.steps)
 
 
 def test_a_cell_at_the_edge_of_the_cloud_is_off_by_what_it_is_beyond_the_edge(run, make_loop):
@@ -249,15 +249,15 @@ def test_goals_of_a_replay_stand_where_the_recorded_parameters_say(recorded, ele
     bag = replace(run_of([]), parameters={
         'reconstructor': {'object_size': 0.5},
         'view_planner': {'policy': 'farthest', **recorded}})
-    camera = recorded_settings(bag).load_planner().first_goal(orbit_camera(1.0, 0.3)).camera
+    camera = recorded_setup(bag).load_planner().first_goal(orbit_camera(1.0, 0.3)).camera
     assert (camera.elevation, camera.distance) == pytest.approx((elevation, distance))
 
 
 def test_a_replay_computes_with_the_threads_of_the_run_and_leaves_torch_as_it_was(monkeypatch):
     before, set_to = torch.get_num_threads(), []
-    settings = recorded_settings(replace(run_of([]), parameters={
+    setup = recorded_setup(replace(run_of([]), parameters={
         'reconstructor': {'threads': before + 1}}))
-    reconstructor = settings.load_reconstructor()
+    reconstructor = setup.load_reconstructor()
     setting = torch.set_num_threads
     monkeypatch.setattr(torch, 'set_num_threads',
                         lambda count: (set_to.append(count), setting(count)))
@@ -267,40 +267,40 @@ def test_a_replay_computes_with_the_threads_of_the_run_and_leaves_torch_as_it_wa
     assert f'{before + 1} threads' in reconstructor.provenance['runtime']
 
 
-def test_settings_are_those_of_the_bag_and_what_it_lacks_is_the_cores():
+def test_the_setup_is_that_of_the_bag_with_the_cores_defaults():
     bag = replace(run_of([]), provenance={'weights_sha256': weights_hash()}, parameters={
         'reconstructor': {'weights': '', 'threshold': float('nan'), 'object_size': 0.25,
                           'threads': 2, 'take_views': 'at_goal'},
         'view_planner': {'weights': '', 'policy': 'random', 'seed': 5, 'max_views': 3,
                          'motion_weight': 1, 'azimuth_range': [-1, 2.0],
                          'forbidden_sectors': [0.6, 1.1], 'reachable_azimuths': []}})
-    settings = recorded_settings(bag)
-    assert settings.weights == SHIPPED
-    assert settings.threads == 2
-    assert settings.reconstructor == {'object_size': 0.25}
-    assert settings.planner == {
+    setup = recorded_setup(bag)
+    assert setup.weights == SHIPPED
+    assert setup.threads == 2
+    assert setup.reconstructor == {'object_size': 0.25}
+    assert setup.planner == {
         'policy': 'random', 'seed': 5, 'max_views': 3, 'weights': SHIPPED, 'motion_weight': 1.0,
-        'azimuth_range': [-1.0, 2.0], 'forbidden_sectors': [0.6, 1.1], 'reachable_azimuths': []}
-    goal = settings.load_planner().first_goal(orbit_camera(0.8))
+        'azimuth_range': (-1.0, 2.0), 'forbidden_sectors': (0.6, 1.1), 'reachable_azimuths': ()}
+    goal = setup.load_planner().first_goal(orbit_camera(0.8))
     assert goal.camera.azimuth == pytest.approx(np.pi / 6)
-    assert settings.load_reconstructor().object_size == 0.25
+    assert setup.load_reconstructor().object_size == 0.25
 
 
 def test_a_bag_that_names_no_policy_has_no_planner():
-    assert recorded_settings(run_of([])).load_planner() is None
+    assert recorded_setup(run_of([])).load_planner() is None
 
 
 def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
     other = FOLDER / '2d3d.safetensors'
     bag = replace(run_of([]), provenance={'weights_sha256': weights_hash(other)})
-    assert recorded_settings(bag).weights == other
+    assert recorded_setup(bag).weights == other
     moved = tmp_path / 'moved.safetensors'
     moved.write_bytes(b'weights of another day')
     bag = replace(bag, provenance={'weights_sha256': weights_hash(moved)})
-    assert recorded_settings(bag, moved).weights == moved
-    with pytest.raises(WeightsError, match='the weights have changed since'):
-        recorded_settings(bag)
-    assert recorded_settings(bag, other, instead=True).weights == other
+    assert recorded_setup(bag, moved).weights == moved
+    with pytest.raises(WeightsError, match='which have changed since'):
+        recorded_setup(bag)
+    assert recorded_setup(bag, other, any_weights=True).weights == other
 
 
 @pytest.mark.parametrize(('node', 'parameter', 'value'), [
@@ -310,14 +310,14 @@ def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
     ('view_planner', 'azimuth_range', 'all'), ('view_planner', 'forbidden_sectors', ['a', 'b'])])
 def test_a_recorded_parameter_that_cannot_be_is_refused_by_its_name(node, parameter, value):
     bag = replace(run_of([]), parameters={f'/robot/{node}': {parameter: value}})
-    with pytest.raises(DataError, match=f'parameter {parameter} is .*: expected'):
-        recorded_settings(bag)
+    with pytest.raises(DataError, match=f'parameter {parameter}: expected'):
+        recorded_setup(bag)
 
 
 def test_size_and_front_are_those_given_else_the_bags_own():
     bag = replace(run_of([]), parameters={'turntable_camera': {'object_size': 2},
                                           'view_planner': {'policy': 'farthest'}})
-    assert recorded_settings(bag).reconstructor == {'object_size': 2.0}
-    settings = recorded_settings(bag, given={'object_size': 0.25, 'object_yaw': 1.0})
-    assert settings.reconstructor == {'object_size': 0.25, 'object_yaw': 1.0}
-    assert settings.planner['object_yaw'] == 1.0
+    assert recorded_setup(bag).reconstructor == {'object_size': 2.0}
+    setup = recorded_setup(bag, scene_parameters={'object_size': 0.25, 'object_yaw': 1.0})
+    assert setup.reconstructor == {'object_size': 0.25, 'object_yaw': 1.0}
+    assert setup.planner['object_yaw'] == 1.0

@@ -54,4 +54,4 @@ def test_each_policy_takes_the_views_that_it_asks_for(
     assert episode.done in ('max_views', 'entropy_settled')
     code, said = replayed(monkeypatch, capsys, out)
     assert code == 0
-    assert said.endswith('same bits: what was recorded and the replay\n')
+    assert said.endswith('same bits: recording and replay\n')

@@ -44,8 +44,8 @@ def test_images_that_nobody_counted_are_told(run):
     assert said(replace(run, gaps=ImageGaps(0.1, 0, 0.0, 0))) == []
     [gap] = said(replace(run, gaps=ImageGaps(0.1, 7, 0.8)))
     assert 'About 7 images are missing' in gap and 'every 100 ms' in gap and '0.8 s' in gap
-    [unheard] = said(replace(run, gaps=ImageGaps(0.1, unheard=9)))
-    assert unheard.startswith('9 images that were recorded never reached')
+    [uncounted] = said(replace(run, gaps=ImageGaps(0.1, uncounted=9)))
+    assert uncounted.startswith('9 images that were recorded never reached')
 
 
 def test_one_is_told_as_one(run):
@@ -53,8 +53,8 @@ def test_one_is_told_as_one(run):
     assert warning.startswith('1 image was dropped: no camera pose arrived close enough to it')
     [gap] = said(replace(run, gaps=ImageGaps(0.1, 1, 0.2)))
     assert 'About 1 image is missing' in gap
-    [unheard] = said(replace(run, gaps=ImageGaps(0.1, unheard=1)))
-    assert unheard.startswith('1 image that was recorded')
+    [uncounted] = said(replace(run, gaps=ImageGaps(0.1, uncounted=1)))
+    assert uncounted.startswith('1 image that was recorded')
 
 
 @pytest.mark.parametrize(('count', 'often'), [(1, 'once'), (2, 'twice'), (3, '3 times')])
@@ -67,10 +67,10 @@ def test_what_nodes_warned_of_is_told_in_words(run, count, often):
 
 
 @pytest.mark.parametrize(('key', 'words'), [
-    ('refused/no_pose', 'refused: no pose'), ('warned/noisy_poses', 'warned of poses that jump'),
+    ('refused/no_pose', 'rejected: no pose'), ('warned/noisy_poses', 'warned of poses that jump'),
     ('dropped/unheard', 'images lost on the way'), ('weights_sha256', 'weights (SHA-256)'),
     ('dropped/new_kind', 'dropped: new kind'),
-    ('warned/qos/camera/image_raw', 'warned of QoS profiles that do not fit (camera/image_raw)')])
+    ('warned/qos/camera/image_raw', 'warned of incompatible QoS profiles (camera/image_raw)')])
 def test_counters_and_records_have_words(key, words):
     assert key_words(key) == words
 
@@ -86,14 +86,14 @@ def test_what_some_views_lack_was_lost_on_the_way_and_is_told(run):
 
 def test_refusal_of_a_kind_unknown_here_is_told_by_its_name(run):
     [warning] = said(counted(run, refused__gremlins=2))
-    assert '2 messages were refused (gremlins)' in warning
+    assert '2 messages were rejected (gremlins)' in warning
 
 
 @pytest.mark.parametrize(('reason', 'level', 'words'), [
     ('max_views', 'note', 'as many views'),
     ('entropy_settled', 'note', 'by itself'),
     ('battery', 'note', 'battery'),
-    ('', 'warning', 'never said that it was done'),
+    ('', 'warning', 'The episode is incomplete'),
 ])
 def test_reason_to_stop_is_told(run, reason, level, words):
     assert any(words in text for text in said(changed(run, done=reason), level))

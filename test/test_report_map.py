@@ -1,4 +1,4 @@
-"""The map of the turntable: where things stand on it, and that petals say what scores say."""
+"""The map of the turntable: where things stand on it, and that the bars show the scores."""
 
 from dataclasses import replace
 import math
@@ -21,15 +21,14 @@ def drawn(run):
     return turntable_map(Subject('A', run, run.episodes[0]))
 
 
-def petals(run, scores):
-    """Return the outer ends of the first view's petals, (24,) radii."""
+def bars(run, scores):
+    """Return the lengths of the first view's bars, (24,)."""
     candidates = Candidates.of([orbit_camera(azimuth) for azimuth in AZIMUTHS])
     goal = RecordedGoal(orbit_camera(0.0), 0, candidates, np.asarray(scores, np.float32), 0)
     [trace] = [trace for trace in drawn(changed(run, first_goal=goal))['data']
-               if trace.get('fill') == 'toself' and trace['meta'] == {'of': 0}]
-    radii = [math.hypot(x, y) if x is not None else 0.0
-             for x, y in zip(trace['x'], trace['y'], strict=True)]
-    return np.array(radii).reshape(24, -1).max(axis=1)
+               if trace['type'] == 'barpolar' and trace['meta'] == {'of': 0}]
+    np.testing.assert_allclose(trace['theta'], np.degrees(AZIMUTHS))
+    return np.array(trace['r'])
 
 
 @pytest.mark.parametrize(('azimuth_deg', 'at'), [
@@ -52,13 +51,13 @@ def test_images_with_room_stay_where_their_cameras_were():
     assert spread_out(azimuths) == azimuths
 
 
-def test_longer_petals_are_better_scores(run):
+def test_longer_bars_are_better_scores(run):
     scores = np.random.default_rng(0).normal(size=24)
-    assert (np.argsort(petals(run, scores)) == np.argsort(scores)).all()
+    assert (np.argsort(bars(run, scores)) == np.argsort(scores)).all()
 
 
-def test_equal_scores_give_equal_petals(run):
-    assert np.ptp(petals(run, np.full(24, 3.0))) < 1e-9
+def test_equal_scores_give_equal_bars(run):
+    assert np.ptp(bars(run, np.full(24, 3.0))) < 1e-9
 
 
 def test_every_view_shows_its_image_its_goal_and_its_number(run):
@@ -83,6 +82,6 @@ def test_goal_without_scores_is_still_drawn(run):
     goal = RecordedGoal(orbit_camera(1.0), 0, None, None, 0)
     views = [replace(view, goal=None) for view in run.episodes[0].views]
     figure = drawn(changed(run, first_goal=goal, views=views))
-    assert not any(trace.get('fill') == 'toself' for trace in figure['data'])
+    assert not any(trace['type'] == 'barpolar' for trace in figure['data'])
     assert sum(trace.get('marker', {}).get('symbol') == 'diamond-open'
                for trace in figure['data']) == 2  # small, and large while view 1 is chosen

@@ -13,7 +13,7 @@ import sys
 
 from active_recon.bags.runs.run import TopicSummary
 from active_recon.errors import ConfigError, DataError
-from active_recon.report.page import MOST_SUBJECTS, report_page, write_page
+from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
 import numpy as np
@@ -139,7 +139,7 @@ def test_bag_with_hardly_anything_in_it_still_gives_a_page(run):
                        parameters={}, counters={}, topics=[], begin=0, end=0)
     page = page_of(stranger)
     assert 'An object, rebuilt from 1 view' in page
-    assert 'no loop' in page
+    assert 'without the loop' in page
     assert 'data-own="stages"' not in page
 
 
@@ -152,10 +152,10 @@ def test_figure_that_is_not_finite_is_left_out(run):
 
 
 def test_no_episode_and_too_many_are_refused(run):
-    with pytest.raises(DataError, match='no episode with views'):
+    with pytest.raises(DataError, match='no episodes with views'):
         report_page([])
-    with pytest.raises(ConfigError, match=f'at most {MOST_SUBJECTS}'):
-        report_page([Subject('A', run, run.episodes[0])] * (MOST_SUBJECTS + 1))
+    with pytest.raises(ConfigError, match=f'at most {MAX_SUBJECTS}'):
+        report_page([Subject('A', run, run.episodes[0])] * (MAX_SUBJECTS + 1))
 
 
 def test_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch):

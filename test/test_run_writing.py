@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from active_recon.bags.replay.what_if import Others, run_under
+from active_recon.bags.replay.what_if import run_with_overrides
+from active_recon.bags.runs.loop_setup import Overrides, recorded_setup
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.run_writing import write_run
-from active_recon.bags.runs.settings import recorded_settings
 from active_recon.errors import RecordingError
 from active_recon.geometry.cameras import Camera, orbit_camera
 import numpy as np
@@ -104,7 +104,7 @@ def test_a_view_of_images_alone_is_written_without_what_nobody_computed(run, tmp
 
 def test_nothing_is_overwritten_and_nothing_half_written(run, bag):
     before = {path: path.read_bytes() for path in bag.iterdir()}
-    with pytest.raises(RecordingError, match='nothing is overwritten'):
+    with pytest.raises(RecordingError, match='is not overwritten'):
         write_run(run, bag)
     assert {path: path.read_bytes() for path in bag.iterdir()} == before
     torn = replace(run.episodes[0].views[1], latent=np.zeros(3, np.float32))
@@ -159,24 +159,24 @@ def test_a_goal_of_the_same_azimuth_at_another_elevation_is_another_goal(run, tm
     low, high = (
         replace(episode.first_goal, camera=orbit_camera(1.0, elevation), stamp=stamp,
                 received=stamp) for elevation, stamp in ((0.2, SECOND), (0.9, SECOND + 1)))
-    goals = replace(low, instead=[high])
+    goals = replace(low, replacements=[high])
     write_run(replace(run, episodes=[replace(episode, first_goal=goals)]), tmp_path / 'two')
     (read,) = read_run(tmp_path / 'two').episodes
     assert [goal.elevation for goal in read.given_up(None)] == [pytest.approx(0.2)]
-    assert read.first_goal.followed.camera.elevation == pytest.approx(0.9)
+    assert read.first_goal.final.camera.elevation == pytest.approx(0.9)
 
 
 PLACES = {'/robot/reconstructor': {'object_size': 1.0, 'object_frame': 'table'}}
 
 
-@pytest.mark.parametrize('others', [Others(policy='farthest'), Others(threshold=0.2)])
-def test_a_run_rewritten_under_others_keeps_its_frame_and_where_its_goals_stand(
-        network, attention, tmp_path, others):
+@pytest.mark.parametrize('overrides', [Overrides(policy='farthest'), Overrides(threshold=0.2)])
+def test_a_run_rewritten_with_overrides_keeps_its_frame_and_where_its_goals_stand(
+        network, attention, tmp_path, overrides):
     loop = loop_of(network, policies(attention)['random'](), elevation=0.7, distance=2.6)
     written = [episode_of(*loop, SECOND, orbit_camera(1.0, 0.7, 2.6))]
     planner = {'policy': 'farthest', 'elevation': 0.7, 'distance': 2.6, 'max_views': 1}
     run = replace(run_of(written), parameters={**PLACES, '/robot/view_planner': planner})
-    other = run_under(run, recorded_settings(run), others)
+    other = run_with_overrides(run, recorded_setup(run), overrides)
     write_run(other, tmp_path / 'other')
     (read,), (made,) = read_run(tmp_path / 'other').episodes, other.episodes
     assert same_goal(read.first_goal, made.first_goal)

@@ -4,7 +4,7 @@ import math
 
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.rebuilt import lacks_reconstruction, rebuilt
-from active_recon.bags.runs.scene import Scene, told_background
+from active_recon.bags.runs.scene import parse_background, Scene
 from active_recon.bags.runs.topics import Topics
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError
@@ -65,24 +65,24 @@ def test_a_background_is_taken_away_as_it_is_told(tmp_path):
     path = tmp_path / 'empty.png'
     cv2.imwrite(str(path), BEHIND[..., ::-1])
     for number, told in enumerate(('0,177,64', str(path))):
-        how, empty = told_background(told)
+        how, empty = parse_background(told)
         found = views(tmp_path / str(number), on_green() + joints(),
                       Scene(background=how, empty_scene=empty))
         assert (found[0].image[0, 0] == 255).all()
         assert (found[0].image[12, 16] == (200, 30, 40)).all()
     for wrong in ('grey', '0,300,64', str(tmp_path)):
         with pytest.raises(ConfigError):
-            told_background(wrong)
+            parse_background(wrong)
 
 
 def test_what_the_bag_tells_cannot_be_told_otherwise(tmp_path):
     posed = [*images(), *cameras()]
     for number, scene in enumerate((Scene(elevation=0.5), Scene(camera_position=(1, 0, 1)))):
-        with pytest.raises(ConfigError, match='the bag has the poses of the camera on /tracker'):
+        with pytest.raises(ConfigError, match='the bag has camera poses on /tracker'):
             views(tmp_path / str(number), posed, scene)
-    with pytest.raises(ConfigError, match='both tell the elevation'):
+    with pytest.raises(ConfigError, match='both set the elevation'):
         Scene(elevation=0.5, camera_position=(1, 0, 1))
-    with pytest.raises(ConfigError, match='without --camera-position'):
+    with pytest.raises(ConfigError, match='needs --camera-position'):
         Scene(camera_orientation=(0, 0, 0, 1))
 
 

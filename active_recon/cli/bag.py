@@ -1,4 +1,4 @@
-"""`active-recon bag`: what is in a bag, and one that was cut off made whole."""
+"""`active-recon bag`: shows the content of bags and repairs them."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,7 @@ from typing import Annotated
 from active_recon.cli.bag_info import info
 import typer
 
-bag = typer.Typer(help='Recorded bags: look into them, repair them.', no_args_is_help=True)
+bag = typer.Typer(help='Recorded bags: show their content, repair them.', no_args_is_help=True)
 bag.command()(info)
 
 
@@ -16,11 +16,11 @@ def repair(
         metavar='BAG', help="A bag's folder, or one of its MCAP files.")],
 ) -> None:
     """
-    Make a bag whole whose recorder was killed, or whose disk was full.
+    Repair a bag whose recorder was killed, or whose disk was full.
 
-    Index, summary and metadata.yaml are built anew from all that can be read. Nothing is thrown
-    away: what is whole is not touched, and each file that had to be written anew is kept as it was
-    as <name>.damaged beside it, which you may delete once you are content.
+    Index, summary and metadata.yaml are rebuilt from all that can be read. Nothing is lost: intact
+    files are left unchanged, and the original of each repaired file is kept as <name>.damaged next
+    to it, until you delete it.
 
     Example: active-recon bag repair bags/2026-11-21_14-30-00
     """
@@ -32,9 +32,9 @@ def repair(
     for each in repairs:
         messages = f'{each.contents.counts.total()} messages'
         if each.kept_as is None:
-            typer.echo(f'{each.path.name}: whole, {messages}')
+            typer.echo(f'{each.path.name}: intact, {messages}')
         else:
-            typer.echo(f'{each.path.name}: made whole, {messages}; kept as it was as '
+            typer.echo(f'{each.path.name}: repaired, {messages}; original kept as '
                        f'{each.kept_as.name}')
         for loss in each.lost:
             typer.echo(f'{each.path.name}: could not be read: {loss}')

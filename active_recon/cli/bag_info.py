@@ -1,4 +1,4 @@
-"""`active-recon bag info`: what is in a bag, and whether it can be replayed."""
+"""`active-recon bag info`: the content of a bag, and whether it can be replayed."""
 
 import math
 from pathlib import Path
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from active_recon.bags.runs.run import RecordedRun
     from active_recon.bags.runs.scene import Scene
     from active_recon.bags.runs.topics import Topics
-    from active_recon.bags.storage.raw import BagSummary
+    from active_recon.bags.storage.bag import BagSummary
 
 
 @with_bag_options
@@ -23,10 +23,10 @@ def info(
     scene: 'Scene',
 ) -> None:
     """
-    Say what is in a bag, and whether it can be replayed, or what is missing for that.
+    Show the content of a bag, and whether it can be replayed or what is missing for that.
 
-    Other people's bags are read too: name the topics of the camera where they are not found, and
-    tell what the bag does not.
+    Bags of other recorders are read too: name the camera's topics if they are not found, and give
+    by options what the bag lacks.
 
     Example: active-recon bag info drive.db3 --image /cam/color --azimuth /table/joints
     --object-size 0.16
@@ -34,14 +34,14 @@ def info(
     from active_recon.bags.runs.description import describe_bag
 
     described = describe_bag(path, topics, scene, bag_progress(path))
-    _tell_contents(path, described.summary)
+    _print_contents(path, described.summary)
     if described.missing:
         typer.echo(f'cannot be replayed: {described.missing}')
     if described.run is not None:
-        _tell_run(described.run, not described.missing)
+        _print_run(described.run, not described.missing)
 
 
-def _tell_contents(path: Path, summary: 'BagSummary') -> None:
+def _print_contents(path: Path, summary: 'BagSummary') -> None:
     messages = sum(topic.count for topic in summary.topics)
     typer.echo(f'{path}: {messages} messages in {(summary.end - summary.begin) / 1e9:.1f} s')
     for name, value in summary.provenance.items():
@@ -53,19 +53,19 @@ def _tell_contents(path: Path, summary: 'BagSummary') -> None:
         typer.echo(f'  {topic.name:<{width}}  {topic.count:>6}  {topic.type_name}')
 
 
-def _tell_run(run: 'RecordedRun', replays: bool) -> None:
-    from active_recon.bags.runs.missing import missing_words
+def _print_run(run: 'RecordedRun', replays: bool) -> None:
+    from active_recon.bags.runs.missing import describe_missing
 
-    chosen = 'that its gate would take' if 'bag' in run.counters else 'that the loop took'
+    chosen = 'that its view gate accepts' if 'bag' in run.counters else 'that the loop took'
     typer.echo(f'{"can be replayed, with " if replays else ""}the views {chosen}:')
     for number, episode in enumerate(run.episodes, 1):
         azimuths = ', '.join(f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
         end = f', done: {episode.done}' if episode.done else ''
         taken = f'{len(episode.views)} views at azimuths {azimuths} degrees'
         typer.echo(f'  episode {number}: {taken if azimuths else "no view"}{end}')
-        if missing := missing_words(episode):
+        if missing := describe_missing(episode):
             typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')
     if run.assumed and (not replays or 'bag' in run.counters):
-        typer.echo('assumed, since the bag does not tell:')
+        typer.echo('assumed, since the bag does not say:')
         for assumption in run.assumed:
             typer.echo(f'  {assumption}')

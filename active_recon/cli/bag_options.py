@@ -1,4 +1,4 @@
-"""The options by which a command is told what other people's bags do not tell."""
+"""Options for what the bags of other recorders lack."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -12,11 +12,11 @@ import typer
 if TYPE_CHECKING:
     from active_recon.bags.runs.scene import Scene
 
-_PANEL = "Other people's bags"
+_PANEL = 'Bags of other recorders'
 
 
-def _option(*names: str, **told: Any) -> Any:
-    return typer.Option(*names, rich_help_panel=_PANEL, show_default=False, **told)
+def _option(*names: str, **keywords: Any) -> Any:
+    return typer.Option(*names, rich_help_panel=_PANEL, show_default=False, **keywords)
 
 
 _TOPICS: dict[str, tuple[Any, Any]] = {
@@ -27,15 +27,15 @@ _TOPICS: dict[str, tuple[Any, Any]] = {
         help="PoseStamped of the camera; or its azimuth, radians, as a turntable's JointState or "
              'a Float64.')], ''),
     'joint': (Annotated[str, _option(
-        metavar='NAME', help='Of the JointState, if it has several.')], ''),
+        metavar='NAME', help='Joint of the JointState, if it has several.')], ''),
     'turned_object': (Annotated[bool, _option(
         '--turned-object',
-        help='The azimuth is that of the turntable under a fixed camera.')], False),
+        help='The angle is that of a turntable in front of a fixed camera.')], False),
     'object_frame': (Annotated[str, _option(
         metavar='FRAME', help='Frame of the PoseStamped; default: object.')], 'object'),
     'max_pose_gap': (Annotated[float, _option(
         min=0, metavar='SECONDS',
-        help='From an image to the poses that its own lies between; default: 0.1.')], 0.1),
+        help='Longest time from an image to the poses used for it; default: 0.1.')], 0.1),
 }
 _SCENE: dict[str, tuple[Any, Any]] = {
     'object_size': (Annotated[float | None, _option(
@@ -46,21 +46,21 @@ _SCENE: dict[str, tuple[Any, Any]] = {
         help="Azimuth of the object's front; default: as recorded, else 0.")], None),
     'elevation_deg': (Annotated[float | None, _option(
         min=-89.0, max=89.0, metavar='DEGREES',
-        help='Of the camera, where the bag has azimuths alone; default: 30.')], None),
+        help='Of the camera, if the bag has azimuths only; default: 30.')], None),
     'camera_position': (Annotated[str | None, _option(
-        metavar='X,Y,Z', help="Of the camera in the object's frame at angle 0, m.")], None),
+        metavar='X,Y,Z', help="Camera position in the object's frame at angle 0, m.")], None),
     'camera_orientation': (Annotated[str | None, _option(
-        metavar='X,Y,Z,W', help='Of its optical frame there; default: it looks at the object.')],
+        metavar='X,Y,Z,W', help='Its orientation; default: it looks at the object.')],
         None),
     'background': (Annotated[str, _option(
         metavar='COLOR|IMAGE',
-        help='What becomes white behind the object: a colour as RED,GREEN,BLUE, or what an image '
-             'of the empty scene shows.')], ''),
+        help='Background to replace by white: a colour as RED,GREEN,BLUE, or an image of the '
+             'empty scene.')], ''),
 }
 
 
 def with_bag_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command its parameters `topics` and `scene` from options of its command line."""
+    """Decorate a command: its parameters `topics` and `scene` come from these options."""
     own = inspect.signature(command).parameters
     given = {**_TOPICS, **_SCENE}
 
@@ -85,9 +85,9 @@ def with_bag_options(command: Callable[..., None]) -> Callable[..., None]:
 def _scene(object_size: float | None, object_yaw_deg: float | None, elevation_deg: float | None,
            camera_position: str | None, camera_orientation: str | None,
            background: str) -> 'Scene':
-    from active_recon.bags.runs.scene import Scene, told_background
+    from active_recon.bags.runs.scene import parse_background, Scene
 
-    how, empty_scene = told_background(background)
+    how, empty_scene = parse_background(background)
     return Scene(object_size, _radians(object_yaw_deg), _radians(elevation_deg),
                  _numbers('--camera-position', camera_position, 3),
                  _numbers('--camera-orientation', camera_orientation, 4), how, empty_scene)
@@ -97,13 +97,13 @@ def _radians(degrees: float | None) -> float | None:
     return None if degrees is None else math.radians(degrees)
 
 
-def _numbers(option: str, told: str | None, count: int) -> list[float] | None:
-    if told is None:
+def _numbers(option: str, text: str | None, count: int) -> list[float] | None:
+    if text is None:
         return None
     try:
-        numbers = [float(each) for each in told.split(',')]
+        numbers = [float(each) for each in text.split(',')]
     except ValueError:
         numbers = []
     if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise ConfigError(f'{option}: {told!r} is not {count} numbers with commas between them')
+        raise ConfigError(f'{option}: expected {count} numbers separated by commas, got {text!r}')
     return numbers

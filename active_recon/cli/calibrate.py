@@ -1,4 +1,4 @@
-"""`active-recon calibrate`: where the camera stands around the object, from images of a board."""
+"""`active-recon calibrate`: estimates the pose of the camera from images of a board."""
 
 import math
 from pathlib import Path
@@ -18,39 +18,39 @@ def calibrate(
     )] = Path('calibration'),
     print_board: Annotated[Path | None, typer.Option(
         help='Write the board as an image (PNG), to be printed at its true size.')] = None,
-    squares: Annotated[str, typer.Option(help='Of the board, COLUMNSxROWS.')] = '7x5',
+    squares: Annotated[str, typer.Option(help='Squares of the board, COLUMNSxROWS.')] = '7x5',
     square_mm: Annotated[float, typer.Option(help='Side of a square, measured on paper.')] = 30.0,
     marker_mm: Annotated[float | None, typer.Option(
         help='Side of a marker; default: 3/4 of a square.')] = None,
-    dictionary: Annotated[str, typer.Option(help='Of the markers, such as 5x5_100.')] = '4x4_50',
+    dictionary: Annotated[str, typer.Option(help='Markers, such as 5x5_100.')] = '4x4_50',
     board_thickness_mm: Annotated[float, typer.Option(
-        help='How high the printed face lies above the plate.')] = 0.0,
+        help='Height of the printed face above the plate.')] = 0.0,
     step_deg: Annotated[float | None, typer.Option(
-        help="The table's angle from each image to the next, in the order of their names; the "
+        help="The table's rotation from each image to the next, in the order of names; the "
              'first is at 0.')] = None,
     angles_deg: Annotated[Path | None, typer.Option(
         help="A CSV file of the table's angles: image, degrees.")] = None,
     camera_azimuth_deg: Annotated[float, typer.Option(
-        help="Of the camera at the table's angle 0; at 0 the object's front faces it.")] = 0.0,
+        help="Camera azimuth at the table's angle 0; at 0 the object's front faces it.")] = 0.0,
     poses: Annotated[Path | None, typer.Option(
-        help="A CSV file of an arm's poses instead of a turntable, the camera's mount in the "
-             'base frame: image, x, y, z, qx, qy, qz, qw.')] = None,
+        help="For an arm instead of a turntable: a CSV file of the poses of the camera's mount in "
+             'the base frame: image, x, y, z, qx, qy, qz, qw.')] = None,
     camera_info: Annotated[Path | None, typer.Option(
         help="The lens, as ROS's camera_calibration writes it (YAML); default: estimated.")
     ] = None,
     lens_images: Annotated[list[Path] | None, typer.Option(
-        help='More images of the board, tilted every way, or folders of them, to estimate the '
-             'lens from.')] = None,
-    base_frame: Annotated[str, typer.Option(help="Of an arm: its base's tf frame.")] = 'base_link',
+        help='More images of the board at various tilts, or folders of them, to estimate the '
+             'lens.')] = None,
+    base_frame: Annotated[str, typer.Option(help="The tf frame of an arm's base.")] = 'base_link',
     mount_frame: Annotated[str, typer.Option(help='The frame of the poses.')] = 'tool0',
     camera_frame: Annotated[str, typer.Option(
         help="The camera's optical frame.")] = 'camera_optical_frame',
 ) -> None:
     """
-    Find the camera beside a turntable, or on an arm, from images of a ChArUco board.
+    Calibrate a camera at a turntable, or on an arm, from images of a ChArUco board.
 
-    Lay the board on the table and turn it in steps under the fixed camera; or let it lie and move
-    the arm. What is found is written as parameters of reconstructor and view_planner.
+    Lay the board on the table and rotate it in steps in front of the fixed camera; or keep it in
+    place and move the arm. The result is written as parameters of reconstructor and view_planner.
 
     For example: active-recon calibrate --print-board board.png, and then
     active-recon calibrate images/ --step-deg 15 --object-size 0.25
@@ -65,7 +65,7 @@ def calibrate(
         width, height = board.printed_size()
         typer.echo(f'wrote {print_board}: print it at 100 %, not fitted to the page, and measure '
                    f'it: {columns} x {rows} squares are {width * 1e3:.1f} x {height * 1e3:.1f} '
-                   'mm. Where they are not, give the side of a square by --square-mm.')
+                   'mm. If they are not, give the side of a square by --square-mm.')
         return
     if not images or object_size is None:
         raise ConfigError('no images of the board, or no --object-size: give both, or '
@@ -111,5 +111,5 @@ def calibrate(
 def _squares(words: str) -> tuple[int, int]:
     columns, _, rows = words.lower().partition('x')
     if not (columns.isdecimal() and rows.isdecimal()):
-        raise ConfigError(f'--squares: {words!r} is not COLUMNSxROWS, such as 7x5')
+        raise ConfigError(f'--squares: expected COLUMNSxROWS, such as 7x5, got {words!r}')
     return int(columns), int(rows)

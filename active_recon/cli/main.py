@@ -1,4 +1,4 @@
-"""The command `active-recon`; what a subcommand needs is imported when it runs."""
+"""The command `active-recon`; subcommands import what they need when they run."""
 
 from collections.abc import Callable
 import inspect
@@ -33,7 +33,7 @@ app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')
 
 
-def _tell_version(asked: bool) -> None:
+def _print_version(asked: bool) -> None:
     if asked:
         typer.echo(f'active-recon {__version__}')
         raise typer.Exit
@@ -42,13 +42,13 @@ def _tell_version(asked: bool) -> None:
 @app.callback()
 def _any_command(
     version: Annotated[bool, typer.Option(
-        '--version', callback=_tell_version, is_eager=True, help='Tell the version.')] = False,
+        '--version', callback=_print_version, is_eager=True, help='Show the version.')] = False,
 ) -> None:
     """Active 3D reconstruction of an object from few camera views."""
 
 
 def _flow(commands: typer.Typer) -> None:
-    """Leave it to the terminal where the lines of a help break, but not its paragraphs."""
+    """Let the terminal wrap the lines of help texts, but keep their paragraphs."""
     for each in commands.registered_commands:
         assert each.callback is not None
         each.help = flowing(each.callback)
@@ -67,7 +67,7 @@ _flow(app)
 
 
 def main() -> None:
-    """Run the command; what the package refuses is one line and exit code 2."""
+    """Run the command; errors of the package are one line and exit code 2."""
     try:
         app()
     except ActiveReconError as error:

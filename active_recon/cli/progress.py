@@ -1,4 +1,4 @@
-"""One progress bar for everything that takes more than two seconds."""
+"""Progress bars on a terminal, progress lines in a log."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,11 +17,11 @@ from rich.progress import (
 )
 
 _LARGE_BAG = 50_000_000  # bytes, about a second
-_LINE_EVERY = 30.0  # seconds between lines where there is no terminal to draw a bar on
+_LINE_EVERY = 30.0  # seconds between lines in a log
 
 
 def bag_progress(path: Path) -> Reporting:
-    """Return the progress bar for a bag that takes more than a moment to read, else none."""
+    """Return the progress bar for reading a large bag, or `silent` for a small one."""
     files = path.rglob('*') if path.is_dir() else [path]
     size = sum(file.stat().st_size for file in files if file.is_file())
     return progress_bar if size > _LARGE_BAG else silent
@@ -30,9 +30,9 @@ def bag_progress(path: Path) -> Reporting:
 @contextmanager
 def progress_bar(title: str, total: int) -> Iterator[Callable[[int, str], None]]:
     """
-    Yield `advance(steps, note)`: a bar with the note and the time left, or lines in a log.
+    Yield `advance(steps, note)`, which updates a bar with a note and the time left.
 
-    A long note stands on a line of its own above the bar's.
+    Without a terminal it prints a line every half minute instead.
     """
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -55,7 +55,7 @@ def _log_lines(title: str, total: int) -> Callable[[int, str], None]:
 
     def advance(steps: int, note: str) -> None:
         nonlocal last, done, first
-        first = first or steps  # what a resumed run had done already took no time
+        first = first or steps  # the first step of a resumed run is what was done before
         done += steps
         now = time.monotonic()
         if done < total and now - last < _LINE_EVERY:

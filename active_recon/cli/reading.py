@@ -1,4 +1,4 @@
-"""Datasets read with a progress bar; what was left out is told."""
+"""Reading datasets with a progress bar and a list of what was left out."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,11 +20,11 @@ Split = Annotated[str | None, typer.Option(
 def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
                  split: str | None = None, part: str = '', at_once: bool = True) -> 'ViewSet':
     """
-    Read the objects of some datasets into memory, in the sizes that a network asks for.
+    Read the objects of datasets into memory, in the sizes that a network needs.
 
-    Not `at_once`, images of any cameras are read when they are first shown. With a `split`, only
-    those of its `part` (train, val or test). A single root may be PASCAL3D+'s folder, whose
-    photographs are objects of one view each.
+    Unless `at_once`, images of any cameras are read when they are first used. With a `split`,
+    only the objects of its `part` (train, val or test) are read. A single root may be
+    PASCAL3D+'s folder, whose photographs are objects of one view each.
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.splits import list_split
@@ -40,7 +40,7 @@ def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
     with progress_bar(f'reading {title}', len(folders)) as advance:
         views = read_views(folders, lambda: advance(1, ''), spec.resolution, spec.image_size,
                            framed=not spec.needs_front, at_once=at_once)
-    _tell_left_out(title, len(views), missing, views.unreadable)
+    _print_left_out(title, len(views), missing, views.unreadable)
     return views
 
 
@@ -49,17 +49,17 @@ def _read_photographs(root: Path, title: str, spec: 'NetworkSpec') -> 'ViewSet':
     from active_recon.datasets.photographs import read_photographs
 
     if not spec.needs_front:
-        raise ConfigError(f'{root}: photographs without their cameras are for networks that take '
-                          'them from the front alone, such as --model 2d3d-attention')
+        raise ConfigError(f'{root}: these photographs have no cameras: expected a network without '
+                          'camera input, such as --model 2d3d-attention')
     photographs, left_out = list_photographs(root)
     with progress_bar(f'reading {title}', len(photographs)) as advance:
         views = read_photographs(photographs, left_out, lambda: advance(1, ''),
                                  spec.resolution)
-    _tell_left_out(title, len(views), (), views.unreadable)
+    _print_left_out(title, len(views), (), views.unreadable)
     return views
 
 
-def _tell_left_out(title: str, count: int, missing: Sequence[str],
+def _print_left_out(title: str, count: int, missing: Sequence[str],
                    unreadable: Sequence[str]) -> None:
     for refusal in (*missing, *unreadable):
         typer.echo(f'left out: {refusal}', err=True)

@@ -1,4 +1,4 @@
-"""`active-recon record-sweep`: a bag of all 24 azimuths of a simulated turntable."""
+"""`active-recon record-sweep`: records a bag of all 24 azimuths of a simulated turntable."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,12 +18,12 @@ def record_sweep(
         help="The mesh file's axis that is up: x, y, z, or with a sign. Default: its "
              "format's.")] = None,
     front: Annotated[str | None, typer.Option(
-        help="The mesh file's axis of the front; the same.")] = None,
+        help="The mesh file's axis of the front; likewise.")] = None,
 ) -> None:
     """
-    Record all 24 azimuths of an object on a simulated turntable, with no ROS running.
+    Record all 24 azimuths of an object on a simulated turntable, without ROS.
 
-    A policy may ask such a bag for any view: replay shows what it would have seen.
+    Such a bag can be replayed with any policy: it has every view that one may ask for.
 
     Example: active-recon record-sweep chair --out bags/chair-sweep
     """

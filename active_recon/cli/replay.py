@@ -1,4 +1,4 @@
-"""`active-recon replay`: a recorded run again, with no ROS running, as it was or under others."""
+"""`active-recon replay`: replays a recorded run without ROS, as recorded or with overrides."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -17,10 +17,9 @@ import typer
 
 if TYPE_CHECKING:
     from active_recon.bags.replay.verification import Verification
-    from active_recon.bags.replay.what_if import Others
+    from active_recon.bags.runs.loop_setup import LoopSetup, Overrides
     from active_recon.bags.runs.run import RecordedRun
     from active_recon.bags.runs.scene import Scene
-    from active_recon.bags.runs.settings import Settings
     from active_recon.bags.runs.topics import Topics
     from active_recon.reconstructor import Reconstructor
 
@@ -32,34 +31,34 @@ def replay(
     topics: 'Topics',
     scene: 'Scene',
     model: Annotated[str | None, typer.Option(
-        help='Another model: its name, or a weights file. The views stay those that were taken.',
+        help='Another model: its name, or a weights file. The views stay as recorded.',
     )] = None,
     policy: Annotated[str | None, policy_option(
-        'Another policy. It chooses among the views of the bag, and is refused where it wants '
-        'one that was never taken.')] = None,
+        'Another policy. It chooses among the views of the bag; an error, if it asks for one '
+        'that was never taken.')] = None,
     threshold: Annotated[float | None, typer.Option(
-        help='Another occupancy above which a cell is occupied.')] = None,
+        help='Another occupancy threshold of occupied cells.')] = None,
     out: Annotated[Path | None, typer.Option(
-        help='The folder of the new bag, with one of the three above; default: beside BAG, with '
-             'what is other in its name.')] = None,
+        help='The folder of the new bag, with one of the three above; default: next to BAG, with '
+             'the overrides in its name.')] = None,
     weights: Annotated[Path | None, typer.Option(
-        help='The weights file that BAG was recorded with, where it does not ship any more.',
+        help='The weights file that BAG was recorded with, if it does not ship any more.',
     )] = None,
     mesh: Annotated[Path | None, typer.Option(
-        help='Write the shape after the last view as PLY, OBJ or STL, metres; of several episodes '
-             'each, with its number.')] = None,
+        help='Write the shape after the last view as PLY, OBJ or STL, in metres; one file for '
+             'each episode, numbered if there are several.')] = None,
     voxels: Annotated[Path | None, typer.Option(
-        help='The same as voxels: binvox, or npz with their probabilities.')] = None,
+        help='The same as voxels: binvox, or npz with probabilities.')] = None,
     threads: Annotated[int | None, typer.Option(
-        min=1, help='CPU threads of the network; default: as many as the run had.')] = None,
+        min=1, help='CPU threads of the network; default: as recorded.')] = None,
 ) -> None:
     """
-    Replay a bag and compare with what was recorded, or replay it under others.
+    Replay a bag and compare it with the recording, or replay it with another model or policy.
 
-    The images go through the network and the policy again, in the order of their stamps, with no
-    ROS running and no clock. The same machine and versions give the same bits, another machine the
-    same within a tolerance; which of them held is told. Exit code 1: neither. With --model,
-    --policy or --threshold nothing is compared, and a new bag is written beside the old one.
+    The images go through the network and the policy again, in the order of their stamps, without
+    ROS and without a clock. The same machine and versions give the same bits, another machine the
+    same values within a tolerance; the output says which. Exit code 1: neither. With --model,
+    --policy or --threshold nothing is compared, and a new bag is written next to the old one.
 
     Example: active-recon replay bags/2026-11-21_14-35-54
 
@@ -69,56 +68,55 @@ def replay(
     """
     from active_recon.bags.replay.comparison import NOTHING_RECORDED
     from active_recon.bags.replay.verification import verify
-    from active_recon.bags.replay.what_if import Others
+    from active_recon.bags.runs.loop_setup import Overrides, recorded_setup
     from active_recon.bags.runs.reading import read_run
-    from active_recon.bags.runs.settings import recorded_settings
     from active_recon.models.weights_files import find_weights
 
-    others = Others(find_weights(model) if model else None, policy, threshold)
-    if out and others == Others():
-        raise ConfigError('--out without --model, --policy or --threshold: no bag is written '
-                          'where nothing is other')
+    overrides = Overrides(find_weights(model) if model else None, policy, threshold)
+    if out and overrides == Overrides():
+        raise ConfigError('--out without --model, --policy or --threshold: a bag is written '
+                          'with one of them only')
     files = ShapeFiles(mesh, voxels)
     began = time.monotonic()
     run = read_run(path, topics, scene, bag_progress(path))
     reading_s = time.monotonic() - began
-    settings = recorded_settings(run, others.weights or weights, others.weights is not None,
-                                 scene.given)
-    settings = replace(settings, threads=threads or settings.threads)
-    if others != Others():
-        _write_under(run, settings, others, out, files)
+    setup = recorded_setup(run, overrides.weights or weights, overrides.weights is not None,
+                           scene.parameters)
+    setup = replace(setup, threads=threads or setup.threads)
+    if overrides != Overrides():
+        _write_with_overrides(run, setup, overrides, out, files)
         return
-    reconstructor, planner = settings.load_reconstructor(), settings.load_planner()
+    reconstructor, planner = setup.load_reconstructor(), setup.load_planner()
     began = time.monotonic()
     with _bar('replaying', run) as advance:
         verified = verify(run, reconstructor, planner, lambda: advance(1, ''))
     took_s = reading_s + time.monotonic() - began
-    files.write([episode.views[-1].reconstruction.grid for episode in verified.episodes
-                 if episode.views], reconstructor.threshold)
+    files.write([episode.steps[-1].reconstruction.grid for episode in verified.episodes
+                 if episode.steps], reconstructor.threshold)
     if verified.comparison.verdict == NOTHING_RECORDED:
-        _tell_reconstructed(verified, run, reconstructor)
+        _print_reconstruction(verified, run, reconstructor)
     else:
-        _tell(verified, run, took_s)
+        _print_comparison(verified, run, took_s)
 
 
-def _tell_reconstructed(verified: 'Verification', run: 'RecordedRun',
-                        reconstructor: 'Reconstructor') -> None:
-    """Say what came of a bag that has no record of the loop's to compare with."""
+def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
+                          reconstructor: 'Reconstructor') -> None:
+    """Print the result for a bag that has no record of the loop to compare with."""
     for assumption in run.assumed:
         typer.echo(f'assumed: {assumption}')
     for episode in verified.episodes:
-        if not episode.views:
+        if not episode.steps:
             continue
-        first, last = (view.reconstruction.grid for view in (episode.views[0], episode.views[-1]))
+        first, last = (step.reconstruction.grid for step in (episode.steps[0], episode.steps[-1]))
         count = int(last.occupied(reconstructor.threshold).sum())
         typer.echo(
-            f'reconstructed from {len(episode.views)} views: {count} of {last.occupancy.size} '
+            f'reconstructed from {len(episode.steps)} views: {count} of {last.occupancy.size} '
             f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():.0f} to '
             f'{last.entropy():.0f} nats; the bag has no record to compare with')
     typer.echo(f'hash {verified.hash}')
 
 
-def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
+def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
     from active_recon.bags.replay.comparison import DIFFERENT
 
     ran_s = (run.end - run.begin) / 1e9
@@ -131,28 +129,27 @@ def _tell(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
         typer.echo(f'  {name:<14}{found.compared:>4} compared  {found.verdict:<17} {gap}'.rstrip())
     for number, episode in enumerate(run.episodes, 1):
         if episode.begun_before:
-            typer.echo(f'episode {number} had begun before the recording: it is not compared')
+            typer.echo(f'episode {number} began before the recording: it is not compared')
     if not verified.knows_policy:
-        typer.echo('the bag does not tell which policy chose: goals and stop are not compared')
+        typer.echo('the bag does not name its policy: goals and stop are not compared')
     typer.echo(f'hash {verified.hash}')
     verdict = verified.comparison.verdict
-    typer.echo(f'{verdict}: what was recorded and the replay')
+    typer.echo(f'{verdict}: recording and replay')
     if verdict == DIFFERENT:
         raise typer.Exit(1)
 
 
-def _write_under(run: 'RecordedRun', settings: 'Settings', others: 'Others',
-                 out: Path | None, files: ShapeFiles) -> None:
-    from active_recon.bags.replay.what_if import beside, run_under
+def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Overrides',
+                          out: Path | None, files: ShapeFiles) -> None:
+    from active_recon.bags.replay.what_if import default_folder, run_with_overrides
     from active_recon.bags.runs.run_writing import write_run
 
     with _bar('replaying', run) as advance:
-        other = run_under(run, settings, others, lambda: advance(1, ''))
-    folder = out or beside(run.path, others)
+        other = run_with_overrides(run, setup, overrides, lambda: advance(1, ''))
+    folder = out or default_folder(run.path, overrides)
     write_run(other, folder)
     grids = [episode.views[-1].reconstruction for episode in other.episodes if episode.views]
-    threshold = settings.under(others.weights, threshold=others.threshold
-                               ).load_reconstructor().threshold
+    threshold = setup.with_overrides(overrides).load_reconstructor().threshold
     files.write([grid for grid in grids if grid is not None], threshold)
     for episode in other.episodes:
         entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)

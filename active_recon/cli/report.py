@@ -1,4 +1,4 @@
-"""`active-recon report`: recorded runs as one page that can be sent to anybody."""
+"""`active-recon report`: writes recorded runs as one self-contained page."""
 
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
@@ -19,36 +19,36 @@ if TYPE_CHECKING:
 @with_bag_options
 def report(
     bags: Annotated[list[Path], typer.Argument(
-        metavar='BAG', help='rosbag2 folders, or MCAP or sqlite3 files. Several stand side by '
-                            'side.')],
+        metavar='BAG', help='rosbag2 folders, or MCAP or sqlite3 files. Several are shown side '
+                            'by side.')],
     topics: 'Topics',
     scene: 'Scene',
     out: Annotated[Path | None, typer.Option(
-        help='Where the page goes; default: report.html in the first bag.')] = None,
+        help='File of the page; default: report.html in the first bag.')] = None,
     truth: Annotated[list[Path] | None, typer.Option(
-        help="The object's true shape for the IoU: a mesh in metres and where it stands in the "
-             "object's frame, a .binvox, or bed, car, chair, sofa, table; once for all bags, or "
-             'once for each in their order. The demo needs none.')] = None,
+        help="The object's true shape for the IoU: a mesh in metres in the object's frame, a "
+             '.binvox, or bed, car, chair, sofa, table; once for all bags, or once for each in '
+             'their order. Not needed for the demo.')] = None,
     fit: Annotated[bool, typer.Option(
-        '--fit', help="Centre the true shape, scale its longest side to the cube's, turn it by "
-                      'the yaw of the run.')] = False,
+        '--fit', help="Centre the true shape, scale its longest side to the cube's and rotate it "
+                      'by the yaw of the run.')] = False,
     up: Annotated[str | None, typer.Option(
         help="The true mesh's axis that is up: x, y, z, or with a sign. Default: its "
              "format's.")] = None,
     front: Annotated[str | None, typer.Option(
-        help="The true mesh's axis of +x; the same.")] = None,
+        help="The true mesh's axis of +x; likewise.")] = None,
     episode: Annotated[int | None, typer.Option(
         min=1, help='Only this episode of each bag, counted from 1; default: all with '
                     'views.')] = None,
     model: Annotated[str | None, typer.Option(
-        help='What rebuilds the shapes where a bag holds none: a model that ships, or a '
-             '.safetensors file.')] = None,
+        help='The model for bags without reconstructions: its name, or a .safetensors file.',
+    )] = None,
 ) -> None:
     """
-    Write recorded runs as one HTML page that opens in any browser, with no network.
+    Write recorded runs as one HTML page that opens in any browser, offline.
 
-    It shows the shape after each view in 3D, the images around the turntable, what the planner
-    thought, entropy and IoU, where the time went, and what went wrong.
+    It shows the shape after each view in 3D, the images around the turntable, the planner's
+    scores, entropy and IoU, the latency of each stage, and all warnings.
 
     Example: active-recon report bags/2026-11-21_10-00-00 --out run.html
     """
@@ -58,10 +58,10 @@ def report(
 
     truths = truth or []
     if len(truths) not in (0, 1, len(bags)):
-        raise ConfigError(f'--truth: {len(truths)} of them for {len(bags)} bags: give one for '
-                          'all, or one for each')
+        raise ConfigError('--truth: expected one for all bags, or one for each of '
+                          f'{len(bags)}, got {len(truths)}')
     if not truths and (fit or up or front):
-        raise ConfigError('--fit, --up and --front tell how --truth stands: give it too')
+        raise ConfigError('--fit, --up and --front need --truth: give it too')
     files = [TruthFile(each, fit, up, front) for each in truths]
     path = out or (bags[0] if bags[0].is_dir() else bags[0].parent) / 'report.html'
     subjects: list[Subject] = []

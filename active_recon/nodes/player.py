@@ -5,8 +5,8 @@ from pathlib import Path
 import time
 
 from active_recon.bags.runs.playing import played_topics
+from active_recon.bags.storage.bag import RawMessage
 from active_recon.bags.storage.opening import open_bag
-from active_recon.bags.storage.raw import RawMessage
 from active_recon.errors import ConfigError
 from active_recon.nodes.runtime.definitions import message_class
 from active_recon.nodes.runtime.parameters import Parameters

@@ -34,7 +34,7 @@ from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.images import mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.views import UnreadView, ViewJoiner
+from msg_tools.views import View, ViewJoiner
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -136,7 +136,7 @@ class ReconstructorNode(ManagedNode):
         return commit
 
     def _begin_episode(self) -> None:
-        self._pending: UnreadView | None = None
+        self._pending: View | None = None
         self._reconstructor.reset()
         self._gate.reset()
         self._reconstruction = None
@@ -221,8 +221,7 @@ class ReconstructorNode(ManagedNode):
             with self._diagnostics.rejecting():
                 self._add_view(view)
 
-    def _add_view(self, unread: UnreadView) -> None:
-        view = unread.read()
+    def _add_view(self, view: View) -> None:
         mask = None if view.mask is None else mask_from_msg(view.mask)
         image = self._background.cleared(view.image, mask, self._capture.reference)
         reconstruction = self._reconstructor.add_view(image, view.camera)

@@ -1,1 +1,1 @@
-"""Recorded runs as one HTML page that opens with no network; it knows no ROS."""
+"""Reports of recorded runs: one self-contained HTML page, made without ROS."""

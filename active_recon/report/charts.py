@@ -1,8 +1,8 @@
 """
 Plotly figures as plain JSON values: entropy and IoU over the views, and the time of each stage.
 
-A colour that begins with two dashes is a variable of the page's style sheet, which knows light
-and dark; the page resolves it.
+A colour that begins with two dashes is a variable of the page's style sheet, which has a light
+and a dark scheme; the page resolves it.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,17 +22,17 @@ def view_color(number: int) -> str:
 
 
 def entropy_chart(subjects: Sequence[Subject]) -> Figure:
-    """Return how unsure the estimate was after each view, a line for each subject."""
+    """Return the entropy after each view, with one line for each subject."""
     return _progress(subjects, 'entropy, nats', lambda subject: subject.entropies, '%{y:.0f} nats')
 
 
 def iou_chart(subjects: Sequence[Subject]) -> Figure:
-    """Return the overlap with the truth after each view, a line for each subject."""
+    """Return the IoU with the true shape after each view, with one line for each subject."""
     return _progress(subjects, 'IoU', lambda subject: subject.ious, 'IoU %{y:.3f}')
 
 
 def stage_chart(timings: Sequence[Timing]) -> Figure:
-    """Return the milliseconds of each stage from image to goal, a bar for each view."""
+    """Return the milliseconds of each stage from image to goal, with one bar for each view."""
     views = [f'view {number}' for number in range(1, len(timings) + 1)]
     return {
         'data': [{

@@ -1,11 +1,11 @@
-"""What a reader should know of a run before believing it, each in one sentence."""
+"""Warnings and notes on a run, each in one sentence."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
-from active_recon.bags.runs.missing import lost_words
+from active_recon.bags.runs.missing import describe_lost
 from active_recon.bags.runs.parameters import node_parameters
 from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, view_distance
 from active_recon.report.stages import two_clocks
@@ -13,26 +13,28 @@ from active_recon.report.subject import degrees, Subject
 from active_recon.report.words import counted, refused, times, warned
 
 _STOPPED = {
-    'max_views': ('view limit', 'It stopped because it had taken as many views as it was '
+    'max_views': ('view limit', 'It stopped because it had taken as many views as '
                                 'allowed.'),
-    'entropy_settled': ('settled', 'It stopped by itself: the last two views changed almost '
-                                   'nothing, so another was not worth taking.'),
-    'no_reachable_azimuth': ('nowhere to go', 'It stopped because the camera did not get to any '
-                                              'azimuth that was left.'),
-    'stopped': ('stopped', 'It stopped because it was asked to.'),
-    '': ('cut off', 'It never said that it was done: the recording ends, or a new episode '
-                    'begins, in the middle.'),
+    'entropy_settled': ('settled', 'It stopped by itself: the last two views hardly changed '
+                                   'the entropy.'),
+    'no_reachable_azimuth': ('no reachable goal', 'It stopped because the camera could not reach '
+                                                  'any of the remaining azimuths.'),
+    'stopped': ('stopped', 'It was stopped by a service call.'),
+    '': ('incomplete', 'The episode is incomplete: the recording ends, or a new episode begins, '
+                       'before it was done.'),
 }
+
+
 @dataclass(frozen=True)
 class Finding:
-    """A sentence, and how much it matters: 'warning' or 'note'."""
+    """A sentence and its level: 'warning' or 'note'."""
 
     level: str
     text: str
 
 
 def findings(subject: Subject) -> list[Finding]:
-    """Return what the run earned, the warnings first."""
+    """Return the findings on an episode, warnings first."""
     found = [Finding(level, text) for level, text in (
         *_beginning(subject), *_stop(subject), *_counted(subject), *_missing(subject),
         *_lost(subject), *_off_goal(subject), *_off_elevation(subject), *_estimate(subject))]
@@ -40,64 +42,62 @@ def findings(subject: Subject) -> list[Finding]:
 
 
 def stopped(reason: str) -> str:
-    """Return in a word or two why an episode stopped, by the planner's reason."""
+    """Return a short text for the planner's reason to stop."""
     word, _ = _STOPPED.get(reason, (reason, ''))
     return word
 
 
 def _beginning(subject: Subject) -> Iterator[tuple[str, str]]:
     if subject.episode.begun_before:
-        yield 'warning', ('The recording begins in the middle of the episode: there were views '
-                          'before the first one here.')
+        yield 'warning', ('The recording begins in the middle of the episode: earlier views are '
+                          'missing.')
 
 
 def _stop(subject: Subject) -> Iterator[tuple[str, str]]:
     reason = subject.episode.done
     if not reason and not any(subject.goals):
-        yield 'note', 'No planner was recorded: the views are those that the camera came by.'
+        yield 'note', 'No planner was recorded: the views are those that the camera passed.'
         return
     _, sentence = _STOPPED.get(reason, ('', f'It stopped for the reason “{reason}”.'))
     yield 'note' if reason else 'warning', sentence
 
 
 def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
-    """Yield what the nodes counted; the counts are of the whole run, not of one episode."""
+    """Yield the findings from the nodes' counters, which count the whole run."""
     for node, counts in sorted(subject.run.counters.items()):
         name = node.strip('/')
         for key, count in sorted(counts.items()):
             kind = key.removeprefix('refused/')
             if count > 0 and kind != key:
-                yield 'warning', f'{refused(kind, count)}, says the {name}.'
+                yield 'warning', f'{refused(kind, count)} (counted by the {name}).'
             elif count > 0 and key.startswith('warned/') and key != 'warned/elevation':
                 yield 'warning', (f'The {name} warned {times(count)} of '
                                   f'{warned(key.removeprefix("warned/"))}.')
         if {'images', 'views', 'images_unused'} <= counts.keys():
-            yield 'note', (f'By the last count of the {name}, '
-                           f'{counted(counts["images"], "image")} came in. '
-                           f'{counted(counts["views"], "view")} came of them; '
-                           f'{counted(counts["images_unused"], "image")} showed the '
-                           'camera on its way or waiting: what is left out as it should be.')
+            yield 'note', (f'The {name} received {counted(counts["images"], "image")}: '
+                           f'{counted(counts["views"], "view")} and '
+                           f'{counted(counts["images_unused"], "unused image")}, taken while the '
+                           'camera moved or waited, as intended.')
 
 
 def _missing(subject: Subject) -> Iterator[tuple[str, str]]:
-    """Yield what nobody counted, since it never came."""
+    """Yield the findings on images that never arrived."""
     gaps = subject.run.gaps
     if gaps.missing and gaps.period_s:
         are = 'is' if gaps.missing == 1 else 'are'
         yield 'warning', (f'About {counted(gaps.missing, "image")} {are} missing: the camera '
-                          'showed one every '
-                          f'{1e3 * gaps.period_s:.0f} ms, but once none for '
-                          f'{gaps.longest_s:.1f} s.')
-    if gaps.unheard:
-        were = 'was' if gaps.unheard == 1 else 'were'
-        yield 'warning', (f'{counted(gaps.unheard, "image")} that {were} recorded never reached '
+                          f'usually sends one every {1e3 * gaps.period_s:.0f} ms; the longest '
+                          f'gap is {gaps.longest_s:.1f} s.')
+    if gaps.uncounted:
+        were = 'was' if gaps.uncounted == 1 else 'were'
+        yield 'warning', (f'{counted(gaps.uncounted, "image")} that {were} recorded never reached '
                           'the reconstructor.')
 
 
 def _lost(subject: Subject) -> Iterator[tuple[str, str]]:
-    if lost := lost_words(subject.episode):
-        yield 'warning', (f'The recording lacks {", ".join(lost)}: it was published and did not '
-                          'reach the recorder.')
+    if lost := describe_lost(subject.episode):
+        yield 'warning', (f'The recording lacks {", ".join(lost)}: published, but not received '
+                          'by the recorder.')
 
 
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
@@ -112,7 +112,7 @@ def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
 
 def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:
     if subject.run.provenance.get('needs_front') == 'false':
-        return  # such a network takes any camera
+        return  # such a network accepts any camera
     off = [(number, view.camera.elevation) for number, view in enumerate(subject.views, 1)
            if abs(view.camera.elevation - CANONICAL_ELEVATION) > ELEVATION_TOLERANCE]
     if off:
@@ -120,21 +120,21 @@ def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:
                            for number, elevation in off)
         views = 'view' if len(off) == 1 else 'views'
         yield 'warning', (
-            f'The camera stood at another elevation than the {degrees(CANONICAL_ELEVATION)}° that '
-            f'the network was trained with, in {views} {listed}: the shape will be worse.')
+            f'The camera was not at the elevation of {degrees(CANONICAL_ELEVATION)}° that the '
+            f'network was trained with, in {views} {listed}: the shape will be worse.')
 
 
 def _estimate(subject: Subject) -> Iterator[tuple[str, str]]:
     if subject.computed:
-        yield 'note', ('The bag holds no reconstruction. The shapes shown here were computed from '
-                       f'its images for this page, by {subject.computed}.')
+        yield 'note', ('The bag has no reconstruction. The shapes shown here were computed from '
+                       f'its images for this page, with {subject.computed}.')
     for assumption in subject.run.assumed if subject.computed else ():
-        yield 'note', f'Assumed, since the bag does not tell: {assumption}.'
+        yield 'note', f'Assumed, since the bag does not say: {assumption}.'
     if subject.placed:
         yield 'note', subject.placed
     known = [entropy for entropy in subject.entropies if entropy is not None]
     if len(known) > 1 and known[-1] > known[0]:
         yield 'note', 'After the last view the estimate was less certain than after the first.'
     if any(map(two_clocks, subject.views)):
-        yield 'warning', ('The images are stamped by another clock than the recorder’s, so how '
-                          'long they were on their way is not known.')
+        yield 'warning', ('The stamps of the images and the recorder’s times are from different '
+                          'clocks, so the latency of the images is unknown.')

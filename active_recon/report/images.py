@@ -1,4 +1,4 @@
-"""Images as a page carries them."""
+"""Images embedded in the page."""
 
 from base64 import b64encode
 
@@ -10,7 +10,7 @@ _QUALITY = 85
 
 
 def data_uri(image: NDArray[np.uint8], longest: int) -> str:
-    """Return an image (H, W, 3) uint8 RGB as a WebP URI, its sides at most so many pixels."""
+    """Return an image (H, W, 3) uint8 RGB as a WebP URI, its longer side at most `longest`."""
     scale = longest / max(image.shape[:2])
     if scale < 1:
         height, width = (max(1, round(side * scale)) for side in image.shape[:2])

@@ -1,4 +1,4 @@
-"""The page itself: one HTML file with its style, its script and Plotly inside."""
+"""The page: one HTML file that contains its styles, scripts and Plotly."""
 
 from base64 import b64encode
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from active_recon.report.words import key_words
 from jinja2 import Environment, PackageLoader, StrictUndefined
 import plotly
 
-MOST_SUBJECTS = 12
-"""Each is drawn in 3D, and browsers hold not many more such drawings on a page."""
+MAX_SUBJECTS = 12
+"""Each is drawn in 3D, and browsers limit the number of such drawings on a page."""
 _IMAGE_SIDE = 320
 _PLOTLY = Path(plotly.__file__).parent / 'package_data' / 'plotly.min.js'
 
@@ -31,14 +31,13 @@ def report_page(subjects: Sequence[Subject]) -> str:
     """
     Return the HTML page of some episodes; the same episodes give the same text.
 
-    Raises DataError where there is none, ConfigError where there are more than a browser draws.
+    Raises DataError if there are none, ConfigError if there are too many for a browser.
     """
     if not subjects:
-        raise DataError('no episode with views to report on: no image of these '
-                        'bags became a view')
-    if len(subjects) > MOST_SUBJECTS:
-        raise ConfigError(f'{len(subjects)} episodes are too many for one page, which has at most '
-                          f'{MOST_SUBJECTS}: name fewer bags, or one episode of each')
+        raise DataError('no episodes with views: no image of these bags became a view')
+    if len(subjects) > MAX_SUBJECTS:
+        raise ConfigError(f'too many episodes for one page: expected at most {MAX_SUBJECTS}, got '
+                          f'{len(subjects)}; name fewer bags, or one episode of each')
     panels = [_panel(subject) for subject in subjects]
     several = len(subjects) > 1
     known_truth = any(subject.truth is not None for subject in subjects)
@@ -52,12 +51,12 @@ def report_page(subjects: Sequence[Subject]) -> str:
     environment.filters |= {'number': _number, 'degrees': degrees, 'words': key_words}
     return environment.get_template('page.html').render(
         panels=panels, several=several, known_truth=known_truth, stages=STAGES,
-        drawn=_packed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
-        plotly=_packed(_PLOTLY.read_bytes()))
+        drawn=_compressed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
+        plotly=_compressed(_PLOTLY.read_bytes()))
 
 
 def write_page(page: str, path: Path) -> None:
-    """Write a page, whole or not at all; raises DataError where it cannot be written."""
+    """Write a page atomically; raises DataError if it cannot be written."""
     partial = path.with_name(f'.{path.name}.partial')
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -69,7 +68,7 @@ def write_page(page: str, path: Path) -> None:
 
 
 def _panel(subject: Subject) -> dict[str, Any]:
-    """Return what the template says of one subject."""
+    """Return the template's variables of one subject."""
     run, times = subject.run, timings(subject.episode)
     recorded = datetime.fromtimestamp(run.begin / 1e9, UTC)
     return {
@@ -92,16 +91,16 @@ def _panel(subject: Subject) -> dict[str, Any]:
 
 
 def _object_name(provenance: str) -> str:
-    """Return a name to speak of: a mesh file goes by its stem."""
+    """Return the object's name; of a mesh file its stem."""
     path = Path(provenance)
     return path.stem if path.suffix else provenance
 
 
 def _number(value: float | None, places: int = 0) -> str:
-    """Return a figure for people, a dash where it is not known."""
+    """Return a number as text, a dash if it is unknown."""
     return '–' if value is None else f'{value:,.{places}f}'.replace(',', '\u202f')
 
 
-def _packed(raw: bytes) -> str:
-    """Return bytes as base64 of gzip, without the time that gzip would add."""
+def _compressed(raw: bytes) -> str:
+    """Return bytes as base64 of gzip, without gzip's time stamp."""
     return b64encode(gzip.compress(raw, 9, mtime=0)).decode()

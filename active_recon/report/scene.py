@@ -1,4 +1,4 @@
-"""What the page's 3D view is drawn from: a panel's cells after each view, as JSON values."""
+"""The data of the page's 3D view: the cells after each view, as JSON values."""
 
 from base64 import b64encode
 from typing import Any
@@ -8,20 +8,20 @@ from active_recon.report.subject import shown_grid, Subject
 import numpy as np
 
 STEPS = 65535
-"""An occupancy of 1 on the page, where occupancies are whole numbers of 16 bits."""
+"""The value of an occupancy of 1 on the page, where occupancies are 16-bit integers."""
 
 
 def scene(subject: Subject) -> dict[str, Any]:
     """
     Return the cells after each view and the cameras around them.
 
-    `grids` holds base64 of little-endian uint16 in the order [x, y, z], null where no shape is
-    known; `truth` the same of the true cells. Lengths are in sides of the cube.
+    `grids` has base64 of little-endian uint16 in the order [x, y, z], null without a shape;
+    `truth` the same of the true cells. Lengths are in sides of the cube.
     """
     grids = [shown_grid(view) for view in subject.views]
     return {
-        'grids': [None if grid is None else _packed(grid.occupancy) for grid in grids],
-        'truth': None if subject.truth is None else _packed(subject.truth.astype(np.float32)),
+        'grids': [None if grid is None else _encoded(grid.occupancy) for grid in grids],
+        'truth': None if subject.truth is None else _encoded(subject.truth.astype(np.float32)),
         'side': next((len(grid.occupancy) for grid in grids if grid is not None), 0),
         'threshold': subject.threshold,
         'cameras': [{'azimuth': view.camera.azimuth, 'color': view_color(number)}
@@ -29,6 +29,6 @@ def scene(subject: Subject) -> dict[str, Any]:
     }
 
 
-def _packed(occupancy: np.ndarray[Any, np.dtype[np.float32]]) -> str:
+def _encoded(occupancy: np.ndarray[Any, np.dtype[np.float32]]) -> str:
     steps = np.rint(np.clip(occupancy, 0, 1) * STEPS).astype('<u2')
     return b64encode(steps.tobytes()).decode()

@@ -1,4 +1,4 @@
-"""Where the time goes from an image to the goal that follows from it."""
+"""The latency from an image to the goal that follows from it, by stages."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedVi
 
 NS_PER_MS = 1e6
 ONE_CLOCK_S = 60.0
-"""A message recorded later than that after its stamp, or before it, has a stamp of other clock."""
+"""The longest plausible time from stamp to recording; beyond it the clocks differ."""
 
 
 class Stage(NamedTuple):
-    """A stage by its name, what happens in it, and the messages with whose arrival it ends."""
+    """A stage: its name, its meaning, and the messages whose arrival ends it."""
 
     name: str
     meaning: str
@@ -22,23 +22,23 @@ class Stage(NamedTuple):
 
 
 STAGES = (
-    Stage('on its way', 'from the exposure until the image was recorded', ('camera/image_raw',)),
-    Stage('reconstruct', 'the network takes the image in and publishes the shape',
+    Stage('transport', 'from the exposure until the image was recorded', ('camera/image_raw',)),
+    Stage('reconstruct', 'until the reconstruction was published',
           ('occupancy',)),
-    Stage('hand over', 'until all that the planner needs has arrived',
+    Stage('hand over', 'until all messages for the planner were published',
           ('latent', 'view', 'entropy')),
-    Stage('decide', 'the planner names the next goal', ('goal',)),
+    Stage('decide', 'until the planner published the next goal', ('goal',)),
 )
 
 
 @dataclass(frozen=True)
 class Timing:
     """
-    Milliseconds of one view, None where not recorded.
+    Milliseconds of one view, None if not recorded.
 
-    `stages` are those of STAGES, `total` is from the image to the goal, `turn` from the goal that
-    asked for the view to its image. Arrivals are the recorder's: what overtook the end of the
-    stage before took 0.
+    `stages` are those of STAGES, `total` is from the image to the goal, `turn` from the goal of
+    the view to its image. Times are those of the recorder; a stage that ended before the one
+    before it took 0.
     """
 
     stages: tuple[float | None, ...]
@@ -49,18 +49,18 @@ class Timing:
 def timings(episode: RecordedEpisode) -> list[Timing]:
     """Return the timing of each view."""
     asked = [episode.first_goal, *(view.goal for view in episode.views)]
-    return [_timing(view, goal and goal.followed)
+    return [_timing(view, goal and goal.final)
             for view, goal in zip(episode.views, asked, strict=False)]
 
 
 def two_clocks(view: RecordedView) -> bool:
-    """Return whether an image's stamp and the recorder's times cannot be of one clock."""
+    """Return whether an image's stamp and the recorder's times are from different clocks."""
     return any(not 0 <= arrival - view.stamp <= ONE_CLOCK_S * 1e9
                for arrival in view.received.values())
 
 
 def median(values: Sequence[float | None]) -> float | None:
-    """Return the middle of what is known, None where nothing is."""
+    """Return the lower median of the known values, None if there are none."""
     known = [value for value in values if value is not None]
     return median_low(known) if known else None
 
@@ -81,7 +81,7 @@ def _timing(view: RecordedView, asked: RecordedGoal | None) -> Timing:
 
 
 def _no_earlier(before: int | None, end: int | None) -> int | None:
-    """Return the later of two, of which either may not be known."""
+    """Return the later of two times; None is unknown."""
     return end if before is None else before if end is None else max(before, end)
 
 

@@ -1,4 +1,4 @@
-"""What a page shows: one episode of one run, and what is known beside it."""
+"""What a page shows: one episode of a run, with its true shape."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, eq=False)
 class Subject:
     """
-    One episode that has views, under a letter of its own on the page.
+    One episode that has views, with its letter on the page.
 
-    `truth` holds the object's true cells, (X, Y, Z), where they are known, and `placed` says how
-    they were. `computed` says that the bag held no reconstruction and that this was made up for,
-    by which weights.
+    `truth` has the object's true cells, (X, Y, Z), if they are known, and `placed` says how they
+    were placed. `computed` names the weights that made the reconstruction, if the bag had none.
     """
 
     letter: str
@@ -35,13 +34,13 @@ class Subject:
 
     @property
     def goals(self) -> list[RecordedGoal | None]:
-        """The goal that asked for each view."""
+        """The goal of each view."""
         decided = [self.episode.first_goal, *(view.goal for view in self.views[:-1])]
-        return [goal and goal.followed for goal in decided]
+        return [goal and goal.final for goal in decided]
 
     @property
     def threshold(self) -> float:
-        """Occupancy above which a cell counts as occupied: between what was and what was not."""
+        """The threshold of occupied cells, from the recorded grids."""
         above, below = 1.0, 0.0
         for view in self.views:
             if view.reconstruction is not None and view.occupied is not None:
@@ -52,25 +51,25 @@ class Subject:
 
     @property
     def entropies(self) -> list[float | None]:
-        """Nats after each view, None where not known."""
+        """Nats after each view, None if unknown."""
         return [view.entropy if view.entropy is not None and math.isfinite(view.entropy) else None
                 for view in self.views]
 
     @property
     def ious(self) -> list[float | None]:
-        """IoU with the truth after each view, None where not known."""
+        """IoU with the true shape after each view, None if unknown."""
         return [None if self.truth is None or view.occupied is None
                 else float(iou(view.occupied.occupied(0), self.truth)) for view in self.views]
 
     @property
     def travel(self) -> float:
-        """Radians travelled between the views, the short way each time."""
+        """Radians between consecutive views, each the shorter way, summed."""
         azimuths = [view.camera.azimuth for view in self.views]
         return float(np.abs(azimuth_difference(azimuths[1:], azimuths[:-1])).sum())
 
 
 def shown_grid(view: RecordedView) -> VoxelGrid | None:
-    """Return the probabilities after a view, or its occupied cells where there are no more."""
+    """Return the probabilities after a view, else its occupied cells, else None."""
     return view.reconstruction if view.reconstruction is not None else view.occupied
 
 

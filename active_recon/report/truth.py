@@ -1,4 +1,4 @@
-"""The true shape of a recorded object, where it stood."""
+"""The true shape of a recorded object, in its place."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,9 +32,9 @@ class TruthFile:
     """
     A mesh, a binvox file, or the name of an object that ships.
 
-    A mesh is in metres and where it stands in the object's frame; with `fit`, and where the
-    object ships, it is centred and scaled so that its longest side is the cube's, and turned by
-    the run's `object_yaw`. `up` and `front` name the mesh's axes, None: those of its format.
+    A mesh is in metres and in the object's frame. With `fit`, and if it is a shipped object, it is
+    centred, scaled until its longest side is the cube's, and turned by the run's `object_yaw`.
+    `up` and `front` name the mesh's axes; None: those of its format.
     """
 
     path: Path
@@ -44,10 +44,10 @@ class TruthFile:
 
     def read(self, run: RecordedRun, object_size: float | None = None) -> Truth:
         """
-        Return the true cells of a run's object; `object_size` metres where the run tells none.
+        Return the true cells of a run's object; `object_size` in metres, None: the run's.
 
-        Raises MeshError, DataError where nothing of it is in the run's cube, and ConfigError where
-        a binvox has other cells than the run.
+        Raises MeshError, DataError if the mesh is outside of the run's cube, and ConfigError if a
+        binvox has another resolution or size than the run.
         """
         size = object_size or _object_size(run)
         if self.path.suffix.lower() == '.binvox':
@@ -64,32 +64,32 @@ class TruthFile:
         inside = _share_inside(mesh)
         if inside == 0:
             raise DataError(
-                f"{self.path}: nothing of it is in the run's cube of {size:g} m about the "
-                f'origin: it reaches from {low} to {high} m. A mesh is taken in metres '
-                'and where it stands; --fit centres and scales it, --object-size tells the cube')
+                f"{self.path}: outside of the run's cube of {size:g} m about the origin: it "
+                f"reaches from {low} to {high} m. Meshes are in metres and in the object's "
+                'frame; --fit centres and scales one, --object-size sets the cube')
         outside = f' {100 * (1 - inside):.0f} % of its surface is outside of the cube.'
         return Truth(_in_place(mesh, _resolution(run)),
-                     f'The true shape is {file.name}, in metres and where it stands in the '
+                     f'The true shape is {file.name}, in metres and in the '
                      f"object's frame.{outside if inside < 1 else ''}")
 
     def _of_binvox(self, run: RecordedRun, size: float) -> Truth:
         grid, resolution = read_binvox(self.path), _resolution(run)
         side = grid.occupancy.shape[0]
         if side != resolution:
-            raise ConfigError(f'{self.path}: {side} cells a side, where {run.path.name} has '
-                              f'{resolution}')
+            raise ConfigError(f'{self.path}: wrong resolution: expected {resolution} cells a side '
+                              f'as in {run.path.name}, got {side}')
         if self.fit:
             return Truth(_turned(grid, run), f'The true shape is {self.path.name}, its cells '
                                              "taken as the cube's.")
         if abs(grid.size / size - 1) > _SAME_SIDE:
-            raise ConfigError(f"{self.path}: a cube of {grid.size:g} m, where the run's has "
-                              f"{size:g} m: --fit takes its cells as the cube's, --object-size "
-                              'tells the cube')
+            raise ConfigError(f'{self.path}: wrong size: expected a cube of {size:g} m as in the '
+                              f"run, got {grid.size:g} m; --fit uses its cells as the cube's, "
+                              '--object-size sets the cube')
         return Truth(grid.occupied(0.5), f'The true shape is {self.path.name}, cell by cell.')
 
 
 def known_truth(run: RecordedRun) -> Truth | None:
-    """Return the true cells where the camera says that it showed an object that ships."""
+    """Return the true cells if the simulated camera showed a shipped object, else None."""
     camera = node_parameters(run, 'turntable_camera')
     mesh = Path(str(camera.get('mesh', '')))
     ships = mesh.stem in shipped_objects() and (
@@ -109,7 +109,7 @@ def _turned(grid: VoxelGrid, run: RecordedRun) -> NDArray[np.bool_]:
 
 
 def _share_inside(mesh: trimesh.Trimesh) -> float:
-    """Return the share of a mesh's surface that is in the unit cube about the origin."""
+    """Return the fraction of a mesh's surface in the unit cube about the origin."""
     if np.abs(mesh.bounds).max() <= 0.5:
         return 1.0
     points, _ = trimesh.sample.sample_surface(mesh, _SAMPLES, seed=0)
@@ -117,7 +117,7 @@ def _share_inside(mesh: trimesh.Trimesh) -> float:
 
 
 def _in_place(mesh: trimesh.Trimesh, resolution: int) -> NDArray[np.bool_]:
-    """Return the cells of a mesh in the unit cube; what sticks out of it is closed outside."""
+    """Return the cells of a mesh in the unit cube; parts outside of it close the mesh there."""
     third = mesh.copy()
     third.apply_transform(np.diag([1 / 3, 1 / 3, 1 / 3, 1]))
     middle = (slice(resolution, 2 * resolution),) * 3

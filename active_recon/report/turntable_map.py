@@ -1,8 +1,8 @@
 """
-The turntable from above: images around it, the object in it, goals and what the planner thought.
+The turntable from above: the object, the images around it, the goals and their scores.
 
-Lengths are of the map: the ring of cameras has the radius 1. The object's front, +x, points down.
-A trace with a `meta` of `{'of': k}` belongs to view k, from 0, and shows while that is chosen.
+The unit of length is the radius of the ring of cameras. The object's front, +x, points down. A
+trace with a `meta` of `{'of': k}` belongs to view k, from 0, and is shown while k is selected.
 """
 
 from collections.abc import Sequence
@@ -19,11 +19,17 @@ from numpy.typing import NDArray
 
 _OBJECT = 1.1  # side of the object's cube
 _GOALS = 1.12
-_PETAL = (1.22, 1.56)  # from the worst score to the best
+_SCORES = (1.22, 1.56)  # from the worst score to the best
+_SHORTEST = 0.03  # the bar of the worst score
 _THUMBNAILS = 1.95
 _THUMBNAIL = 0.62
 _REACH = _THUMBNAILS + _THUMBNAIL / 2 + 0.04
 _TOGETHER = math.radians(8)
+# A ring around the map's centre in its scale; the hole leaves the pointer to what is inside
+_SCORE_RING = {
+    'bgcolor': 'rgba(0,0,0,0)', 'hole': _SCORES[0] / _REACH,
+    'radialaxis': {'range': [_SCORES[0], _REACH], 'visible': False},
+    'angularaxis': {'rotation': -90, 'direction': 'counterclockwise', 'visible': False}}
 
 
 def turntable_map(subject: Subject) -> Figure:
@@ -44,7 +50,8 @@ def turntable_map(subject: Subject) -> Figure:
     return {
         'data': data,
         'layout': {
-            'showlegend': False, 'margin': {'l': 0, 'r': 0, 't': 0, 'b': 0},
+            'showlegend': False, 'margin': {'l': 0, 'r': 0, 't': 0, 'b': 0}, 'dragmode': False,
+            'polar': _SCORE_RING,
             'xaxis': axis, 'yaxis': {**axis, 'scaleanchor': 'x'},
             'images': [_thumbnail(view.image, at, side)
                        for view, at in zip(subject.views, spread, strict=True)],
@@ -96,7 +103,7 @@ def _from_above(view: RecordedView, threshold: float) -> list[dict[str, Any]]:
 
 
 def _decision(goal: RecordedGoal | None) -> list[dict[str, Any]]:
-    """Return the goal amid a petal for each candidate azimuth, the longer the better its score."""
+    """Return the goal, and a bar for each candidate azimuth that is longer for a better score."""
     if goal is None:
         return []
     chosen = _goal(goal.camera.azimuth, 15, '--goal')
@@ -107,29 +114,15 @@ def _decision(goal: RecordedGoal | None) -> list[dict[str, Any]]:
     if not len(scores):
         return [chosen]
     shares = (scores - scores.min()) / (np.ptp(scores) or 1.0)
-    x: list[float | None] = []
-    y: list[float | None] = []
-    tips, words = [], []
     gaps = np.diff(np.unique(azimuths), append=azimuths.min() + TURN)
-    half = 0.4 * min(TURN / VIEW_COUNT, gaps.min())
-    for azimuth, score, share in zip(azimuths.tolist(), scores.tolist(), shares.tolist(),
-                                     strict=True):
-        inner, outer = _PETAL[0], _PETAL[0] + 0.03 + share * (_PETAL[1] - _PETAL[0])
-        corners = [place(azimuth + turn, radius) for turn, radius in (
-            (-half, inner), (-half, outer), (0, outer), (half, outer), (half, inner),
-            (-half, inner))]
-        x += [*(corner[0] for corner in corners), None]
-        y += [*(corner[1] for corner in corners), None]
-        tips.append(place(azimuth, (inner + outer) / 2))
-        words.append(f'{degrees(azimuth)}°: score {score:.4g}')
-    return [
-        {'type': 'scatter', 'mode': 'lines', 'x': x, 'y': y, 'fill': 'toself',
-         'fillcolor': '--score', 'line': {'width': 0}, 'hoverinfo': 'skip'},
-        {'type': 'scatter', 'mode': 'markers', 'x': [tip[0] for tip in tips],
-         'y': [tip[1] for tip in tips], 'marker': {'size': 14, 'opacity': 0},
-         'text': words, 'hovertemplate': '%{text}<extra></extra>'},
-        chosen,
-    ]
+    return [{
+        'type': 'barpolar', 'theta': np.degrees(azimuths).tolist(), 'base': _SCORES[0],
+        'r': (_SHORTEST + shares * (_SCORES[1] - _SCORES[0])).tolist(),
+        'width': math.degrees(0.8 * min(TURN / VIEW_COUNT, gaps.min())),
+        'marker': {'color': '--score', 'line': {'width': 0}},
+        'text': [f'{degrees(azimuth)}°: score {score:.4g}' for azimuth, score in
+                 zip(azimuths.tolist(), scores.tolist(), strict=True)],
+        'hovertemplate': '%{text}<extra></extra>'}, chosen]
 
 
 def _path(azimuths: Sequence[float]) -> list[dict[str, Any]]:

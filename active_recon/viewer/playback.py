@@ -32,8 +32,8 @@ def _episode_states(episode: RecordedEpisode) -> Iterator[LoopState]:
             view.occupied)
         end = view.stamp
         if view.goal is not None:
-            _set_goal(observer, view.goal.followed)
-            end = view.goal.followed.stamp + 1
+            _set_goal(observer, view.goal.final)
+            end = view.goal.final.stamp + 1
         if view is episode.views[-1]:
             observer.set_done(end, episode.done)
         yield observer.state

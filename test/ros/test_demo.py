@@ -12,8 +12,8 @@ import time
 from active_recon import __version__
 from active_recon.bags.replay.comparison import SAME_BITS
 from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.reading import read_run
-from active_recon.bags.runs.settings import recorded_settings
 from active_recon.bags.storage.opening import open_bag
 from active_recon.objects import find_object
 from active_recon.runtimes import load_runtime
@@ -173,7 +173,7 @@ def test_the_whole_loop_is_in_the_bag(messages):
 def test_the_bag_replays_to_the_same_bits_on_the_machine_that_made_it(finished):
     folder, _, _ = finished
     run = read_run(folder)
-    settings = recorded_settings(run)
+    settings = recorded_setup(run)
     verified = verify(run, settings.load_reconstructor(), settings.load_planner())
     assert verified.knows_policy
     assert {found.verdict for found in verified.comparison.deviations.values()} == {SAME_BITS}

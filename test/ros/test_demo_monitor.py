@@ -3,10 +3,11 @@
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.launching.demo_monitor import DemoMonitor
 from active_recon.volumes.voxels import VoxelGrid
-from conftest import BUDGET_S, LATCHED_QOS
 from msg_tools.loop import view_to_msgs
 import numpy as np
 import pytest
+
+from .conftest import BUDGET_S, LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 

@@ -3,8 +3,8 @@
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.bags.replay.comparison import SAME_BITS, WITHIN_TOLERANCE
 from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.reading import read_run
-from active_recon.bags.runs.settings import recorded_settings
 import pytest
 from std_msgs.msg import Header
 
@@ -42,7 +42,7 @@ def test_a_loop_keeps_to_its_limits_and_its_bag_replays_under_them(
     assert len(goals) == 4
     limits = MotionLimits(**LIMITS)
     assert all(limits.allows(goal.camera.azimuth) for goal in goals)
-    settings = recorded_settings(run)
+    settings = recorded_setup(run)
     assert settings.planner.items() >= {**LIMITS, 'motion_weight': 0.5}.items()
     found = verify(run, settings.load_reconstructor(), settings.load_planner())
     assert found.comparison.verdict in (SAME_BITS, WITHIN_TOLERANCE)

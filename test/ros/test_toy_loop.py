@@ -4,9 +4,9 @@ from pathlib import Path
 import signal
 
 from active_recon.bags.replay.verification import verify
-from active_recon.bags.replay.what_if import Others, run_under
+from active_recon.bags.replay.what_if import run_with_overrides
+from active_recon.bags.runs.loop_setup import Overrides, recorded_setup
 from active_recon.bags.runs.reading import read_run
-from active_recon.bags.runs.settings import recorded_settings
 from active_recon.models.registry import NETWORKS
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.policies import POLICIES
@@ -57,11 +57,11 @@ def test_toys_run_the_loop_and_their_bag_replays_to_the_same_bits(
     assert len(episode.views) == VIEWS
     first, second = (view.camera.direction for view in episode.views[:2])
     assert first[:2] @ second[:2] < 0  # on the other side
-    settings = recorded_settings(run)
+    settings = recorded_setup(run)
     found = verify(run, settings.load_reconstructor(), settings.load_planner())
     assert found.comparison.verdict == 'same bits'
     assert found.comparison.deviations['goal'].compared == VIEWS - 1
-    other = run_under(run, settings, Others(policy='opposite', threshold=0.6))
+    other = run_with_overrides(run, settings, Overrides(policy='opposite', threshold=0.6))
     grids = [each.views[-1].occupied.occupancy > 0
              for each in (run.episodes[-1], other.episodes[-1])]
     assert 0 < np.count_nonzero(grids[1]) < np.count_nonzero(grids[0])

@@ -1,1 +1,1 @@
-"""Runs computed anew, and compared with what was recorded."""
+"""Replaying runs and comparing them with the recording."""

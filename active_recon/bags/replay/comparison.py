@@ -1,9 +1,9 @@
-"""What a replay computed beside what was recorded: the same bits, or how far apart."""
+"""Comparison of a replay with the recording: the same bits, or the largest deviation."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from active_recon.bags.replay.replay import ReplayedEpisode, ReplayedView
+from active_recon.bags.replay.replay import ReplayedEpisode, ReplayStep
 from active_recon.bags.runs.run import RecordedGoal
 from active_recon.geometry.cameras import Camera, view_distance
 from active_recon.planner import Goal
@@ -20,9 +20,9 @@ TOLERANCES: Mapping[str, float] = {
     'scores': 1e-3,
     'stop': 0.0,
 }
-"""How far another machine's replay may be off: probabilities and latents as they are, entropy as a
-share, goals in radians between the views, scores in the policy's units, and whether the episode
-ended not at all."""
+"""The accepted deviations on another machine: absolute for probabilities and latents, relative for
+entropy, radians between the views for goals, in the policy's units for scores; none for the end of
+an episode."""
 
 SAME_BITS, WITHIN_TOLERANCE, DIFFERENT, NOTHING_RECORDED = (
     'same bits', 'within tolerance', 'different', 'nothing recorded')
@@ -30,7 +30,7 @@ SAME_BITS, WITHIN_TOLERANCE, DIFFERENT, NOTHING_RECORDED = (
 
 @dataclass
 class Deviation:
-    """Of one quantity: how many were compared, how many had the same bits, the largest gap."""
+    """Of one quantity: the numbers of values compared and with the same bits, and the largest."""
 
     tolerance: float
     compared: int = 0
@@ -39,7 +39,7 @@ class Deviation:
 
     @property
     def verdict(self) -> str:
-        """One of the four words above."""
+        """One of the four verdicts above."""
         if not self.compared:
             return NOTHING_RECORDED
         if self.same == self.compared:
@@ -56,7 +56,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """The worst of the quantities; what was not recorded does not count."""
+        """The worst verdict of the recorded quantities."""
         verdicts = {deviation.verdict for deviation in self.deviations.values()}
         return next((word for word in (DIFFERENT, WITHIN_TOLERANCE, SAME_BITS)
                      if word in verdicts), NOTHING_RECORDED)
@@ -64,49 +64,49 @@ class Comparison:
 
 def compare(episodes: Sequence[ReplayedEpisode], threshold: float) -> Comparison:
     """
-    Compare all that was recorded of each view with what the replay made of it.
+    Compare all that was recorded of each view with its replay.
 
-    `threshold` is that above which the replay calls a cell occupied. An episode that had begun
-    before the recording is left out: the network had seen more of it than the bag has.
+    `threshold` is the replay's threshold of occupied cells. An episode that began before the
+    recording is left out: the network had seen more views than the bag has.
     """
     comparison = Comparison()
     for episode in episodes:
         if episode.recorded.begun_before:
             continue
-        for view in episode.views:
-            done = episode.recorded.done_after(view.recorded)
-            for name, same, apart in _deviations(view, done, threshold):
+        for step in episode.steps:
+            done = episode.recorded.done_after(step.recorded)
+            for name, same, apart in _deviations(step, done, threshold):
                 deviation = comparison.deviations[name]
                 deviation.compared += 1
                 deviation.same += same
-                # A NaN is as far off as can be
+                # NaN counts as infinite
                 deviation.largest = max(deviation.largest, apart if apart == apart else np.inf)
     return comparison
 
 
-def _deviations(view: ReplayedView, done: str,
+def _deviations(step: ReplayStep, done: str,
                 threshold: float) -> Iterator[tuple[str, bool, float]]:
-    """Yield the name of each recorded quantity, whether its bits are the same, and the gap."""
-    recorded, grid = view.recorded, view.reconstruction.grid
+    """Yield each recorded quantity, whether its bits are the same, and the deviation."""
+    recorded, grid = step.recorded, step.reconstruction.grid
     if recorded.reconstruction is not None:
         yield 'probabilities', *_cells(recorded.reconstruction, grid, PUBLISHED_FLOOR)
     if recorded.occupied is not None:
         yield 'occupancy', *_cells(recorded.occupied, grid, threshold)
     if recorded.latent is not None:
-        latent = view.reconstruction.latent
+        latent = step.reconstruction.latent
         yield ('latent', np.array_equal(recorded.latent, latent),
                _largest(recorded.latent, latent))
     if recorded.entropy is not None:
         entropy = grid.entropy()
         yield ('entropy', recorded.entropy == entropy,
                abs(recorded.entropy - entropy) / max(abs(recorded.entropy), 1e-9))
-    if view.decision is None:
+    if step.decision is None:
         return
-    if done != 'stopped' and (recorded.goal is not None or done):  # a service says no more when
-        stopped_alike = view.decision.reason == done
+    if done != 'stopped' and (recorded.goal is not None or done):  # a service call has no time
+        stopped_alike = step.decision.reason == done
         yield 'stop', stopped_alike, 0.0 if stopped_alike else np.inf
-    if recorded.goal is not None and view.decision.goal is not None:
-        yield from _goal(recorded.goal, view.decision.goal)
+    if recorded.goal is not None and step.decision.goal is not None:
+        yield from _goal(recorded.goal, step.decision.goal)
 
 
 def _goal(recorded: RecordedGoal, goal: Goal) -> Iterator[tuple[str, bool, float]]:
@@ -118,7 +118,7 @@ def _goal(recorded: RecordedGoal, goal: Goal) -> Iterator[tuple[str, bool, float
 
 
 def _is_pose_of(recorded: Camera, camera: Camera) -> bool:
-    """Return whether a pose is that of the camera, or what its message makes of it, bit by bit."""
+    """Return whether a pose has the bits of the camera's pose, before or after its message."""
     return any(np.array_equal(recorded.pose, pose)
                for pose in (camera.pose, pose_through_msg(camera.pose)))
 
@@ -127,13 +127,13 @@ def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, fl
     """
     Compare a recorded cloud of the cells above a threshold with the whole grid.
 
-    A cell that is missing in the cloud was at most at the threshold.
+    A cell that is not in the cloud was at most at the threshold.
     """
     recorded = recorded.as_fine_as(grid)
     if recorded.occupancy.shape != grid.occupancy.shape:
         return False, np.inf
-    told = recorded.occupancy > 0
-    apart = np.where(told, np.abs(recorded.occupancy - grid.occupancy),
+    published = recorded.occupancy > 0
+    apart = np.where(published, np.abs(recorded.occupancy - grid.occupancy),
                      np.maximum(grid.occupancy - np.float32(above), 0))
     return np.array_equal(recorded.occupancy, grid.above(above).occupancy), float(apart.max())
 

@@ -1,10 +1,10 @@
-"""Replay: the recorded views through the core again, with no ROS and no clock."""
+"""Replay: recorded views through the core again, without ROS and without a clock."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import hashlib
 
-from active_recon.bags.runs.recorded_object import seen_again
+from active_recon.bags.runs.recorded_object import replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun, RecordedView
 from active_recon.geometry.cameras import Camera
 from active_recon.planner import Decision, Goal, Planner
@@ -14,8 +14,8 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class ReplayedView:
-    """A view folded in again; the decision after it is None where no planner was asked."""
+class ReplayStep:
+    """One view reconstructed again; the decision after it is None without a planner."""
 
     recorded: RecordedView
     reconstruction: Reconstruction
@@ -24,20 +24,20 @@ class ReplayedView:
 
 @dataclass(frozen=True, eq=False)
 class ReplayedEpisode:
-    """An episode's views again; the first goal follows from where the camera stood."""
+    """An episode replayed; the first goal follows from the first camera pose."""
 
     recorded: RecordedEpisode
     first_goal: Goal | None
-    views: Sequence[ReplayedView]
+    steps: Sequence[ReplayStep]
 
 
 def replay(run: RecordedRun, reconstructor: Reconstructor, planner: Planner | None = None,
            advance: Callable[[], None] = lambda: None) -> list[ReplayedEpisode]:
     """
-    Fold all views in again, in the order of their stamps, and decide after each.
+    Reconstruct with all views again, in the order of their stamps, and decide after each.
 
-    The planner goes from episode to episode as the node's did, so that a seed draws the same.
-    `advance` is called after each view. Raises ViewError on a view that is none.
+    The planner continues from episode to episode as the node's did, so that a seed draws the
+    same. `advance` is called after each view. Raises ViewError on an invalid view.
     """
     return [_replay_episode(episode, reconstructor, planner, advance)
             for episode in sorted(run.episodes, key=lambda episode: episode.begin)]
@@ -51,35 +51,35 @@ def _replay_episode(episode: RecordedEpisode, reconstructor: Reconstructor,
         if episode.first_goal is not None:
             first_goal = planner.first_goal(episode.first_goal.camera)
             _give_up(planner, episode.given_up(None))
-    views = []
-    for step in seen_again(episode.views, reconstructor):
+    steps = []
+    for step in replay_views(episode.views, reconstructor):
         decision = None
         if planner is not None:
             decision = decide(planner, step.known, step.view.camera)
             _give_up(planner, episode.given_up(step.view))
-        views.append(ReplayedView(step.view, step.known, decision))
+        steps.append(ReplayStep(step.view, step.known, decision))
         advance()
-    return ReplayedEpisode(episode, first_goal, views)
+    return ReplayedEpisode(episode, first_goal, steps)
 
 
 def _give_up(planner: Planner, goals: Sequence[Camera]) -> None:
-    """Leave out what the run left out: no clock tells again when a goal took too long."""
+    """Give up the goals that the run gave up: a replay has no clock for their timeouts."""
     for goal in goals:
         planner.give_up(goal)
 
 
 def decide(planner: Planner, reconstruction: Reconstruction, camera: Camera) -> Decision:
-    """Return what the planner decides of what its node hears."""
+    """Return the planner's decision from what its node receives."""
     grid = reconstruction.grid
     return planner.add_view(reconstruction.latent, camera, grid.entropy(),
                             grid.above(PUBLISHED_FLOOR) if planner.wants_volume else None)
 
 
 def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:
-    """Return the SHA-256 of every bit that a replay has computed."""
+    """Return the SHA-256 of all that a replay computed."""
     digest = hashlib.sha256()
-    for view in (view for episode in episodes for view in episode.views):
-        reconstruction, decision = view.reconstruction, view.decision
+    for step in (step for episode in episodes for step in episode.steps):
+        reconstruction, decision = step.reconstruction, step.decision
         digest.update(reconstruction.grid.occupancy.tobytes())
         digest.update(reconstruction.latent.tobytes())
         of_all_cells = float(entropy(reconstruction.grid.occupancy.astype(np.float64)))

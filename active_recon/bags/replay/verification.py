@@ -1,4 +1,4 @@
-"""Whether a run replays to what was recorded."""
+"""Verification that a run replays to what was recorded."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from active_recon.reconstructor import Reconstructor
 @dataclass(frozen=True)
 class Verification:
     """
-    What came of a replay: its episodes, the comparison, the hash of every bit computed.
+    The result of a replay: its episodes, the comparison and the hash of all that was computed.
 
-    `knows_policy`: whether the bag tells which policy chose, so that it was asked again.
+    `knows_policy`: whether the bag names the policy, so that its decisions were replayed.
     """
 
     episodes: Sequence[ReplayedEpisode]
@@ -25,16 +25,16 @@ class Verification:
 
     @property
     def view_count(self) -> int:
-        """Of all episodes."""
-        return sum(len(episode.views) for episode in self.episodes)
+        """The number of views in all episodes."""
+        return sum(len(episode.steps) for episode in self.episodes)
 
 
 def verify(run: RecordedRun, reconstructor: Reconstructor, planner: Planner | None,
            advance: Callable[[], None] = lambda: None) -> Verification:
     """
-    Replay a run with what it was made with, and compare; `advance` is called after each view.
+    Replay a run and compare it with the recording; `advance` is called after each view.
 
-    Raises ViewError on a view that is none.
+    Raises ViewError on an invalid view.
     """
     episodes = replay(run, reconstructor, planner, advance)
     return Verification(episodes, compare(episodes, reconstructor.threshold),

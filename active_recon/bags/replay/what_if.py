@@ -1,17 +1,17 @@
-"""A recorded run under another model, another threshold or another policy."""
+"""A recorded run as it would have been with another model, threshold or policy."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
 from pathlib import Path
 
 from active_recon import __version__
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.bags.replay.replay import decide
+from active_recon.bags.runs.loop_setup import LoopSetup, Overrides
 from active_recon.bags.runs.parameters import node_parameters
-from active_recon.bags.runs.recorded_object import RecordedObject, seen_again
+from active_recon.bags.runs.recorded_object import RecordedObject, replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
-from active_recon.bags.runs.settings import Settings
 from active_recon.environment import run_episode, TimeStep
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera, nearest_camera, view_distance
@@ -20,62 +20,46 @@ from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
 import numpy as np
 
-_BETWEEN_VIEWS = 1_000_000_000  # nanoseconds: views in another order need stamps of their own
+_VIEW_PERIOD_NS = 1_000_000_000  # views in a new order get stamps of their own
 
 
-@dataclass(frozen=True)
-class Others:
-    """What a run is to be replayed under; None: as it was."""
-
-    weights: Path | None = None
-    policy: str | None = None
-    threshold: float | None = None
-
-    @property
-    def name(self) -> str:
-        """What is other, in a word for the name of a bag."""
-        return '_'.join(word for word in (
-            self.weights and self.weights.stem, self.policy,
-            self.threshold and f'threshold-{self.threshold:g}') if word)
-
-
-def beside(path: Path, others: Others) -> Path:
-    """Return where a bag's replay under others goes: beside it, with what is other in its name."""
+def default_folder(path: Path, overrides: Overrides) -> Path:
+    """Return the folder for the new bag: next to the old one, with the overrides in its name."""
     place = path.resolve()
     name = place.name if place.is_dir() else place.stem
-    return place.with_name(f'{name}_{others.name}')
+    return place.with_name(f'{name}_{overrides.name}')
 
 
-def run_under(run: RecordedRun, recorded: Settings, others: Others,
-              advance: Callable[[], None] = lambda: None) -> RecordedRun:
+def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrides,
+                       advance: Callable[[], None] = lambda: None) -> RecordedRun:
     """
-    Return the run as it would have been under others, for a bag of its own.
+    Return the run as it would have been with the overrides, to be written as a bag.
 
-    Another policy chooses among the recorded views, and they get new stamps. Otherwise views and
-    goals stay what they were; with another model the run then tells no longer which policy chose
-    them. Raises DataError where the policy wants a view that was never taken, and WeightsError or
-    ConfigError where the others cannot be had.
+    Another policy chooses among the recorded views, which get new stamps. Otherwise views and
+    goals stay as recorded; with another model the run no longer states the policy that chose
+    them. Raises DataError if the policy asks for a view that was never taken, WeightsError or
+    ConfigError if an override is invalid.
     """
-    settings = recorded.under(others.weights, others.policy, others.threshold)
-    reconstructor = settings.load_reconstructor()
+    setup = recorded.with_overrides(overrides)
+    reconstructor = setup.load_reconstructor()
     before = sorted(run.episodes, key=lambda episode: episode.begin)
-    if others.policy is None:
-        episodes = [reconstructed(episode, reconstructor, advance) for episode in before]
+    if overrides.policy is None:
+        episodes = [reconstruct_episode(episode, reconstructor, advance) for episode in before]
     else:
-        planner = settings.load_planner()
+        planner = setup.load_planner()
         assert planner is not None
         tolerance = node_parameters(run, 'reconstructor').get('goal_tolerance', GOAL_TOLERANCE)
-        episodes = [explored(episode, reconstructor, planner, tolerance, advance)
+        episodes = [replan_episode(episode, reconstructor, planner, tolerance, advance)
                     for episode in before]
     made_by = dict(reconstructor.provenance)
     provenance = {**run.provenance, **made_by, 'version': __version__,
                   'replay_of': run.path.resolve().name}
     parameters = {'/reconstructor': {
         **node_parameters(run, 'reconstructor'), **made_by, 'threshold': math.nan,
-        'weights': str(settings.weights), **settings.reconstructor}}
-    if settings.planner is not None and (others.policy or not others.weights):
-        planning = {**node_parameters(run, 'view_planner'), **settings.planner,
-                    'weights': str(settings.planner['weights'])}
+        'weights': str(setup.weights), **setup.reconstructor}}
+    if setup.planner is not None and (overrides.policy or not overrides.weights):
+        planning = {**node_parameters(run, 'view_planner'), **setup.planner,
+                    'weights': str(setup.planner['weights'])}
         parameters['/view_planner'] = planning
         provenance['policy'] = planning['policy']
     times = [time for episode in episodes for view in episode.views
@@ -84,28 +68,28 @@ def run_under(run: RecordedRun, recorded: Settings, others: Others,
                    begin=min(times, default=run.begin), end=max(times, default=run.end))
 
 
-def reconstructed(episode: RecordedEpisode, reconstructor: Reconstructor,
-                  advance: Callable[[], None] = lambda: None) -> RecordedEpisode:
+def reconstruct_episode(episode: RecordedEpisode, reconstructor: Reconstructor,
+                        advance: Callable[[], None] = lambda: None) -> RecordedEpisode:
     """Return the episode with the same views and goals, reconstructed by another model."""
     views = []
-    for step in seen_again(episode.views, reconstructor):
-        views.append(_known(step.view, step.known, reconstructor.threshold))
+    for step in replay_views(episode.views, reconstructor):
+        views.append(_reconstructed(step.view, step.known, reconstructor.threshold))
         advance()
     return replace(episode, views=views)
 
 
-def explored(episode: RecordedEpisode, reconstructor: Reconstructor, planner: Planner,
-             goal_tolerance: float, advance: Callable[[], None] = lambda: None) -> RecordedEpisode:
+def replan_episode(episode: RecordedEpisode, reconstructor: Reconstructor, planner: Planner,
+                   goal_tolerance: float, advance: Callable[[], None] = lambda: None
+                   ) -> RecordedEpisode:
     """
-    Return the episode as it would have been had the planner chosen among the recorded views.
+    Return the episode as if the planner had chosen among its recorded views.
 
-    The first view is the one that the run began with. A goal is reached by the nearest view
-    within `goal_tolerance`, radians. The views get stamps of their own, a second apart. Raises
-    DataError that names the azimuth where no view was taken near a goal.
+    It starts with the first recorded view. A goal is reached by the nearest view within
+    `goal_tolerance`, radians. The views get new stamps, a second apart. Raises DataError with the
+    azimuth of a goal near which no view was taken.
     """
     if not episode.views:
-        raise DataError('no view in the episode, and so none to choose from',
-                        'no_views')
+        raise DataError('no views in the episode to choose from', 'no_views')
     planner.reset()
     began = (min(episode.views, key=lambda view: view.stamp).camera
              if episode.first_goal is None else episode.first_goal.camera)
@@ -120,11 +104,11 @@ def explored(episode: RecordedEpisode, reconstructor: Reconstructor, planner: Pl
     views = []
     for step in run_episode(RecordedObject(reconstructor),
                             _nearest(episode.views, first.camera, goal_tolerance, 0), follow):
-        stamp = episode.begin + step.number * _BETWEEN_VIEWS
+        stamp = episode.begin + step.number * _VIEW_PERIOD_NS
         decision = decide(planner, step.known, step.view.camera)
-        known = _known(step.view, step.known, reconstructor.threshold)
+        view = _reconstructed(step.view, step.known, reconstructor.threshold)
         views.append(replace(
-            known, stamp=stamp, received={}, done=decision.reason,
+            view, stamp=stamp, received={}, done=decision.reason,
             # A nanosecond later: the goal comes after the view that led to it
             goal=None if decision.goal is None else RecordedGoal.of(decision.goal, stamp + 1)))
         advance()
@@ -138,17 +122,17 @@ def _nearest(views: Sequence[RecordedView], goal: Camera, tolerance: float,
     away = view_distance(view.camera, goal)
     if away > tolerance:
         raise DataError(
-            f'after view {taken} the policy asks for a view from an azimuth of '
-            f'{np.degrees(goal.azimuth):.1f} degrees and an elevation of '
-            f'{np.degrees(goal.elevation):.1f}; expected one within '
-            f'{np.degrees(tolerance):.1f} degrees of it among the {len(views)} recorded, the '
-            f'nearest is {np.degrees(away):.1f} off. A view that was never taken is not '
-            'made up: record all azimuths by `active-recon record-sweep`', 'missing_view')
+            f'no recorded view at the goal after view {taken}, azimuth '
+            f'{np.degrees(goal.azimuth):.1f} degrees, elevation {np.degrees(goal.elevation):.1f}: '
+            f'expected one within {np.degrees(tolerance):.1f} degrees among {len(views)}, the '
+            f'nearest is {np.degrees(away):.1f} off. Record all azimuths by '
+            '`active-recon record-sweep`', 'missing_view')
     return view
 
 
-def _known(view: RecordedView, reconstruction: Reconstruction, threshold: float) -> RecordedView:
-    """Return the view with what the reconstructor would have published of it."""
+def _reconstructed(view: RecordedView, reconstruction: Reconstruction,
+                   threshold: float) -> RecordedView:
+    """Return the view with what the reconstructor would have published after it."""
     grid = reconstruction.grid
     return replace(
         view, reconstruction=grid.above(PUBLISHED_FLOOR), occupied=grid.above(threshold),

@@ -1,1 +1,1 @@
-"""Bags as runs: the views of an episode, its parameters, its goals."""
+"""Bags as runs: episodes with their views and goals, and the parameters of the nodes."""

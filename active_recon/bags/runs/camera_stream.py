@@ -1,4 +1,4 @@
-"""The camera of a bag as the reconstructor's node would have seen it: images joined to poses."""
+"""The camera in a bag: images joined with poses as in the reconstructor's node."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
@@ -8,13 +8,13 @@ from typing import Any
 
 from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import CameraTopics, IMAGE_ROLE, INFO_ROLE, POSE_ROLE, Topics
+from active_recon.bags.storage.bag import Bag
 from active_recon.bags.storage.message_types import (
     FLOAT,
     JOINT_STATE,
     POSE,
     read_message,
 )
-from active_recon.bags.storage.raw import Bag
 from active_recon.errors import DataError, MessageError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics
 from active_recon.reporting import Advance, Reporting, silent
@@ -22,25 +22,24 @@ from msg_tools.camera_images import size_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
 from msg_tools.goals import joint_position_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.views import UnreadView, ViewJoiner
+from msg_tools.views import View, ViewJoiner
 import numpy as np
 from numpy.typing import NDArray
 
 
 class CameraStream:
     """
-    Reads the camera's topics of a bag.
+    Reads the camera topics of a bag.
 
-    Poses are interpolated and refused as in the node. Where a bag has azimuths alone and the
-    scene tells no position, or where it has no camera info of a calibrated camera, the camera
-    stands at that azimuth as the scene says, and the shorter side of its image is what the
-    canonical camera sees. Azimuths without stamps are joined to the images on their receive
-    times. Raises ConfigError where the scene tells what the bag does.
+    Poses are interpolated and rejected as in the node. If the bag has azimuths only and the scene
+    no camera position, or if it has no camera info of a calibrated camera, the camera is assumed
+    at that azimuth on the scene's orbit, with a lens whose shorter side matches the canonical
+    camera. Azimuths without stamps are joined with the images on their receive times. Raises
+    ConfigError if the scene repeats what the bag has.
 
-    `assumed` tells in words what neither bag nor scene does, once the views were read.
-
-    `received` tells when what bears a stamp was received, by the topic's name in the loop,
-    nanoseconds; `images` are the stamp and the receive time of each image read, wanted or not.
+    - assumed: in words, what neither the bag nor the scene states; complete once `views` ended
+    - received: receive times by topic name in the loop and by stamp, nanoseconds
+    - images: stamp and receive time of each image read, wanted or not, nanoseconds
     """
 
     def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics, scene: Scene,
@@ -58,24 +57,24 @@ class CameraStream:
         self.received: dict[str, dict[int, int]] = {
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
-    def views(self, wanted: Callable[[int], bool]) -> Iterator[UnreadView | MessageError]:
+    def views(self, wanted: Callable[[int], bool]) -> Iterator[View | MessageError]:
         """
-        Yield the images whose stamps are wanted, with their cameras, or why they are refused.
+        Yield the images with wanted stamps and their cameras, or the errors that reject them.
 
-        Raises DataError where the images' times run backwards.
+        Raises DataError if the stamps of the images decrease.
         """
         yield from self._read_cameras()
         with self._reporting('reading the images', self._camera.image.count) as advance:
             yield from self._joined(wanted, advance)
 
     def begins_after(self, stamp: int) -> bool:
-        """Return whether an image of that stamp, or what tells of its camera, came too early."""
+        """Return whether an image of that stamp, or its camera, is from before the recording."""
         firsts = [entries[0][0] for entries in (self._poses, self._lenses)
                   if entries and not self._unstamped]
         return stamp < max(min(self.images)[0] if self.images else math.inf, *firsts)
 
     def _joined(self, wanted: Callable[[int], bool], advance: Advance
-                ) -> Iterator[UnreadView | MessageError]:
+                ) -> Iterator[View | MessageError]:
         joiner = ViewJoiner(self._topics.max_pose_gap)
         fed = 0
         for message in self._bag.messages({self._camera.image.name}):
@@ -95,15 +94,15 @@ class CameraStream:
                 joiner.add_image(time, msg, now=0)
             except MessageError as error:
                 if error.kind == 'out_of_order':
-                    raise DataError(f'{message.topic}: the times run backwards: {error}',
+                    raise DataError(f'{message.topic}: the stamps decrease: {error}',
                                     error.kind) from error
                 yield error
                 continue
-            for view in joiner.joined(now=math.inf):  # what may come has come
-                yield replace(view, stamp=stamp) if isinstance(view, UnreadView) else view
+            for view in joiner.joined(now=math.inf):  # nothing more is to come
+                yield replace(view, stamp=stamp) if isinstance(view, View) else view
 
     def _read_cameras(self) -> Iterator[MessageError]:
-        """Read the poses and lenses, in the order of their stamps; yield what is refused."""
+        """Read the poses and lenses and sort them by their stamps; yield the errors."""
         info, azimuth = self._camera.camera_info, self._camera.azimuth
         poses = []
         for message in self._bag.messages({azimuth.name, *([info.name] if info else ())}):
@@ -133,26 +132,26 @@ class CameraStream:
         angle = (joint_position_from_msg(msg, self._topics.joint) if kind == JOINT_STATE
                  else float(msg.data))
         if not math.isfinite(angle):
-            raise MessageError(f'expected a finite azimuth, got {angle}', 'azimuth')
+            raise MessageError(f'azimuth not finite: got {angle}', 'azimuth')
         return self._scene.pose_at(angle, self._topics.turned_object)
 
     def _place(self) -> None:
-        """Decide how much is known of where the camera stands, and refuse what is told twice."""
+        """Decide how much of the camera is known; raise ConfigError on redundant options."""
         scene, azimuth = self._scene, self._camera.azimuth
         has_poses, recorded = azimuth.type_name == POSE, bool(self._lenses)
         if not has_poses and scene.camera_position is None:
-            self._lenses.clear()  # at a distance that nobody knows, a lens says nothing
-        scene.require_needed(azimuth.name, has_poses, has_poses and bool(self._lenses))
+            self._lenses.clear()  # at an unknown distance a lens is of no use
+        scene.reject_redundant(azimuth.name, has_poses, has_poses and bool(self._lenses))
         self.assumed = scene.assumed(self._camera.image.name, has_poses, recorded)
 
     def _placed(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the pose itself, or one at its azimuth where no lens is known."""
+        """Return the pose, or one on the orbit at its azimuth if no lens is known."""
         if self._lenses or self._scene.camera_position is not None:
             return pose
         return self._scene.orbit_pose(Camera(pose).azimuth)
 
     def _lens(self, time: int, height: int, width: int) -> Intrinsics:
-        """Return the camera info of that time, or the last before it."""
+        """Return the last camera info at or before a time, else an assumed lens."""
         if self._lenses:
             return self._lenses[max(bisect_right(self._lenses, time, key=_stamp) - 1, 0)][1]
         side = min(height, width)

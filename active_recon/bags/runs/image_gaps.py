@@ -1,4 +1,4 @@
-"""Images that should be in a recording and are not: gaps in the stream, and counts that differ."""
+"""Images missing in a recording: gaps in the stream, and differences of the counts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 FEWEST = 10
-"""Images from which on a camera is known to stream."""
+"""The smallest number of images that shows that a camera streams."""
 _REGULAR_WITHIN = 0.25  # of the period
 _REGULAR_SHARE = 0.8  # of the images
-_SLACK = 3  # images on their way, or between two counts, at either end
+_SLACK = 3  # images in transit, or between two counts, at either end
 
 
 @dataclass(frozen=True)
@@ -18,23 +18,23 @@ class ImageGaps:
     """
     What is missing between the first image of a recording and the last.
 
-    - period_s: how far apart the images usually are; None where the camera does not stream
-    - missing: how many would fit into the gaps; longest_s: the longest gap, 0 where there is none
-    - unheard: images that were recorded and that the loop did not count; None: not known
+    - period_s: the usual time between images, seconds; None if the camera does not stream
+    - missing: the number of images that fit into the gaps; longest_s: the longest gap, seconds
+    - uncounted: images that were recorded but not counted by the loop; None if unknown
     """
 
     period_s: float | None = None
     missing: int = 0
     longest_s: float = 0.0
-    unheard: int | None = None
+    uncounted: int | None = None
 
 
 def gaps_between(stamps: Sequence[int]) -> ImageGaps:
     """
     Return the gaps in images of those stamps, nanoseconds in any order.
 
-    A gap is twice the usual period or more. Where the images come neither as often nor as
-    regularly as a stream's, nothing is said to be missing.
+    A gap is at least twice the usual period. If the images are fewer or less regular than those
+    of a stream, nothing is reported as missing.
     """
     apart: NDArray[np.float64] = np.diff(np.unique(stamps)).astype(np.float64) / 1e9
     if len(apart) + 1 < FEWEST:
@@ -48,19 +48,20 @@ def gaps_between(stamps: Sequence[int]) -> ImageGaps:
     return ImageGaps(period, int((steps[gaps] - 1).sum()), float(apart[gaps].max(initial=0.0)))
 
 
-def unheard_images(received: Sequence[int], counts: Sequence[tuple[int, Mapping[str, int]]]
+def uncounted_images(received: Sequence[int], counts: Sequence[tuple[int, Mapping[str, int]]]
                    ) -> int | None:
     """
-    Return how many recorded images a node did not count.
+    Return the number of recorded images that a node did not count.
 
-    `received` are the images' receive times, `counts` the node's counters with theirs,
-    nanoseconds. They are compared between the first count and the last, so that it does not
-    matter who started first; None where there are not two, or the node began anew.
+    `received` are the receive times of the images, `counts` the node's counters with their
+    receive times, nanoseconds. Only images between the first count and the last are compared, so
+    that the order of start does not matter. None if there are fewer than two counts, or the node
+    was restarted.
     """
     known = [(time, count['images']) for time, count in counts if 'images' in count]
     if len(known) < 2 or any(b < a for (_, a), (_, b) in zip(known, known[1:], strict=False)):
         return None
     (begin, first), (end, last) = known[0], known[-1]
     recorded = sum(begin < time <= end for time in received)
-    unheard = recorded - (last - first)
-    return unheard if unheard > _SLACK else 0
+    uncounted = recorded - (last - first)
+    return uncounted if uncounted > _SLACK else 0

@@ -1,22 +1,22 @@
-"""Which topics of images are a camera's: depth, masks and latents tell themselves by a message."""
+"""Which image topics are a camera's, and which are depth, masks or latents."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from active_recon.bags.runs.run import TopicSummary
+from active_recon.bags.storage.bag import Bag
 from active_recon.bags.storage.message_types import COMPRESSED_IMAGE, read_message
-from active_recon.bags.storage.raw import Bag
 from msg_tools.images import ENCODINGS, MASK_ENCODINGS
 import numpy as np
 
-_MASK_SHADES = 2  # an object and what is none; a photograph has more
+_MASK_SHADES = 2  # object and background; a photograph has more
 
 
-def what_else(bag: Bag, topics: Sequence[TopicSummary]) -> dict[str, str]:
+def non_camera_topics(bag: Bag, topics: Sequence[TopicSummary]) -> dict[str, str]:
     """
-    Return what the topics show that are no camera's, by their names; a camera's are left out.
+    Return the topics that are not a camera's, with what they show in words.
 
-    Each is judged by its first message. Raises DataError where that is damaged.
+    Each topic is judged by its first message. Raises DataError if that is damaged.
     """
     waiting = {topic.name: topic.type_name for topic in topics}
     found: dict[str, str] = {}
@@ -40,8 +40,9 @@ def _in_image(topic: str, msg: Any) -> str:
 
 
 def _in_compressed(topic: str, msg: Any) -> str:
-    packed = str(msg.format)
-    return f'depth ({packed})' if 'compressedDepth' in packed or '16UC1' in packed else ''
+    encoding = str(msg.format)
+    depth = 'compressedDepth' in encoding or '16UC1' in encoding
+    return f'depth ({encoding})' if depth else ''
 
 
 def _is_mask(topic: str, msg: Any) -> bool:

@@ -1,9 +1,10 @@
-"""What the loop published in a bag: views, what they led to, goals, episodes, counters."""
+"""The loop's topics in a bag: views, reconstructions, goals, episodes and counters."""
 
 from collections.abc import Callable
 from typing import Any
 
 from active_recon.bags.runs.run import Candidates
+from active_recon.bags.storage.bag import Bag, RawMessage
 from active_recon.bags.storage.message_types import (
     CLOUD,
     DIAGNOSTICS,
@@ -14,7 +15,6 @@ from active_recon.bags.storage.message_types import (
     POSE,
     read_message,
 )
-from active_recon.bags.storage.raw import Bag, RawMessage
 from active_recon.errors import ActiveReconError, DataError
 from msg_tools.cameras import pose_from_msg
 from msg_tools.diagnostics import diagnostics_from_msg
@@ -36,17 +36,16 @@ _DIAGNOSTICS = '/diagnostics'
 
 class LoopRecord:
     """
-    The loop's topics, their names after a namespace such as '/'; read once, as a whole.
+    The content of the loop's topics in a namespace such as '/'; all is read at once.
 
-    - parts: what was said, by the topic's name in the loop, then by its stamp in nanoseconds
-    - published, received: when it was, the same way; what was published again counts once
-    - counters: the last ones of `/diagnostics`, by node; counted: all of them, with the times at
-      which they were received
+    - parts: the converted messages by topic name in the loop, then by stamp in nanoseconds
+    - published, received: their times, by the same keys; a message published again counts once
+    - counters: the last ones of `/diagnostics`, by node; counted: all of them, with their receive
+      times
 
-    In older recordings an entropy has no stamp and is that of all cells: there it is computed of
-    the `probabilities` of each view.
-    `object_size` is the grid's side in metres. Raises DataError on what is not as the loop's
-    nodes write it.
+    Older recordings have an entropy of all cells without a stamp; it is then computed from the
+    `probabilities` of each view. `object_size` is the side of the grid in metres. Raises
+    DataError on messages that the loop's nodes do not write.
     """
 
     def __init__(self, bag: Bag, namespace: str, object_size: float, object_frame: str) -> None:
@@ -83,12 +82,12 @@ class LoopRecord:
 
     def _take(self, role: str, message: RawMessage) -> None:
         if message.type_name != LOOP[role]:
-            raise DataError(f'{message.topic}: expected messages of {LOOP[role]}, as the loop '
-                            f'publishes them, got {message.type_name}', 'topics')
+            raise DataError(f'{message.topic}: not the type that the loop publishes: expected '
+                            f'{LOOP[role]}, got {message.type_name}', 'topics')
         msg = read_message(message)
         stamp = nanoseconds_from_stamp(msg.stamp if LOOP[role] == HEADER else msg.header.stamp)
         if stamp in self.parts[role] and role != 'done':
-            return  # only an end can be taken back, under the stamp of the episode
+            return  # only `done` can be withdrawn, under the stamp of the episode
         try:
             self.parts[role][stamp] = self._from_msg[role](msg)
         except ActiveReconError as error:
@@ -98,14 +97,14 @@ class LoopRecord:
         self.received[role][stamp] = message.received
 
     def _refine_empty_grids(self) -> None:
-        """Give grids that were recorded without a cell those of the grid recorded next to them."""
+        """Give grids without occupied cells the resolution of the nearest other grid in time."""
         recorded = self.parts['occupancy'], self.parts['probabilities']
-        told = {stamp: grid for grids in recorded for stamp, grid in grids.items()
-                if grid.occupancy.any()}
-        for grids in recorded if told else ():
+        filled = {stamp: grid for grids in recorded for stamp, grid in grids.items()
+                  if grid.occupancy.any()}
+        for grids in recorded if filled else ():
             for stamp in [stamp for stamp, grid in grids.items() if not grid.occupancy.any()]:
-                nearest = min(told, key=lambda other: abs(other - stamp))
-                grids[stamp] = grids[stamp].as_fine_as(told[nearest])
+                nearest = min(filled, key=lambda other: abs(other - stamp))
+                grids[stamp] = grids[stamp].as_fine_as(filled[nearest])
 
     def _compute_entropies(self) -> None:
         for stamp, grid in self.parts['probabilities'].items():

@@ -1,4 +1,4 @@
-"""What a recording lacks of an episode's views."""
+"""What a recording lacks of the views of an episode."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,7 +9,7 @@ _PLANNED = 'goal'
 
 
 def missing_parts(episode: RecordedEpisode) -> Mapping[str, Sequence[int]]:
-    """Return by what is missing the numbers of the views without it; a goal follows its view."""
+    """Return the numbers of the views that lack a part, by the part; a goal follows its view."""
     parts: dict[str, list[Any]] = {
         'probabilities': [view.reconstruction for view in episode.views],
         'occupancy': [view.occupied for view in episode.views],
@@ -22,14 +22,14 @@ def missing_parts(episode: RecordedEpisode) -> Mapping[str, Sequence[int]]:
     return {part: numbers for part, numbers in without.items() if numbers}
 
 
-def missing_words(episode: RecordedEpisode) -> list[str]:
-    """Return in words what is missing, and of which views where it is not of all."""
+def describe_missing(episode: RecordedEpisode) -> list[str]:
+    """Return the missing parts in words, with the views unless it is all of them."""
     return [part if _of_all(episode, part, numbers) else _of_some(part, numbers)
             for part, numbers in missing_parts(episode).items()]
 
 
-def lost_words(episode: RecordedEpisode) -> list[str]:
-    """Return in words what is missing of some views and not of all: it was lost on the way."""
+def describe_lost(episode: RecordedEpisode) -> list[str]:
+    """Return in words the parts that some views lack but not all: they were lost on the way."""
     return [_of_some(part, numbers) for part, numbers in missing_parts(episode).items()
             if not _of_all(episode, part, numbers)]
 

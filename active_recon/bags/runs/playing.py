@@ -1,4 +1,4 @@
-"""What of a bag can be played: its topics, with the QoS that they were offered with."""
+"""The topics of a bag to play, with their offered QoS."""
 
 from pathlib import Path
 
@@ -11,20 +11,20 @@ from active_recon.reporting import Reporting, silent
 def played_topics(bag: Path, rate: float, names: str = '',
                   reporting: Reporting = silent) -> list[Topic]:
     """
-    Return the topics of a bag that are to be played, all where no names are given.
+    Return the topics of a bag to play: those of `names`, or all if it is empty.
 
-    All of the bag is read for it, so that a damaged one is refused and not played in part. Names
-    stand with commas between and may leave out the first '/'. Raises ConfigError where the rate
-    is not above 0 or the bag has no such topic, DataError where there is no whole bag.
+    The whole bag is read, so that a damaged one is rejected and not played in part. `names` are
+    separated by commas and may lack the first '/'. Raises ConfigError if the rate is not above 0
+    or the bag has no such topic, DataError if the bag is missing or damaged.
     """
     if not 0 < rate < float('inf'):
-        raise ConfigError(f'--rate {rate:g}: expected a rate above 0, 1 being that of the '
-                          'recording')
+        raise ConfigError(f'--rate: expected a rate above 0, where 1 is that of the recording, '
+                          f'got {rate:g}')
     topics = {topic.name: Topic(topic.name, topic.type_name, topic.qos)
               for topic in open_bag(bag).summary(reporting).topics if topic.count}
     wanted = [f'/{name.strip().lstrip("/")}' for name in names.split(',') if name] or list(topics)
     missing = [name for name in wanted if name not in topics]
     if missing:
-        raise ConfigError(f'{bag}: expected topics of the bag, which are '
-                          f'{", ".join(sorted(topics))}, got {", ".join(missing)}')
+        raise ConfigError(f'{bag}: no topics {", ".join(missing)} in the bag: expected some of '
+                          f'{", ".join(sorted(topics))}')
     return [topics[name] for name in dict.fromkeys(wanted)]

@@ -1,4 +1,4 @@
-"""The views of a bag: those that the loop says it took, or those that its gate lets through."""
+"""The views in a bag: those that the loop took, or those that its view gate accepts."""
 
 from bisect import bisect_right
 from collections import Counter
@@ -23,12 +23,12 @@ _ROUNDING = 1e-9  # rad
 def recorded_episodes(stream: CameraStream, record: LoopRecord,
                       scene: Scene) -> list[RecordedEpisode]:
     """
-    Return the episodes that the loop recorded, each with its views in the order it took them.
+    Return the recorded episodes, each with its views in the order in which they were taken.
 
-    What was recorded before any episode began is one without an id. Views from before the
-    recording, of which a latched message tells, are left out. The background is taken away as the
-    scene says, where the loop did not. Raises DataError where the image of another view is
-    missing or its camera is, ViewError where the object is not found in an image.
+    Views before the first episode form one without an id. Views from before the recording, known
+    from latched messages, are left out. The background is removed as the scene says, unless the
+    loop did so. Raises DataError if the image or the camera of another view is missing, ViewError
+    if the object is not found in an image.
     """
     stamps = sorted(record.parts['view'])
     views = _taken_views(stream, stamps)
@@ -47,9 +47,9 @@ def recorded_episodes(stream: CameraStream, record: LoopRecord,
 def gated_views(stream: CameraStream, gate: ViewGate,
                 scene: Scene) -> tuple[RecordedEpisode, dict[str, int]]:
     """
-    Return the views that the gate of the reconstructor's node lets through, as one episode.
+    Return the views that the node's view gate accepts, as one episode, and the node's counters.
 
-    And with it the node's counters. Raises DataError where not one image becomes a view.
+    Raises DataError if no image becomes a view.
     """
     views = []
     counters: Counter[str] = Counter()
@@ -62,7 +62,7 @@ def gated_views(stream: CameraStream, gate: ViewGate,
                 counters['images'] += 1
                 counters['images_unused'] += 1
                 continue
-            views.append(_view(view.read(), None, stream, None, scene))
+            views.append(_view(view, None, stream, None, scene))
         except ViewError as error:
             refusal = refusal or str(error)
             counters[f'refused/{error.kind}'] += 1
@@ -72,10 +72,10 @@ def gated_views(stream: CameraStream, gate: ViewGate,
     if not counters['images']:
         raise DataError(f'no image has an azimuth: {refusal or "there is no image"}', 'no_views')
     if not views and refusal:
-        raise DataError(f'not one image became a view: {refusal}', 'no_views')
+        raise DataError(f'no image became a view: {refusal}', 'no_views')
     if not views:
-        raise DataError(f'the camera never stands still in its {counters["images"]} images: '
-                        'expected one that does for its views', 'no_views')
+        raise DataError('no image became a view: expected a camera that stops, got '
+                        f'{counters["images"]} images of a moving one', 'no_views')
     counters['views'] = len(views)
     return RecordedEpisode('', views[0].stamp, None, views, ''), dict(counters)
 
@@ -87,7 +87,8 @@ def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
         try:
             if isinstance(view, MessageError):
                 raise view
-            found[view.stamp] = view.read()
+            _ = view.image  # decodes it: one that cannot be decoded is missing
+            found[view.stamp] = view
         except MessageError as error:
             refusal = refusal or str(error)
     for number, stamp in enumerate(stamps, 1):
@@ -99,17 +100,17 @@ def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
 
 def _episode(episode: Episode, views: Sequence[View], end: float, stream: CameraStream,
              record: LoopRecord, scene: Scene) -> RecordedEpisode:
-    """Return an episode, with each goal after the view that it was decided upon."""
-    asked: dict[int, list[RecordedGoal]] = {}
+    """Return an episode, with each goal after the view from which it was decided."""
+    goals: dict[int, list[RecordedGoal]] = {}
     published = [record.published['view'][view.stamp] for view in views]
     for goal in _goals(record, episode.begin, end):
         after = bisect_right(published, record.published['next_view'][goal.stamp])
-        before = asked.setdefault(after, [])
-        # One from where the last was: `plan` asked for it again
+        before = goals.setdefault(after, [])
+        # The same place once more: `plan` asked for it again
         if not before or view_distance(before[-1].camera, goal.camera) > _ROUNDING:
             before.append(goal)
-    decided = {after: replace(first, instead=instead)
-               for after, (first, *instead) in asked.items()}
+    decided = {after: replace(first, replacements=replacements)
+               for after, (first, *replacements) in goals.items()}
     reasons = [(record.published['done'][stamp], reason)
                for stamp, (_, reason) in record.parts['done'].items()
                if episode.begin <= stamp < end]
@@ -133,9 +134,9 @@ def _goals(record: LoopRecord, begin: int, end: float) -> list[RecordedGoal]:
 
 
 def _with_azimuth(camera: Camera, azimuth: float) -> Camera:
-    """Return a goal's camera with the bits of a joint's angle: its own went through a sine."""
+    """Return a goal's camera with the exact azimuth of the joint: its pose has a rounded one."""
     if abs(float(azimuth_difference(azimuth, camera.azimuth))) > _ROUNDING:
-        return camera  # a joint that counts otherwise
+        return camera  # a joint with another zero or direction
     return OrbitCamera(camera.pose, camera.intrinsics, azimuth)
 
 
@@ -149,7 +150,7 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
     def part(role: str) -> Any:
         return parts.get(role, {}).get(view.stamp)
 
-    image = part('view_image')  # where the background was taken away, the network saw this
+    image = part('view_image')  # with the background removed, as the network saw it
     if image is None:
         image = scene.cleared(view.image)
     return RecordedView(view.stamp, image, view.camera,

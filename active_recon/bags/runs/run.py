@@ -1,4 +1,4 @@
-"""A recorded run, as plain numbers: what a bag is read into, replayed from and reported on."""
+"""A recorded run as plain data, for replay and reports."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 @dataclass(frozen=True)
 class TopicSummary:
     """
-    A topic of a bag: its full name, its type as in 'std_msgs/msg/Header', its messages.
+    A topic of a bag: its full name, its type as in 'std_msgs/msg/Header', its message count.
 
-    `qos` are the profiles that its publishers offered, as far as the bag tells.
+    `qos` are the profiles that its publishers offered; empty if unknown.
     """
 
     name: str
@@ -30,14 +30,14 @@ class TopicSummary:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Cameras that the planner chose among: positions (N, 3) in metres, azimuths (N,) radians."""
+    """The cameras to choose from: positions (N, 3) in metres, azimuths (N,) in radians."""
 
     positions: NDArray[np.float64]
     azimuths: NDArray[np.float64]
 
     @classmethod
     def of(cls, cameras: Sequence[Camera]) -> 'Candidates':
-        """Return those of a goal."""
+        """Return the candidates of cameras."""
         return cls(np.array([camera.position for camera in cameras]).reshape(-1, 3),
                    np.array([camera.azimuth for camera in cameras]))
 
@@ -45,13 +45,13 @@ class Candidates:
 @dataclass(frozen=True, eq=False)
 class RecordedGoal:
     """
-    Where the planner wanted to look from, and what it thought of every candidate.
+    A goal of the planner and the scores of its candidates.
 
-    - camera: in the object frame, with the lens of none; its azimuth has all of its bits where
-      `next_azimuth` was recorded; stamp: the goal's identity, nanoseconds
-    - candidates, N of them, and scores (N,): None where they were not recorded
+    - camera: in the object frame, without a lens; its azimuth is exact if `next_azimuth` was
+      recorded; stamp: the goal's identity, nanoseconds
+    - candidates, N of them, and scores (N,): None if they were not recorded
     - received: when the recorder received the goal, nanoseconds
-    - instead: the goals that followed as this one was given up, and then those, until a view came
+    - replacements: the goals that followed, as this one and then those were given up
     """
 
     camera: Camera
@@ -59,34 +59,34 @@ class RecordedGoal:
     candidates: Candidates | None
     scores: NDArray[np.float32] | None
     received: int
-    instead: Sequence['RecordedGoal'] = ()
+    replacements: Sequence['RecordedGoal'] = ()
 
     @classmethod
     def of(cls, goal: Goal, stamp: int, received: int | None = None) -> 'RecordedGoal':
-        """Return what is recorded of a goal; by default it is received as it is stamped."""
+        """Return a goal as recorded; by default it is received at its stamp."""
         return cls(goal.camera, stamp, Candidates.of(goal.candidates), goal.scores,
                    stamp if received is None else received)
 
     @property
-    def followed(self) -> 'RecordedGoal':
+    def final(self) -> 'RecordedGoal':
         """The goal that was not given up."""
-        return (self, *self.instead)[-1]
+        return (self, *self.replacements)[-1]
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedView:
     """
-    A view that the network took in, and what was known after it; None: not recorded.
+    A view and what the loop published after it; None: not recorded.
 
     - stamp: of the image, nanoseconds; image: (H, W, 3) uint8 RGB; camera: in the object frame
-    - reconstruction: the probabilities, 0 where they were below the floor that is published
+    - reconstruction: the probabilities, 0 below the floor of what is published
     - occupied: the cells above the threshold
     - latent: A_t, (C, h, w); entropy: nats
-    - goal: decided after this view; None too where the episode was done
-    - done: the reason where the episode was done after this view, '' where it was not; with a goal
-      too where `plan` then asked for one more
-    - received: when each message of the view was received, nanoseconds, by the topic's name in
-      the loop: 'camera/image_raw', 'view', 'occupancy', 'probabilities', 'entropy', ...
+    - goal: decided after this view; None also if the episode was done
+    - done: the reason if the episode was done after this view, else ''; a goal may follow if
+      `plan` was called then
+    - received: receive times of the view's messages, nanoseconds, by topic name in the loop:
+      'camera/image_raw', 'view', 'occupancy', 'probabilities', 'entropy', ...
     """
 
     stamp: int
@@ -106,7 +106,7 @@ class RecordedEpisode:
     """
     One object's views; `begin` in nanoseconds, `done` the reason for the end, '' if none.
 
-    `begun_before`: there were views before the recording, whose images it does not have.
+    `begun_before`: the episode had views before the recording, which lacks their images.
     """
 
     id: str
@@ -117,16 +117,16 @@ class RecordedEpisode:
     begun_before: bool = False
 
     def done_after(self, view: RecordedView) -> str:
-        """Return the reason where it was that view that ended the episode, else ''."""
+        """Return the reason if the episode ended after that view, else ''."""
         ends = not view.done and view is self._last and view.goal is None
         return self.done if ends else view.done
 
     def given_up(self, view: RecordedView | None) -> list[Camera]:
-        """Return the cameras of the goals given up after a view, None: before the first one."""
+        """Return the cameras of the goals given up after a view; None: before the first view."""
         goal = view.goal if view else self.first_goal
         if goal is None:
             return []
-        asked = [goal.camera, *(later.camera for later in goal.instead)]
+        asked = [goal.camera, *(later.camera for later in goal.replacements)]
         none_left = view is self._last and self.done == 'no_reachable_azimuth'
         return asked if none_left else asked[:-1]
 
@@ -138,14 +138,13 @@ class RecordedEpisode:
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
     """
-    All episodes of a bag, and what it says of itself.
+    All episodes of a bag and its metadata.
 
-    - provenance: the bag's own record of versions, hashes, policy, seed and object; others' bags
-      have none
+    - provenance: versions, hashes, policy, seed and object; empty in bags of other recorders
     - parameters: by node; counters: the last of `/diagnostics`, by node
     - begin, end: receive times of the first and the last message, nanoseconds
-    - gaps: what of the camera's images is missing
-    - assumed: in words, what neither the bag nor its reader was told
+    - gaps: missing images
+    - assumed: in words, what neither the bag nor the options state
     """
 
     path: Path

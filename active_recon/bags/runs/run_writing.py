@@ -1,4 +1,4 @@
-"""A run of plain numbers written as a bag, on the loop's topics: the inverse of reading one."""
+"""Writing a run as a bag with the loop's topics: the inverse of reading one."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -6,27 +6,26 @@ from typing import Any
 
 from active_recon.bags.runs.parameters import node_parameters
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun
-from active_recon.bags.storage.atomic_bag import whole_bag, write_message
+from active_recon.bags.storage.atomic_bag import atomic_bag, write_message
 from active_recon.bags.storage.metadata import QosProfile
 from active_recon.bags.storage.writer import BagWriter
 from active_recon.geometry.cameras import OBJECT_FRAME
 from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
 from msg_tools.loop import goal_to_msgs, image_to_msgs, view_to_msgs
 
-_UNNAMED = 'unnamed'  # of a bag without episodes: on the wire each has an id
+_UNNAMED = 'unnamed'  # messages need an id, runs without recorded episodes have none
 _LATCHED = QosProfile(durability='transient_local')
 _STREAM = QosProfile()
 
 
 def write_run(run: RecordedRun, folder: Path) -> None:
     """
-    Write a run as a new bag, whole or not at all.
+    Write a run as a new bag, atomically.
 
-    Poses and clouds are in the run's own `object_frame`. What a view or a goal does not tell when
-    it was received bears its stamp. Raises RecordingError where the folder exists or the disk is
-    full.
+    Poses and clouds are in the run's own `object_frame`. Messages without a receive time get
+    their stamp. Raises RecordingError if the folder exists or the disk is full.
     """
-    with whole_bag(folder) as bag:
+    with atomic_bag(folder) as bag:
         _write(run, bag)
 
 
@@ -42,12 +41,12 @@ def _write(run: RecordedRun, bag: BagWriter) -> None:
 
 
 def _messages(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
-    """Yield when each message was received, its topic, its stamp, and itself."""
+    """Yield receive time, topic, stamp and message."""
     received = episode.begin
     for message in _of_views(episode, frame):
         received = max(received, message[0])
         yield message
-    if episode.done and not any(map(episode.done_after, episode.views)):  # no view has ended it
+    if episode.done and not any(map(episode.done_after, episode.views)):  # not after a view
         yield received, 'done', received, done_to_msg(received, episode.done)
 
 
@@ -67,8 +66,8 @@ def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, 
         yield from _of_goal(view.goal, frame)
 
 
-def _of_goal(asked: RecordedGoal | None, frame: str) -> Iterator[tuple[int, str, int, Any]]:
-    for goal in () if asked is None else (asked, *asked.instead):
+def _of_goal(recorded: RecordedGoal | None, frame: str) -> Iterator[tuple[int, str, int, Any]]:
+    for goal in () if recorded is None else (recorded, *recorded.replacements):
         scores = None if goal.candidates is None or goal.scores is None else (
             goal.candidates.positions, goal.candidates.azimuths, goal.scores)
         messages = goal_to_msgs(goal.stamp, goal.camera, scores, frame)

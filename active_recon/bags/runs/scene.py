@@ -1,4 +1,4 @@
-"""What a bag of others does not tell of the scene: sizes, the camera's place, the background."""
+"""What a bag may lack: the object's size and front, the camera's pose, the background."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, eq=False)
 class Scene:
     """
-    What is told beside a bag; None: as recorded, else as the canonical scene has it.
+    The options that complete a bag; None: as recorded, else as in the canonical scene.
 
     - object_size: side of the voxel grid, m; object_yaw: azimuth of the object's front, rad
-    - elevation: of the camera, rad, where the bag tells its azimuth alone
-    - camera_position: (3,), m, in the object's frame while the recorded angle is 0;
+    - elevation: of the camera, rad, if the bag has its azimuth only
+    - camera_position: (3,), m, in the object's frame at the recorded angle 0;
       camera_orientation: its optical frame's unit quaternion x, y, z, w, None: it looks at the
       object's centre, upright
-    - background: how the object is told from what is behind it; empty_scene: (H, W, 3) uint8 RGB
+    - background: how the background is removed; empty_scene: (H, W, 3) uint8 RGB
     """
 
     object_size: float | None = None
@@ -36,23 +36,23 @@ class Scene:
     empty_scene: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a camera that stands nowhere, or at two places."""
+        """Raise ConfigError on an incomplete or contradictory camera pose."""
         if self.camera_position is None and self.camera_orientation is not None:
-            raise ConfigError('--camera-orientation without --camera-position: give both')
+            raise ConfigError('--camera-orientation needs --camera-position: give both')
         if self.camera_position is not None and self.elevation is not None:
-            raise ConfigError('--elevation-deg and --camera-position both tell the elevation: '
+            raise ConfigError('--elevation-deg and --camera-position both set the elevation: '
                               'give one of them')
         if self.camera_position is not None:
             self._fixed_camera(turned_object=True)
 
     @property
     def size(self) -> float:
-        """Side of the grid in metres: 1 where nobody tells."""
+        """Side of the grid in metres, 1 by default."""
         return 1.0 if self.object_size is None else self.object_size
 
     @property
-    def given(self) -> Mapping[str, float | None]:
-        """What of it a reconstructor and a planner are told."""
+    def parameters(self) -> Mapping[str, float | None]:
+        """The parameters of reconstructor and planner among the options."""
         return {'object_size': self.object_size, 'object_yaw': self.object_yaw}
 
     def pose_at(self, angle: float, turned_object: bool) -> NDArray[np.float64]:
@@ -70,30 +70,31 @@ class Scene:
         elevation = CANONICAL_ELEVATION if self.elevation is None else self.elevation
         return orbit_camera(azimuth, elevation, CANONICAL_DISTANCE * self.size).pose
 
-    def require_needed(self, topic: str, has_poses: bool, whole: bool) -> None:
-        """Raise ConfigError where the bag tells what was given: poses, or the `whole` camera."""
+    def reject_redundant(self, topic: str, has_poses: bool, has_camera: bool) -> None:
+        """Raise ConfigError on options for what the bag has: poses, or poses and lens."""
         if has_poses and self.camera_position is not None:
-            raise ConfigError(f'--camera-position: the bag has the poses of the camera on {topic}')
-        if whole and self.elevation is not None:
-            raise ConfigError(f'--elevation-deg: the bag has the poses of the camera on {topic}, '
-                              'and its camera info')
+            raise ConfigError('--camera-position: not needed: the bag has camera poses on '
+                              f'{topic}')
+        if has_camera and self.elevation is not None:
+            raise ConfigError(f'--elevation-deg: not needed: the bag has camera poses on {topic}, '
+                              'and camera info')
 
     def assumed(self, image: str, has_poses: bool, has_lens: bool) -> list[str]:
-        """Return in words what neither a bag nor this tells, each with the option that would."""
+        """Return in words what neither bag nor options state, each with its option."""
         placed = has_poses or self.camera_position is not None
         missing = [option for option, known in (
             ('--camera-info', has_lens), ('--camera-position', placed)) if not known]
-        told = []
+        assumptions = []
         if missing:
-            told.append(f'the lens on {image}: the object fills the shorter side '
-                        f'({" and ".join(missing)})')
+            assumptions.append(f'the lens on {image}: the object fills the shorter side '
+                               f'({" and ".join(missing)})')
         if missing and self.elevation is None and self.camera_position is None:
-            told.append(f'elevation {math.degrees(CANONICAL_ELEVATION):.0f} degrees '
-                        f'(--elevation-deg{"" if has_poses else " or --camera-position"})')
-        return told
+            assumptions.append(f'elevation {math.degrees(CANONICAL_ELEVATION):.0f} degrees '
+                               f'(--elevation-deg{"" if has_poses else " or --camera-position"})')
+        return assumptions
 
     def cleared(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return an image with its background white, if so told; raises ViewError."""
+        """Return an image with its background removed as set up; raises ViewError."""
         return self.background.cleared(image, reference=self.empty_scene)
 
     def _fixed_camera(self, turned_object: bool) -> FixedCamera:
@@ -108,21 +109,22 @@ class Scene:
             distance).pose, direction)
 
 
-def told_background(told: str) -> tuple[Background, NDArray[np.uint8] | None]:
+def parse_background(option: str) -> tuple[Background, NDArray[np.uint8] | None]:
     """
-    Return how the object is told from its background, and the image of the empty scene if any.
+    Return how the background is removed, and the image of the empty scene if there is one.
 
-    `told` is a colour, red,green,blue, or the path of such an image; '' leaves images as they are.
+    `option` is a colour, red,green,blue, or the path of such an image; '' keeps the background.
+    Raises ConfigError if it is neither.
     """
-    if not told:
+    if not option:
         return Background(), None
-    shares = told.split(',')
-    if all(share.strip().isdecimal() for share in shares):
-        return Background('color', tuple(map(int, shares))), None
-    if not Path(told).is_file():
-        raise ConfigError(f'--background: {told} is neither a colour, such as 0,177,64, nor a '
+    channels = option.split(',')
+    if all(channel.strip().isdecimal() for channel in channels):
+        return Background('color', tuple(map(int, channels))), None
+    if not Path(option).is_file():
+        raise ConfigError(f'--background: {option} is neither a colour, such as 0,177,64, nor a '
                           'file with an image of the empty scene')
-    image = cv2.imread(told, cv2.IMREAD_COLOR)
+    image = cv2.imread(option, cv2.IMREAD_COLOR)
     if image is None:
-        raise ConfigError(f'--background: {told} is no image that can be read')
+        raise ConfigError(f'--background: {option} is no readable image')
     return Background('reference'), np.ascontiguousarray(image[..., ::-1], np.uint8)

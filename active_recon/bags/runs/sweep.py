@@ -1,18 +1,18 @@
-"""A bag of every view of a turntable, from which any policy can be answered what it asks for."""
+"""Recording a bag with every view of a turntable, from which any policy can be replayed."""
 
 from collections.abc import Callable
 from pathlib import Path
 import time
 
 from active_recon import __version__
-from active_recon.bags.storage.atomic_bag import whole_bag, write_message
+from active_recon.bags.storage.atomic_bag import atomic_bag, write_message
 from active_recon.bags.storage.metadata import QosProfile
 from active_recon.bags.storage.writer import BagWriter
 from active_recon.simulation.shown_object import ShownObject
 from msg_tools.loop import image_to_msgs
 
 IMAGES_EACH = 3
-"""At each azimuth, so that the camera is seen to stand still."""
+"""Images at each azimuth, so that the camera counts as still."""
 _PERIOD_NS = 100_000_000
 _STEP_NS = 1_000_000  # from stamp to receipt, and from one message of an image to the next
 
@@ -20,16 +20,16 @@ _STEP_NS = 1_000_000  # from stamp to receipt, and from one message of an image 
 def record_sweep(shown: ShownObject, folder: Path, begin: int | None = None,
                  object_size: float = 1.0, advance: Callable[[], None] = lambda: None) -> None:
     """
-    Write a bag in which the camera goes around an object once and stands still at each view.
+    Write a bag in which the camera goes around an object once and stops at each view.
 
-    It is what the nodes' simulated turntable would have streamed at 10 Hz from `begin` on,
-    nanoseconds since 1970; by default up to now. `object_size` is what the object was shown with,
-    metres. `advance` is called after each view. The folder appears when the bag is complete;
-    RecordingError where it is there already, or the disk full.
+    It has what the simulated turntable would have streamed at 10 Hz from `begin` on, nanoseconds
+    since 1970; by default it ends now. `object_size` is the side of the object's cube, metres.
+    `advance` is called after each view. The folder appears when the bag is complete; raises
+    RecordingError if it exists or the disk is full.
     """
     stamp = begin if begin is not None else (
         time.time_ns() - len(shown.images) * IMAGES_EACH * _PERIOD_NS)
-    with whole_bag(folder) as bag:
+    with atomic_bag(folder) as bag:
         bag.add_provenance({'version': __version__, 'object': shown.name})
         bag.attach_parameters('/turntable_camera', {'object_size': object_size})
         for index in range(len(shown.images)):
@@ -40,7 +40,7 @@ def record_sweep(shown: ShownObject, folder: Path, begin: int | None = None,
 
 
 def _write_view(bag: BagWriter, shown: ShownObject, index: int, stamp: int) -> None:
-    # The image comes last, as from the node: whoever hears it has what belongs to it.
+    # The image comes last, as from the node: its subscribers then have its pose and lens.
     messages = image_to_msgs(stamp, shown.images[index], shown.cameras[index])
     for number, (topic, msg) in enumerate(messages.items(), start=1):
         received = stamp + number * _STEP_NS

@@ -1,11 +1,12 @@
-"""Which topics of a bag are the camera, its azimuth and the loop's own."""
+"""Finding the topics of the camera, its poses and the loop in a bag."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from active_recon.bags.runs.image_kinds import what_else
+from active_recon.bags.runs.image_kinds import non_camera_topics
 from active_recon.bags.runs.run import TopicSummary
+from active_recon.bags.storage.bag import Bag, BagSummary
 from active_recon.bags.storage.message_types import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -14,8 +15,8 @@ from active_recon.bags.storage.message_types import (
     JOINT_STATE,
     POSE,
 )
-from active_recon.bags.storage.raw import Bag, BagSummary
 from active_recon.errors import ConfigError, DataError
+from active_recon.parameters.reconstructor import ReconstructorParameters
 
 IMAGE_TYPES = (IMAGE, COMPRESSED_IMAGE)
 AZIMUTH_TYPES = (POSE, JOINT_STATE, FLOAT)
@@ -28,15 +29,15 @@ _OF_THE_LOOP = ('/view', '/view_image', '/latent', '/camera/mask', '/next_view',
 @dataclass(frozen=True)
 class Topics:
     """
-    Where a bag has what a view needs; '' finds it by its name in the loop or by its type.
+    The topics with what a view needs; '' finds a topic by its name in the loop or by its type.
 
     - image: sensor_msgs Image or CompressedImage; camera_info: sensor_msgs CameraInfo
     - azimuth: geometry_msgs PoseStamped of the camera; or radians, as a sensor_msgs JointState or
       a std_msgs Float64
-    - joint: of the JointState, where it has several
-    - turned_object: the radians are a turntable's under a fixed camera, whose azimuth is minus it
-    - object_frame: in which a PoseStamped is expected
-    - max_pose_gap: seconds from an image to a pose that is interpolated, as in the node
+    - joint: the joint's name, if the JointState has several
+    - turned_object: the angle is a turntable's under a fixed camera, whose azimuth is its negative
+    - object_frame: the frame of the PoseStamped
+    - max_pose_gap: the longest time from an image to its neighbouring poses, s, as in the node
     """
 
     image: str = ''
@@ -44,23 +45,23 @@ class Topics:
     azimuth: str = ''
     joint: str = ''
     turned_object: bool = False
-    object_frame: str = 'object'
-    max_pose_gap: float = 0.1
+    object_frame: str = ReconstructorParameters.object_frame
+    max_pose_gap: float = ReconstructorParameters.max_pose_gap
 
     def __post_init__(self) -> None:
-        """Refuse a gap that is none."""
+        """Raise ConfigError on an invalid gap."""
         if not 0 <= self.max_pose_gap < math.inf:
-            raise ConfigError('max_pose_gap: expected seconds from 0 on, got '
+            raise ConfigError('max_pose_gap: expected 0 or more seconds, got '
                               f'{self.max_pose_gap}')
 
 
 @dataclass(frozen=True)
 class CameraTopics:
     """
-    The topics of the camera; `azimuth` bears the pose, or just the azimuth.
+    The topics of the camera; `azimuth` has its poses, or only its azimuths.
 
-    `of_views`: the camera's own images were not recorded, and these are what the network saw of
-    them, one of each view.
+    `of_views`: the camera's images were not recorded; `image` has what the network saw instead,
+    one image for each view.
     """
 
     image: TopicSummary
@@ -70,25 +71,25 @@ class CameraTopics:
 
 
 def loop_namespace(present: Sequence[TopicSummary]) -> str | None:
-    """Return what stands before the loop's topics, '/' or '/robot/'; None: no view was taken."""
+    """Return the namespace of the loop's topics, '/' or '/robot/'; None: no view was taken."""
     namespaces = [topic.name.removesuffix('view') for topic in present
                   if topic.name.endswith('/view') and topic.type_name == POSE and topic.count]
     if len(namespaces) > 1:
-        raise DataError(f'views of several loops, in {", ".join(namespaces)}: expected the topics '
-                        'of one loop in a bag')
+        raise DataError(f'views of several loops, in {", ".join(namespaces)}: expected one loop '
+                        'in a bag')
     return namespaces[0] if namespaces else None
 
 
 def camera_topics(bag: Bag, summary: BagSummary, topics: Topics) -> CameraTopics:
     """
-    Return the camera's topics; DataError that says all that is missing or cannot be told apart.
+    Return the camera's topics; raises DataError that names all missing or ambiguous ones.
 
-    A topic is found by its option, else by the name that it had for the loop's nodes, which the
-    recorder notes where it was another than their own, else by its name in the loop, else by its
-    type and by what its first message shows. What the nodes heard as something else is none.
+    A topic is found by its option, else by its remapped name, which the recorder stores, else by
+    its name in the loop, else by its type and its first message. Topics that the nodes subscribed
+    to under another role are left out.
     """
     if not any(topic.count for topic in summary.topics):
-        raise DataError('no messages in it: the bag is empty', 'empty')
+        raise DataError('no messages: the bag is empty', 'empty')
     search = _Search(bag, summary)
     missing = []
     try:
@@ -105,7 +106,7 @@ def camera_topics(bag: Bag, summary: BagSummary, topics: Topics) -> CameraTopics
 
 
 class _Search:
-    """Looks for the topics of one bag."""
+    """Finds the topics in one bag."""
 
     def __init__(self, bag: Bag, summary: BagSummary) -> None:
         self._bag = bag
@@ -116,11 +117,11 @@ class _Search:
                          if topic.count and topic.name not in others]
 
     def image(self, name: str) -> tuple[TopicSummary, bool]:
-        """Return the topic of the images, and whether they are those that the network saw."""
+        """Return the topic of the images, and whether they are what the network saw."""
         fitting = self._fitting(name, IMAGE_TYPES)
         usual = self._known_by_name(name, fitting, IMAGE_ROLE)
-        # A message is read only where names leave a doubt
-        others = {} if usual else what_else(self._bag, fitting)
+        # Messages are read only if the names are not enough
+        others = {} if usual else non_camera_topics(self._bag, fitting)
         cameras = usual or [topic for topic in fitting if topic.name not in others]
         if cameras:
             return _only(cameras, IMAGE_TYPES, "a camera's images", '--image'), False
@@ -134,7 +135,7 @@ class _Search:
             f'{" or ".join(IMAGE_TYPES)}; name the topic with --image', 'topics')
 
     def azimuth(self, name: str, loops_own: bool) -> TopicSummary:
-        """Return the topic of the poses or azimuths; `loops_own`: that of the views alone."""
+        """Return the topic of the poses or azimuths; `loops_own`: that of the views only."""
         views = [topic for topic in self._present
                  if topic.name.endswith('/view') and topic.type_name == POSE]
         fitting = self._fitting(name, AZIMUTH_TYPES)
@@ -147,34 +148,34 @@ class _Search:
         return _only(found, AZIMUTH_TYPES, "the camera's poses or azimuths", '--azimuth')
 
     def camera_info(self, name: str, image: TopicSummary) -> TopicSummary | None:
-        """Return the topic of the camera info; None: there is none, or none was named."""
+        """Return the topic of the camera info, None if there is none."""
         fitting = self._fitting(name, (CAMERA_INFO,))
-        beside = f'{image.name.removesuffix("/compressed").rpartition("/")[0]}/camera_info'
+        sibling = f'{image.name.removesuffix("/compressed").rpartition("/")[0]}/camera_info'
         found = self._known_by_name(name, fitting, INFO_ROLE) or [
-            topic for topic in fitting if topic.name == beside] or fitting
+            topic for topic in fitting if topic.name == sibling] or fitting
         if not found and name:
             raise DataError(f'no camera info on {name}: expected {CAMERA_INFO}; name the topic '
                             'with --camera-info', 'topics')
         return _only(found, (CAMERA_INFO,), 'camera info', '--camera-info') if found else None
 
     def _fitting(self, name: str, types: Sequence[str]) -> list[TopicSummary]:
-        """Return the topics of the types: that of the name, else all but the loop's own."""
+        """Return the topics of the types with that name, or all but the loop's own."""
         return [topic for topic in self._present if topic.type_name in types and (
             topic.name == name if name else not topic.name.endswith(_OF_THE_LOOP))]
 
     def _known_by_name(self, name: str, fitting: Sequence[TopicSummary],
                        usual: str) -> list[TopicSummary]:
-        """Return those that an option, or the recorder's note, or the usual name tells."""
+        """Return the topics found by an option, by the recorded name, or by the usual name."""
         if name:
             return list(fitting)
-        heard = self._recorded_as.get(usual, '')
-        return ([topic for topic in fitting if heard in (topic.name, topic.name.removesuffix(
+        remapped = self._recorded_as.get(usual, '')
+        return ([topic for topic in fitting if remapped in (topic.name, topic.name.removesuffix(
             '/compressed'))] or [topic for topic in fitting if topic.name.endswith(f'/{usual}')])
 
 
 def _only(topics: Sequence[TopicSummary], types: Sequence[str], what: str,
           option: str) -> TopicSummary:
-    """Return the one of the first type that there is, since the first tells most."""
+    """Return the topic of the first type present: types are in order of preference."""
     for kind in types:
         candidates = [topic for topic in topics if topic.type_name == kind]
         if len(candidates) == 1:

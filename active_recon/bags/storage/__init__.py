@@ -1,1 +1,1 @@
-"""Bags as files: MCAP and sqlite3, read, written, repaired."""
+"""Bags as files: reading, writing and repairing MCAP, reading sqlite3."""

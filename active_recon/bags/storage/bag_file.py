@@ -1,10 +1,10 @@
-"""One MCAP file of a bag: what was flushed to it is kept, whatever happens next."""
+"""One MCAP file of a bag; flushed messages survive a crash of the writer."""
 
 from collections.abc import Mapping
 from operator import itemgetter
 from pathlib import Path
 
-from active_recon.bags.storage.chunk_file import WholeChunks
+from active_recon.bags.storage.chunk_file import ChunkFile
 from active_recon.bags.storage.metadata import (
     as_yaml,
     bag_information,
@@ -21,22 +21,21 @@ class BagFile:
     """
     An MCAP file of profile `ros2` that is being written; `path` must not exist yet.
 
-    Messages wait in a chunk until `flush`, or until there are a million bytes of them, and stand
-    in it in the order in which they were received: a middleware hands over topic by topic, but a
-    file without an index is scanned, for which some readers ask for that order. Every method
-    raises OSError where the disk is full or fails, and then what was flushed before stands in a
-    readable file.
+    Messages are buffered into a chunk until `flush`, or until it holds a million bytes. Within a
+    chunk they are sorted by receive time: the middleware delivers topic by topic, but some
+    readers require time order when they scan a file without an index. Every method raises
+    OSError if the disk is full or fails; the messages flushed before remain in a readable file.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.contents = Contents()
-        """What was taken in."""
+        """All messages written, including those not flushed yet."""
         self.flushed = Contents()
-        """What of it is in the file."""
+        """The messages that are in the file."""
         self.chunks = 0
-        """How many chunks that are; each costs memory, for the index."""
-        self._chunks = WholeChunks(path)
+        """The number of chunks in the file; the index keeps each of them in memory."""
+        self._chunks = ChunkFile(path)
         # Summary offsets as this library writes them are refused by checkers of MCAP files.
         self._mcap = Writer(self._chunks, use_summary_offsets=False)  # type: ignore[arg-type]
         self._channels: dict[str, int] = {}
@@ -44,7 +43,7 @@ class BagFile:
         self._waiting: list[tuple[int, int, bytes, int, int]] = []
         self._waiting_bytes = 0
         self._mcap.start(profile='ros2', library='active_recon')
-        # Without this record rosbag2 takes a bare file for one of an older version.
+        # Without this record rosbag2 treats a bare file as one of an older version.
         self.add_metadata('rosbag2', {
             'serialized_metadata': as_yaml(bag_information([(path.name, Contents())], []))})
         try:
@@ -57,11 +56,11 @@ class BagFile:
 
     @property
     def size(self) -> int:
-        """The bytes that the file has, without the chunk begun."""
+        """The size of the file in bytes, without the open chunk."""
         return self._chunks.tell()
 
     def add_topic(self, topic: Topic, definition: str) -> None:
-        """Announce a topic that the file does not have yet."""
+        """Register a topic that the file does not have yet."""
         if topic.type_name not in self._schemas:
             self._schemas[topic.type_name] = self._mcap.register_schema(
                 topic.type_name, 'ros2msg', definition.encode())
@@ -70,12 +69,12 @@ class BagFile:
             {'offered_qos_profiles': offered_qos_yaml(topic.qos)})
 
     def has(self, topic: str) -> bool:
-        """Whether the topic was announced."""
+        """Whether the topic is registered."""
         return topic in self._channels
 
     def write(self, topic: str, data: bytes, receive_time: int, publish_time: int,
               sequence: int) -> None:
-        """Take in a message of an announced topic; times in nanoseconds since 1970."""
+        """Buffer a message of a registered topic; times in nanoseconds since 1970."""
         self.contents.add(topic, receive_time)
         self._waiting.append(
             (receive_time, self._channels[topic], data, publish_time, sequence))
@@ -84,15 +83,15 @@ class BagFile:
             self.flush()
 
     def add_metadata(self, name: str, record: Mapping[str, str]) -> None:
-        """Take in a record of metadata; a later one of the same name holds."""
+        """Add a metadata record; the last one of a name is valid."""
         self._mcap.add_metadata(name, dict(record))
 
     def attach(self, name: str, media_type: str, data: bytes, time: int) -> None:
-        """Take in an attachment; `time` in nanoseconds since 1970."""
+        """Add an attachment; `time` in nanoseconds since 1970."""
         self._mcap.add_attachment(time, time, name, media_type, data)
 
     def flush(self) -> None:
-        """Write the chunk begun, and all else that waits."""
+        """Write the open chunk and all other buffered records."""
         for time, channel, data, publish_time, sequence in sorted(
                 self._waiting, key=itemgetter(0)):
             self._mcap.add_message(channel, time, data, publish_time, sequence)
@@ -102,7 +101,7 @@ class BagFile:
         self._note_flushed()
 
     def sync(self) -> None:
-        """Return when what was flushed would survive a power cut."""
+        """Block until the flushed data would survive a power cut."""
         self._chunks.sync()
 
     def finish(self) -> None:
@@ -112,7 +111,7 @@ class BagFile:
         self._chunks.end()
 
     def abandon(self) -> None:
-        """Close the file as it is: after the last flush, with no index."""
+        """Close the file as it is after the last flush, without an index."""
         self._chunks.close()
 
     def _note_flushed(self) -> None:

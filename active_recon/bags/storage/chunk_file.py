@@ -1,4 +1,4 @@
-"""The file under the MCAP writer: after each flush it is one that readers open to its end."""
+"""The output stream of the MCAP writer: after each flush the file is readable to its end."""
 
 from contextlib import suppress
 import fcntl
@@ -10,39 +10,34 @@ from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC
 
 
-class WholeChunks:
+class ChunkFile:
     """
-    The stream under the MCAP writer: a flush reaches the file as a whole or not at all.
+    A stream for the MCAP writer whose flushes are atomic: all of the data is written, or none.
 
-    After what was flushed stands an ending without a summary, which the next flush overwrites: a
-    file whose writer was killed needs no repair to be read, only to be indexed. An ordinary
-    buffered file would leave half a chunk behind where the disk is full, and would try to write
-    the rest again when it is closed.
+    Each flush appends a footer without a summary, which the next flush overwrites: the file of a
+    writer that was killed is readable without repair and lacks only the index. An ordinary
+    buffered file would leave half a chunk behind on a full disk, and would try to write the rest
+    again when it is closed.
     """
 
     def __init__(self, path: Path) -> None:
         self._file = path.open('xb', buffering=0)
-        with suppress(OSError):  # a disk that knows no locks; for who would repair the file
+        with suppress(OSError):  # keeps `bag repair` away, if the file system has locks
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._kept = 0
         self._pending = bytearray()
 
-    @property
-    def pending(self) -> bool:
-        """Whether something waits for a flush."""
-        return bool(self._pending)
-
     def tell(self) -> int:
-        """Return the position in bytes, what waits included."""
+        """Return the position in bytes, buffered data included."""
         return self._kept + len(self._pending)
 
     def write(self, data: bytes) -> int:
-        """Take bytes in until the next flush; return how many."""
+        """Buffer bytes until the next flush; return their number."""
         self._pending += data
         return len(data)
 
     def flush(self) -> None:
-        """Write what waits; where that fails, OSError, and the file is as it was before."""
+        """Write the buffered bytes; on failure raise OSError and leave the file unchanged."""
         if not self._pending:
             return
         self._put(self._pending + _ENDING)
@@ -50,11 +45,11 @@ class WholeChunks:
         self._pending.clear()
 
     def sync(self) -> None:
-        """Return when what was flushed would survive a power cut; OSError where it would not."""
+        """Block until the flushed bytes would survive a power cut; raises OSError."""
         os.fsync(self._file.fileno())
 
     def end(self) -> None:
-        """Write what waits as the file's own end, and close it; OSError as `flush`."""
+        """Write the buffered bytes, which end the file, and close it; raises OSError."""
         self._put(self._pending)
         self._pending.clear()
         self.sync()
@@ -65,11 +60,11 @@ class WholeChunks:
         self._file.close()
 
     def _put(self, data: bytes | bytearray) -> None:
-        """Write after what is kept, over the ending; put the ending back where that fails."""
+        """Write after the flushed bytes, over the footer; restore the footer on failure."""
         try:
             self._write_at_end(data)
         except OSError:
-            # On the bytes that it stood on: there was room for it before.
+            # In its old place: there was room for it before.
             self._write_at_end(_ENDING)
             self._file.truncate(self._kept + len(_ENDING))
             raise

@@ -1,4 +1,4 @@
-"""What rosbag2 itself has packed, by file or by message, unpacked to no more than is stated."""
+"""Decompression of bags that rosbag2 compressed by file or by message, with a size limit."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -6,69 +6,70 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from active_recon.bags.storage.mcap_file import MOST_BYTES
+from active_recon.bags.storage.mcap_file import MAX_RECORD_BYTES
 from active_recon.errors import DataError
 from zstandard import frame_content_size, ZstdDecompressor, ZstdError
 
-MOST_TIMES = 200
-"""A packed file may unpack to so many times its bytes, and to MOST_BYTES in any case: images of
-one colour come to about a hundred."""
-PACKINGS = ('', 'file', 'message')
-_PIECE = 1 << 20
+MAX_COMPRESSION_RATIO = 200
+"""The largest ratio of decompressed to compressed size that is accepted for a file larger than
+MAX_RECORD_BYTES once decompressed: images of one colour reach about a hundred."""
+COMPRESSION_MODES = ('', 'file', 'message')
+_BLOCK_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
 class StoredFiles:
-    """The files of a recording in their order, and how rosbag2 packed them: one of PACKINGS."""
+    """The files of a bag in their order, and their compression: one of COMPRESSION_MODES."""
 
     paths: Sequence[Path]
-    packed: str = ''
+    compression_mode: str = ''
 
     @contextmanager
-    def opened(self) -> Iterator[list[Path]]:
+    def decompressed(self) -> Iterator[list[Path]]:
         """
-        Yield files that can be read, as many; packed ones are unpacked to the disk meanwhile.
+        Yield the files to read, one for each path; compressed ones as temporary copies.
 
-        Raises DataError where one is not packed by zstd, or unpacks to more than is allowed.
+        Raises DataError if one is not compressed by zstd, or is too large once decompressed.
         """
-        if self.packed != 'file':
+        if self.compression_mode != 'file':
             yield list(self.paths)
             return
         with TemporaryDirectory() as folder:
-            yield [_unpacked_file(path, Path(folder)) for path in self.paths]
+            yield [_decompressed_file(path, Path(folder)) for path in self.paths]
 
-    def message(self, data: bytes) -> bytes:
-        """Return a stored message's bytes unpacked; raises DataError as `opened` does."""
-        if self.packed != 'message':
+    def decompressed_message(self, data: bytes) -> bytes:
+        """Return the bytes of a stored message; raises DataError as `decompressed` does."""
+        if self.compression_mode != 'message':
             return data
         try:
-            declared = frame_content_size(data)  # -1: it does not tell
-            most = min(declared, MOST_BYTES) if declared >= 0 else MOST_BYTES
-            unpacked = ZstdDecompressor().stream_reader(data).read(most + 1)
+            declared = frame_content_size(data)  # -1: unknown
+            limit = min(declared, MAX_RECORD_BYTES) if declared >= 0 else MAX_RECORD_BYTES
+            message = ZstdDecompressor().stream_reader(data).read(limit + 1)
         except ZstdError as error:
-            raise DataError(f'a message that is not packed by zstd as it claims ({error})',
+            raise DataError(f'damaged message: expected zstd compression ({error})',
                             'damaged') from error
-        if declared > most or len(unpacked) > most:
-            raise DataError(f'a message of {len(data)} bytes that unpacks to more than {most}',
-                            'too_large')
-        return unpacked
+        if declared > limit or len(message) > limit:
+            raise DataError(f'message too large: its {len(data)} bytes decompress to more than '
+                            f'{limit}', 'too_large')
+        return message
 
 
-def _unpacked_file(path: Path, folder: Path) -> Path:
-    unpacked = folder / path.stem
-    most = max(MOST_BYTES, MOST_TIMES * path.stat().st_size)
+def _decompressed_file(path: Path, folder: Path) -> Path:
+    decompressed = folder / path.stem
+    limit = max(MAX_RECORD_BYTES, MAX_COMPRESSION_RATIO * path.stat().st_size)
     size = 0
     try:
-        with (path.open('rb') as file, unpacked.open('wb') as out,
+        with (path.open('rb') as file, decompressed.open('wb') as out,
               ZstdDecompressor().stream_reader(file, read_across_frames=True) as reader):
-            while piece := reader.read(_PIECE):
-                size += len(piece)
-                if size > most:
-                    raise DataError(f'{path}: unpacks to more than {most} bytes', 'too_large')
-                out.write(piece)
+            while block := reader.read(_BLOCK_BYTES):
+                size += len(block)
+                if size > limit:
+                    raise DataError(f'{path}: too large: decompresses to more than {limit} bytes',
+                                    'too_large')
+                out.write(block)
     except ZstdError as error:
-        raise DataError(f'{path}: not packed by zstd as its name says ({error})',
+        raise DataError(f'{path}: damaged: expected zstd compression ({error})',
                         'damaged') from error
     except OSError as error:
-        raise DataError(f'{path}: cannot be unpacked: {error.strerror}') from error
-    return unpacked
+        raise DataError(f'{path}: cannot be decompressed: {error.strerror}') from error
+    return decompressed

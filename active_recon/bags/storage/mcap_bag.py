@@ -1,9 +1,10 @@
-"""A recording in MCAP, of one file or of several that follow each other."""
+"""A bag of one or several consecutive MCAP files."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from active_recon.bags.storage.bag import bag_summary, BagSummary, RawMessage
 from active_recon.bags.storage.compression import StoredFiles
 from active_recon.bags.storage.mcap_file import mcap_records
 from active_recon.bags.storage.message_types import require_standard
@@ -15,7 +16,6 @@ from active_recon.bags.storage.metadata import (
     Topic,
     yaml_mapping,
 )
-from active_recon.bags.storage.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import DataError
 from active_recon.reporting import Advance, Reporting, silent
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
@@ -24,14 +24,14 @@ _Record = RawMessage | Metadata | Attachment
 
 
 class McapBag:
-    """MCAP files that follow each other in the recording of that path."""
+    """Consecutive MCAP files of the bag at a path."""
 
     def __init__(self, path: Path, files: StoredFiles) -> None:
         self._path = path
         self._files = files
 
     def summary(self, reporting: Reporting = silent) -> BagSummary:
-        """Read all of the files and say what is in them."""
+        """Return what is in the files, all of which are read."""
         size = sum(path.stat().st_size for path in self._files.paths)
         with reporting('checking the bag', size) as advance:
             return self._summary(advance)
@@ -52,7 +52,7 @@ class McapBag:
         return bag_summary(topics.values(), contents, provenance, parameters)
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        """Yield the messages of the topics, file after file, each in its order."""
+        """Yield the messages of the topics, file after file, in file order."""
         wanted = frozenset(topics)
         for record in self._records({}, lambda steps, note: None):
             if isinstance(record, RawMessage) and record.topic in wanted:
@@ -60,8 +60,8 @@ class McapBag:
 
     def _records(self, topics: dict[str, Topic], advance: Advance
                  ) -> Iterator[_Record]:
-        """Yield what the files hold; `topics` gathers those that they announce."""
-        with self._files.opened() as files:
+        """Yield the content of the files; their topics are added to `topics`."""
+        with self._files.decompressed() as files:
             yield from new_in_bag(
                 self._file_records(mcap_records(path, advance, name), name, topics)
                 for name, path in zip(self._files.paths, files, strict=True))
@@ -81,11 +81,11 @@ class McapBag:
                     qos_from_yaml(record.metadata.get('offered_qos_profiles', '')))
             elif isinstance(record, Message):
                 if record.channel_id not in channels:
-                    raise DataError(f'{name}: expected messages of announced channels, got '
-                                    f'one of channel {record.channel_id}', 'damaged')
+                    raise DataError(f'{name}: message of unknown channel {record.channel_id}',
+                                    'damaged')
                 topic = channels[record.channel_id]
                 try:
-                    data = self._files.message(record.data)
+                    data = self._files.decompressed_message(record.data)
                 except DataError as error:
                     raise DataError(f'{name}: {error}', error.kind) from error
                 yield RawMessage(topic.name, topic.type_name, data, record.log_time,
@@ -96,23 +96,23 @@ class McapBag:
 
 def new_in_bag(files: Iterable[Iterator[_Record]]) -> Iterator[_Record]:
     """
-    Yield the records of files that follow each other without what a file repeats of those before.
+    Yield the records of consecutive files without the messages that a file repeats.
 
-    That is the last message of a topic, once more with its bytes and its time of publication.
+    A repeated message is the last one of its topic, with the same bytes and publish time.
     """
     last: dict[str, tuple[int, bytes]] = {}
     for number, records in enumerate(files):
         for record in records:
             if isinstance(record, RawMessage):
-                said = record.published, record.data
-                if number and last.get(record.topic) == said:
+                message = record.published, record.data
+                if number and last.get(record.topic) == message:
                     continue
-                last[record.topic] = said
+                last[record.topic] = message
             yield record
 
 
 def _type_name(channel: Channel, schemas: Mapping[int, Schema]) -> str:
     schema = schemas.get(channel.schema_id)
     name = schema.name if schema else 'unknown'
-    # What is not CDR bears a name that no type has, and is so read by nobody.
+    # Messages that are not CDR get the name of no type, so that nothing reads them.
     return name if channel.message_encoding == 'cdr' else f'{name} as {channel.message_encoding}'

@@ -1,4 +1,4 @@
-"""MCAP files read record by record; no length is believed before the bytes are there."""
+"""Reading MCAP files record by record; every length is checked before memory is allocated."""
 
 from collections.abc import Callable, Iterator
 from io import BytesIO
@@ -12,110 +12,155 @@ from active_recon.reporting import Advance
 from lz4.frame import LZ4FrameDecompressor
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.records import (
+    Attachment,
+    Channel,
+    Chunk,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Message,
+    Metadata,
+    Schema,
+)
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdDecompressor
 
-MOST_BYTES = 1 << 28
-"""A record or an unpacked chunk of more is refused: no camera makes such messages."""
-MOST_ATTACHED = 1 << 20
-"""Attachments of more are passed over: parameters are far smaller."""
-_HEAD = 9  # bytes: an opcode and a length
-_Reader = Callable[[ReadDataStream], McapRecord]
-_CHUNKED: dict[Opcode, _Reader] = {Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read}
-_READ: dict[Opcode, _Reader] = {
-    **_CHUNKED, Opcode.CHUNK: Chunk.read, Opcode.METADATA: Metadata.read,
-    Opcode.ATTACHMENT: Attachment.read}
+MAX_RECORD_BYTES = 1 << 28
+"""Larger records and decompressed chunks are rejected: no camera makes such messages."""
+MAX_ATTACHMENT_BYTES = 1 << 20
+"""Larger attachments are skipped: parameters are far smaller."""
+_HEAD_BYTES = 9  # an opcode and a length
+_MIN_MESSAGE_BYTES = 22
+_REPAIR = '`active-recon bag repair` keeps all that is intact'
+_Parser = Callable[[ReadDataStream], McapRecord]
+_IN_CHUNK: dict[int, _Parser] = {Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Channel.read}
+_PARSERS: dict[int, _Parser] = {
+    **_IN_CHUNK, Opcode.HEADER: Header.read, Opcode.CHUNK: Chunk.read,
+    Opcode.METADATA: Metadata.read, Opcode.ATTACHMENT: Attachment.read,
+    Opcode.DATA_END: DataEnd.read, Opcode.FOOTER: Footer.read}
 
 
 def mcap_records(path: Path, advance: Advance, name: Path | None = None) -> Iterator[McapRecord]:
     """
-    Yield the schemas, channels, messages, metadata and attachments of a file, in its order.
+    Yield the records of a file in file order, chunks opened; indexes are skipped.
 
-    The index is not used, so that it cannot mislead. `advance` is told the bytes. `name` is what
-    a person knows the file by, where it is another. Raises DataError where the file is no whole
-    MCAP file or a chunk is not what its checksum says.
+    `advance` is called with the number of bytes read. `name` is the path to show in errors, if
+    it differs from `path`. Raises DataError if the file is not a complete MCAP file or a chunk
+    does not match its checksum.
     """
     name = name or path
     try:
         with path.open('rb') as file:
-            yield from _file_records(file, path.stat().st_size, advance)
+            for record in RecordReader(file, path.stat().st_size, advance).records():
+                if isinstance(record, Chunk):
+                    yield from chunk_records(record)
+                else:
+                    yield record
     except DataError as error:
         raise DataError(f'{name}: {error}', error.kind) from error
     except OSError as error:
         raise DataError(f'{name}: cannot be read: {error.strerror}') from error
-    except Exception as error:  # the decoders raise whatever damaged bytes lead them to
+    except Exception as error:  # the decoders raise all kinds of errors on damaged bytes
         raise DataError(f'{name}: damaged: it has records that cannot be understood '
-                        f'({str(error) or type(error).__name__}); `active-recon bag '
-                        'repair` keeps the others', 'damaged') from error
+                        f'({str(error) or type(error).__name__}); {_REPAIR}', 'damaged') from error
 
 
-def _file_records(file: BinaryIO, size: int, advance: Advance) -> Iterator[McapRecord]:
-    if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-        raise DataError('no MCAP file: it begins otherwise', 'no_mcap')
-    for opcode, length in _heads(file, size):
-        advance(_HEAD + length, '')
-        if opcode == Opcode.FOOTER:
-            file.seek(length, 1)
-            if file.read() == MCAP0_MAGIC:
-                advance(2 * len(MCAP0_MAGIC), '')
-                return
-            break
-        if opcode == Opcode.MESSAGE or opcode in _READ:
-            if opcode == Opcode.ATTACHMENT and length > MOST_ATTACHED:
+class RecordReader:
+    """
+    Reads the top-level records of an MCAP file from its beginning.
+
+    `size` is the file's, in bytes. `position` is the end of the last complete record.
+    """
+
+    def __init__(self, file: BinaryIO, size: int,
+                 advance: Advance = lambda steps, note: None,
+                 max_record_bytes: int = MAX_RECORD_BYTES,
+                 max_attachment_bytes: int = MAX_ATTACHMENT_BYTES) -> None:
+        self.position = 0
+        self._file = file
+        self._size = size
+        self._advance = advance
+        self._max_record_bytes = max_record_bytes
+        self._max_attachment_bytes = max_attachment_bytes
+
+    def records(self) -> Iterator[McapRecord]:
+        """
+        Yield header, schemas, channels, messages, chunks, metadata, attachments and footer.
+
+        Raises DataError if the file is not MCAP, or ends before its footer and magic bytes.
+        """
+        if self._file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            raise DataError('no MCAP file: wrong magic bytes at its beginning', 'no_mcap')
+        self.position = self._file.tell()
+        for opcode, length in _heads(self._file, self._size):
+            self._advance(_HEAD_BYTES + length, '')
+            wanted = opcode == Opcode.MESSAGE or opcode in _PARSERS
+            if not wanted or (
+                    opcode == Opcode.ATTACHMENT and length > self._max_attachment_bytes):
                 continue
-            record = _record(opcode, file, length)
-            if isinstance(record, Chunk):
-                yield from _chunk_records(record)
-            else:
+            record = _parse(opcode, self._file, length, self._max_record_bytes)
+            self.position = self._file.tell()
+            if isinstance(record, Footer):
+                if self._file.read() != MCAP0_MAGIC:
+                    break
+                self.position = self._size
+                self._advance(2 * len(MCAP0_MAGIC), '')
                 yield record
-    raise DataError('its end is missing, as where a recorder was killed; `active-recon bag '
-                    'repair` keeps all that is whole', 'truncated')
+                return
+            yield record
+        raise DataError(f'incomplete: its end is missing, as after a killed recorder; {_REPAIR}',
+                        'truncated')
 
 
-def _chunk_records(chunk: Chunk) -> Iterator[McapRecord]:
-    data = _unpacked(chunk)
+def chunk_records(chunk: Chunk) -> Iterator[McapRecord]:
+    """
+    Yield the schemas, channels and messages of a chunk.
+
+    Raises DataError if it is too large or does not match its checksum.
+    """
+    data = _decompressed(chunk)
     stream = BytesIO(data)
     for opcode, length in _heads(stream, len(data)):
-        if opcode == Opcode.MESSAGE or opcode in _CHUNKED:
-            yield _record(opcode, stream, length)
+        if opcode == Opcode.MESSAGE or opcode in _IN_CHUNK:
+            yield _parse(opcode, stream, length, MAX_RECORD_BYTES)
 
 
 def _heads(stream: BinaryIO, end: int) -> Iterator[tuple[int, int]]:
-    """Yield each record's opcode and length, the stream at its content."""
+    """Yield the opcode and length of each record, with the stream at its content."""
     following = stream.tell()
     while following < end:
         stream.seek(following)
-        head = stream.read(_HEAD)
-        opcode, length = struct.unpack('<BQ', head) if len(head) == _HEAD else (0, 0)
+        head = stream.read(_HEAD_BYTES)
+        opcode, length = struct.unpack('<BQ', head) if len(head) == _HEAD_BYTES else (0, 0)
         left = end - stream.tell()
-        if len(head) < _HEAD or length > left:
-            raise DataError(
-                f'cut off at byte {following}: a record there claims {length} bytes and {left} '
-                f'are left; `active-recon bag repair` keeps all that is whole',
-                'truncated')
+        if len(head) < _HEAD_BYTES or length > left:
+            raise DataError(f'cut off at byte {following}: a record there claims {length} bytes, '
+                            f'{left} are left; {_REPAIR}', 'truncated')
         following = stream.tell() + length
         yield opcode, length
 
 
-def _record(opcode: int, stream: BinaryIO, length: int) -> McapRecord:
-    if length > MOST_BYTES:
-        raise DataError(f'a record of {length} bytes: expected at most {MOST_BYTES}',
+def _parse(opcode: int, stream: BinaryIO, length: int, max_bytes: int) -> McapRecord:
+    if length > max_bytes:
+        raise DataError(f'record too large: expected at most {max_bytes} bytes, got {length}',
                         'too_large')
     content = ReadDataStream(BytesIO(stream.read(length)))
     if opcode != Opcode.MESSAGE:
-        return _READ[Opcode(opcode)](content)
-    if length < 22:
-        raise DataError(f'a message of {length} bytes: expected at least 22', 'damaged')
+        return _PARSERS[opcode](content)
+    if length < _MIN_MESSAGE_BYTES:
+        raise DataError(f'damaged message: expected at least {_MIN_MESSAGE_BYTES} bytes, got '
+                        f'{length}', 'damaged')
     message: Message = Message.read(content, length)
     return message
 
 
-def _unpacked(chunk: Chunk) -> bytes:
+def _decompressed(chunk: Chunk) -> bytes:
     size = chunk.uncompressed_size
-    if size > MOST_BYTES:
-        raise DataError(f'a chunk that claims {size} bytes: expected at most {MOST_BYTES}',
-                        'too_large')
+    if size > MAX_RECORD_BYTES:
+        raise DataError(f'chunk too large: expected at most {MAX_RECORD_BYTES} bytes, got a '
+                        f'claim of {size}', 'too_large')
     if chunk.compression == 'zstd':
         data = ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
     elif chunk.compression == 'lz4':
@@ -123,10 +168,9 @@ def _unpacked(chunk: Chunk) -> bytes:
     elif chunk.compression == '':
         data = chunk.data
     else:
-        raise DataError(f'a chunk packed by {chunk.compression!r}: expected zstd, lz4 or '
-                        'nothing', 'compression')
+        raise DataError('unknown chunk compression: expected zstd, lz4 or none, got '
+                        f'{chunk.compression!r}', 'compression')
     if len(data) != size or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise DataError(f'a chunk of {size} bytes is not as it was written, {len(data)} bytes '
-                        'without its checksum; `active-recon bag repair` keeps '
-                        'the others', 'damaged')
+        raise DataError(f'damaged chunk: its {size} bytes do not match their checksum; {_REPAIR}',
+                        'damaged')
     return bytes(data)

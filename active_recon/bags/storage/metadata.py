@@ -1,4 +1,4 @@
-"""rosbag2's description of a bag: what it holds, and the QoS its topics were offered with."""
+"""rosbag2's metadata.yaml: the content of a bag and the offered QoS of its topics."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,7 +8,7 @@ from typing import Any
 from active_recon.errors import DataError
 import yaml
 
-VERSION = 9  # of the description, as Jazzy writes it
+VERSION = 9  # of metadata.yaml in Jazzy
 RELIABILITIES = ('reliable', 'best_effort')
 DURABILITIES = ('volatile', 'transient_local')
 _RELIABILITY: Mapping[object, str] = {
@@ -16,12 +16,13 @@ _RELIABILITY: Mapping[object, str] = {
 _DURABILITY: Mapping[object, str] = {
     **{word: word for word in DURABILITIES}, 1: 'transient_local', 2: 'volatile'}
 PROVENANCE = 'active_recon'
-"""The name of the MCAP metadata record that says what made a bag; the last one of a file holds."""
+"""The MCAP metadata record with the versions, weights and policy that made a bag; the last one in
+a file is valid."""
 
 
 @dataclass(frozen=True)
 class QosProfile:
-    """What a publisher offers, in rosbag2's words."""
+    """The QoS that a publisher offers, in rosbag2's terms."""
 
     reliability: str = 'reliable'
     """'reliable' or 'best_effort'."""
@@ -39,7 +40,7 @@ class Topic:
 
     @property
     def latched(self) -> bool:
-        """Whether who comes late is told the last message."""
+        """Whether late subscribers receive the last message."""
         return bool(self.qos) and all(
             profile.durability == 'transient_local' for profile in self.qos)
 
@@ -59,12 +60,12 @@ class Contents:
         self.counts[topic] += 1
 
     def copy(self) -> 'Contents':
-        """Return what stays as it is while this goes on counting."""
+        """Return an independent copy."""
         return Contents(self.counts.copy(), self.begin, self.end)
 
 
 def total(parts: Iterable[Contents]) -> Contents:
-    """Return the contents of several files together."""
+    """Return the sum of the contents of several files."""
     filled = [part for part in parts if part.counts]
     if not filled:
         return Contents()
@@ -74,7 +75,7 @@ def total(parts: Iterable[Contents]) -> Contents:
 
 def bag_information(files: Sequence[tuple[str, Contents]],
                     topics: Iterable[Topic]) -> dict[str, Any]:
-    """Return what metadata.yaml says of a bag of MCAP files, given by name and in their order."""
+    """Return the content of metadata.yaml for a bag of MCAP files, given by name and in order."""
     whole = total(contents for _, contents in files)
     return {
         'version': VERSION,
@@ -100,59 +101,60 @@ def bag_information(files: Sequence[tuple[str, Contents]],
 
 
 def parameters_name(node: str) -> str:
-    """Return the name of the attachment that holds a node's parameters, by its full name."""
+    """Return the name of the attachment with the parameters of a node, given its full name."""
     return f'parameters/{node.strip("/")}.yaml'
 
 
 def parameters_node(name: str) -> str:
-    """Return whose parameters an attachment of that name holds; '' where it is another's."""
+    """Return the node whose parameters are in an attachment of that name; '' for others."""
     if name.startswith('parameters/') and name.endswith('.yaml'):
         return name.removeprefix('parameters/').removesuffix('.yaml')
     return ''
 
 
 def metadata_yaml(information: dict[str, Any]) -> str:
-    """Return the text of the file metadata.yaml."""
+    """Return the text of metadata.yaml."""
     return as_yaml({'rosbag2_bagfile_information': information})
 
 
 def offered_qos_yaml(qos: Sequence[QosProfile]) -> str:
-    """Return the profiles as the channel of a topic carries them."""
+    """Return the profiles as the metadata of an MCAP channel has them."""
     return as_yaml(_offered(qos)) if qos else ''
 
 
 def as_yaml(value: object) -> str:
-    """Return the value as YAML, its keys in their order."""
+    """Return the value as YAML, with its keys in their order."""
     return str(yaml.safe_dump(value, sort_keys=False))
 
 
 def yaml_mapping(text: bytes, name: str) -> dict[str, Any]:
     """
-    Return the mapping in a YAML text; DataError that says the name where it is none.
+    Return the mapping in a YAML text; raises DataError with the name if it is none.
 
-    An alias is refused: a few of them, nested, are gigabytes once they are written out.
+    Aliases are rejected: a few nested ones expand to gigabytes.
     """
     try:
         value = yaml.load(text, _NoAliases)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise DataError(f'{name}: no YAML: {" ".join(str(error).split())}') from error
+        raise DataError(f'{name}: invalid YAML: {" ".join(str(error).split())}') from error
     if not isinstance(value, dict):
-        raise DataError(f'{name}: a {type(value).__name__} where a mapping was expected')
+        raise DataError(f'{name}: invalid content: expected a mapping, got a '
+                        f'{type(value).__name__}')
     return value
 
 
 class _NoAliases(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: object) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError('an alias, which no recording needs')
+            raise yaml.YAMLError('aliases are not allowed')
         return super().compose_node(parent, index)
 
 
 def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
     """
-    Return the profiles that the channel of a topic carries; what is unknown is left out.
+    Return the profiles in the metadata of an MCAP channel; unknown ones are left out.
 
-    Before Jazzy their words were numbers, those of the middleware.
+    Before Jazzy the policies were the numbers of the middleware's enumerations.
     """
     try:
         offered = yaml.load(text, _NoAliases) or []
@@ -171,7 +173,7 @@ def _span(contents: Contents) -> dict[str, Any]:
 
 
 def _offered(qos: Sequence[QosProfile]) -> list[dict[str, Any]]:
-    # A publisher's history and depth are not told to others, so they are unknown here.
+    # Discovery does not share a publisher's history and depth, so they are unknown here.
     return [{
         'history': 'unknown',
         'depth': 0,
@@ -186,5 +188,5 @@ def _offered(qos: Sequence[QosProfile]) -> list[dict[str, Any]]:
 
 
 def _forever() -> dict[str, int]:
-    """Return a new mapping each time: one met twice is written as an anchor that few expect."""
+    """Return a new mapping each time: YAML writes a shared one as an anchor, which few expect."""
     return {'sec': 9223372036, 'nsec': 854775807}

@@ -1,4 +1,4 @@
-"""A bag that was cut off, made whole again: index, summary and metadata.yaml."""
+"""Repair of an incomplete bag: its index, summary and metadata.yaml."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -7,7 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from active_recon.bags.storage.files import free_name, mcap_files, sync_folder, write_whole
+from active_recon.bags.storage.files import free_name, mcap_files, sync_folder, write_atomically
+from active_recon.bags.storage.mcap_rewriter import McapRewriter
 from active_recon.bags.storage.metadata import (
     bag_information,
     Contents,
@@ -15,7 +16,6 @@ from active_recon.bags.storage.metadata import (
     qos_from_yaml,
     Topic,
 )
-from active_recon.bags.storage.rewriting import Rewriting
 from active_recon.bags.storage.salvage import Salvage
 from active_recon.errors import DataError
 from mcap.records import Channel, Message, Schema
@@ -25,10 +25,10 @@ import yaml
 @dataclass
 class Repair:
     """
-    What was found in one file of a bag, and what became of it.
+    The outcome for one file of a bag.
 
     - lost: what could not be read, in words
-    - kept_as: where the file as it was found stands now; None where it was whole and is untouched
+    - kept_as: the path of the original file; None if it was intact and was left unchanged
     """
 
     path: Path
@@ -41,13 +41,13 @@ class Repair:
 def repair_bag(bag: Path, advance: Callable[[str], None] = lambda name: None
                ) -> tuple[list[Repair], bool]:
     """
-    Make a bag whole: a folder, or one MCAP file, whose metadata.yaml is then left alone.
+    Repair a bag: a folder, or one MCAP file, whose metadata.yaml is then left unchanged.
 
-    Whole files are not touched. What is not whole is written anew beside, and takes the file's
-    name only when it is on the disk; the file as it was is kept as `<name>.damaged`. `advance` is
-    told each file that is done. Returns the files and whether metadata.yaml was written. Raises
-    DataError where there is no bag, where it is still being recorded, or the disk is full; what
-    was there before is there then too.
+    Intact files are left unchanged. A damaged one is rewritten to a temporary file that replaces
+    it once it is on the disk; the original is kept as `<name>.damaged`. `advance` is called with
+    the name of each finished file. Returns the files and whether metadata.yaml was written.
+    Raises DataError if there is no bag, it is still being recorded, or the disk is full; the bag
+    is then unchanged.
     """
     files = bag_files(bag)
     try:
@@ -58,23 +58,23 @@ def repair_bag(bag: Path, advance: Callable[[str], None] = lambda name: None
             advance(each.path.name)
         return repairs, bag.is_dir() and _repair_metadata(bag, repairs)
     except OSError as error:
-        raise DataError(f'{bag}: cannot be repaired: {error}; what was there is untouched',
+        raise DataError(f'{bag}: cannot be repaired: {error}; nothing was changed',
                         'not_repaired') from error
 
 
 def bag_files(bag: Path) -> list[Path]:
-    """Return a bag's files in the order in which they were recorded; DataError on no bag."""
+    """Return a bag's files in the order of recording; raises DataError if there is no bag."""
     if bag.is_file():
         return [bag]
     files = mcap_files(bag)
     if not files:
-        raise DataError(f'{bag}: no bag there: expected a folder of MCAP files, or one of '
-                        'them', 'no_bag')
+        raise DataError(f'{bag}: no bag there: expected a folder of MCAP files, or one MCAP file',
+                        'no_bag')
     return files
 
 
 def _open_finished(path: Path) -> Salvage:
-    """Refuse what is no MCAP, and a file that its writer has still locked."""
+    """Return a file for reading; raises DataError if it is not MCAP or still being recorded."""
     with path.open('rb') as file:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -89,15 +89,15 @@ def _repair_file(found: Salvage) -> Repair:
     repair = _survey(found)
     if found.indexed and not repair.lost:
         return repair
-    written = Rewriting(path.with_name(f'.{path.name}.part'))
+    rewritten = McapRewriter(path.with_name(f'.{path.name}.part'))
     try:
         for record in found.records():
-            written.add(record)
-        written.finish()
+            rewritten.add(record)
+        rewritten.finish()
     except BaseException:
-        written.drop()
+        rewritten.discard()
         raise
-    repair.kept_as = _exchange(path, written.path)
+    repair.kept_as = _replace(path, rewritten.path)
     return repair
 
 
@@ -119,16 +119,16 @@ def _survey(found: Salvage) -> Repair:
                 repair.contents.add(topics[record.channel_id], record.log_time)
             else:
                 unknown += 1
-    repair.lost = found.lost + [f'{unknown} messages whose topic is not known'] * (unknown > 0)
+    repair.lost = found.lost + [f'{unknown} messages of unknown topics'] * (unknown > 0)
     return repair
 
 
-def _exchange(path: Path, repaired: Path) -> Path:
-    """Put a file in another's place; return where the other is kept. Never is there neither."""
+def _replace(path: Path, repaired: Path) -> Path:
+    """Replace a file and return the path of the original; one of them exists at any time."""
     kept = free_name(path, 'damaged')
     try:
         os.link(path, kept)
-    except OSError:  # a disk that knows no second name of a file
+    except OSError:  # a file system without hard links
         path.rename(kept)
     repaired.replace(path)
     sync_folder(path.parent)
@@ -136,21 +136,21 @@ def _exchange(path: Path, repaired: Path) -> Path:
 
 
 def _repair_metadata(folder: Path, repairs: Sequence[Repair]) -> bool:
-    """Write metadata.yaml where it is missing or says what is not so; return whether."""
+    """Write metadata.yaml if it is missing or wrong; return whether it was written."""
     path = folder / 'metadata.yaml'
     topics = {name: topic for repair in repairs for name, topic in repair.topics.items()}
     information = bag_information(
         [(repair.path.name, repair.contents) for repair in repairs], topics.values())
     if path.exists():
-        if _told(path) == _essence(information):
+        if _read_essence(path) == _essence(information):
             return False
         path.rename(free_name(path, 'damaged'))
-    write_whole(path, metadata_yaml(information))
+    write_atomically(path, metadata_yaml(information))
     return True
 
 
-def _told(path: Path) -> object:
-    """Return what a metadata.yaml says of files and messages; None where it cannot be read."""
+def _read_essence(path: Path) -> object:
+    """Return the files and message counts in a metadata.yaml; None if it cannot be read."""
     try:
         return _essence(yaml.safe_load(path.read_text())['rosbag2_bagfile_information'])
     except (yaml.YAMLError, UnicodeError, KeyError, TypeError):

@@ -1,41 +1,22 @@
-"""What can still be read from an MCAP file, however it ends."""
+"""Reading what is intact of a damaged or incomplete MCAP file."""
 
 from collections.abc import Iterator
 from pathlib import Path
-import struct
-from typing import BinaryIO
 
+from active_recon.bags.storage.mcap_file import chunk_records, RecordReader
 from active_recon.errors import DataError
-from mcap.exceptions import McapError
-from mcap.records import (
-    Attachment,
-    Channel,
-    Chunk,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Message,
-    Metadata,
-    Schema,
-)
-from mcap.stream_reader import breakup_chunk, StreamReader
+from mcap.records import Chunk, DataEnd, Footer, McapRecord
 from mcap.writer import MCAP0_MAGIC
-import zstandard
-
-_BROKEN = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struct.error,
-           zstandard.ZstdError)
-_CONTENT = (Header, Schema, Channel, Message, Metadata, Attachment)
 
 
 class Salvage:
     """
-    The whole records of an MCAP file, and once they are read, what was wrong with it.
+    The intact records of an MCAP file and, after they were read, the damage found.
 
-    - lost: what could not be read, in words; empty where nothing was lost
+    - lost: what could not be read, in words; empty if nothing was lost
     - indexed: whether the file ends as it should, with an index
 
-    Raises DataError where the file is no MCAP at all.
+    Raises DataError if the file is not MCAP.
     """
 
     def __init__(self, path: Path) -> None:
@@ -43,57 +24,43 @@ class Salvage:
         self.lost: list[str] = []
         self.indexed = False
         with path.open('rb') as file:
-            begins = file.read(len(MCAP0_MAGIC))
-        if not MCAP0_MAGIC.startswith(begins):
-            raise DataError(f'{path}: no MCAP file: it begins otherwise',
+            beginning = file.read(len(MCAP0_MAGIC))
+        if not MCAP0_MAGIC.startswith(beginning):
+            raise DataError(f'{path}: no MCAP file: wrong magic bytes at its beginning',
                             'no_mcap')
 
     def records(self) -> Iterator[McapRecord]:
         """Yield header, schemas, channels, messages, metadata and attachments in file order."""
         self.lost.clear()
+        self.indexed = False
+        size = self.path.stat().st_size
         with self.path.open('rb') as file:
-            whole = _WholeReads(file, self.path.stat().st_size)
+            reader = RecordReader(file, size, max_record_bytes=size, max_attachment_bytes=size)
             try:
-                yield from self._content(whole)
-            except _BROKEN:
-                if whole.size > whole.kept:
-                    self.lost.append(f'the end, {whole.size - whole.kept} bytes from byte '
-                                     f'{whole.kept} on')
+                yield from self._content(reader)
+            except OSError:
+                raise
+            except Exception:  # the decoders raise all kinds of errors on damaged bytes
+                if size > reader.position:
+                    self.lost.append(f'the last {size - reader.position} bytes, from byte '
+                                     f'{reader.position}')
 
-    def _content(self, whole: '_WholeReads') -> Iterator[McapRecord]:
-        reader = StreamReader(
-            whole, emit_chunks=True, record_size_limit=None)  # type: ignore[arg-type]
+    def _content(self, reader: RecordReader) -> Iterator[McapRecord]:
         in_data = True
-        for record in reader.records:
-            whole.keep()
-            if isinstance(record, Chunk):
-                yield from self._opened(record)
-            elif isinstance(record, DataEnd):
-                in_data = False  # what follows repeats what was there
-            elif isinstance(record, Footer):
+        for record in reader.records():
+            if isinstance(record, Footer):
                 self.indexed = record.summary_start > 0
-            elif in_data and isinstance(record, _CONTENT):
+            elif isinstance(record, DataEnd):
+                in_data = False  # the summary repeats schemas and channels
+            elif in_data and isinstance(record, Chunk):
+                yield from self._chunk(record)
+            elif in_data:
                 yield record
 
-    def _opened(self, chunk: Chunk) -> Iterator[McapRecord]:
+    def _chunk(self, chunk: Chunk) -> list[McapRecord]:
+        """Return the records of a chunk, all or none."""
         try:
-            yield from breakup_chunk(chunk, validate_crc=True)
-        except _BROKEN as error:
+            return list(chunk_records(chunk))
+        except Exception as error:
             self.lost.append(f'a chunk of {len(chunk.data)} bytes ({error})')
-
-
-class _WholeReads:
-    """A stream that ends where a read would: what is cut off is not read in part."""
-
-    def __init__(self, file: BinaryIO, size: int) -> None:
-        self.size = size
-        self.kept = 0
-        """The bytes that were read and understood."""
-        self._file = file
-
-    def keep(self) -> None:
-        """Note that what was read so far was understood."""
-        self.kept = self._file.tell()
-
-    def read(self, count: int) -> bytes:
-        return self._file.read(count) if count <= self.size - self._file.tell() else b''
+            return []

@@ -1,8 +1,8 @@
 """
-Bags: MCAP files with rosbag2's metadata.yaml beside them.
+Bags: MCAP files with rosbag2's metadata.yaml.
 
-The writer knows no ROS: types arrive as names, definitions as text, messages as the CDR bytes
-that went over the wire. What it writes opens in rosbag2, rosbags, mcap-ros2-support and Foxglove.
+The writer needs no ROS: types are given as names, definitions as text, messages as CDR bytes. Its
+bags open in rosbag2, rosbags, mcap-ros2-support and Foxglove.
 """
 
 from collections import Counter
@@ -13,7 +13,7 @@ import time
 from types import TracebackType
 
 from active_recon.bags.storage.bag_file import BagFile
-from active_recon.bags.storage.files import sync_folder, write_whole
+from active_recon.bags.storage.files import sync_folder, write_atomically
 from active_recon.bags.storage.metadata import (
     as_yaml,
     bag_information,
@@ -27,21 +27,21 @@ from active_recon.bags.storage.metadata import (
 )
 from active_recon.errors import RecordingError
 
-MOST_CHUNKS = 20_000
-"""Of one file; their index takes 30 MB of memory until it is written."""
+MAX_CHUNKS = 20_000
+"""Chunks in one file; their index takes 30 MB of memory until it is written."""
 
 
 class BagWriter:
     """
     Records messages into a folder: `<folder's name>_0.mcap`, `_1.mcap`, ..., `metadata.yaml`.
 
-    The folder is made where it is missing; a folder that already holds a bag is refused, nothing
-    is ever overwritten. A new file is begun when the last has reached `max_bytes`, or MOST_CHUNKS;
-    it repeats the last message of each latched topic, as it was published, so that it can be read
-    alone (`new_in_bag` tells them from new ones).
-    Messages reach the disk in chunks, by `flush` or when a chunk is full. Where the disk is full
-    (or fails) the call that noticed raises RecordingError, the unwritten chunk is dropped, and
-    the bag is closed: it stays a readable one up to its last chunk.
+    The folder is created if it is missing; one that already holds a bag is rejected, nothing is
+    ever overwritten. A new file is started when the last one has reached `max_bytes` or
+    MAX_CHUNKS; it repeats the last message of each latched topic, so that it can be read alone
+    (`new_in_bag` skips the repeated messages).
+    Messages reach the disk in chunks, by `flush` or when a chunk is full. If the disk is full or
+    fails, the call raises RecordingError, the open chunk is dropped and the bag is closed; it
+    remains readable up to its last chunk.
     """
 
     def __init__(self, folder: Path, max_bytes: int | None = None) -> None:
@@ -59,31 +59,31 @@ class BagWriter:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
-                raise FileExistsError(errno.EEXIST, 'a bag exists there already')
+                raise FileExistsError(errno.EEXIST, 'it already holds a bag')
             self._file = self._begin_file(0)
         except OSError as error:
-            raise RecordingError(f'expected to begin a new bag in {folder}, but: {error}',
+            raise RecordingError(f'cannot start a bag in {folder}: {error}',
                                  'bag_not_begun') from error
 
     @property
     def path(self) -> Path:
-        """The file that is being written, or was the last."""
+        """The current or last file."""
         return self._file.path
 
     @property
     def message_count(self) -> int:
-        """Messages taken in so far, the ones not yet on disk among them."""
+        """The number of messages written so far, including those not yet on disk."""
         return self._counts.total()
 
     def add_topic(self, name: str, type_name: str, definition: str,
                   qos: tuple[QosProfile, ...] = ()) -> None:
         """
-        Announce a topic before its first message; one that never has any is not in the bag.
+        Register a topic before its first message; a topic without messages is not in the bag.
 
         `type_name` is as in 'std_msgs/msg/Header', `definition` its text in the ros2msg form: the
         message file, then each type that it names, after a line of 80 '=' and 'MSG: pkg/Name'.
-        `qos` are the profiles that its publishers offer. Announced again, a topic stays as it is;
-        another type is refused.
+        `qos` are the profiles that its publishers offer. Registering a topic again changes
+        nothing; raises RecordingError if its type differs.
         """
         self._require_open()
         if name not in self._topics:
@@ -91,19 +91,19 @@ class BagWriter:
             return
         known = self._topics[name][0].type_name
         if known != type_name:
-            raise RecordingError(f'{name}: expected messages of {known} as before, '
+            raise RecordingError(f'{name}: changed type: expected {known} as before, '
                                  f'got {type_name}', 'topic_type')
 
     def write(self, topic: str, data: bytes, receive_time: int, publish_time: int) -> None:
         """
-        Take in one message: its CDR bytes, header included; times in nanoseconds since 1970.
+        Write one message: its CDR bytes, header included; times in nanoseconds since 1970.
 
-        Raises RecordingError where the topic was not announced, the bag is closed, or the disk
-        is full.
+        Raises RecordingError if the topic is not registered, the bag is closed or the disk is
+        full.
         """
         self._require_open()
         if topic not in self._topics:
-            raise RecordingError(f'{topic}: expected a topic announced by add_topic', 'topic')
+            raise RecordingError(f'{topic}: unknown topic: register it by add_topic', 'topic')
         self._counts[topic] += 1
         try:
             if self._file_is_full():
@@ -118,10 +118,10 @@ class BagWriter:
 
     def add_provenance(self, record: Mapping[str, str]) -> None:
         """
-        Record what made the bag, on the disk at once: versions, hashes, policy, seed, object.
+        Record what made the bag, flushed at once: versions, hashes, policy, seed, object.
 
-        What is told later is added to it; each file of the bag tells all that was known. Raises
-        RecordingError as `write` does.
+        Later calls add to the record; each file of the bag has all that was known by then.
+        Raises RecordingError as `write` does.
         """
         self._require_open()
         self._provenance |= record
@@ -132,7 +132,7 @@ class BagWriter:
         self.flush()
 
     def attach_parameters(self, node: str, parameters: Mapping[str, object]) -> None:
-        """Attach a node's parameters by its name, on the disk at once; raises as `write` does."""
+        """Attach a node's parameters by its name, flushed at once; raises as `write` does."""
         self._require_open()
         self._parameters[node] = as_yaml(dict(parameters)).encode()
         try:
@@ -143,9 +143,9 @@ class BagWriter:
 
     def flush(self) -> None:
         """
-        Bring all that was taken in to the disk, where it survives a power cut.
+        Write all messages to the disk, where they survive a power cut.
 
-        Raises RecordingError where the disk is full.
+        Raises RecordingError if the disk is full.
         """
         self._require_open()
         try:
@@ -155,7 +155,7 @@ class BagWriter:
             self._abandon(error)
 
     def close(self) -> None:
-        """Complete the bag; a second call does nothing. RecordingError where the disk is full."""
+        """Complete the bag, once; raises RecordingError if the disk is full."""
         if self._closed:
             return
         try:
@@ -166,7 +166,7 @@ class BagWriter:
         self._closed = True
 
     def _begin_file(self, number: int) -> BagFile:
-        """Begin a file that tells what made it, as the first does."""
+        """Start a file, with the provenance and parameters known so far."""
         file = BagFile(self.folder / f'{self.folder.name}_{number}.mcap')
         if self._provenance:
             file.add_metadata(PROVENANCE, self._provenance)
@@ -180,7 +180,7 @@ class BagWriter:
                     time.time_ns())
 
     def _file_is_full(self) -> bool:
-        return self._file.chunks >= MOST_CHUNKS or (
+        return self._file.chunks >= MAX_CHUNKS or (
             self._max_bytes is not None
             and self._file.size - self._repeated_bytes >= self._max_bytes)
 
@@ -207,15 +207,15 @@ class BagWriter:
 
     def _require_open(self) -> None:
         if self._closed:
-            raise RecordingError(f'{self.path}: expected an open bag, but it was closed', 'closed')
+            raise RecordingError(f'{self.path}: the bag is closed', 'closed')
 
     def _abandon(self, error: OSError) -> None:
-        """End the bag after its last whole chunk, and say why."""
+        """Close the bag after its last complete chunk and raise RecordingError."""
         self._closed = True
         kept = total(contents for _, contents in self._files()).counts.total() - self._repeated
         lost = self.message_count - kept
-        message = (f'{self.path}: the disk took no more ({error.strerror}); the bag ends after '
-                   f'{kept} messages, {lost} were lost')
+        message = (f'{self.path}: writing failed ({error.strerror}); the bag ends after {kept} '
+                   f'messages, {lost} were lost')
         self._file.abandon()
         try:
             self._write_metadata()
@@ -230,12 +230,13 @@ class BagWriter:
     def _write_metadata(self) -> None:
         files = self._files()
         counts = total(contents for _, contents in files).counts
-        # Readers look in the files for the definition of each topic that is named there
+        # Readers look in the files for the definition of each topic that metadata.yaml lists
         topics = [topic for topic, _ in self._topics.values() if counts[topic.name]]
-        write_whole(self.folder / 'metadata.yaml', metadata_yaml(bag_information(files, topics)))
+        write_atomically(
+            self.folder / 'metadata.yaml', metadata_yaml(bag_information(files, topics)))
 
     def __enter__(self) -> 'BagWriter':
-        """Close the bag where the block ends."""
+        """Close the bag at the end of the block."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,

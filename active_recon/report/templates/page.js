@@ -14,7 +14,7 @@
   const dark = matchMedia('(prefers-color-scheme: dark)');
   const still = matchMedia('(prefers-reduced-motion: reduce)');
 
-  // Colours are named as the style sheet's variables, which know light and dark.
+  // Colours are named as the style sheet's variables, which have a light and a dark scheme.
   const resolved = (value) => {
     if (typeof value === 'string' && value.startsWith('--')) {
       return getComputedStyle(document.documentElement).getPropertyValue(value).trim();
@@ -50,7 +50,7 @@
         ? ` · IoU ${overlap(cells, truth, threshold).toFixed(2)}` : '';
       panel.querySelector('.count').textContent = cells
         ? `${mesh.count} cells${chosen() === 'truth' ? ' of the true shape' : ''}${fit}`
-        : 'no shape is known after this view';
+        : 'no shape was recorded after this view';
       draw(place, { data: sceneTraces(mesh, scene.cameras, self.at), layout: { ...SCENE_LAYOUT,
         scene: { ...SCENE_LAYOUT.scene, camera: { eye: eyeAt(self.angle),
           center: { x: 0, y: 0, z: -0.08 } } } } });
@@ -103,6 +103,6 @@
   document.documentElement.dataset.ready = 'yes';
 })().catch((error) => {
   const trouble = document.getElementById('trouble');
-  trouble.textContent = `The drawings could not be made: ${error.message}. A browser of 2023 or later is needed.`;
+  trouble.textContent = `The drawings failed: ${error.message}. A browser of 2023 or later is needed.`;
   trouble.hidden = false;
 });

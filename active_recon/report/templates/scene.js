@@ -1,5 +1,5 @@
 'use strict';
-// The 3D view: cells above a threshold as cubes, amid the camera's places.
+// The 3D view: cells above a threshold as cubes, and the camera's positions.
 
 const FACES = [  // outward direction, and the corners counter-clockwise as seen from outside
   [[1, 0, 0], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]]],

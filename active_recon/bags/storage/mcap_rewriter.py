@@ -1,31 +1,31 @@
-"""The records of an MCAP file written anew, with an index."""
+"""Writing the records of an MCAP file to a new file with an index."""
 
 from pathlib import Path
 
-from active_recon.bags.storage.chunk_file import WholeChunks
+from active_recon.bags.storage.chunk_file import ChunkFile
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 from mcap.writer import Writer
 
 
-class Rewriting:
+class McapRewriter:
     """
-    An MCAP file that takes whole records of another; OSError where the disk is full.
+    A new MCAP file with the records of another; raises OSError if the disk is full.
 
-    What an attempt before has left at `path` is written over. Messages of a channel that was not
-    added are left out.
+    A file that an earlier attempt left at `path` is overwritten. Messages of unknown channels
+    are left out.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         path.unlink(missing_ok=True)
-        self._chunks = WholeChunks(path)
+        self._chunks = ChunkFile(path)
         self._mcap = Writer(self._chunks, use_summary_offsets=False)  # type: ignore[arg-type]
         self._started = False
         self._schemas: dict[int, int] = {0: 0}
         self._channels: dict[int, int] = {}
 
     def add(self, record: McapRecord) -> None:
-        """Take in one record, in the order of the other file."""
+        """Write one record; they come in the order of the other file."""
         if isinstance(record, Header):
             self._start(record.profile, record.library)
         elif isinstance(record, Schema) and record.id not in self._schemas:
@@ -46,14 +46,14 @@ class Rewriting:
         self._chunks.flush()
 
     def finish(self) -> None:
-        """Write the index; return when the file would survive a power cut."""
+        """Write the index; block until the file would survive a power cut."""
         if not self._started:
             self._start('ros2', 'active_recon')
         self._mcap.finish()  # type: ignore[no-untyped-call]
         self._chunks.end()
 
-    def drop(self) -> None:
-        """Leave nothing behind."""
+    def discard(self) -> None:
+        """Close and delete the file."""
         self._chunks.close()
         self.path.unlink(missing_ok=True)
 

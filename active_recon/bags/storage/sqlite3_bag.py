@@ -1,9 +1,10 @@
-"""Bags in rosbag2's other storage, sqlite3."""
+"""A bag in rosbag2's storage sqlite3."""
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, ExitStack
 from pathlib import Path
 
+from active_recon.bags.storage.bag import bag_summary, BagSummary, RawMessage
 from active_recon.bags.storage.compression import StoredFiles
 from active_recon.bags.storage.message_types import require_standard
 from active_recon.bags.storage.metadata import (
@@ -13,22 +14,21 @@ from active_recon.bags.storage.metadata import (
     RELIABILITIES,
     Topic,
 )
-from active_recon.bags.storage.raw import bag_summary, BagSummary, RawMessage
 from active_recon.errors import ActiveReconError, DataError
 from active_recon.reporting import Reporting, silent
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
 
 
-class OtherBag:
-    """Databases that follow each other in the recording of that path, as rosbags reads them."""
+class Sqlite3Bag:
+    """Consecutive databases of the bag at a path, read by rosbags."""
 
     def __init__(self, path: Path, files: StoredFiles) -> None:
         self._path = path
         self._files = files
 
     def summary(self, reporting: Reporting = silent) -> BagSummary:
-        """Say what is in the bag, once all of it has been read."""
+        """Return what is in the databases, all of which are read."""
         contents = Contents()
         topics: dict[str, Topic] = {}
         with self._readers() as readers, reporting(
@@ -37,25 +37,25 @@ class OtherBag:
                 topics |= {each.topic: Topic(each.topic, each.msgtype, _offered(each))
                            for each in reader.connections}
                 for connection, received, data in reader.messages():
-                    self._files.message(data)
+                    self._files.decompressed_message(data)
                     contents.add(connection.topic, received)
                     advance(1, '')
         return bag_summary(topics.values(), contents, {}, {})
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        """Yield the messages of the topics, file after file, each by its receive times."""
+        """Yield the messages of the topics, file after file, in the order of receive times."""
         with self._readers() as readers:
             for reader in readers:
                 wanted = [each for each in reader.connections if each.topic in topics]
                 for connection, received, data in reader.messages(wanted) if wanted else ():
                     yield RawMessage(connection.topic, connection.msgtype,
-                                     self._files.message(data), received, received)
+                                     self._files.decompressed_message(data), received, received)
 
     @contextmanager
     def _readers(self) -> Iterator[list[Reader]]:
-        """Open a reader of each file, whose errors are told as ours."""
+        """Open a reader of each file; its errors are raised as DataError."""
         try:
-            with self._files.opened() as files, ExitStack() as stack:
+            with self._files.decompressed() as files, ExitStack() as stack:
                 readers = [stack.enter_context(Reader(file)) for file in files]
                 for connection in (each for reader in readers for each in reader.connections):
                     if connection.msgdef.format == MessageDefinitionFormat.MSG:
@@ -63,11 +63,11 @@ class OtherBag:
                             connection.msgtype, connection.msgdef.data.encode(), self._path)
                 yield readers
         except ActiveReconError as error:
-            told = str(error)
-            raise DataError(told if told.startswith(str(self._path)) else f'{self._path}: {told}',
-                            error.kind) from error
-        except Exception as error:  # the library raises whatever damaged bytes lead it to
-            raise DataError(f'{self._path}: no bag of rosbag2 (MCAP or sqlite3) that can be read: '
+            reason = str(error)
+            raise DataError(reason if reason.startswith(str(self._path))
+                            else f'{self._path}: {reason}', error.kind) from error
+        except Exception as error:  # the library raises all kinds of errors on damaged bytes
+            raise DataError(f'{self._path}: no readable rosbag2 bag (MCAP or sqlite3): '
                             f'{" ".join(str(error).split())}') from error
 
 

@@ -1,4 +1,4 @@
-"""The network and the planner that a run was made with, found again by what its bag says."""
+"""The network and the planner that a run was recorded with, restored from what its bag says."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -23,11 +23,27 @@ _OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw',
 
 
 @dataclass(frozen=True)
-class Settings:
-    """
-    What the loop was started with; what is missing in the mappings is the core's default.
+class Overrides:
+    """What to change of the recorded setup; None keeps what was recorded."""
 
-    `planner` is None where nothing tells which policy chose.
+    weights: Path | None = None
+    policy: str | None = None
+    threshold: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The overrides as a part of a folder's name."""
+        return '_'.join(word for word in (
+            self.weights and self.weights.stem, self.policy,
+            self.threshold and f'threshold-{self.threshold:g}') if word)
+
+
+@dataclass(frozen=True)
+class LoopSetup:
+    """
+    What the loop was started with; names missing in the mappings have the core's defaults.
+
+    `planner` is None if the bag does not say which policy chose the views.
     """
 
     weights: Path
@@ -35,14 +51,14 @@ class Settings:
     planner: Mapping[str, Any] | None
     threads: int = 1
 
-    def under(self, weights: Path | None = None, policy: str | None = None,
-              threshold: float | None = None) -> 'Settings':
-        """Return the settings with another model, policy or threshold; None keeps what was."""
+    def with_overrides(self, overrides: Overrides) -> 'LoopSetup':
+        """Return the setup with another model, policy or threshold."""
+        weights, policy = overrides.weights, overrides.policy
         reconstructor = dict(self.reconstructor)
         if weights is not None:
             reconstructor.pop('threshold', None)  # each model has its own
-        if threshold is not None:
-            reconstructor['threshold'] = threshold
+        if overrides.threshold is not None:
+            reconstructor['threshold'] = overrides.threshold
         planner = None if self.planner is None else dict(self.planner)
         if policy is not None:
             yaw = {name: reconstructor[name] for name in ('object_yaw',) if name in reconstructor}
@@ -53,11 +69,11 @@ class Settings:
                        planner=planner)
 
     def load_reconstructor(self) -> Reconstructor:
-        """Raise WeightsError or ConfigError where it cannot be."""
+        """Return the reconstructor; raises WeightsError or ConfigError."""
         return Reconstructor.load(self.weights, threads=self.threads, **self.reconstructor)
 
     def load_planner(self) -> Planner | None:
-        """Return None where nothing tells which policy chose; raise as the reconstructor does."""
+        """Return the planner, None if the policy is unknown; raises WeightsError, ConfigError."""
         if self.planner is None:
             return None
         limits = MotionLimits(**{name: self.planner[name] for name in _OF_LIMITS
@@ -67,21 +83,22 @@ class Settings:
             name: value for name, value in self.planner.items() if name not in _OF_LIMITS})
 
 
-def recorded_settings(run: RecordedRun, weights: Path | None = None, instead: bool = False,
-                      given: Mapping[str, float | None] | None = None) -> Settings:
+def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: bool = False,
+                   scene_parameters: Mapping[str, float | None] | None = None) -> LoopSetup:
     """
-    Return what a run was made with, by its parameters and the hash of its weights.
+    Return what a run was recorded with, by its parameters and the hash of its weights.
 
-    `weights`: a file to look at first, or, with `instead`, to be taken whatever was recorded.
-    `given`: `object_size` in metres and `object_yaw` in radians where the bag does not tell, or
-    tells what is not so; None: it does. Raises WeightsError where no file has the recorded hash,
-    DataError where a parameter cannot be used.
+    `weights`: the file to check first or, with `any_weights`, to use whatever its hash.
+    `scene_parameters`: `object_size` in metres and `object_yaw` in radians, which replace the
+    recorded ones; None keeps those. Raises WeightsError if no file has the recorded hash,
+    DataError if a parameter is invalid.
     """
-    placed = {name: value for name, value in (given or {}).items() if value is not None}
+    placed = {name: value for name, value in (scene_parameters or {}).items()
+              if value is not None}
     size = _given(node_parameters(run, 'turntable_camera'), ('object_size',))
     of_reconstructor = {**size, **node_parameters(run, 'reconstructor'), **placed}
     of_planner = {**node_parameters(run, 'view_planner'), **placed}
-    found = weights if weights and instead else _recorded_weights(
+    found = weights if weights and any_weights else _recorded_weights(
         run, weights, of_reconstructor.get('weights', ''))
     planner = None
     if 'policy' in of_planner:
@@ -89,18 +106,18 @@ def recorded_settings(run: RecordedRun, weights: Path | None = None, instead: bo
         own = of_planner.get('weights', '')
         same = own == of_reconstructor.get('weights', '')
         planner['weights'] = found if same else find_weights(own or None)
-    return Settings(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
+    return LoopSetup(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
                     of_reconstructor.get('threads', 1))
 
 
 def _given(parameters: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """Return the named parameters that were given: NaN stands for one that was not."""
+    """Return the named parameters that are set: NaN means 'not set'."""
     return {name: value for name in names if (value := parameters.get(name)) is not None
             and not (isinstance(value, float) and math.isnan(value))}
 
 
 def _named(parameter: str) -> Path | None:
-    """Return the file that a node's parameter names, if it still ships where it is a name."""
+    """Return the weights file that a node's parameter names, None if it is not there any more."""
     with suppress(WeightsError):
         return find_weights(parameter) if parameter else None
     return None
@@ -115,6 +132,6 @@ def _recorded_weights(run: RecordedRun, weights: Path | None, parameter: str) ->
         if path.is_file() and weights_hash(path) == wanted:
             return path
     raise WeightsError(
-        f'{run.path}: expected the weights that it was recorded with, SHA-256 {wanted[:12]}..., '
-        'but neither those that ship nor those that were named are: the weights have changed '
-        'since. Name the file by --weights, or replay under others by --model')
+        f'{run.path}: weights not found: expected those of the recording, SHA-256 '
+        f'{wanted[:12]}..., among the given and the shipped ones, which have changed since. Give '
+        'the file by --weights, or replay with another model by --model')

@@ -1,4 +1,4 @@
-"""What every bag is read as: raw messages, and a summary of them."""
+"""The interface of a bag in any storage: raw messages and a summary."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from active_recon.reporting import Reporting, silent
 
 @dataclass(frozen=True)
 class RawMessage:
-    """A message as it went over the wire, CDR; times in nanoseconds since 1970."""
+    """A serialized message (CDR) as it was published; times in nanoseconds since 1970."""
 
     topic: str
     type_name: str
@@ -22,7 +22,7 @@ class RawMessage:
 
 @dataclass(frozen=True)
 class BagSummary:
-    """What is in a bag; `begin` and `end` are receive times, 0 where it holds no message."""
+    """The content of a bag; `begin` and `end` are receive times in ns, 0 if it has no message."""
 
     topics: list[TopicSummary]
     begin: int
@@ -33,7 +33,7 @@ class BagSummary:
 
 def bag_summary(topics: Iterable[Topic], contents: Contents, provenance: Mapping[str, str],
                 parameters: Mapping[str, Mapping[str, Any]]) -> BagSummary:
-    """Return the summary of what was counted."""
+    """Return the summary of the counted messages; topics in the order of their names."""
     counted = [TopicSummary(topic.name, topic.type_name, contents.counts[topic.name], topic.qos)
                for topic in sorted(topics, key=lambda topic: topic.name)]
     return BagSummary(counted, contents.begin, contents.end, provenance, parameters)
@@ -43,7 +43,7 @@ class Bag(Protocol):
     """A bag that can be read any number of times."""
 
     def summary(self, reporting: Reporting = silent) -> BagSummary:
-        """Read all of the bag and say what is in it; DataError where it is damaged."""
+        """Read the whole bag and return its summary; raises DataError if it is damaged."""
 
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
-        """Yield the messages of the topics in the bag's order; DataError where it is damaged."""
+        """Yield the topics' messages in the bag's order; raises DataError if it is damaged."""

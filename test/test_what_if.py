@@ -1,4 +1,4 @@
-"""A run under others: only views that were taken, and what another had made of them."""
+"""A run with overrides: another model or threshold, another policy among recorded views."""
 
 from dataclasses import replace
 import math
@@ -6,9 +6,14 @@ from pathlib import Path
 
 from active_recon.bags.replay.comparison import compare, SAME_BITS
 from active_recon.bags.replay.replay import replay
-from active_recon.bags.replay.what_if import beside, explored, Others, reconstructed, run_under
+from active_recon.bags.replay.what_if import (
+    default_folder,
+    reconstruct_episode,
+    replan_episode,
+    run_with_overrides,
+)
+from active_recon.bags.runs.loop_setup import LoopSetup, Overrides, recorded_setup
 from active_recon.bags.runs.run import RecordedEpisode, RecordedView
-from active_recon.bags.runs.settings import recorded_settings, Settings
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network_2d3d import Network2d3d
@@ -41,7 +46,7 @@ def azimuths(episode):
 
 def test_a_policy_gets_the_views_that_it_asks_for(sweep, loop):
     reconstructor, _ = loop
-    episode = explored(sweep, reconstructor, Planner(UniformPolicy(4), 4, 0.0), 0.14)
+    episode = replan_episode(sweep, reconstructor, Planner(UniformPolicy(4), 4, 0.0), 0.14)
     np.testing.assert_allclose(azimuths(episode), np.radians([0, 90, 180, 270]), atol=1e-9)
     goals = [view.goal and view.goal.camera for view in episode.views]
     assert [goal and round(math.degrees(goal.azimuth)) for goal in goals] == [90, 180, 270, None]
@@ -50,8 +55,8 @@ def test_a_policy_gets_the_views_that_it_asks_for(sweep, loop):
     assert all(view.image.tobytes() in images for view in episode.views)
 
 
-def test_what_was_explored_is_a_run_like_a_recorded_one(sweep, loop):
-    run = run_of([explored(sweep, *loop, 0.14)])
+def test_a_replanned_episode_is_a_run_like_a_recorded_one(sweep, loop):
+    run = run_of([replan_episode(sweep, *loop, 0.14)])
     stamps = [stamp for view in run.episodes[0].views
               for stamp in (view.stamp, view.goal.stamp if view.goal else view.stamp + 1)]
     assert stamps == sorted(set(stamps))
@@ -59,9 +64,9 @@ def test_what_was_explored_is_a_run_like_a_recorded_one(sweep, loop):
     assert compare(replay(run, *loop), THRESHOLD).verdict == SAME_BITS
 
 
-def test_exploring_what_a_policy_has_taken_takes_the_same_again(loop):
+def test_replanning_with_the_same_policy_takes_the_same_views(loop):
     episode = episode_of(*loop, SECOND, 1.0)
-    again = explored(episode, *loop, 0.14)
+    again = replan_episode(episode, *loop, 0.14)
     assert azimuths(again) == azimuths(episode)
     for before, after in zip(episode.views, again.views, strict=True):
         np.testing.assert_array_equal(before.reconstruction.occupancy,
@@ -73,20 +78,20 @@ def test_exploring_what_a_policy_has_taken_takes_the_same_again(loop):
 def test_a_view_that_was_never_taken_is_refused_by_its_azimuth(sweep, loop):
     reconstructor, _ = loop
     half = replace(sweep, views=sweep.views[:12])  # 0 to 165 degrees
-    with pytest.raises(DataError, match='after view 1 .* azimuth of 180.0 degrees.* 13.0 off'):
-        explored(half, reconstructor, Planner(FarthestPolicy(), 4, 0.0), 0.14)
+    with pytest.raises(DataError, match='after view 1, azimuth 180.0 degrees.* 13.0 off'):
+        replan_episode(half, reconstructor, Planner(FarthestPolicy(), 4, 0.0), 0.14)
 
 
 def test_an_episode_without_views_is_refused(sweep, loop):
-    with pytest.raises(DataError, match='no view in the episode'):
-        explored(replace(sweep, views=[]), *loop, 0.14)
+    with pytest.raises(DataError, match='no views in the episode'):
+        replan_episode(replace(sweep, views=[]), *loop, 0.14)
 
 
 def test_another_threshold_changes_the_occupied_cells_alone(loop):
     episode = episode_of(*loop, SECOND, 1.0)
     reconstructor, _ = loop
     reconstructor.threshold = 0.2
-    again = reconstructed(episode, reconstructor)
+    again = reconstruct_episode(episode, reconstructor)
     for before, after in zip(episode.views, again.views, strict=True):
         kept = before.reconstruction.occupancy > 0.2
         np.testing.assert_array_equal(after.occupied.occupancy > 0, kept)
@@ -105,47 +110,51 @@ def weights(tmp_path, tiny, network, attention):
     return paths
 
 
-def test_a_run_under_others_says_so_and_replays_to_the_same_bits(
+def test_a_run_with_overrides_says_so_and_replays_to_the_same_bits(
         sweep, weights, tiny, tmp_path):
-    recorded = Settings(weights[0], {'object_size': 1.0}, None)
+    recorded = LoopSetup(weights[0], {'object_size': 1.0}, None)
     run = replace(run_of([sweep]), path=tmp_path / 'walk', provenance={
         'object': 'chair', 'config_sha256': 'old'})
-    other = run_under(run, recorded, Others(weights[1], 'attention', 0.12))
+    other = run_with_overrides(run, recorded, Overrides(weights[1], 'attention', 0.12))
     assert other.provenance == {
         'object': 'chair', 'policy': 'attention', 'replay_of': 'walk', 'version': '0.1.0',
         'weights_sha256': weights_hash(weights[1]), 'config_sha256': config_hash(tiny),
         'runtime': f'torch {torch.__version__}, float32, cpu, 1 threads', 'needs_front': 'true'}
-    settings = recorded_settings(other)
-    assert settings.weights == weights[1]
-    assert settings.planner['policy'] == 'attention'
-    assert compare(replay(other, settings.load_reconstructor(), settings.load_planner()),
+    setup = recorded_setup(other)
+    assert setup.weights == weights[1]
+    assert setup.planner['policy'] == 'attention'
+    assert compare(replay(other, setup.load_reconstructor(), setup.load_planner()),
                    0.12).verdict == SAME_BITS
 
 
 def test_under_another_model_alone_nothing_tells_who_chose_the_views(weights, tmp_path, loop):
     run = replace(run_of([episode_of(*loop, SECOND, 1.0)]), path=tmp_path, parameters={
         '/view_planner': {'policy': 'attention', 'weights': str(weights[0]), 'max_views': 3}})
-    recorded = Settings(weights[0], {}, {'policy': 'attention', 'weights': weights[0]})
-    other = run_under(run, recorded, Others(weights=weights[1]))
+    recorded = LoopSetup(weights[0], {}, {'policy': 'attention', 'weights': weights[0]})
+    other = run_with_overrides(run, recorded, Overrides(weights=weights[1]))
     assert azimuths(other.episodes[0]) == azimuths(run.episodes[0])
     assert '/view_planner' not in other.parameters
-    same_model = run_under(run, recorded, Others(threshold=0.2))
+    same_model = run_with_overrides(run, recorded, Overrides(threshold=0.2))
     assert same_model.parameters['/view_planner']['max_views'] == 3
     assert same_model.parameters['/reconstructor']['threshold'] == 0.2
 
 
 def test_each_model_has_its_own_threshold_unless_one_is_given(weights):
-    recorded = Settings(weights[0], {'threshold': 0.3}, None)
-    assert recorded.under(weights[1]).load_reconstructor().threshold == THRESHOLD
-    assert recorded.under(weights[1], threshold=0.2).load_reconstructor().threshold == 0.2
-    assert recorded.under(policy='farthest').load_reconstructor().threshold == 0.3
+    recorded = LoopSetup(weights[0], {'threshold': 0.3}, None)
+    assert recorded.with_overrides(
+        Overrides(weights[1])).load_reconstructor().threshold == THRESHOLD
+    assert recorded.with_overrides(
+        Overrides(weights[1], threshold=0.2)).load_reconstructor().threshold == 0.2
+    assert recorded.with_overrides(
+        Overrides(policy='farthest')).load_reconstructor().threshold == 0.3
 
 
 def test_the_new_bag_lies_beside_the_old_one_wherever_the_user_stands(tmp_path, monkeypatch):
     bag = tmp_path / 'run.of.today'
     bag.mkdir()
     monkeypatch.chdir(bag)
-    others = Others(Path('some/2d3d.safetensors'), 'farthest', 0.25)
+    overrides = Overrides(Path('some/2d3d.safetensors'), 'farthest', 0.25)
     expected = tmp_path / 'run.of.today_2d3d_farthest_threshold-0.25'
-    assert beside(Path('.'), others) == beside(bag, others) == expected
-    assert beside(tmp_path / 'one.mcap', Others(policy='random')) == tmp_path / 'one_random'
+    assert default_folder(Path('.'), overrides) == default_folder(bag, overrides) == expected
+    assert default_folder(tmp_path / 'one.mcap', Overrides(policy='random')) == (
+        tmp_path / 'one_random')
