@@ -6,11 +6,19 @@ from typing import Any, Self
 from active_recon.errors import ConfigError
 
 VOLUME_LOSSES = ('mse', 'bce', 'dice', 'mse+dice', 'bce+dice')
+_RENAMED = {'varied': 'augment', 'short_share': 'curriculum_fraction', 'warm_up': 'warmup_steps',
+            'episodes_alike': 'group_size'}
+
+
+def with_current_keys(values: dict[str, Any]) -> dict[str, Any]:
+    """Return saved settings, nested mappings too, with the keys that were renamed since."""
+    return {_RENAMED.get(key, key): with_current_keys(value) if isinstance(value, dict) else value
+            for key, value in values.items()}
 
 
 @dataclass(frozen=True)
 class Config:
-    """A configuration that is read from a mapping, unknown keys refused."""
+    """A configuration that is read from a mapping and rejects unknown keys."""
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
@@ -31,14 +39,14 @@ class Config:
 
 @dataclass(frozen=True)
 class LossConfig(Config):
-    """Weights of section 3.2's losses and the measure that compares voxels."""
+    """Weights of the losses of section 3.2, and the loss that compares voxels."""
 
     volume_weight: float = 0.4
     silhouette_weight: float = 0.6
     volume_loss: str = 'mse'  # mse (the paper), bce, dice, mse+dice, bce+dice
 
     def __post_init__(self) -> None:
-        """Refuse weights that train nothing."""
+        """Reject weights that train nothing."""
         if min(self.volume_weight, self.silhouette_weight) < 0 or not (
                 self.volume_weight + self.silhouette_weight > 0):
             raise ConfigError('LossConfig: expected weights of 0 or more, not both 0, got '
@@ -53,21 +61,22 @@ class RewardConfig(Config):
     """
     The three-part reward of section 3.3; tau in radians. `paper_distance` is its 1 / d^2.
 
-    So many `episodes_alike` begin with the same object and view, and what a choice earned is
-    judged by what the others did; the paper's is 1, which judges by the baseline alone.
+    The `group_size` episodes of a group begin with the same object and view, and the mean return
+    of the others is part of each one's baseline; with 1, as in the paper, the learned baseline is
+    used alone.
     """
 
     distance_weight: float = 0.02
     distance_tau: float = 0.5235987755982988
     paper_distance: bool = False
     policy_sigma: float = 0.35
-    episodes_alike: int = 1
+    group_size: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse widths that divide by 0."""
+        """Reject widths that divide by 0."""
         if not (self.distance_tau > 0 and self.policy_sigma > 0 and self.distance_weight >= 0):
             raise ConfigError('RewardConfig: expected tau and sigma above 0 and a weight of 0 or '
                               f'more, got {self.to_dict()}')
-        if self.episodes_alike < 1:
-            raise ConfigError('RewardConfig: expected episodes_alike of 1 or more, got '
-                              f'{self.episodes_alike}')
+        if self.group_size < 1:
+            raise ConfigError('RewardConfig: expected group_size of 1 or more, got '
+                              f'{self.group_size}')

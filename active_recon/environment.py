@@ -1,4 +1,4 @@
-"""One object as one episode: the one loop over views, whatever shows them and whoever chooses."""
+"""The environment of an episode, and the one loop over its views."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ Asked = TypeVar('Asked', contravariant=True)
 
 class Environment(Protocol[Asked, Seen]):
     """
-    An object, or a batch of them, that is looked at view by view, and what becomes known of it.
+    An object, or a batch of objects, that is viewed step by step.
 
-    What a view is, is the environment's own: an index of a rendered view, a recorded image, ...
+    The type of a view depends on the environment: the index of a rendered view, an image, ...
     """
 
     def reset(self) -> None:
-        """Begin an episode: nothing was seen yet."""
+        """Begin an episode, before any view."""
         ...
 
     def step(self, view: Asked) -> Seen:
-        """Take a view, and return what is known then."""
+        """Take a view, and return the observation after it."""
         ...
 
 
@@ -31,8 +31,8 @@ class TimeStep(Generic[View, Known]):
     """
     An episode after one more view.
 
-    - number: of the view, from 1 on; view: which it was; known: what is known after it
-    - last: whether the episode was to have no more views than this
+    - number: of the view, from 1 on; view: the view itself; known: the observation after it
+    - last: whether it is the last view of the episode
     """
 
     number: int
@@ -45,10 +45,10 @@ def run_episode(environment: Environment[View, Known], first: View,
                 choose: Callable[[TimeStep[View, Known]], View | None],
                 count: int | None = None) -> Iterator[TimeStep[View, Known]]:
     """
-    Run an episode from its first view on, yielding every view.
+    Run an episode from its first view on, yielding every step.
 
-    `choose` names the next view after each but the last; None ends the episode. `count` is the
-    most views that it has, None: as many as are chosen.
+    `choose` returns the next view after each but the last; None ends the episode. `count` limits
+    the number of views; None is no limit.
     """
     environment.reset()
     view: View | None = first

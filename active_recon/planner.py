@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from active_recon.acquisition.motion import MotionLimits, worth
+from active_recon.acquisition.motion import MotionLimits, utility
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import (
     azimuth_difference,
@@ -36,7 +36,7 @@ _STEEPEST = math.radians(89)  # of goals at the camera's own elevation: above, n
 @dataclass(frozen=True, eq=False)
 class Goal:
     """
-    The camera to look from next, and what every candidate that can be reached is worth.
+    The camera of the next view, and the utility of every reachable candidate.
 
     - camera: its pose in the object frame; it may lie between the candidates
     - candidates: N cameras; scores: (N,), more is better
@@ -303,7 +303,7 @@ class Planner:
             return None
         fresh = is_open & ~np.isin(nearest, taken)
         travel = np.abs(azimuth_difference(azimuths, camera.azimuth))
-        value = worth(scores, travel, self._motion_weight if self._views else 0.0)
+        value = utility(scores, travel, self._motion_weight if self._views else 0.0)
         best = int(np.where(fresh if fresh.any() else is_open, value, -np.inf).argmax())
         own = slice(len(options) - len(self._ring), None)
         return Goal(options[best], [each for each, free in zip(

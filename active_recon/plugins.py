@@ -28,19 +28,19 @@ def load_installed(group: str, name: str) -> Any:
                           f'{type(error).__name__}: {error}') from error
 
 
-def is_in_file(told: str) -> bool:
-    """Return whether a name is one in a file, as in my_file.py:Net."""
-    path, colon, name = told.rpartition(':')
+def is_in_file(reference: str) -> bool:
+    """Return whether a reference is of the form my_file.py:Net."""
+    path, colon, name = reference.rpartition(':')
     return bool(colon) and path.endswith('.py') and name.isidentifier()
 
 
-def load_from_file(told: str) -> Any:
+def load_from_file(reference: str) -> Any:
     """
-    Return what `told`, my_file.py:Net, names.
+    Return the object that a reference of the form my_file.py:Net names.
 
     Raises ConfigError where there is no such file, where it fails, or has no such name.
     """
-    place, _, name = told.rpartition(':')
+    place, _, name = reference.rpartition(':')
     path = Path(place)
     if not path.is_file():
         raise ConfigError(f'{path}: no such file')

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
     """
-    What is known after a view: the grid in the object frame, and the latent (C, h, w).
+    The reconstruction after a view: the grid in the object frame, and the latent (C, h, w).
 
-    `image` is the view as the network saw it, (S, S, 3 or 4) uint8, the fourth channel what was
-    seen at all.
+    `image` is the network's input, (S, S, 3 or 4) uint8; the fourth channel is 255 where the
+    camera saw the pixel.
     """
 
     grid: VoxelGrid
@@ -31,11 +31,11 @@ class Reconstruction:
 
 class Reconstructor:
     """
-    Takes in views of one object and keeps its reconstruction.
+    Integrates views of one object into its reconstruction.
 
     `object_size` is the side of the voxel grid in metres. `object_yaw` is the azimuth of the
-    object's front in the object frame, radians, for networks that need it: they predict with the
-    front at +x. To all others it means nothing. `threshold` None is the weights' own.
+    object's front in the object frame, radians. Only networks that predict with the front at +x
+    use it. `threshold` None is that of the weights.
     """
 
     def __init__(self, runtime: Runtime, object_size: float = 1.0, object_yaw: float = 0.0,
@@ -54,28 +54,28 @@ class Reconstructor:
     def load(cls, weights: Path | None = None, device: str = 'cpu', object_size: float = 1.0,
              object_yaw: float = 0.0, threshold: float | None = None,
              threads: int | None = None, runtime: str = 'torch') -> 'Reconstructor':
-        """Read weights (None: those that ship); raises WeightsError and ConfigError."""
+        """Load weights (None: those that ship); raises WeightsError and ConfigError."""
         return cls(load_runtime(weights, runtime, device, threads), object_size, object_yaw,
                    threshold)
 
     @property
     def spec(self) -> NetworkSpec:
-        """What the network asks of its images, and what it gives."""
+        """The images that the network takes, and the resolution that it predicts at."""
         return self._runtime.spec
 
     @property
     def provenance(self) -> Mapping[str, str]:
-        """What diagnostics and bags tell of the network and of what runs it."""
+        """What diagnostics and bags record of the network and its runtime."""
         needs_front = str(self._runtime.spec.needs_front).lower()
         return {**self._runtime.provenance, 'needs_front': needs_front}
 
     @property
     def view_count(self) -> int:
-        """Views taken in since the episode began."""
+        """Number of views since the episode began."""
         return self._view_count
 
     def set_threshold(self, threshold: float | None) -> None:
-        """Set the occupancy above which a cell is occupied, None for the weights' own."""
+        """Set the occupancy above which a cell is occupied; None is that of the weights."""
         threshold = self._runtime.threshold if threshold is None else threshold
         if not 0 < threshold < 1:
             raise ConfigError(f'threshold: expected a probability in (0, 1), got {threshold}')
@@ -86,15 +86,16 @@ class Reconstructor:
         self._runtime.warm_up()
 
     def reset(self) -> None:
-        """Forget the episode."""
+        """Clear the state for a new episode."""
         self._state = self._runtime.initial_state()
         self._view_count = 0
 
     def add_view(self, image: NDArray[np.uint8], camera: Camera) -> Reconstruction:
         """
-        Take in one view: an image (H, W, 3) uint8 RGB and its camera in the object frame.
+        Update the reconstruction by one view.
 
-        Raises ViewError, and then nothing has changed.
+        Takes an image (H, W, 3) uint8 RGB and its camera in the object frame. Raises ViewError,
+        which leaves the state unchanged.
         """
         shown, seen_by = network_image(image, camera, self._runtime.spec, self.object_size)
         occupancy, latent, self._state = self._runtime.step(

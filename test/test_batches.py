@@ -15,15 +15,15 @@ from torch.testing import assert_close
 import trimesh
 
 
-def draw(views, seed=0, size=64, length=3, varied=True):
-    return draw_batch(views, size, length, np.random.default_rng([seed, 5]), varied)
+def draw(views, seed=0, size=64, length=3, augment=True):
+    return draw_batch(views, size, length, np.random.default_rng([seed, 5]), augment)
 
 
 def sources(views, batch, plain=None):
     """
     Return for each image (T, B) the view it was drawn from, and whether it was mirrored.
 
-    `plain` is the same batch without variation, where the batch is varied.
+    `plain` is the same batch without augmentation, where the batch is augmented.
     """
     plain = plain or batch
     azimuths = batch.cameras.azimuths.numpy()
@@ -58,19 +58,19 @@ def test_shapes_and_ranges_are_those_of_the_network(views):
 
 
 def test_the_views_of_a_sequence_differ(views):
-    chosen, _ = sources(views, draw(views, length=24), draw(views, length=24, varied=False))
+    chosen, _ = sources(views, draw(views, length=24), draw(views, length=24, augment=False))
     assert (np.sort(chosen, axis=0) == np.arange(24)[:, None]).all()
 
 
 def test_every_object_is_drawn_and_half_of_the_sequences_are_mirrored(views):
-    batch = draw(views, size=400, varied=False)
+    batch = draw(views, size=400, augment=False)
     _, mirrored = sources(views, batch)
     assert set(batch.objects.tolist()) == set(range(6))
     assert 0.4 < mirrored.mean() < 0.6
 
 
-def test_without_variation_each_image_is_its_view_on_white_mirrored_with_its_object(views):
-    batch = draw(views, size=32, varied=False)
+def test_without_augmentation_each_image_is_its_view_on_white_mirrored_with_its_object(views):
+    batch = draw(views, size=32, augment=False)
     chosen, mirrored = sources(views, batch)
     for t, row in enumerate(chosen):
         white = views.white(batch.objects, torch.from_numpy(row))
@@ -78,19 +78,19 @@ def test_without_variation_each_image_is_its_view_on_white_mirrored_with_its_obj
         assert_close(batch.images[t], white, rtol=0, atol=0)
 
 
-def test_variation_changes_the_images_and_where_their_pixels_are_alone(views):
-    varied, plain = draw(views, size=40), draw(views, size=40, varied=False)
+def test_augmentation_changes_the_images_and_where_their_pixels_are_alone(views):
+    augmented, plain = draw(views, size=40), draw(views, size=40, augment=False)
     for name in ('voxels', 'objects'):
-        assert_close(getattr(varied, name), getattr(plain, name), rtol=0, atol=0)
-    assert_close(varied.cameras.poses, plain.cameras.poses, rtol=0, atol=0)
-    moved = (varied.cameras.intrinsics - plain.cameras.intrinsics).abs().amax((0, 2, 3)) > 0
+        assert_close(getattr(augmented, name), getattr(plain, name), rtol=0, atol=0)
+    assert_close(augmented.cameras.poses, plain.cameras.poses, rtol=0, atol=0)
+    moved = (augmented.cameras.intrinsics - plain.cameras.intrinsics).abs().amax((0, 2, 3)) > 0
     assert 0 < moved.sum() < 40
-    assert ((varied.images - plain.images).abs().amax((0, 2, 3, 4)) > 0.01).all()
+    assert ((augmented.images - plain.images).abs().amax((0, 2, 3, 4)) > 0.01).all()
 
 
 def test_voxels_come_in_the_set_s_resolution(views):
     fine = dataclasses.replace(views, voxels=torch.rand(6, 64, 64, 64) < 0.3)
-    batch = draw(fine, size=20, varied=False)
+    batch = draw(fine, size=20, augment=False)
     _, mirrored = sources(fine, batch)
     assert batch.voxels.shape == (20, 64, 64, 64)
     assert 0 < mirrored.sum() < 20
@@ -115,7 +115,7 @@ def lopsided(tmp_path_factory):
 
 def test_a_mirrored_sequence_is_the_mirrored_object_seen_from_the_mirrored_azimuths(lopsided):
     straight, mirrored = lopsided
-    batch = draw(straight, size=16, length=4, varied=False)
+    batch = draw(straight, size=16, length=4, augment=False)
     cells = mirrored.voxels[0].float()
     flipped = (batch.voxels - cells).abs().mean((1, 2, 3)) < 0.005
     assert 0 < flipped.sum() < 16  # both occur, and differ

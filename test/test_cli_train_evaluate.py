@@ -39,7 +39,7 @@ def refusal(monkeypatch, capsys, *arguments):
 def training(dataset, out, *more):
     return ('train', dataset, '--validation', dataset, '--out', out, '--steps', 2,
             '--policy-steps', 2, '--batch-size', 2, '--policy-batch-size', 2,
-            '--episodes-alike', 2, '--threads', 1,
+            '--group-size', 2, '--threads', 1,
             *more)
 
 
@@ -83,7 +83,7 @@ def test_a_new_training_never_overwrites_the_checkpoints_of_another(
         run, dataset, monkeypatch, capsys):
     before = (run / 'reconstruction.safetensors').read_bytes()
     line = refusal(monkeypatch, capsys, *training(dataset, run))
-    assert 'go on with --resume' in line
+    assert 'continue it with --resume' in line
     assert (run / 'reconstruction.safetensors').read_bytes() == before
 
 
@@ -161,8 +161,8 @@ def test_an_evaluation_measures_all_that_it_says(run, dataset, tmp_path, monkeyp
     assert set(found['policies']['attention']['auc_above']) == {'random', 'uniform', 'farthest'}
     assert set(found['yaw']) == {'0', '5', '15', '30', '90', '180'}
     assert found['yaw']['0'] == pytest.approx(first[0], abs=5e-3)  # in full precision
-    assert set(found['blindness']) == {'goal_change_deg', 'auc', 'auc_swapped', 'auc_loss'}
-    assert found['blindness']['auc'] == pytest.approx(
+    assert set(found['latent_swap']) == {'goal_change_deg', 'auc', 'auc_swapped', 'auc_loss'}
+    assert found['latent_swap']['auc'] == pytest.approx(
         found['policies']['attention']['auc'], abs=5e-3)
     assert found['baselines']['nearest_image']['mean'] == 1  # the training set itself was asked
     assert 0 < found['baselines']['mean_shape']['mean'] <= 1
@@ -200,7 +200,7 @@ def test_a_model_without_a_view_policy_is_measured_under_the_others(
     assert command(monkeypatch, *arguments, '--json', out) == 0
     found = json.loads(out.read_text())
     assert set(found['policies']) == {'random', 'uniform', 'farthest'}
-    assert not {'blindness', 'yaw'} & found.keys()  # nobody asked for them
+    assert not {'latent_swap', 'yaw'} & found.keys()  # nobody asked for them
     assert '--latent-study: needs' in refusal(monkeypatch, capsys, *arguments, '--latent-study')
     assert 'expected weights with a view policy' in refusal(
         monkeypatch, capsys, *arguments, '--policy', 'attention')
@@ -250,7 +250,7 @@ def test_an_object_that_cannot_be_read_is_listed(run, dataset, tmp_path, monkeyp
     assert found['objects'] == 5
     assert len(found['unreadable']) == 1
     assert 'model.binvox' in capsys.readouterr().err
-    assert 'blindness' not in found
+    assert 'latent_swap' not in found
 
 
 def test_what_cannot_be_done_is_refused_before_anything_is_measured(
@@ -283,22 +283,22 @@ def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given(
     out = tmp_path / 'further'
     given = load_file(run / 'weights.safetensors')
     assert command(monkeypatch, *training(
-        dataset, out, '--begin-with', run / 'weights.safetensors', '--learning-rate', 1e-9,
+        dataset, out, '--init-from', run / 'weights.safetensors', '--learning-rate', 1e-9,
         '--policy-steps', 0)) == 0
     name = 'reconstruction.encoder.memory.gates.weight'
     after = load_file(out / 'weights.safetensors')
     assert_close(after[name].float(), given[name].float(), rtol=2e-3, atol=1e-4)
     card = json.loads((out / 'weights.json').read_text())
     assert card['begun_with']['sha256'] == weights_hash(run / 'weights.safetensors')
-    assert 'both --from and --begin-with' in refusal(monkeypatch, capsys, *training(
-        dataset, tmp_path / 'none', '--begin-with', run / 'weights.safetensors', '--from',
+    assert 'both --freeze-from and --init-from' in refusal(monkeypatch, capsys, *training(
+        dataset, tmp_path / 'none', '--init-from', run / 'weights.safetensors', '--freeze-from',
         run / 'weights.safetensors'))
 
 
 def test_a_policy_alone_leaves_its_reconstruction_as_it_was(run, dataset, tmp_path, monkeypatch):
     out = tmp_path / 'policy'
     assert command(monkeypatch, *training(
-        dataset, out, '--from', run / 'weights.safetensors', '--seed', 3)) == 0
+        dataset, out, '--freeze-from', run / 'weights.safetensors', '--seed', 3)) == 0
     before, after = (load_file(folder / 'weights.safetensors') for folder in (run, out))
     for name, tensor in before.items():
         same = bool((after[name] == tensor).all())

@@ -3,7 +3,7 @@
 from dataclasses import FrozenInstanceError
 import json
 
-from active_recon.config import LossConfig, RewardConfig
+from active_recon.config import LossConfig, RewardConfig, with_current_keys
 from active_recon.errors import ConfigError
 from active_recon.models.network_2d3d import Network2d3dConfig
 from active_recon.training.supervised import TrainingConfig
@@ -36,7 +36,7 @@ def test_unknown_keys_are_named_beside_the_known_ones():
     (LossConfig, {'volume_weight': -0.1}), (LossConfig, {'volume_loss': 'mae'}),
     (LossConfig, {'volume_weight': 0.0, 'silhouette_weight': 0.0}),
     (RewardConfig, {'distance_tau': 0.0}), (RewardConfig, {'policy_sigma': -1.0}),
-    (RewardConfig, {'distance_weight': -1.0}), (RewardConfig, {'episodes_alike': 0}),
+    (RewardConfig, {'distance_weight': -1.0}), (RewardConfig, {'group_size': 0}),
     (Network2d3dConfig, {'view_separation': -0.1}), (Network2d3dConfig, {'view_separation': 3.2}),
     (TrainingConfig, {'steps': 0}), (TrainingConfig, {'steps': 1, 'learning_rate': 0.0}),
     (TrainingConfig, {'steps': 1, 'batch_size': 0}),
@@ -49,3 +49,13 @@ def test_what_makes_or_trains_nothing_is_refused(kind, values):
 def test_the_losses_are_weighted_as_in_the_paper_by_default():
     assert (LossConfig().volume_weight, LossConfig().silhouette_weight) == (0.4, 0.6)
     assert LossConfig().volume_loss == 'mse'
+
+
+def test_saved_settings_get_the_keys_that_were_renamed_since():
+    saved = {'training': {'steps': 3, 'varied': False, 'short_share': 0.2, 'warm_up': 7},
+             'reward': {'episodes_alike': 6}, 'threshold': 0.4}
+    current = with_current_keys(saved)
+    assert TrainingConfig.from_dict(current['training']) == TrainingConfig(
+        3, augment=False, curriculum_fraction=0.2, warmup_steps=7)
+    assert RewardConfig.from_dict(current['reward']) == RewardConfig(group_size=6)
+    assert with_current_keys(current) == current

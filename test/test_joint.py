@@ -35,7 +35,7 @@ def train(views, tiny, path, cut_after=None, seed=0, resume=False):
 
 def a_step(views, network, attention, **options):
     learner = JointLearner(network, attention, views, LossConfig(**options), RewardConfig(), 3,
-                           varied=True)
+                           augment=True)
     return learner(torch.tensor([0, 3, 5]), torch.tensor([2, 9, 23]), np.random.default_rng(0))
 
 

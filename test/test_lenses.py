@@ -1,4 +1,4 @@
-"""Lenses bend straight lines, and the bend can be undone."""
+"""Lenses distort straight lines, and the distortion can be undone."""
 
 import math
 
@@ -20,12 +20,12 @@ LENSES = {
 EACH = pytest.mark.parametrize('lens', LENSES.values(), ids=LENSES)
 
 
-def points(reach=0.6, count=500):
-    return np.random.default_rng(0).uniform(-reach, reach, (count, 2))
+def points(max_radius=0.6, count=500):
+    return np.random.default_rng(0).uniform(-max_radius, max_radius, (count, 2))
 
 
 @EACH
-def test_a_lens_bends_as_opencv_s_own_does(lens):
+def test_a_lens_distorts_as_opencv_does(lens):
     pinhole, coefficients = np.eye(3), np.array(lens.coefficients)
     if lens.model == 'equidistant':
         expected = cv2.fisheye.distortPoints(points()[:, None], pinhole, coefficients)
@@ -33,24 +33,24 @@ def test_a_lens_bends_as_opencv_s_own_does(lens):
         rays = np.column_stack([points(), np.ones(len(points()))])
         expected = cv2.projectPoints(
             rays[:, None], np.zeros(3), np.zeros(3), pinhole, coefficients)[0]
-    np.testing.assert_allclose(lens.bend(points()), expected.reshape(-1, 2), atol=1e-12)
+    np.testing.assert_allclose(lens.distort(points()), expected.reshape(-1, 2), atol=1e-12)
 
 
 @EACH
-def test_what_is_bent_and_straightened_is_where_it_was(lens):
-    np.testing.assert_allclose(lens.straighten(lens.bend(points())), points(), atol=1e-9)
+def test_undistortion_inverts_distortion(lens):
+    np.testing.assert_allclose(lens.undistort(lens.distort(points())), points(), atol=1e-9)
 
 
 @EACH
 def test_the_middle_stays_and_near_it_next_to_nothing_moves(lens):
-    np.testing.assert_allclose(lens.bend(np.zeros((1, 2))), [[0, 0]], atol=1e-12)
+    np.testing.assert_allclose(lens.distort(np.zeros((1, 2))), [[0, 0]], atol=1e-12)
     near = points(1e-3)
-    np.testing.assert_allclose(lens.bend(near), near, atol=2e-8)
+    np.testing.assert_allclose(lens.distort(near), near, atol=2e-8)
 
 
 def test_a_lens_without_coefficients_is_a_pinhole_or_counts_angles():
-    np.testing.assert_allclose(Distortion('plumb_bob', (0.0,) * 5).bend(points()), points())
-    angles = Distortion('equidistant', (0.0,) * 4).bend(np.array([[math.tan(1.2), 0.0]]))
+    np.testing.assert_allclose(Distortion('plumb_bob', (0.0,) * 5).distort(points()), points())
+    angles = Distortion('equidistant', (0.0,) * 4).distort(np.array([[math.tan(1.2), 0.0]]))
     np.testing.assert_allclose(angles, [[1.2, 0.0]])
 
 
@@ -59,18 +59,18 @@ def test_the_further_out_a_point_is_the_further_out_the_lens_shows_it(name):
     radii, lens = np.linspace(0, 50, 20_001), LENSES[name]
     for angle in np.linspace(0, math.tau, 7):
         line = radii[:, None] * [math.cos(angle), math.sin(angle)]
-        shown = np.linalg.norm(lens.bend(line), axis=1)
+        shown = np.linalg.norm(lens.distort(line), axis=1)
         assert (np.diff(shown) > -1e-3 * np.diff(radii)).all()
 
 
 def test_a_curve_that_turns_back_is_followed_to_where_it_does():
-    assert Distortion('plumb_bob', (-0.3, 0.0, 0.0, 0.0)).reach == pytest.approx(
+    assert Distortion('plumb_bob', (-0.3, 0.0, 0.0, 0.0)).max_radius == pytest.approx(
         math.sqrt(1 / 0.9), rel=1e-3)
-    assert Distortion('equidistant', (-0.2, 0.0, 0.0, 0.0)).reach == pytest.approx(
+    assert Distortion('equidistant', (-0.2, 0.0, 0.0, 0.0)).max_radius == pytest.approx(
         math.tan(math.sqrt(1 / 0.6)), rel=1e-3)
-    assert Distortion('rational_polynomial', (0, 0, 0, 0, 0, 0, 0, 0)).reach > 999
+    assert Distortion('rational_polynomial', (0, 0, 0, 0, 0, 0, 0, 0)).max_radius > 999
     pole = Distortion('rational_polynomial', (0, 0, 0, 0, 0, -4.0, 0, 0))
-    assert pole.reach == pytest.approx(0.5, rel=1e-3)
+    assert pole.max_radius == pytest.approx(0.5, rel=1e-3)
 
 
 @pytest.mark.parametrize(('model', 'coefficients', 'said'), [

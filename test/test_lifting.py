@@ -6,16 +6,16 @@ import math
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.models.lifted import (
+    aggregate,
     cell_centers,
-    gathered,
-    no_views,
+    initial_statistics,
     projected,
     projection,
     sampled,
-    statistics,
+    summarise,
 )
 from active_recon.models.lifting import Lifting, LiftingConfig
-from active_recon.models.lifting_decoder import Conv3d, folded, unfolded
+from active_recon.models.lifting_decoder import Conv3d, depth_to_space, space_to_depth
 from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras
 import numpy as np
@@ -107,12 +107,12 @@ def test_an_image_without_a_fourth_channel_was_seen_whole(lifting):
 
 
 @torch.inference_mode()
-def test_cells_look_up_the_same_where_frame_and_cameras_turn_by_a_quarter(lifting):
+def test_the_state_turns_by_a_quarter_with_the_frame_and_the_cameras(lifting):
     images = some_images(3)
     maps = lifting.maps(images)
     turned = VIEWS.turned(torch.full((3,), math.pi / 2))
-    here = lifting.look_up(maps, VIEWS, lifting.initial_state(3))
-    there = lifting.look_up(maps, turned, lifting.initial_state(3))
+    here = lifting.update_from_maps(maps, VIEWS, lifting.initial_state(3))
+    there = lifting.update_from_maps(maps, turned, lifting.initial_state(3))
     for name in ('fine_sum', 'fine_count', 'hull'):
         assert_close(torch.rot90(here[name], 1, (2, 3)), there[name], rtol=0, atol=1e-3)
 
@@ -131,32 +131,32 @@ def test_a_map_is_sampled_at_the_centres_of_its_pixels():
     assert_close(sampled(maps, centers)[0, 0], torch.tensor([0.0, 3.0, 13.0]))
 
 
-def test_what_views_agree_on_are_their_mean_spread_and_extremes():
-    known = no_views(1, 1, 1, torch.device('cpu'))
+def test_view_statistics_are_mean_deviation_and_extremes():
+    known = initial_statistics(1, 1, 1, torch.device('cpu'))
     for value, weight in ((3.0, 1.0), (7.0, 0.0), (-1.0, 1.0)):
-        known = gathered(known, torch.full((1, 1, 1), value), torch.full((1, 1, 1), weight))
-    mean, spread, most, least, share = statistics(known).flatten().tolist()
-    assert (mean, most, least, share) == (1, 3, -1, 0.5)
-    assert spread == pytest.approx((4 + 0.01) ** 0.5)
+        known = aggregate(known, torch.full((1, 1, 1), value), torch.full((1, 1, 1), weight))
+    mean, deviation, highest, lowest, inverse = summarise(known).flatten().tolist()
+    assert (mean, highest, lowest, inverse) == (1, 3, -1, 0.5)
+    assert deviation == pytest.approx((4 + 0.01) ** 0.5)
 
 
-def test_what_views_agree_on_has_the_gradients_that_torch_derives():
+def test_view_statistics_have_the_gradients_that_torch_derives():
     generator = torch.Generator().manual_seed(1)
     found = torch.randn(3, 2, 4, 8, generator=generator, dtype=torch.float64).requires_grad_()
     inside = (torch.rand(3, 2, 1, 8, generator=generator) > 0.3).double()
-    nothing = {name: value.double() for name, value in no_views(2, 4, 2, None).items()}
+    nothing = {name: value.double() for name, value in initial_statistics(2, 4, 2, None).items()}
 
-    def agreed(features):
-        known = gathered(nothing, features, inside)
-        return tuple(known[name] for name in ('sum', 'square', 'most', 'least'))
+    def aggregated(features):
+        known = aggregate(nothing, features, inside)
+        return tuple(known[name] for name in ('sum', 'sum_squares', 'max', 'min'))
 
-    assert torch.autograd.gradcheck(agreed, (found,))
+    assert torch.autograd.gradcheck(aggregated, (found,))
 
 
-def test_folded_cells_unfold_into_the_same_places():
+def test_depth_to_space_inverts_space_to_depth():
     cells = torch.rand(2, 3, 8, 8, 8)
-    assert_close(unfolded(folded(cells)), cells)
-    assert folded(cells)[1, 8 + 5, 1, 2, 3] == cells[1, 1, 3, 4, 7]  # 5 is x and z
+    assert_close(depth_to_space(space_to_depth(cells)), cells)
+    assert space_to_depth(cells)[1, 8 + 5, 1, 2, 3] == cells[1, 1, 3, 4, 7]  # 5 is x and z
 
 
 @torch.inference_mode()
@@ -168,8 +168,8 @@ def test_a_cell_beyond_a_silhouette_is_emptier_by_the_hull_alone(lifting):
     only_left = torch.full((1, 1, 128, 128), 6.0)
     only_left[..., 64:] = -6.0
     front = cameras_at((0, 0, 2.1))
-    state = lifting.look_up(Maps(maps.coarse, maps.fine, maps.seen, only_left), front,
-                            lifting.initial_state(1))
+    state = lifting.update_from_maps(Maps(maps.coarse, maps.fine, maps.seen, only_left), front,
+                                     lifting.initial_state(1))
     logits = lifting.decode(state)[0]
     # Seen from +x, the image's left is -y
     assert (logits[:, 40:].amax() < -2) and (logits[:, :24].amin() > -0.1)
@@ -180,9 +180,9 @@ def test_gradients_reach_every_weight(lifting):
     state = lifting.initial_state(2)
     maps = lifting.maps(images)
     for cameras in (VIEWS.rows(slice(0, 2)), VIEWS.rows(slice(1, 3))):
-        state = lifting.look_up(maps, cameras, state)
-    logits, rough = lifting.logits(state)
-    (logits.square().mean() + rough.square().mean() + maps.foreground.mean()).backward()
+        state = lifting.update_from_maps(maps, cameras, state)
+    logits, coarse = lifting.logits(state)
+    (logits.square().mean() + coarse.square().mean() + maps.foreground.mean()).backward()
     lacking = [name for name, weight in lifting.named_parameters()
                if weight.grad is None or not weight.grad.any()]
     assert lacking == []

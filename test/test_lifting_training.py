@@ -10,7 +10,6 @@ from active_recon.datasets.views import read_views
 from active_recon.models.carving import Carving
 from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.network import Cameras
-from active_recon.training.appearance import misplaced, pictured
 from active_recon.training.calibration import calibrate
 from active_recon.training.lifting import (
     draw_posed_batch,
@@ -19,6 +18,7 @@ from active_recon.training.lifting import (
     turned_by_quarters,
 )
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
+from active_recon.training.posed_augmentation import augment_posed, perturb_poses
 from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def carved(batch):
 
 @pytest.mark.parametrize('seed', range(3))
 def test_mirrored_and_turned_batches_still_agree_with_their_voxels(seen_anyhow, seed):
-    batch = draw_posed_batch(seen_anyhow, 6, 5, np.random.default_rng(seed), varied=False)
+    batch = draw_posed_batch(seen_anyhow, 6, 5, np.random.default_rng(seed), augment=False)
     left, truth = carved(batch), batch.voxels > 0
     assert ((left & truth).sum((1, 2, 3)) > 0.85 * truth.sum((1, 2, 3))).all()
     astray = carved(type(batch)(batch.images, batch.cameras.turned(torch.full((5, 6), 0.8)),
@@ -79,9 +79,9 @@ def test_the_same_seed_draws_the_same_batch(seen_anyhow):
 def test_pictures_are_in_range_and_lose_only_what_they_say(seen_anyhow):
     objects, chosen = torch.arange(4).expand(3, 4), torch.arange(3)[:, None].expand(3, 4)
     seen = seen_anyhow.seen[objects, chosen]
-    pictures = pictured(seen_anyhow.images[objects, chosen], seen,
-                        seen_anyhow.cameras(objects, chosen), seen_anyhow.voxels.float(),
-                        seen_anyhow, np.random.default_rng(0))
+    pictures = augment_posed(seen_anyhow.images[objects, chosen], seen,
+                             seen_anyhow.cameras(objects, chosen), seen_anyhow.voxels.float(),
+                             seen_anyhow, np.random.default_rng(0))
     assert pictures.shape == (3, 4, 4, 128, 128)
     assert pictures.min() >= 0 and pictures.max() <= 1
     assert not (pictures[:, :, 3] > seen).any()
@@ -92,7 +92,7 @@ def test_poses_are_off_by_a_degree_and_a_hundredth_at_most(seen_anyhow):
     objects, chosen = torch.arange(4).repeat(5), torch.arange(20) % 8
     cameras = seen_anyhow.cameras(objects, chosen)
     cameras = Cameras(*(part[None] for part in cameras))
-    off = misplaced(cameras, np.random.default_rng(0))
+    off = perturb_poses(cameras, np.random.default_rng(0))
     turn = cameras.poses[..., :3, :3].transpose(-1, -2) @ off.poses[..., :3, :3]
     angles = torch.rad2deg(((turn.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2).clamp(-1, 1).acos())
     assert 0.3 < angles.max() <= 1.0001
@@ -104,7 +104,7 @@ def test_poses_are_off_by_a_degree_and_a_hundredth_at_most(seen_anyhow):
 def learned_from(seen_anyhow, path, steps, until=None, resume=False):
     torch.manual_seed(0)
     network = Lifting.from_config(TINY)
-    config = TrainingConfig(steps, 2, 3e-3, 2, bfloat16=False, warm_up=1, checkpoint_every=2,
+    config = TrainingConfig(steps, 2, 3e-3, 2, bfloat16=False, warmup_steps=1, checkpoint_every=2,
                             validate_every=100)
     train_lifting(network, seen_anyhow, config, LOSS,
                   Run(make_fabric(False), path, lambda step, measured: None, resume, until),
@@ -125,7 +125,7 @@ def test_the_losses_fall(seen_anyhow, bfloat16):
     torch.manual_seed(0)
     learner = LiftingLearner(Lifting.from_config(TINY), LOSS)
     optimizer = torch.optim.AdamW(learner.parameters(), 5e-3)
-    batch = draw_posed_batch(seen_anyhow, 2, 2, np.random.default_rng(0), varied=False)
+    batch = draw_posed_batch(seen_anyhow, 2, 2, np.random.default_rng(0), augment=False)
     heard = []
     for _ in range(12):
         with torch.autocast('cpu', torch.bfloat16) if bfloat16 else nullcontext():

@@ -5,11 +5,11 @@ import math
 
 from active_recon.errors import DataError
 from active_recon.evaluation.measure import (
-    blindness,
     Episodes,
     interval,
     iou_by_yaw,
     joined,
+    latent_swap_ablation,
     run_policy,
     summary,
     YAWS_DEG,
@@ -176,7 +176,7 @@ def followed(model):
 def test_a_policy_that_looks_at_nothing_loses_nothing_by_anothers_latent(network, views):
     objects, starts = episodes(views, 2)
     blind = followed(Recognising(sees=False))
-    found = blindness(network, blind, views, objects, starts, 0.1, 3)
+    found = latent_swap_ablation(network, blind, views, objects, starts, 0.1, 3)
     assert found.goal_change_deg['mean'] == pytest.approx(0, abs=1e-9)
     assert found.auc_loss == {'mean': 0.0, 'low': 0.0, 'high': 0.0}
     assert found.auc == found.auc_swapped
@@ -184,14 +184,14 @@ def test_a_policy_that_looks_at_nothing_loses_nothing_by_anothers_latent(network
 
 def test_a_policy_that_knows_its_object_goes_elsewhere_by_anothers_latent(views):
     objects, starts = episodes(views, 3)
-    found = blindness(Oracle(views), followed(Recognising(sees=True)), views, objects,
+    found = latent_swap_ablation(Oracle(views), followed(Recognising(sees=True)), views, objects,
                       starts, 0.5, 2)
     assert found.goal_change_deg['mean'] == pytest.approx(60, abs=1e-3)  # three objects away
     assert found.goal_change_deg['low'] == pytest.approx(60, abs=1e-3)
     assert found.auc['mean'] == 1
 
 
-def test_blindness_needs_two_objects(network, attention, views):
+def test_the_latent_swap_ablation_needs_two_objects(network, attention, views):
     one = part_of(views, slice(1))
     with pytest.raises(DataError, match='two objects or more'):
-        blindness(network, followed(attention), one, *episodes(one, 2), 0.1)
+        latent_swap_ablation(network, followed(attention), one, *episodes(one, 2), 0.1)

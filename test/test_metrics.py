@@ -3,8 +3,8 @@
 from active_recon.errors import DataError
 from active_recon.evaluation.metrics import (
     episodes,
-    half_the_set_away,
     iou_per_view,
+    swapped_objects,
     THRESHOLDS,
 )
 from active_recon.evaluation.rollouts import nearest_views, roll_out
@@ -12,7 +12,7 @@ from active_recon.evaluation.validation import best_threshold, policy_auc, recon
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, pose_azimuths
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Choice
-from active_recon.policies.geometric import BlindPolicy, FarthestPolicy, RandomPolicy
+from active_recon.policies.geometric import FarthestPolicy, HeuristicPolicy, RandomPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.volumes.voxels import iou
 import numpy as np
@@ -36,14 +36,14 @@ def test_each_object_starts_from_so_many_different_views(views, starts):
 @pytest.mark.parametrize('count', [2, 3, 6, 17, 67])
 def test_no_object_stands_in_for_itself_and_each_does_so_once(count, starts):
     objects = torch.arange(count).repeat_interleave(starts)
-    others = half_the_set_away(objects, count)
+    others = swapped_objects(objects, count)
     assert (others != objects).all()
     assert (others.bincount(minlength=count) == starts).all()
 
 
 def test_a_single_object_has_no_stand_in():
     with pytest.raises(DataError, match='two objects or more.*got 1'):
-        half_the_set_away(torch.zeros(4, dtype=torch.int64), 1)
+        swapped_objects(torch.zeros(4, dtype=torch.int64), 1)
 
 
 def test_the_nearest_view_is_the_short_way_round():
@@ -51,7 +51,7 @@ def test_the_nearest_view_is_the_short_way_round():
     assert nearest_views(azimuths, np.array([6.2, -0.1])).tolist() == [0, 23]
 
 
-class Listener(BlindPolicy):
+class Listener(HeuristicPolicy):
     """A policy that keeps what it was shown, and steps on by 45 degrees."""
 
     def __init__(self):
@@ -64,9 +64,9 @@ class Listener(BlindPolicy):
         return Choice(scores, self.taken[-1][:, -1] + np.pi / 4), state
 
 
-def rolled_out(network, views, policy, stand_ins=None, count=3):
+def rolled_out(network, views, policy, swapped=None, count=3):
     objects, starts = torch.tensor([0, 3, 5]), torch.tensor([23, 4, 9])
-    return list(roll_out(network, policy, views, objects, starts, count, stand_ins))
+    return list(roll_out(network, policy, views, objects, starts, count, swapped))
 
 
 def test_a_rollout_yields_every_view_and_asks_the_policy_between_them(network, views):

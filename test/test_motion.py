@@ -3,7 +3,7 @@
 from dataclasses import replace
 import math
 
-from active_recon.acquisition.motion import MotionLimits, worth
+from active_recon.acquisition.motion import MotionLimits, utility
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.planner import Planner
@@ -191,10 +191,10 @@ def test_the_more_the_way_costs_the_shorter_it_is(planner, kind):
 def test_a_weight_means_the_same_whatever_the_scale_of_the_scores():
     scores = np.array([0.1, 0.7, 0.3], np.float32)
     travel = np.array([0.0, math.pi, math.pi / 2])
-    plain = worth(scores, travel, 0.5)
-    np.testing.assert_allclose(worth(40 * scores - 3, travel, 0.5), plain, atol=1e-5)
+    plain = utility(scores, travel, 0.5)
+    np.testing.assert_allclose(utility(40 * scores - 3, travel, 0.5), plain, atol=1e-5)
     np.testing.assert_allclose(plain, [0, 1 - 0.5, 1 / 3 - 0.25], atol=1e-6)
-    np.testing.assert_allclose(worth(0 * scores, travel, 0.5), [0, -0.5, -0.25])
+    np.testing.assert_allclose(utility(0 * scores, travel, 0.5), [0, -0.5, -0.25])
 
 
 @pytest.mark.parametrize('kind', KINDS)

@@ -72,7 +72,7 @@ def some_views(count, batch):
 
 
 @torch.no_grad()
-def folded(network, images):
+def run_network(network, images):
     """Return what is known after views (T, B, ...)."""
     return known_after(network, images)
 
@@ -90,7 +90,7 @@ def test_a_sequence_is_answered_after_every_view(tiny_network):
 
 def test_a_state_has_the_same_names_before_any_view_and_after(tiny_network):
     before = tiny_network.initial_state(2)
-    after = folded(tiny_network, some_views(1, 2)).state
+    after = run_network(tiny_network, some_views(1, 2)).state
     assert before.keys() == after.keys()
     assert before['latent'].shape == after['latent'].shape
     assert all(part.isfinite().all() for part in before.values())
@@ -115,14 +115,14 @@ def test_the_runtime_answers_as_the_network_does(tiny_network):
         lens = CANONICAL_INTRINSICS.resized(64, 64)
         occupancy, latent, state = runtime.step(
             image.permute(1, 2, 0).numpy(), orbit_camera(0.5 * t, intrinsics=lens), state)
-    expected = folded(tiny_network, images[:, None].float() / 255)
+    expected = run_network(tiny_network, images[:, None].float() / 255)
     assert_close(torch.from_numpy(occupancy), expected.logits[0].sigmoid())
     assert_close(torch.from_numpy(latent), expected.latent[0])
 
 
 def test_a_view_more_changes_what_is_known(tiny_network):
     images = some_views(2, 1)
-    once, twice = folded(tiny_network, images[:1]), folded(tiny_network, images)
+    once, twice = run_network(tiny_network, images[:1]), run_network(tiny_network, images)
     assert (twice.latent - once.latent).abs().max() > 1e-4
 
 
@@ -141,9 +141,9 @@ def test_the_state_is_passed_and_not_kept(tiny_network):
 
 def test_an_object_is_reconstructed_alike_alone_and_among_others(tiny_network):
     images = some_views(2, 3)
-    together = folded(tiny_network, images)
+    together = run_network(tiny_network, images)
     for index in range(3):
-        alone = folded(tiny_network, images[:, index:index + 1])
+        alone = run_network(tiny_network, images[:, index:index + 1])
         assert_close(together.logits[index:index + 1], alone.logits, rtol=1e-4, atol=1e-4)
         assert_close(together.latent[index:index + 1], alone.latent, rtol=1e-4, atol=1e-4)
 
@@ -169,7 +169,7 @@ def test_what_was_saved_answers_as_before(case, tiny_network, tmp_path):
     save_weights(path, Bundle(tiny_network, None, config, 0.4, model=model))
     loaded = load_weights(path)
     assert (loaded.config, loaded.model, loaded.attention) == (config, model, None)
-    expected, found = (folded(part, some_views(2, 2))
+    expected, found = (run_network(part, some_views(2, 2))
                        for part in (tiny_network, loaded.reconstruction))
     assert_close(found.latent, expected.latent, rtol=0, atol=0.02)
 

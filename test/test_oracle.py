@@ -7,7 +7,7 @@ from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.oracle import roll_out_oracle, rows_of, sequence_iou
 from active_recon.evaluation.rollouts import nearest_views, roll_out
 from active_recon.policies.base import Choice
-from active_recon.policies.geometric import BlindPolicy, RandomPolicy
+from active_recon.policies.geometric import HeuristicPolicy, RandomPolicy
 from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from torch.testing import assert_close
 THRESHOLD = 0.1
 
 
-class Itinerary(BlindPolicy):
+class Itinerary(HeuristicPolicy):
     """A policy that goes where it was told before."""
 
     def __init__(self, azimuths):

@@ -6,7 +6,7 @@ from active_recon.errors import ConfigError, ViewError, WeightsError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.policies import load_policy, Observation, POLICIES, PolicyOptions
-from active_recon.policies.attention import AttentionPolicy, gaps_to_taken, kept_apart
+from active_recon.policies.attention import AttentionPolicy, enforce_separation, gaps_to_taken
 from active_recon.policies.base import distance_to_taken
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
@@ -184,16 +184,16 @@ def draws():
 
 def test_what_is_far_enough_is_left_where_it_is_wanted(draws):
     wanted, taken = draws
-    np.testing.assert_array_equal(kept_apart(wanted, taken, AZIMUTHS[None], 0.0), wanted)
+    np.testing.assert_array_equal(enforce_separation(wanted, taken, AZIMUTHS[None], 0.0), wanted)
     far_enough = apart(wanted, taken) >= 0.5
     assert 0 < far_enough.sum() < len(wanted)
     np.testing.assert_array_equal(
-        kept_apart(wanted, taken, AZIMUTHS[None], 0.5)[far_enough], wanted[far_enough])
+        enforce_separation(wanted, taken, AZIMUTHS[None], 0.5)[far_enough], wanted[far_enough])
 
 
 def test_what_is_too_near_gives_way_to_the_nearest_that_is_not(draws):
     wanted, taken = draws
-    kept = kept_apart(wanted, taken, AZIMUTHS[None], 0.5)
+    kept = enforce_separation(wanted, taken, AZIMUTHS[None], 0.5)
     assert (apart(kept, taken) > 0.5 - 2e-3).all()
     moved = kept != wanted
     enough = np.where(gaps_to_taken(AZIMUTHS[None], taken) > 0.502, AZIMUTHS, np.nan)
@@ -204,7 +204,7 @@ def test_what_is_too_near_gives_way_to_the_nearest_that_is_not(draws):
 def test_where_nothing_is_far_enough_the_farthest_is_taken():
     taken = np.delete(AZIMUTHS, [6, 7, 8])[None]
     np.testing.assert_array_equal(
-        kept_apart(np.array([0.1]), taken, AZIMUTHS[None], 1.0), AZIMUTHS[[7]])
+        enforce_separation(np.array([0.1]), taken, AZIMUTHS[None], 1.0), AZIMUTHS[[7]])
 
 
 def kept_policy(attention, separation):

@@ -94,28 +94,28 @@ def test_the_objective_sums_over_the_steps_and_averages_over_the_episodes():
     assert losses['loss'].item() == pytest.approx((1 + 2 + 3 + 4) / 2 + 1)  # and the baseline's
 
 
-def gradient(rewards, alike):
+def gradient(rewards, group_size):
     """Return the gradient of the objective by log pi, (T - 1, B), with a baseline of 0.5."""
     logs = torch.zeros_like(rewards, requires_grad=True)
     episode = an_episode(logs, torch.full_like(rewards, 0.5), rewards)
-    policy_losses(episode, alike)['loss'].backward()
+    policy_losses(episode, group_size)['loss'].backward()
     return logs.grad
 
 
-def test_what_all_episodes_alike_earn_teaches_nothing():
+def test_what_all_episodes_of_a_group_earn_teaches_nothing():
     rewards = torch.rand(3, 8, generator=torch.Generator().manual_seed(0))
     harder = rewards - torch.tensor([1.0, 7.0]).repeat_interleave(4)
     assert_close(gradient(harder, 4), gradient(rewards, 4))
     assert (gradient(harder, 1) - gradient(rewards, 1)).abs().min() > 0.1
 
 
-def test_an_episode_is_judged_by_the_mean_of_the_others_alike():
+def test_an_episode_is_judged_by_the_mean_of_the_others_of_its_group():
     # Minus the advantage over six episodes: 1 - (2 + 6) / 2 and so on
     assert_close(gradient(torch.tensor([[1.0, 2.0, 6.0, 5.0, 5.0, 5.0]]), 3) * 6,
                  torch.tensor([[3.0, 1.5, -4.5, 0.0, 0.0, 0.0]]))
 
 
-def test_so_many_episodes_begin_alike_as_they_are_told_to(views):
+def test_the_episodes_of_a_group_have_the_same_start(views):
     objects, starts, _ = draw_episodes(views, 12, [5], 3).arguments
     for part in (objects, starts):
         groups = part.reshape(4, 3)
@@ -256,7 +256,7 @@ def test_reinforce_finds_the_azimuth_that_pays(bandit_views, tmp_path, monkeypat
     best = mean_direction(attention) + 2.0
     returns = []
     config = TrainingConfig(steps=60, batch_size=24, learning_rate=3e-2, max_views=2,
-                            bfloat16=False, warm_up=20)
+                            bfloat16=False, warmup_steps=20)
     run = Run(make_fabric(False), tmp_path / 'policy.safetensors',
               lambda step, told: returns.append(told['return']))
     train_policy(Bandit(best), attention, bandit_views, 0.5, config,

@@ -43,7 +43,7 @@ def weights(seen, tmp_path_factory):
     """Return weights of the toy that ten steps have trained."""
     folder = tmp_path_factory.mktemp('toy')
     training = TrainingConfig(
-        steps=10, batch_size=4, max_views=3, learning_rate=0.1, bfloat16=False, warm_up=1)
+        steps=10, batch_size=4, max_views=3, learning_rate=0.1, bfloat16=False, warmup_steps=1)
     torch.manual_seed(0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(NETWORKS, 'toy', toy.ENTRY)

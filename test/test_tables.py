@@ -3,7 +3,7 @@
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.models.lifted import projected, projection
 from active_recon.models.network import Cameras
-from active_recon.training.tables import tables
+from active_recon.training.tables import draw_tables
 import numpy as np
 import pytest
 import torch
@@ -29,11 +29,11 @@ def posts():
 
 
 def test_from_below_no_table_is_seen():
-    assert not tables(seen_from(-0.3), posts(), SIDE, np.random.default_rng(0)).any()
+    assert not draw_tables(seen_from(-0.3), posts(), SIDE, np.random.default_rng(0)).any()
 
 
 def test_a_table_is_premultiplied_and_in_range():
-    seen = tables(seen_from(0.6), posts(), SIDE, np.random.default_rng(1))
+    seen = draw_tables(seen_from(0.6), posts(), SIDE, np.random.default_rng(1))
     assert seen.shape == (3, 2, 4, SIDE, SIDE)
     assert seen.min() >= 0 and (seen[:, :, :3] <= seen[:, :, 3:]).all()
     assert seen[:, :, 3].any()
@@ -42,7 +42,7 @@ def test_a_table_is_premultiplied_and_in_range():
 @pytest.mark.parametrize('seed', range(4))
 def test_views_of_a_table_agree_on_what_lies_at_one_place(seed):
     cameras = seen_from(0.9)
-    seen = tables(cameras, posts(), SIDE, np.random.default_rng(seed))
+    seen = draw_tables(cameras, posts(), SIDE, np.random.default_rng(seed))
     # Cells of a layer of 64 whose lower faces lie on the first post's table: z = -0.375
     places, _ = projected(projection(Cameras(*(part[:, 0] for part in cameras)), SIDE), 64)
     layer = places.unflatten(1, (64, 64, 64))[:, 10:54:4, 10:54:4, 7:9].mean(dim=3).flatten(1, 2)
@@ -53,11 +53,11 @@ def test_views_of_a_table_agree_on_what_lies_at_one_place(seed):
 
 def test_shadows_are_one_connected_share_of_a_table_without_which_it_is_lighter():
     cameras, rng = seen_from(0.9), np.random.default_rng
-    with_post = tables(cameras, posts(), SIDE, rng(5))
+    with_post = draw_tables(cameras, posts(), SIDE, rng(5))
     low = posts()
     low[..., 10:] = 0
     low[1, 28:36, 28:36, 16:18] = 1
-    without = tables(cameras, low, SIDE, rng(5))
+    without = draw_tables(cameras, low, SIDE, rng(5))
     assert_close(with_post[:, :, 3], without[:, :, 3])
     assert (with_post[:, :, :3] <= without[:, :, :3] + 1e-4).float().mean() > 0.97
     assert (with_post[:, :, :3] < without[:, :, :3] - 0.02).any()

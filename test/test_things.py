@@ -3,11 +3,11 @@
 from active_recon.datasets.making import make_object, shape_jobs
 from active_recon.errors import ConfigError
 from active_recon.shapes import ALL_CATEGORIES, make_shape, THINGS
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import box
 from active_recon.shapes.things import GENERATORS, KINDS, thing
 from active_recon.shapes.things.animals import beast, bird, fish, plush
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import choose
 from active_recon.shapes.things.fields import ball, block, column, molten, waves
 from active_recon.shapes.things.patterns import decorated, split
 from active_recon.shapes.things.polygons import area, triangulated

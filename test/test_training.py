@@ -7,7 +7,7 @@ from active_recon.config import LossConfig
 from active_recon.errors import ConfigError
 from active_recon.models.network_2d3d import Network2d3d
 from active_recon.training.loop import (
-    learning_rate_share,
+    lr_factor,
     make_fabric,
     Run,
     TrainingConfig,
@@ -166,7 +166,7 @@ def test_the_loss_falls(views, tiny, tmp_path, bfloat16):
 
 
 def test_the_learning_rate_rises_in_a_line_and_falls_as_half_a_cosine():
-    shares = np.array([learning_rate_share(step, 10_000) for step in range(10_000)])
+    shares = np.array([lr_factor(step, 10_000) for step in range(10_000)])
     assert shares[0] == pytest.approx(1 / 200)
     assert shares[99] == pytest.approx(0.5, abs=1e-3)
     assert shares.max() == pytest.approx(1, abs=1e-3)

@@ -13,7 +13,7 @@ from active_recon.geometry.cameras import pose_directions
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import NetworkEntry, NETWORKS
 from active_recon.policies import Choice, POLICIES, PolicyEntry
-from active_recon.policies.geometric import BlindPolicy
+from active_recon.policies.geometric import HeuristicPolicy
 import numpy as np
 import torch
 from torch import nn
@@ -57,7 +57,7 @@ class Toy(ReconstructionNetwork):
         return self.gain[0] * state['dark'] + self.gain[1]
 
 
-class Opposite(BlindPolicy):
+class Opposite(HeuristicPolicy):
     """The candidate that is farthest from the mean direction of the views taken."""
 
     def choose(self, seen, state):

@@ -39,7 +39,7 @@ class Background:
     tolerance: float = COLOR_TOLERANCE
 
     def __post_init__(self) -> None:
-        """Refuse a word that is none of them, and a colour that is no colour."""
+        """Reject a word that is none of them, and a colour that is no colour."""
         if self.how not in BACKGROUNDS:
             raise ConfigError(f'background: expected one of {", ".join(BACKGROUNDS)}, '
                               f'got {self.how!r}')

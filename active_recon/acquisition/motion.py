@@ -1,4 +1,4 @@
-"""Where the camera can go, and what the way there costs."""
+"""Where the camera can go, and what the travel costs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ class MotionLimits:
     """
     The azimuths that a turntable or an arm can reach, radians in the object frame.
 
-    - azimuth_range: low and high, counter-clockwise from low to high, both within; it may lead
-      through 0, as (5.5, 1.0) and (-0.8, 1.0) do; a whole turn limits nothing
+    - azimuth_range: low and high, counter-clockwise from low to high, both included; it may cross
+      0, as (5.5, 1.0) and (-0.8, 1.0) do; a whole turn is no limit
     - forbidden_sectors: low, high, low, high, ..., each as a range; the ends are forbidden too
-    - reachable_azimuths: the only ones that there are; empty: any
+    - reachable_azimuths: the only azimuths allowed; empty allows any
 
-    Raises ConfigError where one of them is no such thing, or together they leave no azimuth.
+    Raises ConfigError on invalid values, or where they leave no azimuth together.
     """
 
     azimuth_range: Sequence[float] = (0.0, TURN)
@@ -32,7 +32,7 @@ class MotionLimits:
     reachable_azimuths: Sequence[float] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what is no range, no sectors, no azimuth, or leaves nothing."""
+        """Reject invalid values, and those that leave no azimuth."""
         if len(self.azimuth_range) != 2 or not _are_sectors(self.azimuth_range):
             raise ConfigError('azimuth_range: expected low and high, two azimuths that differ, '
                               f'rad, got {list(self.azimuth_range)}')
@@ -88,14 +88,13 @@ class MotionLimits:
         return list(zip(marks.tolist(), widths.tolist(), strict=True))
 
 
-def worth(scores: NDArray[np.float32], travel: NDArray[np.float64],
-          motion_weight: float) -> NDArray[np.float32]:
+def utility(scores: NDArray[np.float32], travel: NDArray[np.float64],
+            motion_weight: float) -> NDArray[np.float32]:
     """
-    Return what candidates are worth, (N,): a policy's scores less the cost of the way.
+    Return the utility of candidates, (N,): a policy's scores less the cost of `travel` (radians).
 
-    The scores are brought to [0, 1], and half a turn of `travel` (radians) costs
-    `motion_weight`: so one weight means the same to every policy. With 0 the scores stay as they
-    are.
+    The scores are scaled to [0, 1], and half a turn costs `motion_weight`, so that one weight
+    means the same for every policy. With 0 the scores are returned unchanged.
     """
     if motion_weight == 0:
         return scores

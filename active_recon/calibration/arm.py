@@ -91,7 +91,7 @@ def _hand_eye(mounts: NDArray[np.float64], boards: NDArray[np.float64]) -> NDArr
     solved = np.linalg.lstsq(left.reshape(-1, 4), -a[:, :3, 3].ravel(), rcond=None)[0]
     if abs(solved[3] - 1) > _SCALE_TOLERANCE:
         raise DataError("expected the arm's poses and the board to have one scale, but by the "
-                        f'poses the squares are {solved[3]:.3g} times as large as was told; '
+                        f'poses the squares are {solved[3]:.3g} times as large as given; '
                         'measure a square, and see that the poses are those of the mount in the '
                         "arm's base frame, in metres, their quaternions x y z w", 'scale')
     pose = np.eye(4)

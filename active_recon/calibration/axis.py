@@ -65,12 +65,13 @@ def _center(poses: NDArray[np.float64], up: NDArray[np.float64], turned: NDArray
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class AngleFit:
     """
-    How the angles that a table tells belong to those that the images show.
+    The fit of a turntable's given angles to those of the images.
 
-    What is shown is `direction` times what is told plus `offset`, radians, and `off`, (N,).
-    `direction` is +1 where the told angle grows counter-clockwise seen from above, else -1.
+    Image angles are `direction` times the given ones plus `offset`, radians, plus the residuals
+    `off`, (N,). `direction` is +1 where the given angle increases counter-clockwise seen from
+    above, else -1.
     """
 
     direction: int
@@ -79,11 +80,11 @@ class Told:
 
 
 def compare_angles(turned: NDArray[np.float64], angles: NDArray[np.float64],
-                   names: Sequence[str]) -> Told:
+                   names: Sequence[str]) -> AngleFit:
     """
-    Compare how far a table turned, counter-clockwise, with its own angles, both radians, (N,).
+    Fit given angles to the table's counter-clockwise angles in the images, radians, (N,).
 
-    Raises DataError where they do not tell the direction, or an image contradicts its angle.
+    Raises DataError where they do not determine the direction, or an image contradicts its angle.
     """
     agreement = {direction: abs(np.exp(1j * (turned - direction * angles)).mean())
                  for direction in (1, -1)}
@@ -94,13 +95,13 @@ def compare_angles(turned: NDArray[np.float64], angles: NDArray[np.float64],
     if abs(off[worst]) > _ANGLE_TOLERANCE:
         raise DataError(
             f'{names[worst]}: expected the table at {math.degrees(angles[worst]):.1f} degrees, '
-            f'as was told, but the board stands {abs(math.degrees(off[worst])):.1f} degrees off '
+            f'as given, but the board stands {abs(math.degrees(off[worst])):.1f} degrees off '
             'that; are the angles or the step right, and are the images in the order of their '
             'names?', 'angles')
     if agreement[direction] - agreement[-direction] < 0.01:
         raise DataError('expected angles that tell which way the table turns; half turns alone '
                         'do not', 'direction')
-    return Told(direction, offset, off)
+    return AngleFit(direction, offset, off)
 
 
 def _angle_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

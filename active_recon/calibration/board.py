@@ -36,7 +36,7 @@ class Board:
     dictionary: str = '4x4_50'
 
     def __post_init__(self) -> None:
-        """Refuse what OpenCV would crash on."""
+        """Reject what OpenCV would crash on."""
         if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) < 4:
             raise ConfigError('board: expected 4 x 3 squares or more, got '
                               f'{self.columns} x {self.rows}')

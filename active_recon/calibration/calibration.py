@@ -65,14 +65,14 @@ class _Look:
 def calibrate_turntable(images: BoardImages, placement: Placement,
                         angles: Mapping[str, float] | None = None) -> Calibration:
     """
-    Find a fixed camera beside a turntable.
+    Find the pose of a fixed camera beside a turntable.
 
     `angles`: of the table, by the image's name, radians; None where they are not known. Raises
-    DataError where the images do not tell it or contradict the angles.
+    DataError where the images do not determine it or contradict the angles.
     """
     look = _look_at(images, FEWEST_OF_TABLE)
-    told = None if angles is None else np.array([angles[one.name] for one in look.seen])
-    found = fit_turntable(look.seen, look.lens, told)
+    given = None if angles is None else np.array([angles[one.name] for one in look.seen])
+    found = fit_turntable(look.seen, look.lens, given)
     pose = placement.on_table(found)
     camera = Camera(pose)
     reconstructor: dict[str, Any] = {

@@ -25,7 +25,7 @@ def board_pose(lens: Intrinsics, seen: Detection) -> NDArray[np.float64]:
     """Return camera from board, (4, 4), by one image alone."""
     plane = (seen.pixels - [lens.cx, lens.cy]) / [lens.fx, lens.fy]
     if lens.distortion is not None:
-        plane = lens.distortion.straighten(plane)
+        plane = lens.distortion.undistort(plane)
     pinhole, none = np.eye(3), np.zeros(5)
     _, turn, shift = cv2.solvePnP(seen.points, plane, pinhole, none, flags=cv2.SOLVEPNP_IPPE)
     turn, shift = cv2.solvePnPRefineLM(seen.points, plane, pinhole, none, turn, shift)
@@ -44,12 +44,12 @@ def project(lens: Intrinsics, points: NDArray[np.float64], pose: NDArray[np.floa
 def write_lens(lens: Intrinsics, path: Path) -> None:
     """Write the lens in the format of ROS's camera_calibration."""
     matrix = _as_ros_counts(lens)
-    bent = lens.distortion or _STRAIGHT
+    distortion = lens.distortion or _STRAIGHT
     path.write_text(yaml.safe_dump({
         'image_width': lens.width, 'image_height': lens.height, 'camera_name': 'camera',
         'camera_matrix': _table(matrix),
-        'distortion_model': bent.model,
-        'distortion_coefficients': _table(np.array([bent.coefficients])),
+        'distortion_model': distortion.model,
+        'distortion_coefficients': _table(np.array([distortion.coefficients])),
         'rectification_matrix': _table(np.eye(3)),
         'projection_matrix': _table(np.column_stack([matrix, np.zeros(3)])),
     }, sort_keys=False, default_flow_style=None))
@@ -62,7 +62,7 @@ def read_lens(path: Path) -> Intrinsics:
         matrix = np.array(content['camera_matrix']['data'], np.float64).reshape(3, 3)
         coefficients = tuple(map(float, content['distortion_coefficients']['data']))
         size = int(content['image_width']), int(content['image_height'])
-        bent = Distortion(content['distortion_model'], coefficients)
+        distortion = Distortion(content['distortion_model'], coefficients)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError,
             ValueError) as error:
         raise DataError(f"{path}: expected a camera's calibration as ROS's camera_calibration "
@@ -72,13 +72,13 @@ def read_lens(path: Path) -> Intrinsics:
     if not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1], *size) <= 0:
         raise DataError(f'{path}: expected a calibrated camera, got the matrix {matrix.tolist()} '
                         f'for images of {size[0]} x {size[1]}')
-    return _lens(matrix, bent if any(coefficients) else None, size)
+    return _lens(matrix, distortion if any(coefficients) else None, size)
 
 
 @dataclass(frozen=True)
 class EstimatedLens:
     """
-    A lens, and whether the images told all of it.
+    A lens, and whether the images determined all of it.
 
     `whole` is false where the board was always seen at the same tilt: such images tell the focal
     length alone, and centre and distortion are taken to be those of an ideal camera.
@@ -106,17 +106,17 @@ def estimate_lens(seen: Sequence[Detection]) -> EstimatedLens:
     middle = normals.mean(0) / np.linalg.norm(normals.mean(0))
     if np.arccos(np.clip(normals @ middle, -1, 1)).max() < _ENOUGH_TILT:
         return EstimatedLens(_lens(matrix, None, size), False)
-    _, matrix, bent, *_ = calibrate(
+    _, matrix, distortion, *_ = calibrate(
         matrix, np.zeros(5), flags=cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_K3)
-    coefficients = tuple(np.ravel(bent)[:5].tolist())
+    coefficients = tuple(np.ravel(distortion)[:5].tolist())
     return EstimatedLens(_lens(matrix, Distortion('plumb_bob', coefficients), size), True)
 
 
-def _lens(matrix: ArrayLike, bent: Distortion | None, size: tuple[int, int]
+def _lens(matrix: ArrayLike, distortion: Distortion | None, size: tuple[int, int]
           ) -> Intrinsics:
     # OpenCV and ROS count from the first pixel's centre, our cameras from its corner
     (fx, _, cx), (_, fy, cy), _ = np.asarray(matrix, np.float64).tolist()
-    return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, *size, bent)
+    return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, *size, distortion)
 
 
 def _as_ros_counts(lens: Intrinsics) -> NDArray[np.float64]:

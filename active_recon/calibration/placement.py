@@ -27,7 +27,7 @@ class Placement:
     azimuth_at_zero: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a cube without a size."""
+        """Reject a cube without a size."""
         if not 0 < self.object_size < np.inf:
             raise ConfigError('object_size: expected metres above 0, got '
                               f'{self.object_size}')

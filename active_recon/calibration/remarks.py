@@ -38,7 +38,7 @@ def of_angles(found: TurntableFit) -> list[str]:
     if found.off is None or (worst := float(np.abs(found.off).max())) <= _EXACT_ANGLE:
         return []
     name = found.images[int(np.argmax(np.abs(found.off)))].seen.name
-    return [f'The angles that were told are up to {math.degrees(worst):.1f} degrees off what the '
+    return [f'The given angles are up to {math.degrees(worst):.1f} degrees off what the '
             f'images show ({name}): does the table slip, or have play?']
 
 

@@ -19,15 +19,15 @@ _FACE_UP = np.diag([1.0, -1.0, -1.0, 1.0])  # a board on the plate, whose z poin
 @dataclass(frozen=True, eq=False)
 class TurntableFit:
     """
-    A turntable as a fixed camera sees it.
+    A turntable in the frame of a fixed camera.
 
     - camera_from_table: at table angle 0, (4, 4); the table's frame has z up along the axis
     - table_from_board: (4, 4)
     - turned: how far the table stands from angle 0, counter-clockwise seen from above, radians,
       (N,)
-    - direction: +1 where the table's own angle grows counter-clockwise, -1 where clockwise, None
-      where no angles were told; angle 0 then is that of the first image
-    - off: how far each told angle is off, radians, (N,), None where none were told
+    - direction: +1 where the table's own angle increases counter-clockwise, -1 where clockwise,
+      None where no angles were given; angle 0 then is that of the first image
+    - off: residuals of the given angles, radians, (N,), None where none were given
     """
 
     camera_from_table: NDArray[np.float64]
@@ -49,10 +49,10 @@ def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
     """
     Find a turntable's axis in the camera's frame, and how far the table turned in each image.
 
-    `angles`: as the table tells them, radians, (N,), None where they are not known. They say
-    where its angle 0 is and which way it grows; a table's play does no harm. The order of the
-    images does not matter, except that without angles the first is at 0. Raises DataError where
-    the images are too few or contradict what was told.
+    `angles`: the table's own, radians, (N,), None where they are not known. They determine its
+    angle 0 and its direction; backlash does no harm. The order of the images does not matter,
+    except that without angles the first is at 0. Raises DataError where the images are too few or
+    contradict the angles.
     """
     if len(seen) < FEWEST_IMAGES:
         raise DataError(f'expected {FEWEST_IMAGES} images of the turning board or more, got '
@@ -79,9 +79,9 @@ def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
     table, board, turned = parts(found)
     if angles is None:
         return TurntableFit(table, board, turned, None, None, images)
-    told = compare_angles(turned, angles, [one.name for one in seen])
-    return TurntableFit(table @ _about_z(told.offset), board, turned - told.offset,
-                        told.direction, told.off, images)
+    fitted = compare_angles(turned, angles, [one.name for one in seen])
+    return TurntableFit(table @ _about_z(fitted.offset), board, turned - fitted.offset,
+                        fitted.direction, fitted.off, images)
 
 
 def _table_frame(up: NDArray[np.float64], center: NDArray[np.float64],

@@ -1,4 +1,4 @@
-"""`active-recon evaluate`: what a model and its policies are worth on held-out objects."""
+"""`active-recon evaluate`: the IoU of a model under view policies, on held-out objects."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -31,7 +31,7 @@ def evaluate(
              'truth; ninety times the work). Default: all but the oracle, attention only where '
              'the model has it.')] = None,
     against: Annotated[str | None, typer.Option(
-        help='Another model, measured on the same objects and starts: the difference is told with '
+        help='Another model, measured on the same objects and starts: prints the difference with '
              'its interval.')] = None,
     paired: Annotated[bool, typer.Option(
         '--paired', help='The same of the two policies that --policy names.')] = False,
@@ -43,20 +43,20 @@ def evaluate(
     split_file: Split = None,
     training: Annotated[list[Path] | None, typer.Option(
         help="Training folders: adds the category's mean shape and the nearest training image, "
-             'two answers that know nothing of detail (may be given several times).')] = None,
+             'two baselines that use no detail (may be given several times).')] = None,
     validation: Annotated[Path | None, typer.Option(
         help="Validation folder, on which the mean shape's threshold is chosen.")] = None,
     json_file: Annotated[Path | None, typer.Option(
-        '--json', help='Where the figures go, with their intervals.')] = None,
+        '--json', help='File for the figures, with their intervals.')] = None,
     rows: Annotated[Path | None, typer.Option(
-        help='Where one row (CSV) of each object, start and view goes.')] = None,
+        help='CSV file with one row for each object, start and view.')] = None,
     yaw_study: Annotated[bool, typer.Option(
-        '--yaw-study', help="Measure too where the object's front stands wrong.")] = False,
+        '--yaw-study', help="Measure too with a wrong yaw of the object's front.")] = False,
     latent_study: Annotated[bool, typer.Option(
-        '--latent-study', help="Measure too what the attention policy loses by another object's "
-                               'latent.')] = False,
+        '--latent-study', help='Latent-swap ablation: measure too what the attention policy '
+                               "loses when it gets another object's latent.")] = False,
     cache: Annotated[Path | None, typer.Option(
-        help='Folder in which episodes are kept: a run that was cut off goes on.')] = None,
+        help='Folder that caches episodes: an interrupted run continues.')] = None,
     bf16: Annotated[bool, typer.Option(
         help='Half precision where it is safe: half the time, and means that differ by less than '
              '0.0001.')] = True,
@@ -65,10 +65,9 @@ def evaluate(
     """
     Measure IoU view by view for each policy, with 95 % intervals over objects, starts and seeds.
 
-    Also: the area under the IoU curve, both entropies, the rotation travelled, and with an oracle
-    the share of the gap between random and it that a policy closes. --against and --paired tell
-    whether one is better than another. Objects that cannot be read are listed, never silently left
-    out.
+    Also: the area under the IoU curve, both entropies, the rotation travelled and, with the
+    oracle, the fraction of the gap between random and oracle that a policy closes. --against and
+    --paired test whether one is better than another. Objects that cannot be read are listed.
 
     Example: active-recon evaluate data/test --model runs/new/weights.safetensors
     --against runs/old/weights.safetensors --policy farthest --rows both.csv
@@ -149,8 +148,8 @@ class _Measured:
 
 
 def _studies(own: _Measured, result: dict[str, Any], yaw: bool, latent: bool) -> None:
-    """Measure and tell what was asked for beside the policies."""
-    from active_recon.evaluation.measure import blindness, iou_by_yaw
+    """Measure and print the studies that were asked for beside the policies."""
+    from active_recon.evaluation.measure import iou_by_yaw, latent_swap_ablation
     from active_recon.evaluation.metrics import episodes
     from active_recon.policies import learned_policy
     from active_recon.runtimes.torch import TorchPolicyRuntime
@@ -170,13 +169,13 @@ def _studies(own: _Measured, result: dict[str, Any], yaw: bool, latent: bool) ->
                           'and two views')
     if latent and attention is not None:
         with progress_bar("other objects' latents", 2 * len(objects)) as advance:
-            seeing = blindness(
+            swap = latent_swap_ablation(
                 trial.network, learned_policy(own.bundle.model, TorchPolicyRuntime(attention)),
                 trial.views, objects, first, trial.threshold, trial.count,
                 lambda done: advance(done, ''))
-        result['blindness'] = asdict(seeing)
-        typer.echo(f"another object's latent: goals move by {seeing.goal_change_deg['mean']:.1f} "
-                   f'deg, area under IoU falls by {_spread(seeing.auc_loss, 4)}')
+        result['latent_swap'] = asdict(swap)
+        typer.echo(f"another object's latent: goals move by {swap.goal_change_deg['mean']:.1f} "
+                   f'deg, area under IoU falls by {_spread(swap.auc_loss, 4)}')
 
 
 def _tell_policies(result: dict[str, Any]) -> None:
@@ -191,29 +190,21 @@ def _tell_policies(result: dict[str, Any]) -> None:
 
 
 def _baselines(training: list[Path], validation: Path, trial: 'Trial') -> dict[str, Any]:
-    from active_recon.evaluation.baselines import (
-        category_means,
-        mean_shape_iou,
-        nearest_image_iou,
-    )
+    from active_recon.evaluation.baselines import Baselines
     from active_recon.evaluation.measure import interval
-    from active_recon.evaluation.metrics import THRESHOLDS
     import torch
 
     held_out = trial.views
     asked = trial.network.spec
-    known = read_objects(training, 'training data', asked)
-    means = category_means(known)
-    chosen_on = read_objects([validation], 'validation data', asked)
-    threshold = max(THRESHOLDS, key=lambda at: mean_shape_iou(means, chosen_on, at).mean())
+    found = Baselines.of(read_objects(training, 'training data', asked),
+                         read_objects([validation], 'validation data', asked))
     result = {
-        'mean_shape': interval(mean_shape_iou(means, held_out, float(threshold)),
-                               torch.arange(len(held_out))),
+        'mean_shape': interval(found.mean_shape(held_out), torch.arange(len(held_out))),
         'nearest_image': interval(
-            nearest_image_iou(known, held_out, trial.objects, trial.starts), trial.objects)}
+            found.nearest_image(held_out, trial.objects, trial.starts), trial.objects)}
     for name, values in result.items():
         typer.echo(f'{name:>14}: {_spread(values)}')
-    return result | {'mean_shape_threshold': float(threshold)}
+    return result | {'mean_shape_threshold': found.threshold}
 
 
 def _difference(figures: dict[str, Any]) -> str:

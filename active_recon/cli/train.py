@@ -31,62 +31,66 @@ def train(
         help="'small' (two CPU cores within an hour), 'published' (its paper's own); of ogn "
              "also 'small-64' and 'published-64'.")] = 'small',
     scheme: Annotated[str, typer.Option(
-        help="'two-stage': reconstruction on random views, then the policy on it, frozen; "
+        help="'two-stage': reconstruction on random views, then the policy with it frozen; "
              "'joint': both together on the policy's views, as in the paper.")] = 'two-stage',
-    begin_from: Annotated[str | None, typer.Option(
-        '--from', help='Weights (or the name of a model that ships) whose reconstruction is '
-                       'taken as it is: only a policy is trained on it.')] = None,
-    begin_with: Annotated[str | None, typer.Option(
-        help='The same, but the reconstruction is trained further.')] = None,
-    steps: Annotated[int, typer.Option(min=1, help='Steps of the reconstruction.')] = 12000,
+    freeze_from: Annotated[str | None, typer.Option(
+        help='Weights (or the name of a model that ships) whose reconstruction network is used '
+             'frozen: only a policy is trained.')] = None,
+    init_from: Annotated[str | None, typer.Option(
+        help='Weights (or the name of a model that ships) to initialise the reconstruction '
+             'network from; it is trained further.')] = None,
+    steps: Annotated[int, typer.Option(
+        min=1, help='Training steps of the reconstruction.')] = 12000,
     policy_steps: Annotated[int, typer.Option(
-        min=0, help='Steps of the view policy; 0 leaves it out.')] = 120,
+        min=0, help='Training steps of the view policy; 0: no policy.')] = 120,
     batch_size: Annotated[int, typer.Option(min=1, help='Objects in a batch.')] = 32,
     policy_batch_size: Annotated[int, typer.Option(min=2, help='Episodes in a batch.')] = 96,
-    learning_rate: Annotated[float, typer.Option(help='At its peak; then half a cosine.')] = 1e-3,
-    policy_learning_rate: Annotated[float, typer.Option(help='The same, of the policy.')] = 1e-3,
-    episodes_alike: Annotated[int | None, typer.Option(
-        min=1, help='Episodes of a batch that begin alike, so that what a choice earned is judged '
-                    'by what the others did. Default: 6; 1, as in the paper, if joint.')] = None,
+    learning_rate: Annotated[float, typer.Option(
+        help='Peak learning rate; it decays by half a cosine.')] = 1e-3,
+    policy_learning_rate: Annotated[float, typer.Option(
+        help='Peak learning rate of the policy.')] = 1e-3,
+    group_size: Annotated[int | None, typer.Option(
+        min=1, help="Episodes with the same start; each one's baseline includes the mean return "
+                    'of the others. Default: 6; 1, as in the paper, if joint.')] = None,
     view_separation_deg: Annotated[float | None, typer.Option(
-        min=0, max=180, help='Degrees that goals stay from the views taken. Default: 60; 0, as in '
-                             'the paper, if joint.')] = None,
+        min=0, max=180, help='Smallest angle between a goal and the views taken, degrees. '
+                             'Default: 60; 0, as in the paper, if joint.')] = None,
     max_views: Annotated[int, typer.Option(
-        min=1, max=24, help='Longest sequence of views that is learned from.')] = 5,
-    short_share: Annotated[float, typer.Option(
-        help='Share of the steps, from the first on, with sequences of two views at most.')] = 0.5,
+        min=1, max=24, help='Longest training sequence, in views.')] = 5,
+    curriculum_fraction: Annotated[float, typer.Option(
+        help='Fraction of the steps, at the start, with sequences of at most two views.')] = 0.5,
     volume_loss: Annotated[str | None, typer.Option(
         help="mse (the paper), bce, dice, mse+dice, bce+dice; default: the network's own."
         )] = None,
     volume_weight: Annotated[float | None, typer.Option(
         help="lambda_V of section 3.2; default: the network's own.")] = None,
     silhouette_weight: Annotated[float | None, typer.Option(help='lambda_S, the same.')] = None,
-    warm_up: Annotated[int, typer.Option(
-        min=1, help='Steps in which the learning rate rises to its peak.')] = 200,
+    warmup_steps: Annotated[int, typer.Option(
+        min=1, help='Steps over which the learning rate rises to its peak.')] = 200,
     checkpoint_every: Annotated[int, typer.Option(
         min=1, help='Steps of the reconstruction between two checkpoints.')] = 200,
     validate_every: Annotated[int, typer.Option(
-        min=1, help='Steps of the reconstruction between two measurements on validation.')] = 500,
-    varied: Annotated[bool, typer.Option(
-        help="Varied backgrounds, light, shift and scale; --no-varied is the paper's plain "
-             'white.')] = True,
+        min=1, help='Steps of the reconstruction between two validations.')] = 500,
+    augment: Annotated[bool, typer.Option(
+        help='Augment backgrounds, light, shift and scale; --no-augment: plain white, as in the '
+             'paper.')] = True,
     seed: Annotated[int, typer.Option(help='The same seed draws the same batches.')] = 0,
-    bf16: Annotated[bool, typer.Option(help='Half precision where it is safe.')] = True,
+    bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     devices: Annotated[int, typer.Option(min=1, help='Processes, or cards, of a machine.')] = 1,
     nodes: Annotated[int, typer.Option(
         min=1, help="Machines; start the command on each, with Lightning Fabric's MASTER_ADDR, "
                     'MASTER_PORT and NODE_RANK set.')] = 1,
     resume: Annotated[bool, typer.Option(
-        help='Go on from the checkpoints in the run folder.')] = False,
+        help='Continue from the checkpoints in the run folder.')] = False,
 ) -> None:
     """
     Train a reconstruction network, and a view policy for it; write weights that load.
 
     The reconstruction learns from random views under the weighted volume and silhouette losses;
-    the policy then learns by policy gradient, with the reconstruction frozen, or both learn
-    together (--scheme joint). Ctrl-C saves a checkpoint; a training that was cut off goes on with
-    --resume. The weights and their card land in OUT/weights.safetensors.
+    the policy then learns by policy gradient with the reconstruction frozen, or both learn
+    together (--scheme joint). Ctrl-C saves a checkpoint; --resume continues an interrupted
+    training. The weights are written to OUT/weights.safetensors, with their card beside them.
     """
     from active_recon.cli.training_log import SummaryLog
     from active_recon.config import LossConfig, RewardConfig
@@ -104,32 +108,32 @@ def train(
                     if (out / f'{stage}.safetensors').exists()),
                   *(out / 'tensorboard').rglob('events.*')]
     if not resume and begun_here:
-        raise ConfigError(f'{out}: holds another training ({begun_here[0].name}); go on with '
-                          '--resume, or name another folder by --out')
-    if begin_from and begin_with:
-        raise ConfigError('both --from and --begin-with: give one of them')
-    begun = begin_from or begin_with
+        raise ConfigError(f'{out}: holds another training ({begun_here[0].name}); continue it '
+                          'with --resume, or name another folder with --out')
+    if freeze_from and init_from:
+        raise ConfigError('both --freeze-from and --init-from: give one of them')
+    begun = freeze_from or init_from
     own_file, model = model, named_network(model)
     entry = network_entry(model)
     loss = LossConfig(
         entry.loss.volume_weight if volume_weight is None else volume_weight,
         entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
         volume_loss or entry.loss.volume_loss)
-    first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, varied,
-                           short_share, warm_up, checkpoint_every, validate_every)
+    first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, augment,
+                           curriculum_fraction, warmup_steps, checkpoint_every, validate_every)
     second = TrainingConfig(
         max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed, bf16,
-        varied=False, warm_up=20, checkpoint_every=50, validate_every=250)
+        augment=False, warmup_steps=20, checkpoint_every=50, validate_every=250)
     joint = scheme == 'joint'
-    if episodes_alike is None:
-        episodes_alike = 1 if joint else 6
+    if group_size is None:
+        group_size = 1 if joint else 6
     if view_separation_deg is None:
         view_separation_deg = 0 if joint else 60
     with_policy = entry.policy is not None and not joint and policy_steps > 0
     plan = Plan(model, size, loss, first, second if with_policy else None,
-                RewardConfig(episodes_alike=episodes_alike), joint,
+                RewardConfig(group_size=group_size), joint,
                 begun=_begun(find_weights(begun)) if begun else None,
-                frozen=begin_with is None, view_separation=math.radians(view_separation_deg))
+                frozen=init_from is None, view_separation=math.radians(view_separation_deg))
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
     fabric = make_fabric(bf16, devices, nodes)
@@ -166,7 +170,7 @@ def _begun(path: Path) -> 'Bundle':
 
 
 def _warn_of_shared_objects(training: 'ViewSet', held_out: 'ViewSet') -> None:
-    """Say where validation objects are trained on, so that they choose and measure too well."""
+    """Warn where validation objects are among the training objects: their IoU is then too high."""
     trained = {folder.images_folder.resolve() for folder in training.folders}
     shared = sum(folder.images_folder.resolve() in trained for folder in held_out.folders)
     if shared:

@@ -1,4 +1,4 @@
-"""What a training says as it goes: a progress bar, and TensorBoard's curves and pictures."""
+"""The log of a training: a progress bar, and TensorBoard's curves and images."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from active_recon.cli.progress import progress_bar
+from active_recon.reporting import by_step
 from torch.utils.tensorboard import SummaryWriter
 
 if TYPE_CHECKING:
@@ -16,9 +17,9 @@ if TYPE_CHECKING:
 
 class SummaryLog:
     """
-    A log in a folder; where a training is resumed, it takes the place of what was cut off.
+    A log in a folder; a resumed training overwrites the steps after its checkpoint.
 
-    Whenever a network was validated, its picture of some of the `shown` objects is logged.
+    After every validation the network's prediction of some of the `shown` objects is logged.
     """
 
     def __init__(self, folder: Path, shown: 'ViewSet') -> None:
@@ -26,7 +27,7 @@ class SummaryLog:
         self._writers: dict[str, SummaryWriter] = {}
 
     def show(self, stage: str, step: int, network: 'ReconstructionNetwork') -> None:
-        """Log what the network makes of the objects after so many steps."""
+        """Log an image of the network's predictions after a number of steps."""
         from active_recon.training.pictures import progress_picture
 
         self._writer(stage, step).add_image(
@@ -36,27 +37,25 @@ class SummaryLog:
     @contextmanager
     def reporting(self, stage: str, steps: int) -> Iterator[
             Callable[[int, dict[str, float]], None]]:
-        """Yield what is told the steps of a stage and what each measured."""
-        done = 0
+        """Yield the report of a stage: it takes each step and what was measured."""
         shown: dict[str, float] = {}
         with progress_bar(stage, steps) as advance:
+            reached = by_step(advance)
+
             def report(step: int, measured: dict[str, float]) -> None:
-                nonlocal done
                 for name, value in measured.items():
                     self._writer(stage, step).add_scalar(f'{stage}/{name}', value, step)
                     # Single batches are noisy: the bar shows a running mean
                     smooth = name in shown and not name.startswith('validation')
                     shown[name] = 0.98 * shown[name] + 0.02 * value if smooth else value
-                told = '  '.join(f'{name} {value:.4f}' for name, value in shown.items())
-                advance(step - done, told)
-                done = step
+                reached(step, '  '.join(f'{name} {value:.4f}' for name, value in shown.items()))
 
             yield report
 
     def _writer(self, stage: str, step: int) -> SummaryWriter:
-        """Return the stage's writer; what the log has from its first step on is passed by."""
+        """Return the stage's writer; logged steps from its first step on are purged."""
         if stage not in self._writers:
-            # Of its own folder: there alone what is passed by is passed by
+            # A folder for each stage: a purge affects the whole folder
             self._writers[stage] = SummaryWriter(self._folder / stage, purge_step=step)
         return self._writers[stage]
 

@@ -37,7 +37,7 @@ class Viewing:
     turned: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what nothing is seen from."""
+        """Reject what nothing is seen from."""
         if self.cameras not in KINDS or not 1 <= self.count <= 99:
             raise ConfigError(f'cameras: expected one of {", ".join(KINDS)}, and 1 to 99 views, '
                               f'got {self.cameras!r} and {self.count}')

@@ -1,6 +1,9 @@
-"""Two answers that know nothing of an image's detail, to measure a network against."""
+"""Two baselines that use no detail of an image: the mean shape and the nearest training image."""
+
+from dataclasses import dataclass
 
 from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.metrics import THRESHOLDS
 from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
@@ -9,6 +12,32 @@ import torch
 from torch import Tensor
 
 _THUMBNAIL = 16  # pixels a side
+
+
+@dataclass(frozen=True, eq=False)
+class Baselines:
+    """Both baselines, of a training set; the mean shape's threshold is chosen on validation."""
+
+    training: ViewSet
+    means: dict[str, Tensor]
+    threshold: float
+
+    @classmethod
+    def of(cls, training: ViewSet, validation: ViewSet) -> 'Baselines':
+        """Return the baselines with the threshold of the highest mean IoU on `validation`."""
+        means = category_means(training)
+        threshold = max(THRESHOLDS, key=lambda at: mean_shape_iou(
+            means, validation, float(at)).mean())
+        return cls(training, means, float(threshold))
+
+    def mean_shape(self, views: ViewSet) -> NDArray[np.float64]:
+        """Return the IoU of each object with its category's mean shape, (N,)."""
+        return mean_shape_iou(self.means, views, self.threshold)
+
+    def nearest_image(self, views: ViewSet, objects: Tensor,
+                      starts: Tensor) -> NDArray[np.float64]:
+        """Return the IoU of each episode (E,) with the training shape of the nearest image."""
+        return nearest_image_iou(self.training, views, objects, starts)
 
 
 def category_means(training: ViewSet) -> dict[str, Tensor]:
@@ -24,7 +53,7 @@ def mean_shape_iou(means: dict[str, Tensor], views: ViewSet,
     """
     Return the IoU of each object with its category's mean shape, (N,).
 
-    It is told the category, which no network is; an unknown category gets the mean of all.
+    It gets the category, which no network does; an unknown category gets the mean of all.
     """
     return np.array([
         float(iou(means.get(str(name), means['']) > threshold, truth))

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.metrics import half_the_set_away
+from active_recon.evaluation.metrics import swapped_objects
 from active_recon.evaluation.oracle import oracle_batch, roll_out_oracle
 from active_recon.evaluation.rollouts import (
     batches,
@@ -76,13 +76,13 @@ def record(steps: Iterable[Step], truth: Tensor, threshold: float) -> Episodes:
 
 def run_policy(network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
                starts: Tensor, threshold: float, count: int = 5,
-               stand_ins: Tensor | None = None, bfloat16: bool = False,
+               swapped: Tensor | None = None, bfloat16: bool = False,
                progress: Callable[[int], None] = lambda done: None) -> Episodes:
-    """Run all episodes (E,) under a policy, which is shown the stand-ins (E,) if there are any."""
+    """Run all episodes (E,) under a policy; with `swapped` (E,), see `roll_out`."""
     parts = []
     for part in batches(len(objects), _BATCH):
         steps = roll_out(network, policy, views, objects[part], starts[part], count,
-                         None if stand_ins is None else stand_ins[part], bfloat16)
+                         None if swapped is None else swapped[part], bfloat16)
         parts.append(record(steps, views.voxels[objects[part]], threshold))
         progress(len(part))
     return joined(parts)
@@ -165,8 +165,14 @@ def _turned_truth(views: ViewSet, item: int, yaw: float) -> Tensor:
 
 
 @dataclass(frozen=True)
-class Blindness:
-    """What a policy does when it is shown the latent of another object instead of its own."""
+class LatentSwap:
+    """
+    A policy that gets the latent of another object, compared with one that gets the true latent.
+
+    Means with their 95 % intervals: `goal_change_deg`, how far the first goal moves from the same
+    start; `auc` and `auc_swapped`, the area under the IoU curve with either latent; `auc_loss`,
+    their difference, paired by episode.
+    """
 
     goal_change_deg: dict[str, float]
     auc: dict[str, float]
@@ -175,33 +181,33 @@ class Blindness:
 
 
 @torch.inference_mode()
-def blindness(network: ReconstructionNetwork, policy: Policy, views: ViewSet,
-              objects: Tensor, starts: Tensor, threshold: float, count: int = 5,
-              progress: Callable[[int], None] = lambda done: None) -> Blindness:
+def latent_swap_ablation(
+    network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
+    starts: Tensor, threshold: float, count: int = 5,
+    progress: Callable[[int], None] = lambda done: None,
+) -> LatentSwap:
     """
     Swap every latent for another object's, seen from the same azimuths; measure what changes.
 
-    `goal_change_deg`: how far the first goal moves, the start being the same. `auc_loss`: how
-    much the area under the IoU curve falls, paired by episode; its interval tells whether it does.
     Raises DataError on a set of a single object.
     """
     observer = Observer(network, views)
-    stand_ins = half_the_set_away(objects, len(views))
+    swapped = swapped_objects(objects, len(views))
     moved = []
     for part in batches(len(objects), _BATCH):
         taken = views.azimuths[objects[part], starts[part]].double().numpy()
         own = RenderedObjects(observer, objects[part])
         own.reset()
         seen, goals = own.step(starts[part]), []
-        for shown in (objects[part], stand_ins[part]):
-            alike = nearest_views(views.azimuths[shown].numpy(), taken)
-            state = observer.update(shown, alike, observer.initial_state(len(shown)))
+        for shown in (objects[part], swapped[part]):
+            nearest = nearest_views(views.azimuths[shown].numpy(), taken)
+            state = observer.update(shown, nearest, observer.initial_state(len(shown)))
             choice, _ = policy.choose(own.observation(state['latent'], seen),
                                       policy.initial_state(len(shown)))
             goals.append(own.goal_azimuths(choice))
         moved.append(np.degrees(np.abs(azimuth_difference(*goals))))
-    seeing, swapped = (
+    with_own, with_swapped = (
         run_policy(network, policy, views, objects, starts, threshold, count, shown,
-                   progress=progress) for shown in (None, stand_ins))
-    return Blindness(interval(np.concatenate(moved), objects), interval(seeing.auc, objects),
-                     interval(swapped.auc, objects), interval(seeing.auc - swapped.auc, objects))
+                   progress=progress).auc for shown in (None, swapped))
+    return LatentSwap(interval(np.concatenate(moved), objects), interval(with_own, objects),
+                      interval(with_swapped, objects), interval(with_own - with_swapped, objects))

@@ -41,14 +41,13 @@ def iou_per_view(
     return result
 
 
-def half_the_set_away(objects: Tensor, count: int) -> Tensor:
+def swapped_objects(objects: Tensor, count: int) -> Tensor:
     """
-    Return for objects (E,) of a set of `count` the ones that stand in for them, never the same.
+    Return another object for each of objects (E,) of a set of `count`: the one half a set away.
 
-    In a set sorted by category that is mostly an object of another one. Raises DataError where
-    there is no other.
+    In a set sorted by category it mostly is of another category. Raises DataError on a set of
+    fewer than two objects.
     """
     if count < 2:
-        raise DataError(f'expected two objects or more, so that one can stand in for another, '
-                        f'got {count}')
+        raise DataError(f'expected two objects or more to swap their latents, got {count}')
     return (objects + count // 2) % count

@@ -44,7 +44,7 @@ Runs = Mapping[str, Sequence[Episodes]]
 """The same episodes under each seed of each policy."""
 
 
-def blind_names() -> list[str]:
+def heuristic_names() -> list[str]:
     """Return the policies that no network brings."""
     return [name for name, entry in POLICIES.items() if not entry.is_learned]
 
@@ -52,7 +52,7 @@ def blind_names() -> list[str]:
 def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
     """Return all policies, the learned ones after the others, and the oracle, which is none."""
     own = [name for name, entry in POLICIES.items() if entry.is_learned and learned]
-    return [*blind_names(), *own, *(['oracle'] if oracle else [])]
+    return [*heuristic_names(), *own, *(['oracle'] if oracle else [])]
 
 
 def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count: int = 5,
@@ -104,7 +104,7 @@ def load_attentions(files: Sequence[Path], network: ReconstructionNetwork) -> li
         if state_hash(bundle.reconstruction) != state_hash(network):
             raise WeightsError(f'{file}: expected a view policy trained on the network that is '
                                'measured, got one trained on another; train it with '
-                               '`active-recon train --from` that network')
+                               '`active-recon train --freeze-from` that network')
         models.append(bundle.attention)
     return models
 
@@ -134,7 +134,7 @@ def compare(trial: Trial, runs: Runs) -> dict[str, Any]:
     policies = {name: summary(seeds, trial.views, trial.objects) for name, seeds in runs.items()}
     for name, figures in policies.items():
         figures['auc_above'] = {other: asdict(difference(areas[name], areas[other]))
-                                for other in blind_names() if other in areas and other != name}
+                                for other in heuristic_names() if other in areas and other != name}
     found: dict[str, Any] = {'policies': policies}
     if 'random' in areas and 'oracle' in areas:
         for name, figures in policies.items():

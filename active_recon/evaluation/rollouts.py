@@ -94,29 +94,29 @@ class RenderedObjects:
 
 @torch.inference_mode()
 def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
-             starts: Tensor, count: int, stand_ins: Tensor | None = None,
+             starts: Tensor, count: int, swapped: Tensor | None = None,
              bfloat16: bool = False) -> Iterator[Step]:
     """
     Run one episode for each object (B,) from the view it starts at (B,), yielding every view.
 
     An azimuth between the views is shown by the nearest rendered view, as on the turntable.
-    `stand_ins`, (B,), are objects whose latents, seen from the same azimuths, the policy is given
-    instead of the true ones: what a policy loses by it is what it owes to seeing.
+    With `swapped`, (B,), the policy gets the latents of these objects, seen from the same
+    azimuths, instead of the true ones.
     """
     observer = Observer(network, views, bfloat16)
     own = RenderedObjects(observer, objects)
-    other = own if stand_ins is None else RenderedObjects(observer, stand_ins)
+    other = own if swapped is None else RenderedObjects(observer, swapped)
     other.reset()
     memory = policy.initial_state(len(objects))
 
     def choose(step: TimeStep[Tensor, Seen]) -> Tensor:
         nonlocal memory
-        told = step.known
-        if stand_ins is not None:
+        given = step.known
+        if swapped is not None:
             at = own.azimuths(step.known)[:, -1]
-            told = other.step(nearest_views(views.azimuths[stand_ins].numpy(), at))
-        volume = observer.occupancy(told.state) if policy.wants_volume else None
-        latent = told.state['latent']
+            given = other.step(nearest_views(views.azimuths[swapped].numpy(), at))
+        volume = observer.occupancy(given.state) if policy.wants_volume else None
+        latent = given.state['latent']
         choice, memory = policy.choose(own.observation(latent, step.known, volume), memory)
         return own.view_of(choice)
 
@@ -143,10 +143,10 @@ class Observer:
     def update(self, objects: Tensor, chosen: Tensor, state: State,
                yaws: Tensor | None = None) -> State:
         """
-        Take in views (B,) of objects (B,).
+        Update the state by views (B,) of objects (B,).
 
-        By `yaws` (B,), radians, the cameras that the network is told are turned about +z: its
-        error about the front.
+        `yaws` (B,), radians, turn the cameras that the network gets about +z: its error about
+        the front.
         """
         cameras = self.views.cameras(objects, chosen)
         if yaws is not None:

@@ -84,11 +84,11 @@ def gap_closed(values: Values, random: Values, oracle: Values, rounds: int = _RO
 def headroom_sentence(headroom: Interval) -> str:
     """Say what choosing views can gain at most; headroom is the oracle's mean minus random's."""
     spread = f'{headroom.mean:.4f} [{headroom.low:.4f}, {headroom.high:.4f}]'
-    told = f'An oracle that sees the truth is ahead of random by {spread}'
+    sentence = f'An oracle that sees the truth is ahead of random by {spread}'
     if headroom.mean < SMALL_HEADROOM:
-        return (f'{told}, under {SMALL_HEADROOM}: on these objects no policy can gain anything '
-                'that matters by choosing its views.')
-    return f'{told}: that is what choosing views can gain at most.'
+        return (f'{sentence}, under {SMALL_HEADROOM}: on these objects no policy can gain '
+                'anything that matters by choosing its views.')
+    return f'{sentence}: that is what choosing views can gain at most.'
 
 
 def _interval(mean: float, draws: Values) -> Interval:

@@ -29,7 +29,7 @@ class Contender:
     A policy under one seed.
 
     `make` builds it, given a generator; None is the greedy oracle, which is no policy, since it is
-    told the truth. `key` tells apart what is kept of it on disk.
+    given the truth. `key` identifies its results on disk.
     """
 
     policy: str

@@ -84,7 +84,7 @@ class Camera:
     intrinsics: Intrinsics = CANONICAL_INTRINSICS
 
     def __post_init__(self) -> None:
-        """Refuse what is no rigid pose."""
+        """Reject what is no rigid pose."""
         if self.pose.shape != (4, 4) or not np.isfinite(self.pose).all():
             raise ViewError(f'expected a finite 4 x 4 camera pose, got\n{self.pose}', 'pose')
         rotation = self.pose[:3, :3]
@@ -156,9 +156,9 @@ class Camera:
         optical = np.asarray(points, np.float64) @ transform[:3, :3].T + transform[:3, 3]
         if self.intrinsics.distortion is not None:
             depth = np.where(optical[:, 2:] > 0, optical[:, 2:], np.nan)
-            bent = self.intrinsics.distortion.bend(optical[:, :2] / depth)
+            distorted = self.intrinsics.distortion.distort(optical[:, :2] / depth)
             lens = self.intrinsics
-            return bent * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[:, 2]
+            return distorted * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[:, 2]
         image = optical @ self.intrinsics.matrix.T
         with np.errstate(divide='ignore', invalid='ignore'):
             return image[:, :2] / image[:, 2:], optical[:, 2]
@@ -180,7 +180,7 @@ class Camera:
                 across[None, :, None] * right + down[:, None, None] * below + forward)
             return rays
         seen = np.stack(np.meshgrid(across, down), axis=-1)
-        straight = lens.distortion.straighten(seen.reshape(-1, 2)).reshape(seen.shape)
+        straight = lens.distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
         return np.asarray(straight[..., :1] * right + straight[..., 1:] * below + forward)
 
 

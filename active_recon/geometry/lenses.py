@@ -1,4 +1,4 @@
-"""How a lens bends the image of a pinhole: ROS's distortion models, which are OpenCV's."""
+"""Lens distortion: ROS's distortion models, which are OpenCV's."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,23 +13,23 @@ MODELS = {'plumb_bob': (4, 5), 'rational_polynomial': (8, 12), 'equidistant': (4
 """Each model's numbers of coefficients, in OpenCV's order: k1, k2, p1, p2, k3, k4, ..."""
 _LARGEST = 1e6  # no lens has it, and its sixth power can still be computed
 _STEP = 1e-6
-_WITHIN = 0.9999  # at the very end of its reach a model may divide by 0
+_WITHIN = 0.9999  # at the largest radius itself a model may divide by 0
 
 
 @dataclass(frozen=True)
 class Distortion:
     """
-    A model out of `MODELS` and its coefficients.
+    A distortion model of `MODELS` and its coefficients.
 
-    It acts on points of the image plane at depth 1, (N, 2), x right and y down. Raises ViewError
-    on another model, another number of coefficients, and those that are not finite.
+    It maps points of the image plane at depth 1, (N, 2), x right and y down. Raises ViewError on
+    an unknown model, a wrong number of coefficients, and coefficients that are not finite.
     """
 
     model: str
     coefficients: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Refuse what no lens has."""
+        """Reject what no lens has."""
         if self.model not in MODELS:
             raise ViewError(f'expected a distortion model out of {", ".join(MODELS)}, got '
                             f'{self.model!r}; publish rectified images instead', 'camera_info')
@@ -41,26 +41,26 @@ class Distortion:
             raise ViewError('expected finite coefficients of distortion, got '
                             f'{self.coefficients}', 'camera_info')
 
-    def bend(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distort(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Return where the lens shows points of the pinhole's plane, (N, 2).
+        Return the distorted points of points of the pinhole's plane, (N, 2).
 
-        Further out than the model goes, where its curve turns back to the centre, points go on
-        outwards, so that what the lens cannot see is never shown inside its image.
+        Beyond `max_radius`, where the model's curve turns back to the centre, the distortion is
+        continued outwards, so that what the lens cannot see never appears inside its image.
         """
         radius = np.linalg.norm(points, axis=1, keepdims=True)
-        beyond = np.maximum(radius - self.reach, 0.0)
+        beyond = np.maximum(radius - self.max_radius, 0.0)
         outwards = points / np.maximum(radius, 1e-12)
-        bent = self._modelled(points - beyond * outwards)
-        return np.asarray(bent + beyond * outwards)
+        distorted = self._modelled(points - beyond * outwards)
+        return np.asarray(distorted + beyond * outwards)
 
-    def straighten(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the points of the pinhole's plane that the lens shows there: bend's inverse."""
+    def undistort(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points of the pinhole's plane of distorted points, (N, 2): the inverse."""
         found, open_ones = points.copy(), np.arange(len(points))
         for _ in range(20):  # Newton's steps; a handful is enough wherever a lens sees well
             near = found[open_ones]
-            wrong = self.bend(near) - points[open_ones]
-            across, down = ((self.bend(near + step) - self.bend(near - step)) / (2 * _STEP)
+            wrong = self.distort(near) - points[open_ones]
+            across, down = ((self.distort(near + step) - self.distort(near - step)) / (2 * _STEP)
                             for step in np.eye(2) * _STEP)
             determinant = across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0]
             found[open_ones] -= np.column_stack([
@@ -72,8 +72,8 @@ class Distortion:
         return found
 
     @cached_property
-    def reach(self) -> float:
-        """The radius in the pinhole's plane up to which the model's curve runs outwards."""
+    def max_radius(self) -> float:
+        """The radius in the pinhole's plane up to which the model is monotonic."""
         k = self.coefficients
         if self.model == 'equidistant':
             angle = math.sqrt(_first_root(Polynomial([1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]])))
@@ -84,12 +84,12 @@ class Distortion:
         return _WITHIN * math.sqrt(min(_first_root(turns), _first_root(d)))
 
     def _modelled(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return OpenCV's model of the points; its own function takes a hundred times as long."""
+        """Evaluate OpenCV's model; its own function takes a hundred times as long."""
         if self.model == 'equidistant':
             radius = np.linalg.norm(points, axis=1, keepdims=True)
             angle = np.arctan(radius)
-            bent = angle * np.polynomial.polynomial.polyval(angle**2, [1, *self.coefficients])
-            return np.asarray(points * bent / np.maximum(radius, 1e-12))
+            distorted = angle * np.polynomial.polynomial.polyval(angle**2, [1, *self.coefficients])
+            return np.asarray(points * distorted / np.maximum(radius, 1e-12))
         k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (*self.coefficients, *[0.0] * 8)[:12]
         x, y = points[:, 0], points[:, 1]
         r2 = x * x + y * y

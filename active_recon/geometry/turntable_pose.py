@@ -28,7 +28,7 @@ class FixedCamera:
     direction: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse what is no pose, and no direction."""
+        """Reject what is no pose, and no direction."""
         Camera(self.pose_at_zero)
         if self.direction not in DIRECTIONS:
             raise ConfigError(f'turntable_direction: expected 1 or -1, got {self.direction}')

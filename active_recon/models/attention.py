@@ -1,4 +1,4 @@
-"""The attentive-recurrent visual model of section 3.3: where to look next."""
+"""The attentive-recurrent visual model of section 3.3: the choice of the next view."""
 
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from torch.nn import functional
 
 
 class Attention(NamedTuple):
-    """What the model proposes: the mean azimuth (B,), radians in (-pi, pi], and b_t (B,)."""
+    """The model's output: the mean azimuth (B,), radians in (-pi, pi], and b_t (B,)."""
 
     mean_azimuth: Tensor
     baseline: Tensor
@@ -25,9 +25,8 @@ class AttentionModel(nn.Module):
     - state: the LSTM's h and c as `hidden` and `memory`, (B, hidden) each
 
     The glimpse is g_t = A_t * ReLU(W [sin l_t, cos l_t]), broadcast over the grid: a product with
-    the bare angle would erase A_t at azimuth 0. The mean azimuth is the angle of a vector of two.
-    Whoever follows it keeps `view_separation`, radians, from every view taken: the model was
-    trained so.
+    the angle itself would erase A_t at azimuth 0. The mean azimuth is the angle of a 2-vector. A
+    policy keeps its goals `view_separation`, radians, from every view taken, as in training.
     """
 
     def __init__(self, latent_channels: int, hidden_channels: int,
@@ -47,12 +46,12 @@ class AttentionModel(nn.Module):
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What who follows the model has to know: `view_separation`, and A_t's `latent_shape`."""
+        """The constants that a policy needs: `view_separation`, and A_t's `latent_shape`."""
         return {'view_separation': self.view_separation,
                 'latent_shape': (self.where.out_features, LATENT_GRID, LATENT_GRID)}
 
     def initial_state(self, batch: int) -> State:
-        """Return the memory of so many episodes before any view, zeros of (B, hidden)."""
+        """Return the state of B episodes before any view, zeros of (B, hidden)."""
         empty = self.memory.weight_hh.new_zeros(batch, self.memory.hidden_size)
         return {'hidden': empty, 'memory': empty}
 

@@ -1,25 +1,25 @@
-"""What an image's border tells of the background: its colour, and what is unlike it."""
+"""The background's colour from an image's border, and the foreground that differs from it."""
 
 import torch
 from torch import Tensor
 from torch.nn import functional
 
 _NEARLY, _CLEARLY = 0.015, 0.045  # distances of a colour from the background's, in [0, 1]
-_SCATTERED, _EVEN = 0.35, 0.7  # shares of the border that is nearly of one colour
+_SCATTERED, _EVEN = 0.35, 0.7  # fractions of the border that are nearly of one colour
 _HALVINGS = 8  # of the range of a colour: to one grey level of 256
 
 
 def foreground(images: Tensor) -> Tensor:
     """
-    Return how far images (B, 3 or 4, S, S) are from their borders' colour, (B, 1, S, S).
+    Return the foreground of images (B, 3 or 4, S, S) by their borders' colour, (B, 1, S, S).
 
-    0 is background, 1 is not. A fourth channel tells what was seen; where nothing was, it is 1.
+    0 is background, 1 foreground. A fourth channel is the mask of seen pixels; others are 1.
     """
     return share_apart(border_distance(images), seen_pixels(images))
 
 
 def share_apart(distance: Tensor, seen: Tensor) -> Tensor:
-    """Return distances of colour as shares of foreground; 1 where nothing was seen."""
+    """Return the foreground of colour distances, in [0, 1]; 1 where nothing was seen."""
     share = ((distance - _NEARLY) / (_CLEARLY - _NEARLY)).clamp(0, 1)
     return torch.where(seen > 0.5, share, 1.0)
 
@@ -41,18 +41,18 @@ def border_distance(images: Tensor) -> Tensor:
 
 def border_evenness(distance: Tensor, images: Tensor) -> Tensor:
     """
-    Return how much a border's colour tells of the background, (B, 1, 1, 1) in [0, 1].
+    Return how well a border's colour represents the background, (B, 1, 1, 1) in [0, 1].
 
-    1 where most of the border has the colour that `distance` is measured from; 0 in clutter.
+    1 where most of the border has the colour from which `distance` is measured; 0 in clutter.
     """
     border = _border(images)
     count = border.sum(dim=(2, 3), keepdim=True)
-    alike = ((distance < _CLEARLY) * border).sum(dim=(2, 3), keepdim=True) / count.clamp(min=1)
-    return ((alike - _SCATTERED) / (_EVEN - _SCATTERED)).clamp(0, 1)
+    even = ((distance < _CLEARLY) * border).sum(dim=(2, 3), keepdim=True) / count.clamp(min=1)
+    return ((even - _SCATTERED) / (_EVEN - _SCATTERED)).clamp(0, 1)
 
 
 def _border(images: Tensor) -> Tensor:
-    """Return 1 along the end of what images show, two pixels wide, else 0, (B, 1, S, S)."""
+    """Return 1 along the edge of the seen pixels, two pixels wide, else 0, (B, 1, S, S)."""
     seen = seen_pixels(images) > 0.5
     inner = -functional.max_pool2d(-seen.float(), 5, 1, 2)
     padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
@@ -63,7 +63,7 @@ def _median(values: Tensor, weights: Tensor) -> Tensor:
     """
     Return the medians of values (B, C, N) in [0, 1] of weight 1, (B, C, 1); 1 where none is.
 
-    By halving the range, since sorting is no part of the graphs that are exported.
+    By bisection, since exported graphs cannot sort.
     """
     half = weights.sum(dim=2, keepdim=True) / 2
     high = torch.ones_like(values[:, :, :1])

@@ -19,12 +19,12 @@ _LATENT_SIDE = 4
 
 @dataclass(frozen=True)
 class CarvingConfig(Config):
-    """By how many pixels silhouettes are dilated: a cell is touched before its centre is."""
+    """The dilation of silhouettes, in pixels: a cell is seen before its centre is."""
 
     dilation: int = 0  # the best on validation
 
     def __post_init__(self) -> None:
-        """Refuse what is no number of pixels."""
+        """Reject an invalid number of pixels."""
         if not 0 <= self.dilation <= 16:
             raise ConfigError(f'CarvingConfig: expected a dilation from 0 to 16 pixels, got '
                               f'{self.dilation}')
@@ -34,17 +34,17 @@ SIZES = {'small': CarvingConfig(), 'published': CarvingConfig()}
 
 
 def carve_nothing(network: 'Carving', voxels: Tensor, categories: NDArray[np.str_]) -> None:
-    """Learn nothing from voxels (N, R, R, R) and categories (N,): there is nothing to fit."""
+    """Fit nothing to voxels (N, R, R, R) and categories (N,): the network has no parameters."""
 
 
 class Carving(ReconstructionNetwork):
     """
     The visual hull: cells whose centre lies outside a dilated silhouette in any view are empty.
 
-    The silhouette is what is not background, and the background is what the image's border shows:
-    it takes one plain colour behind the object, or a background that was taken away before. What a
-    camera did not see rules nothing out. The state is the least share of the foreground at each
-    cell's projection, (B, 64, 64, 64), 1 before any view.
+    The silhouette is what differs from the image's border, so the background must have one plain
+    colour, or be removed before. Cells that a camera does not see stay as they are. The state is
+    the lowest foreground probability at each cell's projection, (B, 64, 64, 64), 1 before any
+    view.
     """
 
     image_size, resolution, needs_front = IMAGE_SIZE, 64, False
@@ -61,21 +61,20 @@ class Carving(ReconstructionNetwork):
         return cls(config.dilation)
 
     def initial_state(self, batch: int) -> State:
-        """Return the state before any view: all may be full."""
+        """Return the state before any view: every cell may be occupied."""
         side = (self.resolution,) * 3
         return {'least': torch.ones(batch, *side, device=self.device),
                 'latent': torch.ones(batch, 1, _LATENT_SIDE, _LATENT_SIDE, device=self.device)}
 
     def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
-        """Return what is not background, (B, 1, 128, 128) in [0, 1]; 1 where nothing was seen."""
-        shares = foreground(images)
-        reach = self._dilation
-        return functional.max_pool2d(shares, 2 * reach + 1, 1, reach)
+        """Return the dilated foreground, (B, 1, 128, 128) in [0, 1]; 1 where nothing was seen."""
+        return functional.max_pool2d(
+            foreground(images), 2 * self._dilation + 1, 1, self._dilation)
 
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
-        """Carve by one more silhouette of each object."""
+        """Return the state carved by one more silhouette of each object."""
         where, depth = projected(projection(cameras, IMAGE_SIZE), self.resolution)
-        # Zeros come in beyond the image, where nothing is ruled out
+        # Outside the image samples are 0, so that nothing is carved there
         found = sampled(encoded.float() - 1, where)[:, 0] + 1  # (B, N)
         found = torch.where(depth > 0, found, 1).reshape(state['least'].shape)
         least = torch.minimum(state['least'], found)

@@ -1,9 +1,9 @@
 """The 3D convolutional LSTM decoder of section 3.2: the attentive latent unit to occupancy."""
 
-from active_recon.models.doubling import DoublingTransposedConv3d
 from active_recon.models.encoder import group_norm, LATENT_GRID
-from active_recon.models.network import start_empty
+from active_recon.models.network import init_occupancy_bias
 from active_recon.models.recurrent import ConvLSTMCell, LstmState
+from active_recon.models.subpixel import SubpixelTransposedConv3d
 from torch import nn, Tensor
 
 
@@ -21,14 +21,14 @@ class Decoder(nn.Module):
         self.latent_channels = latent_channels
         self.memory = ConvLSTMCell(latent_channels, volume_channels, (LATENT_GRID,) * 3)
         wide, narrow = decoder_channels
-        to_logits = DoublingTransposedConv3d(narrow)
+        to_logits = SubpixelTransposedConv3d(narrow)
         self.grow = nn.Sequential(
             nn.ConvTranspose3d(volume_channels, wide, 4, stride=2, padding=1), group_norm(wide),
             nn.LeakyReLU(0.1),
             nn.ConvTranspose3d(wide, narrow, 4, stride=2, padding=1), group_norm(narrow),
             nn.LeakyReLU(0.1),
             to_logits)
-        start_empty(to_logits.bias)
+        init_occupancy_bias(to_logits.bias)
 
     def update(self, latent: Tensor, state: LstmState) -> LstmState:
         """Return the next state."""

@@ -11,10 +11,10 @@ LATENT_GRID = 4  # cells a side of A_t in the image's plane, and of the decoder'
 
 def group_norm(channels: int) -> nn.GroupNorm:
     """
-    Return the normalisation that stands after every convolution but the last (Wu and He 2018).
+    Return the normalisation that follows every convolution but the last (Wu and He 2018).
 
-    Without it the two memories, whose outputs are small at first, leave next to nothing of the
-    image for the decoder to learn from. It looks at one object at a time.
+    Without it hardly any signal of the image gets through the two memories, whose outputs are
+    small at first, to the decoder. It does not depend on the other objects of a batch.
     """
     return nn.GroupNorm(math.gcd(8, channels), channels)
 
@@ -44,9 +44,9 @@ class Encoder(nn.Module):
     - images: (B, 3, 64, 64) in [0, 1]
     - latent A_t: (B, 4 C, 4, 4), the same numbers as a volume of C channels and 4 x 4 x 4 cells
 
-    An image says nothing of its azimuth, and the object is to be rebuilt in its own frame, so
-    what is seen on one side of the image may belong anywhere: the first of the three
-    convolutions after the memory spans its whole grid.
+    An image has no azimuth, and the object is reconstructed in its own frame, so a feature of one
+    side of the image may belong anywhere: the first of the three convolutions after the memory
+    spans its whole grid.
     """
 
     def __init__(self, stem_channels: int, block_channels: tuple[int, int, int],
@@ -75,7 +75,7 @@ class Encoder(nn.Module):
         return last.num_channels // LATENT_GRID ** 2, LATENT_GRID, LATENT_GRID
 
     def encode(self, images: Tensor) -> Tensor:
-        """Return what the residual blocks make of images, (B, F, 4, 4)."""
+        """Return the features of images after the residual blocks, (B, F, 4, 4)."""
         features: Tensor = self.blocks(self.stem(2 * images - 1))
         return features
 

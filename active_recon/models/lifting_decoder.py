@@ -1,4 +1,4 @@
-"""What views agree on to occupancy: a small U-Net, and the hull at full fineness."""
+"""View statistics to occupancy: a small U-Net, and the visual hull at full resolution."""
 
 from active_recon.models.encoder import group_norm
 import torch
@@ -6,14 +6,14 @@ from torch import nn, Tensor
 from torch.nn import functional
 
 FINE_SIDE = 32
-_BEGIN = (0.5, 0.5, -2.0)  # biases of what is learned at 64 cells
+_INITIAL_BIAS = (0.5, 0.5, -2.0)  # of the layer at 64 cells
 
 
 class Conv3d(nn.Conv3d):
     """
-    3 x 3 x 3 convolution that oneDNN computes for a single small volume too.
+    3 x 3 x 3 convolution that uses oneDNN for a single small volume too.
 
-    For those torch takes its plain loop in float32, which takes ten times as long at 16 cells.
+    There torch would use its plain loop in float32, which takes ten times as long at 16 cells.
     """
 
     def __init__(self, channels: int) -> None:
@@ -46,16 +46,16 @@ class Residual3d(nn.Module):
         return functional.relu(cells + self.layers(cells))
 
 
-def folded(cells: Tensor) -> Tensor:
-    """Fold cells (B, C, 2n, 2n, 2n) into those twice as large, (B, 8 C, n, n, n)."""
+def space_to_depth(cells: Tensor) -> Tensor:
+    """Move blocks of 2 x 2 x 2 cells to channels: (B, C, 2n, 2n, 2n) to (B, 8 C, n, n, n)."""
     batch, channels, side = cells.shape[:3]
     n = side // 2
     split = cells.reshape(batch, channels, n, 2, n, 2, n, 2)
     return split.permute(0, 1, 3, 5, 7, 2, 4, 6).reshape(batch, 8 * channels, n, n, n)
 
 
-def unfolded(cells: Tensor) -> Tensor:
-    """Unfold cells (B, 8 C, n, n, n) into those half as large, (B, C, 2n, 2n, 2n)."""
+def depth_to_space(cells: Tensor) -> Tensor:
+    """Move channels to blocks of 2 x 2 x 2 cells: (B, 8 C, n, n, n) to (B, C, 2n, 2n, 2n)."""
     batch, channels, n = cells.shape[:3]
     split = cells.reshape(batch, channels // 8, 2, 2, 2, n, n, n)
     return split.permute(0, 1, 5, 2, 6, 3, 7, 4).reshape(
@@ -64,13 +64,13 @@ def unfolded(cells: Tensor) -> Tensor:
 
 class HullUnet(nn.Module):
     """
-    A U-Net at 16, 8 and 4 cells a side, unfolded to 32 and 64, where the hull joins in.
+    A U-Net at 16, 8 and 4 cells a side, upsampled to 32 and 64, where the hull is added.
 
-    `coarse` and `fine` are the channels that come in at 16 and 32 cells; `channels` those at 16,
-    8 and 4; `head` those at 32. The logits are the network's plus a learned
-    scale, for each cell its own, times the log of the least, and of the second least, foreground
-    probability of all views; that of the least is 1 at least. What the silhouettes leave no room
-    for stays empty without being learned.
+    `coarse` and `fine` are the input channels at 16 and 32 cells, `channels` those of the U-Net
+    at 16, 8 and 4 cells, `head` those at 32. The logits are the U-Net's plus the log of the
+    lowest and of the second lowest foreground probability over all views, each times a scale
+    learned per cell; the scale of the lowest is at least 1. So cells outside the visual hull are
+    empty without having to be learned.
     """
 
     def __init__(self, coarse: int, fine: int, channels: tuple[int, int, int],
@@ -90,31 +90,31 @@ class HullUnet(nn.Module):
         self.to_32 = nn.Conv3d(at_16, 8 * head, 1)
         self.skip_32 = nn.Conv3d(head, head, 1)
         self.to_64 = nn.Conv3d(head, 8 * 3, 1)
-        # It begins as the hull, of which training takes away and to which it adds
+        # The initial prediction is the visual hull
         with torch.no_grad():
             self.to_64.weight.mul_(0.1)
-        self.to_64.bias = nn.Parameter(torch.tensor(_BEGIN).repeat_interleave(8))
+        self.to_64.bias = nn.Parameter(torch.tensor(_INITIAL_BIAS).repeat_interleave(8))
         self.logit_32 = nn.Conv3d(head, 1, 1)
 
     def forward(self, coarse: Tensor, fine: Tensor, hull: Tensor) -> tuple[Tensor, Tensor]:
         """
-        Return logits (B, 64, 64, 64), and rougher ones (B, 32, 32, 32).
+        Return logits (B, 64, 64, 64), and coarse logits (B, 32, 32, 32).
 
-        Takes (B, coarse, 16, 16, 16), (B, fine, 32, 32, 32), and the two least logits of the
-        foreground, (B, 2, 64, 64, 64).
+        Takes view statistics (B, coarse, 16, 16, 16) and (B, fine, 32, 32, 32), and the two
+        lowest foreground logits over all views, (B, 2, 64, 64, 64).
         """
         carved = functional.logsigmoid(hull)
-        entered = self.fine_in(torch.cat([fine, folded(carved[:, :1])], dim=1))
-        at_16 = self.enter(torch.cat([coarse, folded(entered)], dim=1))
-        if not self.training:  # convolutions take two thirds of the time; what trains takes more
+        entered = self.fine_in(torch.cat([fine, space_to_depth(carved[:, :1])], dim=1))
+        at_16 = self.enter(torch.cat([coarse, space_to_depth(entered)], dim=1))
+        if not self.training:  # inference takes two thirds of the time, training more
             at_16 = at_16.contiguous(memory_format=torch.channels_last_3d)
         at_16 = self.down_16(at_16)
         at_8 = self.down_8(self.to_8(at_16))
         at_4 = self.at_4(self.to_4(at_8))
-        at_8 = self.up_8(at_8 + unfolded(self.from_4(at_4)))
-        at_16 = self.up_16(at_16 + unfolded(self.from_8(at_8)))
-        at_32 = functional.relu(unfolded(self.to_32(at_16)) + self.skip_32(entered))
-        learned = unfolded(self.to_64(at_32))  # (B, 3, 64, 64, 64)
+        at_8 = self.up_8(at_8 + depth_to_space(self.from_4(at_4)))
+        at_16 = self.up_16(at_16 + depth_to_space(self.from_8(at_8)))
+        at_32 = functional.relu(depth_to_space(self.to_32(at_16)) + self.skip_32(entered))
+        learned = depth_to_space(self.to_64(at_32))  # (B, 3, 64, 64, 64)
         scales = functional.softplus(learned[:, 1:])
         logits = learned[:, 0] + carved[:, 0] + (scales * carved).sum(dim=1)
         return logits, self.logit_32(at_32)[:, 0]

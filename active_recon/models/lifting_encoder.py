@@ -1,4 +1,4 @@
-"""Images to feature maps and foreground, at the fineness at which cells look them up."""
+"""Images to feature maps and foreground logits, at the resolutions that are lifted."""
 
 import math
 from typing import NamedTuple, Self
@@ -24,10 +24,10 @@ _AT_128 = 8  # channels: more would take longer than all that is narrower
 
 class Maps(NamedTuple):
     """
-    What the images of B views show.
+    Feature maps of the images of B views.
 
     - coarse: (B, C, 32, 32) and fine: (B, c, 64, 64), features
-    - seen: (B, 1, 64, 64) in [0, 1], the share of each pixel that the camera saw
+    - seen: (B, 1, 64, 64) in [0, 1], the fraction of each pixel that the camera saw
     - foreground: (B, 1, 128, 128) logits
     """
 
@@ -106,16 +106,16 @@ class PyramidEncoder(nn.Module):
         self.smooth_64 = _smooth(half)
         self.silhouette = nn.Conv2d(half, 4 * _AT_128, 1)
         self.shown_128 = nn.Conv2d(6, _AT_128, 3, padding=1)
-        # What is learned, and how far what is unlike the border's colour is trusted
+        # Learned logits, and the weight of the difference from the border's colour
         self.foreground = nn.Conv2d(2 * _AT_128, 2, 3, padding=1)
         self.foreground.bias = nn.Parameter(torch.tensor([0.0, _TRUST]))
         self.coarse, self.fine = nn.Conv2d(width + 1, coarse, 1), nn.Conv2d(half + 4, fine, 1)
 
     def forward(self, images: Tensor) -> Maps:
-        """Return the maps of images (B, 3, 128, 128), or (B, 4, ...) with what was seen."""
+        """Return the maps of images (B, 3, 128, 128), or (B, 4, ...) with the mask of `seen`."""
         seen = seen_pixels(images)
         apart = border_distance(images)
-        # One half where the border has no one colour and tells nothing
+        # One half where the border has no single colour and says nothing of the background
         plain = 0.5 + border_evenness(apart, images) * (share_apart(apart, seen) - 0.5)
         shown = torch.cat([(2 * images[:, :3] - 1) * seen, seen, apart * seen, plain], dim=1)
         shown = shown.contiguous(memory_format=torch.channels_last)

@@ -38,8 +38,8 @@ class MeanCodeNetwork(ReconstructionNetwork):
     """
     A single-view network over several views: the mean of their codes is decoded.
 
-    The order of the views is of no matter. The latent is the mean code as (B, D, 1, 1); the rest
-    of the state is the codes' sum, (B, D), and their number, (B, 1).
+    The order of the views does not matter. The latent is the mean code as (B, D, 1, 1); the rest
+    of the state is the sum of the codes, (B, D), and their number, (B, 1).
     """
 
     image_size, needs_front = IMAGE_SIZE, True
@@ -49,7 +49,7 @@ class MeanCodeNetwork(ReconstructionNetwork):
         self.encoder = encoder
 
     def initial_state(self, batch: int) -> State:
-        """Return no code yet."""
+        """Return the state before any view: zeros."""
         empty = torch.zeros(batch, self.encoder.code_size, device=self.device)
         return {'total': empty, 'views': empty[:, :1], 'latent': empty[:, :, None, None]}
 
@@ -59,7 +59,7 @@ class MeanCodeNetwork(ReconstructionNetwork):
         return codes
 
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
-        """Take in images' codes."""
+        """Add the codes of one image of each object, (B, D), to the mean."""
         total = (state['total'] + encoded).to(encoded.dtype)
         views = state['views'] + 1
         mean = (total / views).to(encoded.dtype)

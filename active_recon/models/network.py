@@ -1,4 +1,4 @@
-"""What every reconstruction network is: views in one by one, occupancy out after every view."""
+"""The interface of reconstruction networks: views in one by one, occupancy after every view."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ import torch
 from torch import nn, Tensor
 
 State = dict[str, Tensor]
-"""What a network knows of B objects: named tensors, (B, ...) each; `latent` is among them."""
+"""A network's state for B objects: named tensors, (B, ...) each; one of them is `latent`."""
 
 
-def start_empty(bias: Tensor | None) -> None:
+def init_occupancy_bias(bias: Tensor | None) -> None:
     """
-    Let the bias of a last layer, which gives logits, say p = 0.1 everywhere.
+    Initialise the bias of a last layer, which gives logits, to p = 0.1.
 
-    Most of a grid is empty: that start spares the first thousand steps.
+    Most of a grid is empty: this start saves the first thousand steps.
     """
     assert bias is not None
     nn.init.constant_(bias, -2.2)
@@ -44,7 +44,7 @@ class Cameras(NamedTuple):
 
     @property
     def azimuths(self) -> Tensor:
-        """Azimuths, (...) float32, radians in [0, 2 pi): all that the paper's family looks at."""
+        """Azimuths, (...) float32, radians in [0, 2 pi): all that the paper's family uses."""
         angle = torch.atan2(self.poses[..., 1, 3], self.poses[..., 0, 3])
         return torch.remainder(angle, TURN).float()
 
@@ -69,15 +69,15 @@ class Cameras(NamedTuple):
 
 class ReconstructionNetwork(nn.Module, ABC):
     """
-    The interface of all networks of the registry; the state is passed in and handed back.
+    The interface of all networks of the registry; the state is passed in and returned.
 
     - images: (B, 3, S, S) in [0, 1], S the `image_size`; their cameras: (B, ...). One that needs
       no front also takes a fourth channel: 1 where the camera's image has that pixel, else 0
     - state: (B, ...) named tensors; `initial_state` gives the first, `update` the next one
 
-    Encoding an image, updating the state and decoding it are apart: training decodes after one
-    view of a sequence only, and who tries many sequences of the same views encodes each of them
-    once.
+    Encoding an image, updating the state and decoding it are separate: training decodes only
+    after one view of a sequence, and a search over many sequences of the same views encodes each
+    view once.
     """
 
     image_size: int
@@ -89,12 +89,12 @@ class ReconstructionNetwork(nn.Module, ABC):
 
     @property
     def spec(self) -> NetworkSpec:
-        """What it asks of its images, and what it gives."""
+        """The images that it takes, and the resolution that it predicts at."""
         return NetworkSpec(self.image_size, self.resolution, self.needs_front)
 
     @property
     def device(self) -> torch.device:
-        """Where it lies; one that is fitted, not trained, has buffers alone."""
+        """The device of its parameters, or of its buffers where it has no parameters."""
         held = next(chain(self.parameters(), self.buffers()), None)
         return torch.device('cpu') if held is None else held.device
 
@@ -104,14 +104,14 @@ class ReconstructionNetwork(nn.Module, ABC):
 
     @abstractmethod
     def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
-        """Return what each of the images shows by itself, (B, ...), whatever was seen before."""
+        """Return the encoding of each image, (B, ...); it does not depend on the state."""
 
     @abstractmethod
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
         """
-        Take in what one image of each object shows, (B, ...), and return the next state.
+        Return the state updated by one encoded image of each object, (B, ...).
 
-        Its `latent`, (B, C, h, w), is what a view policy sees.
+        Its `latent`, (B, C, h, w), is the input of a view policy.
         """
 
     @abstractmethod
@@ -119,7 +119,7 @@ class ReconstructionNetwork(nn.Module, ABC):
         """Return the occupancy's logits, (B, R, R, R), indexed [x, y, z]."""
 
     def step(self, images: Tensor, cameras: Cameras, state: State) -> State:
-        """Take in one view of each object: encode it, and update the state."""
+        """Encode one view of each object, and return the updated state."""
         return self.update(self.encode(images, cameras), cameras, state)
 
     def objective(self, state: State, voxels: Tensor) -> Tensor | None:
@@ -131,6 +131,6 @@ class ReconstructionNetwork(nn.Module, ABC):
         return None
 
     def forward(self, images: Tensor, cameras: Cameras, state: State) -> tuple[Tensor, State]:
-        """Take in one view of each object and decode: logits (B, R, R, R), and the next state."""
+        """Encode, update and decode one view of each object: logits (B, R, R, R) and the state."""
         state = self.step(images, cameras, state)
         return self.decode(state), state

@@ -17,7 +17,8 @@ class Network2d3dConfig(Config):
     """
     Sizes of the 2D-3D-attention network; the paper states none of them.
 
-    `view_separation`, radians, is how far its goals stay from every view taken; the paper's is 0.
+    `view_separation`, radians, is the smallest angle between a goal and the views taken; the
+    paper's is 0.
     """
 
     stem_channels: int = 32
@@ -31,7 +32,7 @@ class Network2d3dConfig(Config):
     view_separation: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse sizes that make no network."""
+        """Reject sizes that make no network."""
         sizes = [size for name, value in self.to_dict().items() if name.endswith('channels')
                  for size in (value if isinstance(value, tuple) else (value,))]
         if min(sizes) < 1:
@@ -67,7 +68,7 @@ class Network2d3d(ReconstructionNetwork):
             Decoder(config.latent_channels, config.volume_channels, config.decoder_channels))
 
     def initial_state(self, batch: int) -> State:
-        """Return empty memories."""
+        """Return the state before any view: zeros."""
         encoder = self.encoder.memory.initial_state(batch)
         decoder = self.decoder.memory.initial_state(batch)
         return {'encoder_hidden': encoder.hidden, 'encoder_memory': encoder.memory,
@@ -79,7 +80,7 @@ class Network2d3d(ReconstructionNetwork):
         return self.encoder.encode(images)
 
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
-        """Take in images' features; what is decoded is the decoder's memory."""
+        """Return the state updated by the images' features."""
         latent, encoder = self.encoder.update(
             encoded, LstmState(state['encoder_hidden'], state['encoder_memory']))
         decoder = self.decoder.update(

@@ -44,7 +44,7 @@ class OgnConfig(Config):
     resolution: int = 32
 
     def __post_init__(self) -> None:
-        """Refuse sizes that make no network."""
+        """Reject sizes that make no network."""
         parts = (self.image_channels, self.code_channels, self.level_channels)
         if any(not part or min(part) < 1 for part in parts) or len(self.image_channels) > 6:
             raise ConfigError('OgnConfig: expected channels of 1 or more in every part, six at '
@@ -73,10 +73,10 @@ class Division(nn.Module):
     Mixed cells' features (M, C) to those of their children (8 M, C').
 
     A transposed convolution of stride and kernel 2, which is a linear map to eight children, then
-    a 3 x 3 x 3 convolution over all cells of the new level; at more than 32 cells a side one of
-    1 x 1 x 1, since a network at its beginning, which divides every cell, would there look for
-    the neighbours of 262,144 cells of each object. A cell's features are normalised by
-    themselves, so that no cell depends on which others there are.
+    a 3 x 3 x 3 convolution over all cells of the new level. Above 32 cells a side it is 1 x 1 x 1,
+    since an untrained network, which divides every cell, would have to find the neighbours of
+    262,144 cells of each object. The features of each cell are normalised on their own, so that
+    no cell depends on which others exist.
     """
 
     def __init__(self, in_channels: int, out_channels: int, side: int) -> None:
@@ -109,7 +109,7 @@ class Level(NamedTuple):
 
 class Ogn(MeanCodeNetwork):
     """
-    An octree decoder, sparse all through: only mixed cells have children.
+    An octree decoder, sparse at every level: only mixed cells have children.
 
     Tatarchenko et al. 2017, "Octree Generating Networks: Efficient Convolutional Architectures for
     High-resolution 3D Outputs". Dense up to 8 cells a side; from there on every level says of each

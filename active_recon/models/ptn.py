@@ -6,7 +6,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.encoder import group_norm
 from active_recon.models.mean_code import ImageEncoder, MeanCodeNetwork
-from active_recon.models.network import start_empty, State
+from active_recon.models.network import init_occupancy_bias, State
 from torch import nn, Tensor
 
 _COARSEST = 3  # cells a side of the decoder's first volume
@@ -25,7 +25,7 @@ class PtnConfig(Config):
     volume_channels: tuple[int, int, int]
 
     def __post_init__(self) -> None:
-        """Refuse sizes that make no network."""
+        """Reject sizes that make no network."""
         sizes = (self.image_channels, self.code_channels, self.volume_channels)
         if any(len(part) != 3 or min(part) < 1 for part in sizes):
             raise ConfigError('PtnConfig: expected three channels of 1 or more in every part, '
@@ -64,7 +64,7 @@ class PerspectiveTransformerNet(MeanCodeNetwork):
             nn.ConvTranspose3d(wide, middle, 4), group_norm(middle), nn.ReLU(),  # 6 cells a side
             nn.ConvTranspose3d(middle, narrow, 5, stride=2), group_norm(narrow), nn.ReLU(),  # 15
             to_logits)
-        start_empty(to_logits.bias)
+        init_occupancy_bias(to_logits.bias)
 
     @classmethod
     def from_config(cls, config: PtnConfig) -> 'PerspectiveTransformerNet':

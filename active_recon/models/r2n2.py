@@ -5,9 +5,9 @@ from itertools import pairwise
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError
-from active_recon.models.doubling import DoublingConv3d
 from active_recon.models.encoder import group_norm, IMAGE_SIZE, LATENT_GRID
-from active_recon.models.network import Cameras, ReconstructionNetwork, start_empty, State
+from active_recon.models.network import Cameras, init_occupancy_bias, ReconstructionNetwork, State
+from active_recon.models.subpixel import SubpixelConv3d
 from torch import nn, Tensor
 
 _DOUBLINGS = 3  # from the memory's 4 cells a side to 32
@@ -29,7 +29,7 @@ class R2n2Config(Config):
     decoder_channels: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        """Refuse sizes that make no network."""
+        """Reject sizes that make no network."""
         sizes = (*self.encoder_channels, self.code_channels, self.hidden_channels,
                  *self.decoder_channels)
         if (min(sizes) < 1 or len(self.encoder_channels) != 6
@@ -75,8 +75,8 @@ class ConvGRUCell(nn.Module):
     """
     One step of their 3D convolutional GRU.
 
-    - code: (B, D), what the image says, laid on every cell by a weight of its own
-    - hidden: (B, H, 4, 4, 4), in which neighbours see each other
+    - code: (B, D), of an image; every cell has its own weights for it
+    - hidden: (B, H, 4, 4, 4), updated by convolutions
     """
 
     def __init__(self, code_channels: int, hidden_channels: int) -> None:
@@ -132,9 +132,9 @@ class R2n2(ReconstructionNetwork):
             stages.append(ResidualPair(3, before, after))
         last = decoder_channels[-1]
         self.decoder = nn.Sequential(*stages, (
-            DoublingConv3d(last) if len(decoder_channels) < _DOUBLINGS
+            SubpixelConv3d(last) if len(decoder_channels) < _DOUBLINGS
             else nn.Conv3d(last, 1, 3, padding=1)))
-        start_empty(list(self.decoder.parameters())[-1])
+        init_occupancy_bias(list(self.decoder.parameters())[-1])
 
     @classmethod
     def from_config(cls, config: R2n2Config) -> 'R2n2':
@@ -152,7 +152,7 @@ class R2n2(ReconstructionNetwork):
         return codes
 
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
-        """Take in images' codes."""
+        """Return the state updated by the codes of one image of each object, (B, D)."""
         return _state(self.memory(encoded, state['memory'].to(encoded.dtype)))
 
     def decode(self, state: State) -> Tensor:

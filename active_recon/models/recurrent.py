@@ -7,7 +7,7 @@ from torch import nn, Tensor
 
 
 class LstmState(NamedTuple):
-    """What a cell remembers: H_{t-1} and C_{t-1}, each (B, hidden, *grid)."""
+    """The state of a cell: H_{t-1} and C_{t-1}, each (B, hidden, *grid)."""
 
     hidden: Tensor
     memory: Tensor
@@ -23,7 +23,7 @@ class ConvLSTMCell(nn.Module):
     - state: H and C, (B, H, S, S) or (B, H, S, S, S)
 
     The peephole terms W_c act element by element, as in the original ConvLSTM (Shi et al. 2015).
-    The caller owns the state; the cell remembers nothing between calls.
+    The caller owns the state; the cell keeps nothing between calls.
     """
 
     def __init__(self, feature_channels: int, hidden_channels: int, grid: tuple[int, ...],
@@ -38,7 +38,7 @@ class ConvLSTMCell(nn.Module):
         self.gates = convolution(feature_channels + hidden_channels, 4 * hidden_channels,
                                  kernel_size, padding=kernel_size // 2)
         self.peepholes = nn.Parameter(torch.zeros(3, hidden_channels, *grid))
-        with torch.no_grad():  # a forget gate that starts open lets gradients reach early views
+        with torch.no_grad():  # an open forget gate lets gradients flow to early views
             assert self.gates.bias is not None
             self.gates.bias[:hidden_channels].fill_(1.0)
 

@@ -1,4 +1,4 @@
-"""All reconstruction networks by their names, each in its published size and in a small one."""
+"""The registry of reconstruction networks, each in its published size and in a small one."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -37,11 +37,11 @@ from torch import nn, Tensor
 @dataclass(frozen=True)
 class NetworkEntry:
     """
-    How a network is built, in which sizes, and from which losses it learns.
+    How a network is built, its sizes, and its losses.
 
-    `small` is what two CPU cores train within an hour. `policy` builds the model of the view
-    policy that is trained beside it, if it has one. `fit` stands for training where a network is
-    fitted in one go, to voxels (N, R, R, R) and categories (N,).
+    `small` trains on two CPU cores within an hour. `policy` builds the model of the view policy
+    that is trained with it, if it has one. `fit` replaces training for a network that is fitted
+    in one go, to voxels (N, R, R, R) and categories (N,).
     """
 
     config: type[Config]
@@ -87,18 +87,18 @@ OWN_NETWORKS = 'ACTIVE_RECON_NETWORKS'
 """The environment variable that names networks in files, separated by commas."""
 
 
-def named_network(told: str) -> str:
+def named_network(reference: str) -> str:
     """
-    Return the name under which a network is known: Net where `told` is my_file.py:Net.
+    Return the name of a network, loading it where `reference` is of the form my_file.py:Net.
 
-    Raises ConfigError where such a file has no network, or takes the name of another.
+    Raises ConfigError where the file has no such network, or its name is already taken.
     """
-    if not is_in_file(told):
-        return told
-    name = told.rpartition(':')[2]
+    if not is_in_file(reference):
+        return reference
+    name = reference.rpartition(':')[2]
     if name in NETWORKS:
-        raise ConfigError(f'{told}: {name} is the name of a network of this package')
-    _OWN[name] = _own_entry(told, load_from_file(told))
+        raise ConfigError(f'{reference}: {name} is the name of a network of this package')
+    _OWN[name] = _own_entry(reference, load_from_file(reference))
     return name
 
 
@@ -106,15 +106,15 @@ def network_entry(name: str) -> NetworkEntry:
     """
     Return a network's entry: of the registry, of a file, or of an installed package.
 
-    Raises ConfigError naming those of the registry. No weights file can name a Python file: that
-    is left to who runs the command.
+    Raises ConfigError naming those of the registry. A weights file cannot name a Python file: only
+    the user of the command can.
     """
     if name in NETWORKS:
         return NETWORKS[name]
     if name not in _OWN:
-        for told in filter(None, os.environ.get(OWN_NETWORKS, '').split(',')):
-            if told.rpartition(':')[2] == name:
-                named_network(told)
+        for reference in filter(None, os.environ.get(OWN_NETWORKS, '').split(',')):
+            if reference.rpartition(':')[2] == name:
+                named_network(reference)
     if name in _OWN:
         return _OWN[name]
     if name in installed(NETWORKS_GROUP):
@@ -125,20 +125,20 @@ def network_entry(name: str) -> NetworkEntry:
                       f'{OWN_NETWORKS}=my_file.py:{name} names')
 
 
-def _own_entry(told: str, found: Any) -> NetworkEntry:
+def _own_entry(reference: str, found: Any) -> NetworkEntry:
     """Return an entry as it is, or that of a network whose class has its `Config`."""
     if isinstance(found, NetworkEntry):
         return found
     config = getattr(found, 'Config', None)
     if not (isinstance(found, type) and issubclass(found, ReconstructionNetwork)
             and isinstance(config, type) and issubclass(config, Config)):
-        raise ConfigError(f'{told}: neither a NetworkEntry nor a ReconstructionNetwork with a '
-                          'Config of its own')
+        raise ConfigError(f'{reference}: neither a NetworkEntry nor a ReconstructionNetwork with '
+                          'a Config of its own')
     return NetworkEntry(config, found, {'small': config()}, getattr(found, 'loss', LossConfig()))
 
 
 def network_config(name: str, size: str) -> Config:
-    """Return a network's configuration of a size; raises ConfigError naming those there are."""
+    """Return a network's configuration of a size; raises ConfigError naming the sizes."""
     sizes = network_entry(name).sizes
     if size not in sizes:
         raise ConfigError(f'{name} has no size {size!r}: expected one of {", ".join(sizes)}')

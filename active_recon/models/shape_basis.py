@@ -1,4 +1,4 @@
-"""A deformable shape for each category, fitted to silhouettes: no network, and no training."""
+"""A deformable shape for each category, fitted to silhouettes: no network and no training."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -34,14 +34,14 @@ class ShapeBasisConfig(Config):
     modes: int = 8
 
     def __post_init__(self) -> None:
-        """Refuse what holds no shapes."""
+        """Reject what holds no shapes."""
         if len(set(self.categories)) != len(self.categories) or not (
                 self.categories and self.modes >= 1):
             raise ConfigError('ShapeBasisConfig: expected different categories and modes of 1 or '
                               f'more, got {self.to_dict()}')
 
 
-# Nothing is learned step by step, so that one size serves a laptop and a comparison alike
+# It is fitted in one go, so one size is fast enough for all uses
 SIZES = {'small': ShapeBasisConfig(), 'published': ShapeBasisConfig()}
 
 
@@ -97,7 +97,7 @@ class ShapeBasis(ReconstructionNetwork):
         return outlines_of(images)
 
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
-        """Take in silhouettes, seen from 30 degrees up, and fit to all so far."""
+        """Add silhouettes, seen from 30 degrees up, and fit the shape to all of them."""
         azimuths = cameras.azimuths
         nearest = (azimuths / TURN * VIEW_COUNT).round().long() % VIEW_COUNT
         here = encoded[:, None]

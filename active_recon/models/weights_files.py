@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from active_recon.config import Config
+from active_recon.config import Config, with_current_keys
 from active_recon.errors import WeightsError
 from safetensors import safe_open, SafetensorError
 
@@ -62,10 +62,9 @@ def find_weights(model: str | Path | None = None) -> Path:
 
 
 def read_card(path: Path) -> dict[str, Any]:
-    """Return the card beside weights; empty where there is none."""
+    """Return the card beside weights, with current keys; empty where there is none."""
     beside = path.with_suffix('.json')
-    card: dict[str, Any] = json.loads(beside.read_text()) if beside.is_file() else {}
-    return card
+    return with_current_keys(json.loads(beside.read_text())) if beside.is_file() else {}
 
 
 def weights_hash(path: Path | None = None) -> str:

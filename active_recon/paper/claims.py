@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from active_recon.evaluation.statistics import headroom_sentence, Interval, SMALL_HEADROOM
-from active_recon.paper.results import Claim, told
+from active_recon.paper.results import Claim, format_interval
 
 HOLDS, FAILS, OPEN = 'holds here', 'does not hold here', 'is left open here'
 
@@ -16,7 +16,7 @@ def larger(claim: str, difference: Interval, what: str, least: float = 0.0) -> C
     open between. `what` names the difference.
     """
     beyond = '0' if least == 0 else f'{least:g}'
-    because = f'{_capital(what)}: {told(difference, 4)}'
+    because = f'{_capital(what)}: {format_interval(difference, 4)}'
     if difference.low > least:
         return Claim(claim, HOLDS, f'{because}, above {beyond}.')
     if difference.high <= least:
@@ -26,7 +26,7 @@ def larger(claim: str, difference: Interval, what: str, least: float = 0.0) -> C
 
 def smaller(claim: str, difference: Interval, what: str) -> Claim:
     """Decide a claim that a difference is below 0, as `larger` does."""
-    because = f'{_capital(what)}: {told(difference, 4)}'
+    because = f'{_capital(what)}: {format_interval(difference, 4)}'
     if difference.high < 0:
         return Claim(claim, HOLDS, f'{because}, below 0.')
     if difference.low >= 0:
@@ -46,19 +46,20 @@ def all_larger(claim: str, differences: Mapping[str, Interval], what: str) -> Cl
                if value.low <= 0 < value.high}
     if not behind and not unclear:
         least = min(differences, key=lambda name: differences[name].low)
-        return Claim(claim, HOLDS, f'{_capital(what)}: all of {len(differences)} are above 0, '
-                                   f'the least sure at {least}: {told(differences[least], 4)}.')
+        return Claim(claim, HOLDS, f'{_capital(what)}: all of {len(differences)} are above 0, the '
+                                   f'least sure at {least}: '
+                                   f'{format_interval(differences[least], 4)}.')
     parts = [f'{title} at {_listed(part)}' for title, part in (
         ('not above 0', behind), ('0 lies inside', unclear)) if part]
     return Claim(claim, FAILS if behind else OPEN, f'{_capital(what)}: {"; ".join(parts)}.')
 
 
 def reaches(claim: str, value: Interval, aim: float) -> Claim:
-    """Decide whether a figure reaches an aim: by its mean, its interval told beside it."""
+    """Decide whether a figure reaches an aim: by its mean, with its interval."""
     reached = value.mean >= aim
     lack = '' if reached else f', missed by {aim - value.mean:.3f}'
     return Claim(claim, HOLDS if reached else FAILS,
-                 f'Measured {told(value)}, the aim is {aim:g}{lack}.')
+                 f'Measured {format_interval(value)}, the aim is {aim:g}{lack}.')
 
 
 def headroom(difference: Interval) -> Claim:
@@ -86,7 +87,7 @@ def best(claim: str, wanted: str, gaps: Mapping[str, Interval], what: str) -> Cl
 
 
 def _listed(values: Mapping[str, Interval]) -> str:
-    return ', '.join(f'{name} ({told(value, 4)})' for name, value in values.items())
+    return ', '.join(f'{name} ({format_interval(value, 4)})' for name, value in values.items())
 
 
 def _capital(words: str) -> str:

@@ -7,13 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.baselines import (
-    category_means,
-    mean_shape_iou,
-    nearest_image_iou,
-)
+from active_recon.evaluation.baselines import Baselines
 from active_recon.evaluation.measure import iou_by_yaw
-from active_recon.evaluation.metrics import episodes, THRESHOLDS
+from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.statistics import Interval, Values
 from active_recon.models.network import Cameras
 from active_recon.models.ogn import octree_report, Ogn
@@ -73,13 +69,13 @@ def same_training(cards: Mapping[str, Mapping[str, Any]]) -> Claim:
     seen = {label: views for label, card in cards.items() if (views := views_seen(card))}
     sources = {label: card.get('data') for label, card in cards.items()}
     same = len({json.dumps(source, sort_keys=True) for source in sources.values()}) == 1
-    alike = bool(seen) and max(seen.values()) <= 1.1 * min(seen.values())
-    told = ', '.join(f'{label} {views:,}' for label, views in seen.items()) or 'unknown'
+    about_equal = bool(seen) and max(seen.values()) <= 1.1 * min(seen.values())
+    counts = ', '.join(f'{label} {views:,}' for label, views in seen.items()) or 'unknown'
     objects = 'the same' if same else 'not the same: ' + '; '.join(
         f'{label} {_counted(source)}' for label, source in sources.items())
     return Claim('All systems learned from the same objects and saw about as many views',
-                 HOLDS if same and alike else FAILS,
-                 f'Views seen: {told}. Objects: {objects}.')
+                 HOLDS if same and about_equal else FAILS,
+                 f'Views seen: {counts}. Objects: {objects}.')
 
 
 def _counted(source: Mapping[str, int] | None) -> str:
@@ -98,22 +94,18 @@ def seen_at_random(study: Study, row: Compared, name: str, category: str = '') -
 
 def baselines(study: Study, names: list[str]) -> dict[str, dict[str, Values]]:
     """
-    Return the single-view IoU of answers that know no detail on folders of the data, (N, S) each.
+    Return the single-view IoU of both `Baselines` on folders of the data, (N, S) each.
 
-    The mean shape of the object's category, which is told the category, and the training shape
-    whose image is nearest. The first is shown no view, so its starts are alike.
+    The mean shape does not depend on the view, so it is the same for all starts.
     """
-    training, validation = study.read(*study.training_sets()), study.read(study.objects('val'))
-    means = category_means(training)
-    threshold = float(max(THRESHOLDS, key=lambda at: mean_shape_iou(
-        means, validation, float(at)).mean()))
+    baseline = Baselines.of(study.read(*study.training_sets()), study.read(study.objects('val')))
     found: dict[str, dict[str, Values]] = {}
     for name in names:
         views = study.read(study.objects(name))
         items, starts = episodes(views, study.starts, study.seed)
-        shape = mean_shape_iou(means, views, threshold)
+        shape = baseline.mean_shape(views)
         with study.progress(f'nearest image, {name}', 1) as advance:
-            nearest = nearest_image_iou(training, views, items, starts)
+            nearest = baseline.nearest_image(views, items, starts)
             advance(1, '')
         found[name] = {
             'mean shape (told the category)': shape[:, None].repeat(study.starts, axis=1),

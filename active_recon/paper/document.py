@@ -51,7 +51,7 @@ def write_document(study: Study) -> bool:
 
 def _verdict(verdict: str, claims: dict[str, list[Claim]]) -> list[str]:
     """Return a heading and the claims of one verdict, each with the part that it stands in."""
-    told: Sequence[Claim] = [
+    verdicts: Sequence[Claim] = [
         Claim(f'{claim.claim} ([{name}]({name}.md))', claim.verdict, claim.because)
         for name, own in claims.items() for claim in own if claim.verdict == verdict]
-    return [f'### What {verdict}', sentences(told)] if told else []
+    return [f'### What {verdict}', sentences(verdicts)] if verdicts else []

@@ -44,10 +44,10 @@ def inputs7(study: Study) -> dict[str, Any]:
 
 def _annotations(root: Path) -> dict[str, Any]:
     """Return the folder, the number of annotated images and the hash of names and sizes."""
-    told = [f'{path.relative_to(root)} {path.stat().st_size}'
+    lines = [f'{path.relative_to(root)} {path.stat().st_size}'
             for path in sorted((root / 'Annotations').glob('*/*.mat'))]
-    return {'folder': str(root), 'images': len(told),
-            'sha256': hashlib.sha256('\n'.join(told).encode()).hexdigest()}
+    return {'folder': str(root), 'images': len(lines),
+            'sha256': hashlib.sha256('\n'.join(lines).encode()).hexdigest()}
 
 
 def make7(study: Study) -> Result:

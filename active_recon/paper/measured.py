@@ -15,7 +15,7 @@ from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights
 from active_recon.paper.study import Objects, Study
 from active_recon.policies import Choice, Observation
-from active_recon.policies.geometric import BlindPolicy
+from active_recon.policies.geometric import HeuristicPolicy
 from active_recon.runtimes import State
 from active_recon.volumes.silhouettes import frustum, project_all
 import numpy as np
@@ -83,7 +83,7 @@ def _run(study: Study, weights: Path, policy: str,
         return trial, contender.key, trial.run(contender, lambda done: advance(done, ''))
 
 
-class Retaken(BlindPolicy):
+class Retaken(HeuristicPolicy):
     """A policy that takes known azimuths (B, T) again."""
 
     def __init__(self, azimuths: Values) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.config import LossConfig, RewardConfig
-from active_recon.evaluation.policy_study import blind_names, policy_study
+from active_recon.evaluation.policy_study import heuristic_names, policy_study
 from active_recon.evaluation.statistics import Interval
 from active_recon.evaluation.trial import Trial
 from active_recon.models.weights import load_weights
@@ -46,9 +46,9 @@ def weights(study: Study) -> list[Path]:
 
 def _plan(study: Study, first: Path) -> Plan:
     card = read_card(first).get('policy') or {}
-    told = {each.name: card[each.name] for each in fields(TrainingConfig) if each.name in card}
+    settings = {each.name: card[each.name] for each in fields(TrainingConfig) if each.name in card}
     rewards = {each.name: card[each.name] for each in fields(RewardConfig) if each.name in card}
-    policy = TrainingConfig(**told) if 'steps' in told else policy_training(study.samples)
+    policy = TrainingConfig(**settings) if 'steps' in settings else policy_training(study.samples)
     return Plan(MODEL, TWO_STAGE.size, LossConfig(),
                 training_plan(TWO_STAGE, study.samples).reconstruction, policy,
                 RewardConfig(**rewards), begun=load_weights(first))
@@ -95,22 +95,22 @@ def learned_from(paths: Sequence[Path]) -> str:
 
 def claims(found: Mapping[str, Any]) -> list[Claim]:
     """Return what follows from the study's figures."""
-    told = [headroom(Interval(**found['headroom']))]
+    verdicts = [headroom(Interval(**found['headroom']))]
     if _OWN in found['policies']:
         above = {name: Interval(**value)
                  for name, value in found['policies'][_OWN]['auc_above'].items()}
-        told.append(larger('The attention policy is ahead of random selection', above['random'],
-                           'area, attention minus random'))
-        told.append(all_larger(
+        verdicts.append(larger('The attention policy is ahead of random selection',
+                               above['random'], 'area, attention minus random'))
+        verdicts.append(all_larger(
             'The attention policy is ahead of policies that see nothing',
             {name: value for name, value in above.items() if name != 'random'},
             'area, attention minus the other'))
     lack = found.get('best_subset', {}).get('oracle_lacks')
     if lack:
-        told.append(larger('Three views chosen together are better than three chosen greedily',
+        verdicts.append(larger('Three views chosen together are better than three chosen greedily',
                            Interval(**lack), 'IoU of the best sequence of three from the same '
                            "start minus the greedy oracle's"))
-    return told
+    return verdicts
 
 
 def _tables(found: Mapping[str, Any]) -> list[Table]:
@@ -123,7 +123,7 @@ def _tables(found: Mapping[str, Any]) -> list[Table]:
     tables.append(Table('What a policy gains, and what it costs', 'policy', names, [
         *(Column(f'area above {other}',
                  [_cell(policies[name]['auc_above'].get(other)) for name in names])
-          for other in blind_names()),
+          for other in heuristic_names()),
         Column('share of the gap to the oracle',
                [_cell(policies[name].get('gap_closed')) for name in names]),
         _column(policies, 'rotation, rad', 'rotation'),

@@ -27,7 +27,7 @@ class Column:
     published: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse figures of ours under the heading of the published, and the other way round."""
+        """Reject figures of ours under the heading of the published, and the other way round."""
         intervals = any(isinstance(cell, Interval) for cell in self.cells)
         if self.heading.startswith(PUBLISHED) or (self.published and intervals):
             raise ConfigError(f'{self.heading}: expected published figures and measured ones in '
@@ -51,7 +51,7 @@ class Table:
     digits: int = 3
 
     def __post_init__(self) -> None:
-        """Refuse columns of another length."""
+        """Reject columns of another length."""
         for column in self.columns:
             if len(column.cells) != len(self.rows):
                 raise ConfigError(f'{self.title}: expected {len(self.rows)} cells in the column '
@@ -78,7 +78,7 @@ class Table:
             case str():
                 return cell
             case Interval():
-                return told(cell, self.digits)
+                return format_interval(cell, self.digits)
             case int():
                 return f'{cell:,}'
         return f'{cell:.{self.digits}f}'
@@ -114,7 +114,7 @@ class Result:
     figures: Mapping[str, Any] = field(default_factory=dict)
 
 
-def told(spread: Interval, digits: int = 3) -> str:
+def format_interval(spread: Interval, digits: int = 3) -> str:
     """Return a mean with its interval, for people to read."""
     return f'{spread.mean:.{digits}f} [{spread.low:.{digits}f}, {spread.high:.{digits}f}]'
 

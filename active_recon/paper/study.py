@@ -107,15 +107,15 @@ class Study:
 
     def command(self, part: str) -> str:
         """Return the command that makes a part under these settings."""
-        told = ['active-recon', 'paper', part]
+        words = ['active-recon', 'paper', part]
         usual = Study()
         for option in ('data', 'models', 'out', 'model', 'pascal3d', 'samples', 'starts', 'seed',
                        'threads', 'policy_seeds', 'policy_starts', 'subset_objects', 'device'):
             if (value := getattr(self, option)) != getattr(usual, option):
-                told += [f'--{option.replace("_", "-")}', str(value)]
+                words += [f'--{option.replace("_", "-")}', str(value)]
         if self.training != usual.training:
-            told += [word for name in self.training for word in ('--training', name)]
-        return ' '.join(told)
+            words += [word for name in self.training for word in ('--training', name)]
+        return ' '.join(words)
 
     def training_sets(self, category: str = '', resolution: int = RESOLUTION) -> list[Objects]:
         """Return what the systems learn from."""

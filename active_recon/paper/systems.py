@@ -12,6 +12,7 @@ from active_recon.models.registry import network_entry, NETWORKS
 from active_recon.models.weights import save_weights
 from active_recon.models.weights_files import find_weights, read_card
 from active_recon.paper.study import Objects, Study
+from active_recon.reporting import by_step
 from active_recon.training.loop import make_fabric, Measured, TrainingConfig
 from active_recon.training.plan import Plan, Report, seeded, train_plan
 from active_recon.training.supervised import mean_length, steps_for
@@ -104,9 +105,9 @@ def train_system(system: System, training: Sequence[Objects], validation: Object
 def run_plan(plan: Plan, training: Sequence[Objects], validation: Objects, out: Path,
              study: Study, seed: int) -> Path:
     """
-    Train as planned, unless the weights are there; return them.
+    Train as planned, unless the weights are there; return their path.
 
-    A training that was cut off goes on from its checkpoints in `out`.
+    An interrupted training continues from its checkpoints in `out`.
     """
     weights = out / 'weights.safetensors'
     if weights.is_file():
@@ -115,12 +116,10 @@ def run_plan(plan: Plan, training: Sequence[Objects], validation: Objects, out: 
     @contextmanager
     def reporting(stage: str, steps: int) -> Iterator[Report]:
         with study.progress(f'{out.name}: {stage}', steps) as advance:
-            done = 0
+            reached = by_step(advance)
 
             def report(step: int, measured: Measured) -> None:
-                nonlocal done
-                advance(step - done, f'loss {measured["loss"]:.4f}' if measured else '')
-                done = step
+                reached(step, f'loss {measured["loss"]:.4f}' if measured else '')
 
             yield report
 
@@ -140,7 +139,7 @@ def training_plan(system: System, samples: int) -> Plan:
     steps = (max(1, round(samples / (BATCH * MAX_VIEWS))) if system.joint
              else steps_for(samples, BATCH, MAX_VIEWS))
     first = TrainingConfig(steps, BATCH, LEARNING_RATE, MAX_VIEWS,
-                           warm_up=min(200, max(1, steps // 10)))
+                           warmup_steps=min(200, max(1, steps // 10)))
     policy = policy_training(samples) if system.policy else None
     return Plan(system.model, system.size, system.loss or network_entry(system.model).loss, first,
                 policy, joint=system.joint)
@@ -149,8 +148,8 @@ def training_plan(system: System, samples: int) -> Plan:
 def policy_training(samples: int) -> TrainingConfig:
     """Return how a view policy is trained beside a reconstruction that saw so many views."""
     steps = max(1, round(POLICY_SHARE * samples / (POLICY_BATCH * MAX_VIEWS)))
-    return TrainingConfig(steps, POLICY_BATCH, POLICY_LEARNING_RATE, MAX_VIEWS, varied=False,
-                          warm_up=min(20, steps), checkpoint_every=50, validate_every=250)
+    return TrainingConfig(steps, POLICY_BATCH, POLICY_LEARNING_RATE, MAX_VIEWS, augment=False,
+                          warmup_steps=min(20, steps), checkpoint_every=50, validate_every=250)
 
 
 def views_seen(card: Mapping[str, Any]) -> int | None:
@@ -161,5 +160,5 @@ def views_seen(card: Mapping[str, Any]) -> int | None:
     if not {'steps', 'batch_size', 'max_views'} <= set(training):
         return None
     length = (training['max_views'] if card.get('scheme') == 'joint'
-              else mean_length(training['max_views'], training.get('short_share', 0.5)))
+              else mean_length(training['max_views'], training.get('curriculum_fraction', 0.5)))
     return int(training['steps'] * training['batch_size'] * length)

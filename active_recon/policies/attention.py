@@ -14,11 +14,11 @@ _ROUNDING = 1e-3  # rad, of the azimuths that were rendered
 
 class AttentionPolicy:
     """
-    The mean of pi(u_t | theta; s_t), kept apart from the views taken; its state is the LSTM's.
+    The mean of pi(u_t | theta; s_t), separated from the views taken; its state is the LSTM's.
 
-    The paper's goes wherever the mean is, and so to the same view twice in half of its episodes:
-    what the network has learned to see is what it goes back to. The model says how far apart. It
-    knows cameras by their azimuth alone.
+    The paper's policy always takes the mean, and so the same view twice in half of its episodes.
+    Here goals keep the model's `view_separation` from all views taken. Only the cameras' azimuths
+    are used.
     """
 
     wants_volume = False
@@ -35,11 +35,11 @@ class AttentionPolicy:
 
     def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """
-        Take the mean, or the candidate nearest to it that is far enough from the views taken.
+        Choose the mean, or the candidate nearest to it that is separated from the views taken.
 
-        A candidate's score is its log density, up to a constant; what is too near to a view is
-        worth less than anything else, and the less the nearer.
-        Raises ViewError where the latents are those of another model.
+        A candidate's score is its log density, up to a constant. Candidates too near to a view
+        score lower than all others, and the lower the nearer they are. Raises ViewError where the
+        latents are those of another model.
         """
         if seen.latent.shape[1:] != self._latent_shape:
             raise ViewError(f'expected a latent of the shape {self._latent_shape}, as the policy '
@@ -53,26 +53,31 @@ class AttentionPolicy:
         scores = np.where(gaps > self._separation - _ROUNDING, -away ** 2 / 2,
                           -(math.pi / self._sigma) ** 2 / 2
                           - (self._separation - gaps) / self._sigma)
-        far_enough = np.abs(azimuth_difference(taken, mean[:, None])).min(axis=1)
-        return Choice(scores.astype(np.float32),
-                      np.where(far_enough >= self._separation, mean, np.nan)), state
+        separated = is_separated(mean, taken, self._separation)
+        return Choice(scores.astype(np.float32), np.where(separated, mean, np.nan)), state
 
 
-def kept_apart(wanted: NDArray[np.float64], taken: NDArray[np.float64],
+def enforce_separation(wanted: NDArray[np.float64], taken: NDArray[np.float64],
                candidates: NDArray[np.float64], separation: float) -> NDArray[np.float64]:
     """
     Return azimuths (B,) at least `separation` from all taken (B, t), and near those wanted (B,).
 
-    Those wanted, where they are far enough; else the nearest of the candidates (B, K) that is;
-    where none is, the farthest from what was taken. All in radians.
+    The wanted azimuth where it is separated; else the nearest of the candidates (B, K) that is;
+    where none is, the candidate farthest from the views taken. All in radians.
     """
-    far_enough = np.abs(azimuth_difference(taken, wanted[:, None])).min(axis=1) >= separation
     away = np.abs(azimuth_difference(candidates, wanted[:, None]))
     gaps = gaps_to_taken(candidates, taken)
     # All that are too near come after all that are not, which are at most half a turn away
     rank = np.where(gaps > separation - _ROUNDING, -away, gaps - TURN)
     best = np.take_along_axis(candidates, rank.argmax(axis=1)[:, None], axis=1)[:, 0]
-    return np.where(far_enough, wanted, best)
+    return np.where(is_separated(wanted, taken, separation), wanted, best)
+
+
+def is_separated(azimuths: NDArray[np.float64], taken: NDArray[np.float64],
+                 separation: float) -> NDArray[np.bool_]:
+    """Return whether azimuths (B,) are at least `separation` from all taken (B, t), radians."""
+    nearest = np.abs(azimuth_difference(taken, azimuths[:, None])).min(axis=1)
+    return np.asarray(nearest >= separation)
 
 
 def gaps_to_taken(candidates: NDArray[np.float64],

@@ -1,4 +1,4 @@
-"""What every view policy is: what was seen in, what every candidate is worth out."""
+"""The interface of view policies: an observation in, a score for every candidate out."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, eq=False)
 class Observation:
     """
-    What B episodes have come to after a view, and where they may look next.
+    B episodes after a view, and the candidates for the next one.
 
     - latent: (B, C, h, w), the network's after that view
-    - taken: (B, t, 4, 4), the poses of the cameras of all views so far, the last one's last
+    - taken: (B, t, 4, 4), the poses of the cameras of all views so far, in order
     - candidates: (B, K, 4, 4), poses of cameras; one set for all where B is 1 there
     - occupancy: (B, R, R, R), the published probabilities, for policies of `wants_volume`
 
@@ -31,11 +31,11 @@ class Observation:
 @dataclass(frozen=True, eq=False)
 class Choice:
     """
-    Where to look next, for B episodes.
+    The choice of the next view, for B episodes.
 
-    - scores: (B, K), what each candidate is worth; more is better
-    - azimuth: (B,), radians, where the policy would look if it were not bound to the candidates,
-      NaN where it would not; None: nowhere
+    - scores: (B, K), of the candidates; higher is better
+    - azimuth: (B,), radians, that the policy prefers to all candidates; NaN where it prefers
+      none; None: for no episode
     """
 
     scores: NDArray[np.float32]
@@ -44,9 +44,9 @@ class Choice:
 
 class Policy(Protocol):
     """
-    Scores the candidates for the next view; its state is handed back to be passed in again.
+    Scores the candidates for the next view; its state is passed in and returned.
 
-    `wants_volume`: whether it looks at the observation's occupancy.
+    `wants_volume`: whether it uses the observation's occupancy.
     """
 
     @property

@@ -1,4 +1,4 @@
-"""The policies that look at no image: random, uniform, farthest."""
+"""The heuristic policies, which use no image: random, uniform, farthest."""
 
 from active_recon.geometry.cameras import direction_distance, pose_azimuths, pose_directions, TURN
 from active_recon.policies.base import Choice, distance_to_taken, is_fresh, Observation
@@ -6,8 +6,8 @@ from active_recon.runtimes import State
 import numpy as np
 
 
-class BlindPolicy:
-    """A policy without a state, which looks at cameras alone."""
+class HeuristicPolicy:
+    """A policy without a state that uses only the cameras."""
 
     wants_volume = False
 
@@ -16,8 +16,8 @@ class BlindPolicy:
         return {}
 
 
-class RandomPolicy(BlindPolicy):
-    """Any candidate not yet taken, all alike; any at all once every one was taken."""
+class RandomPolicy(HeuristicPolicy):
+    """A random candidate that was not taken yet; any candidate once all were taken."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -29,14 +29,14 @@ class RandomPolicy(BlindPolicy):
         return Choice(np.where(fresh, scores, scores - 1)), state
 
 
-class UniformPolicy(BlindPolicy):
+class UniformPolicy(HeuristicPolicy):
     """An equidistant sweep from the first view around +z, for a given number of views."""
 
     def __init__(self, views: int) -> None:
         self._step = TURN / max(views, 1)
 
     def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
-        """Go one step on from the sweep's start, however roughly it was followed."""
+        """Choose the next azimuth of the sweep, counted from its start; see Policy."""
         first, count = seen.taken[:, 0], seen.taken.shape[1]
         target = (pose_azimuths(first) + count * self._step) % TURN
         height = pose_directions(first)[:, 2]
@@ -46,10 +46,10 @@ class UniformPolicy(BlindPolicy):
         return Choice((-away).astype(np.float32), target), state
 
 
-class FarthestPolicy(BlindPolicy):
+class FarthestPolicy(HeuristicPolicy):
     """The candidate with the largest distance to the nearest view taken."""
 
     def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
-        """Take the first of the farthest."""
+        """Choose the first of the farthest; see Policy."""
         # Rounding settles ties the same way, whatever the precision of the poses
         return Choice(distance_to_taken(seen).round(4).astype(np.float32)), state

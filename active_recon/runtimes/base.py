@@ -47,13 +47,12 @@ class Runtime(Protocol):
     def step(self, image: NDArray[np.uint8], camera: Camera,
              state: State) -> tuple[NDArray[np.float32], NDArray[np.float32], State]:
         """
-        Take in an image (S, S, 3) uint8 RGB of the spec's size, and its camera.
+        Update the state by an image (S, S, 3) uint8 RGB of the spec's size, and its camera.
 
-        Where a network needs no front, a fourth channel may tell what was seen (255) and what not.
-
-        The camera's distance counts in sides of the grid, its azimuth from the object's front
-        where the spec needs one. Returns the occupancy (R, R, R) in [0, 1], the latent (C, h, w),
-        and the next state.
+        If the network needs no front, a fourth channel may be given: 255 where the camera saw the
+        pixel, else 0. The camera's distance is in sides of the grid; its azimuth is relative to
+        the object's front where the spec needs one. Returns the occupancy (R, R, R) in [0, 1],
+        the latent (C, h, w), and the next state.
         """
         ...
 
@@ -66,7 +65,7 @@ class PolicyRuntime(Protocol):
     """
     Runs the model of a learned view policy for B episodes at once.
 
-    `facts` are the numbers that whoever follows the model has to know, by its own names.
+    `facts` are the model's constants that a policy needs, by name.
     """
 
     @property
@@ -87,8 +86,8 @@ def load_runtime(weights: Path | None = None, runtime: str = 'torch', device: st
     """
     Return a runtime of the network in a weights file; None: those that ship.
 
-    `threads` of the CPU, None: as many as the library takes. Raises WeightsError, and ConfigError
-    on a runtime or a device that is not to be had.
+    `threads` is the number of CPU threads; None is the library's default. Raises WeightsError,
+    and ConfigError on a runtime or a device that is not available.
     """
     loaded: Runtime = _module(runtime).load_network(weights, device, threads)
     return loaded

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from active_recon.datasets.views import on_background, ViewSet
 from active_recon.models.network import Cameras
-from active_recon.training.variation import vary
+from active_recon.training import augmentation
 import numpy as np
 import torch
 from torch import Tensor
@@ -27,12 +27,12 @@ class Batch:
 
 
 def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
-               varied: bool = True) -> Batch:
+               augment: bool = True) -> Batch:
     """
-    Draw objects with different random views of each, varied as a camera would vary them.
+    Draw objects with different random views of each, augmented unless `augment` is off.
 
     Half of the sequences are mirrored in the object's plane y = 0, voxels and cameras with the
-    images. Not `varied`, the same views of the same objects stand on plain white.
+    images. Without augmentation the same views of the same objects have a plain white background.
     """
     objects = torch.from_numpy(rng.integers(len(views), size=size))
     order = rng.random((size, views.images.shape[1])).argsort(axis=1)
@@ -41,9 +41,9 @@ def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
     images = views.images[objects, chosen]
     images[:, mirrored] = images[:, mirrored].flip(-2)
     cameras = mirror_some(views.cameras(objects, chosen), mirrored, images.shape[2])
-    if varied:
-        pictures, moved = vary(images, cameras.intrinsics, views, rng)
-        cameras = Cameras(cameras.poses, moved)
+    if augment:
+        pictures, intrinsics = augmentation.augment(images, cameras.intrinsics, views, rng)
+        cameras = Cameras(cameras.poses, intrinsics)
     else:
         flat = on_background(images.flatten(0, 1), torch.ones(length * size, 3))
         pictures = flat.reshape(length, size, *flat.shape[1:])

@@ -1,4 +1,4 @@
-"""A lifting network's temperatures: how sure it may be after how many views."""
+"""Temperature calibration of a lifting network, for each number of views."""
 
 from collections.abc import Callable
 
@@ -18,9 +18,9 @@ def calibrate(network: Lifting, validation: ViewSet,
     """
     Set the temperature for each number of views, in place; return them.
 
-    On random cells of up to 64 objects of `validation`, seen by random views. Cells anywhere, not
-    near the surface alone: what is far from it is surely empty, and has to stay so.
-    `advance` is told how many objects are done.
+    They are fitted on random cells of up to 64 objects of `validation`, with random views. The
+    cells are drawn from the whole grid, not near the surface only, so that confident empty cells
+    stay confident. `advance` is called with the number of objects done.
     """
     network.eval()
     network.temperatures.fill_(1)

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from active_recon.config import with_current_keys
 from active_recon.errors import ConfigError, DataError
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save
@@ -14,7 +15,7 @@ from torch.optim import Optimizer
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Where a training stands: steps done, what it was told, what it measured."""
+    """The progress of a training: steps done, settings, and what was measured."""
 
     step: int
     settings: dict[str, Any]
@@ -23,7 +24,7 @@ class Checkpoint:
 
 def save_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
                     checkpoint: Checkpoint) -> None:
-    """Write a checkpoint in one move: a training cut off while writing keeps the one before."""
+    """Write a checkpoint atomically: if writing is interrupted, the previous one is kept."""
     tensors = {f'module.{name}': tensor.detach().contiguous()
                for name, tensor in module.state_dict().items()}
     for name, parameter in module.named_parameters():
@@ -39,7 +40,7 @@ def save_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
 
 
 def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Checkpoint:
-    """Restore a module and its optimizer; raises DataError on what is no whole checkpoint."""
+    """Restore a module and its optimizer; raises DataError on an incomplete checkpoint."""
     from safetensors import safe_open
 
     try:
@@ -58,12 +59,12 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
                 # AdamW counts its steps on the CPU, wherever the parameter lies
                 device = 'cpu' if key == 'step' else parameter.device
                 optimizer.state[parameter][key] = tensors[stored_name].to(device)
-    return Checkpoint(meta['step'], meta['settings'], meta['log'])
+    return Checkpoint(meta['step'], with_current_keys(meta['settings']), meta['log'])
 
 
 def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
                       settings: dict[str, Any]) -> Checkpoint:
-    """Restore as `load_checkpoint`; raises ConfigError where it was made under other settings."""
+    """Restore as `load_checkpoint`; raises ConfigError if it was made under other settings."""
     stored = load_checkpoint(path, module, optimizer)
     if stored.settings != settings:
         raise ConfigError(f'{path}: made under other settings, {stored.settings}, where these '

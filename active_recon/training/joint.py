@@ -7,6 +7,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.geometry.cameras import AZIMUTHS
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.training import augmentation
 from active_recon.training.loop import (
     Draw,
     Measured,
@@ -17,7 +18,6 @@ from active_recon.training.loop import (
 )
 from active_recon.training.policy_gradient import draw_episodes, policy_losses, run_episodes
 from active_recon.training.supervised import ReconstructionLearner
-from active_recon.training.variation import vary
 import numpy as np
 import torch
 from torch import nn, Tensor
@@ -27,19 +27,19 @@ _THRESHOLD = 0.4  # of the rewards' IoU: the one that is chosen on validation co
 
 class JointLearner(nn.Module):
     """
-    Episodes under the policy's own choices to the losses of both.
+    The losses of both networks over episodes under the policy's own choices.
 
     The reconstruction learns from its losses after one random view of each episode (section 3.2),
-    the policy from its rewards (section 3.3); neither's gradients reach into the other.
+    the policy from its rewards (section 3.3); the gradients of neither flow into the other.
     """
 
     def __init__(self, network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet,
-                 loss: LossConfig, rewards: RewardConfig, length: int, varied: bool) -> None:
+                 loss: LossConfig, rewards: RewardConfig, length: int, augment: bool) -> None:
         super().__init__()
         self.reconstruction = ReconstructionLearner(network, loss)
         self.attention = attention
         self._views, self._rewards = views, rewards
-        self._length, self._varied = length, varied
+        self._length, self._augment = length, augment
 
     def forward(self, objects: Tensor, starts: Tensor,
                 rng: np.random.Generator) -> dict[str, Tensor]:
@@ -51,18 +51,18 @@ class JointLearner(nn.Module):
             # Views come one by one: the same generator for each keeps the scene as it is
             images, cameras = self._views.images[objects, chosen], self._views.cameras(
                 objects, chosen)
-            pictures, intrinsics = vary(images[None], cameras.intrinsics[None], self._views,
-                                        np.random.default_rng(scene))
+            pictures, intrinsics = augmentation.augment(
+                images[None], cameras.intrinsics[None], self._views, np.random.default_rng(scene))
             return pictures[0], Cameras(cameras.poses, intrinsics[0])
 
         episode = run_episodes(
             self.reconstruction.network, self.attention, self._views, objects, starts.cpu(),
-            self._length, _THRESHOLD, self._rewards, rng, show if self._varied else None)
+            self._length, _THRESHOLD, self._rewards, rng, show if self._augment else None)
         seen_from = torch.from_numpy(rng.integers(len(AZIMUTHS), size=len(objects))).to(device)
         losses = self.reconstruction.losses(
             episode.states[rng.integers(self._length)],
             self._views.voxels[objects].float().to(device), seen_from)
-        chosen = policy_losses(episode, self._rewards.episodes_alike)
+        chosen = policy_losses(episode, self._rewards.group_size)
         return losses | chosen | {'loss': losses['loss'] + chosen['loss']}
 
 
@@ -86,10 +86,10 @@ def train_jointly(
 
     def draw(step: int) -> Draw:
         return draw_episodes(views, size, [config.seed, 2, step, run.fabric.global_rank],
-                             rewards.episodes_alike)
+                             rewards.group_size)
 
     train_steps(
         run, JointLearner(network, attention, views, loss, rewards, config.max_views,
-                          config.varied),
+                          config.augment),
         JointModel(network, attention), config, settings, views, draw,
         lambda: validate(network, attention), weight_decay=0.01)

@@ -7,7 +7,6 @@ from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.lifting import Lifting
 from active_recon.models.network import Cameras, ReconstructionNetwork
-from active_recon.training.appearance import misplaced, pictured
 from active_recon.training.batches import mirror_some
 from active_recon.training.loop import (
     Draw,
@@ -18,14 +17,15 @@ from active_recon.training.loop import (
     TrainingConfig,
 )
 from active_recon.training.losses import volume_loss
+from active_recon.training.posed_augmentation import augment_posed, perturb_poses
 from active_recon.training.supervised import drawn_length
 import numpy as np
 import torch
 from torch import nn, Tensor
 from torch.nn import functional
 
-FOREGROUND_WEIGHT, ROUGH_WEIGHT = 0.5, 0.3
-"""Of the silhouettes' loss, and of that of the rougher logits, beside the volume's."""
+FOREGROUND_WEIGHT, COARSE_WEIGHT = 0.5, 0.3
+"""Weights of the silhouettes' loss and of the coarse logits' loss, beside the volume's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +47,11 @@ class PosedBatch:
 
 
 def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
-                     varied: bool = True) -> PosedBatch:
+                     augment: bool = True) -> PosedBatch:
     """
     Draw objects with different random views of each, turned by quarters and mirrored at random.
 
-    `varied`, they look as cameras would see them, and their poses are a little off.
+    With `augment` the images get backgrounds, light and noise, and the poses small errors.
     """
     objects = torch.from_numpy(rng.integers(len(views), size=size))
     order = rng.random((size, views.images.shape[1])).argsort(axis=1)
@@ -70,9 +70,9 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
     for row, quarter in enumerate(quarters):
         voxels[row] = turned_by_quarters(voxels[row], int(quarter))
     alpha = images[..., 3].float() / 255
-    if varied:
-        return PosedBatch(pictured(images, seen, cameras, voxels, views, rng),
-                          misplaced(cameras, rng), alpha,
+    if augment:
+        return PosedBatch(augment_posed(images, seen, cameras, voxels, views, rng),
+                          perturb_poses(cameras, rng), alpha,
                           voxels, objects)
     planes = images.permute(0, 1, 4, 2, 3).float() / 255
     return PosedBatch(with_seen(planes[:, :, :3] + 1 - planes[:, :, 3:], seen), cameras, alpha,
@@ -94,19 +94,19 @@ class LiftingLearner(nn.Module):
 
     def forward(self, images: Tensor, cameras: Cameras, alpha: Tensor,
                 voxels: Tensor) -> dict[str, Tensor]:
-        """Take in images (T, B, 4, S, S) of cameras (T, B, ...); compare with voxels and alpha."""
+        """Return the losses of images (T, B, 4, S, S) of cameras (T, B, ...); see `PosedBatch`."""
         maps = self.network.maps(images.flatten(0, 1))
-        state = self.network.look_up(
+        state = self.network.update_from_maps(
             maps, Cameras(cameras.poses.flatten(0, 1), cameras.intrinsics.flatten(0, 1)),
             self.network.initial_state(len(voxels)))
-        logits, rough = self.network.logits(state)
+        logits, coarse_logits = self.network.logits(state)
         with torch.autocast(logits.device.type, enabled=False):
             volume = volume_loss(logits.float(), voxels, self._kind)
-            rougher = volume_loss(rough.float(), functional.max_pool3d(voxels[:, None], 2)[:, 0],
-                                  self._kind)
+            coarse = volume_loss(coarse_logits.float(),
+                                 functional.max_pool3d(voxels[:, None], 2)[:, 0], self._kind)
             silhouette = self._silhouette_loss(maps.foreground.float(), alpha.flatten(0, 1),
                                                images[:, :, 3].flatten(0, 1))
-        total = volume + ROUGH_WEIGHT * rougher + FOREGROUND_WEIGHT * silhouette
+        total = volume + COARSE_WEIGHT * coarse + FOREGROUND_WEIGHT * silhouette
         return {'loss': total, 'volume': volume.detach(), 'silhouette': silhouette.detach()}
 
     @staticmethod
@@ -124,7 +124,7 @@ def train_lifting(
 
     def draw(step: int) -> Draw:
         length, own = drawn_length(step, config, run.fabric.global_rank)
-        batch = draw_posed_batch(views, size, length, own, config.varied)
+        batch = draw_posed_batch(views, size, length, own, config.augment)
         return Draw((batch.images, batch.cameras, batch.alpha, batch.voxels), batch.objects)
 
     train_steps(run, LiftingLearner(network, loss), network, config,

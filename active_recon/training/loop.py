@@ -21,10 +21,10 @@ Measured = dict[str, float]
 @dataclass(frozen=True)
 class TrainingConfig(Config):
     """
-    How a stage is trained; what it is trained on and the sizes stand elsewhere.
+    How a stage is trained, apart from its data and the network's sizes.
 
-    `short_share` is the share of the steps, from the first on, in which a reconstruction learns
-    from sequences of two views at most.
+    During the first `curriculum_fraction` of the steps a reconstruction learns from sequences of
+    at most two views. The learning rate rises linearly over `warmup_steps`.
     """
 
     steps: int
@@ -33,33 +33,33 @@ class TrainingConfig(Config):
     max_views: int = 5
     seed: int = 0
     bfloat16: bool = True
-    varied: bool = True
-    short_share: float = 0.5
-    warm_up: int = 200
+    augment: bool = True
+    curriculum_fraction: float = 0.5
+    warmup_steps: int = 200
     checkpoint_every: int = 200
     validate_every: int = 500
 
     def __post_init__(self) -> None:
-        """Refuse what trains nothing."""
-        if min(self.steps, self.batch_size, self.max_views, self.warm_up, self.checkpoint_every,
-               self.validate_every) < 1 or not self.learning_rate > 0:
+        """Reject what trains nothing."""
+        if min(self.steps, self.batch_size, self.max_views, self.warmup_steps,
+               self.checkpoint_every, self.validate_every) < 1 or not self.learning_rate > 0:
             raise ConfigError(f'TrainingConfig: expected numbers above 0, got {self.to_dict()}')
-        if not 0 <= self.short_share <= 1:
-            raise ConfigError('TrainingConfig: expected a short_share from 0 to 1, got '
-                              f'{self.short_share}')
+        if not 0 <= self.curriculum_fraction <= 1:
+            raise ConfigError('TrainingConfig: expected a curriculum_fraction from 0 to 1, got '
+                              f'{self.curriculum_fraction}')
 
 
 class TrainingDivergedError(ActiveReconError):
-    """A loss that is not finite."""
+    """A loss is not finite."""
 
 
 class TrainingStoppedError(KeyboardInterrupt):
-    """Ctrl-C or SIGTERM, answered once the step was done and its checkpoint saved."""
+    """Ctrl-C or SIGTERM; raised after the step is done and its checkpoint is saved."""
 
 
 @dataclass(frozen=True)
 class Draw:
-    """What a step learns from: the arguments of its module, and the objects they came from."""
+    """What a step learns from: the arguments of the learner, and the indices of the objects."""
 
     arguments: tuple[Any, ...]
     objects: Tensor
@@ -68,16 +68,17 @@ class Draw:
 @dataclass(frozen=True)
 class Run:
     """
-    Where a training stands on disk, whom it tells, and on how many processes it runs.
+    Where a training runs, where its checkpoint is, and what is called as it goes.
 
-    `show` is called where it was validated, for who wants to look at what was learned.
+    `report` is called after every step with the step and what was measured, `show` after every
+    validation with the step.
     """
 
     fabric: Fabric
     checkpoint_path: Path
     report: Callable[[int, Measured], None]
     resume: bool = False
-    until: int | None = None  # stops early, as a cut would
+    until: int | None = None  # stops early, as an interrupted training does
     show: Callable[[int], None] = lambda step: None
 
 
@@ -85,21 +86,21 @@ def make_fabric(bfloat16: bool, devices: int = 1, nodes: int = 1) -> Fabric:
     """
     Return what runs a training on `devices` processes of each of `nodes` machines.
 
-    A graphics card is used where there is one. Every process draws its own share of a batch.
+    A GPU is used where there is one. Every process draws its own part of a batch.
     """
     return Fabric(accelerator='auto', devices=devices, num_nodes=nodes,
                   strategy='ddp' if devices * nodes > 1 else 'auto',
                   precision='bf16-mixed' if bfloat16 else '32-true')
 
 
-def learning_rate_share(step: int, steps: int, warm_up: int = 200) -> float:
-    """Return the share of the learning rate at a step: a linear start, then half a cosine."""
-    rise = min(1.0, (step + 1) / warm_up)
-    return rise * 0.5 * (1 + math.cos(math.pi * step / steps))
+def lr_factor(step: int, steps: int, warmup_steps: int = 200) -> float:
+    """Return the factor of the learning rate at a step: half a cosine, times a linear warm-up."""
+    warmup = min(1.0, (step + 1) / warmup_steps)
+    return warmup * 0.5 * (1 + math.cos(math.pi * step / steps))
 
 
 def share_of_batch(config: TrainingConfig, fabric: Fabric) -> int:
-    """Return how many objects of a batch this process draws; ConfigError if it divides badly."""
+    """Return how many objects of a batch this process draws; raises ConfigError on a remainder."""
     if config.batch_size % fabric.world_size:
         raise ConfigError(f'batch_size: expected a multiple of the {fabric.world_size} processes,'
                           f' got {config.batch_size}')
@@ -112,14 +113,14 @@ def train_steps(
     validate: Callable[[], Measured], weight_decay: float,
 ) -> None:
     """
-    Train in place: `learner`, called with what `draw` gave, returns losses, of them `loss`.
+    Train in place: `learner`, called with the arguments of `draw`, returns losses, also `loss`.
 
     `trained` is the part of the learner that checkpoints hold. Every step's draw depends on the
-    seed and the step alone, so a training that was cut off and resumed walks the same path as
-    one that was not. `run.report` is called after every step with the losses, and with what
+    seed and the step alone, so a training that was interrupted and resumed gives the same result
+    as one that was not. `run.report` is called after every step with the losses, and with what
     `validate` measured where it did. Raises TrainingDivergedError naming the batch where a loss
     is not finite, ConfigError on a checkpoint of other settings, and TrainingStoppedError where
-    it was asked to stop.
+    it was interrupted.
     """
     fabric = run.fabric
     parameters = [part for part in trained.parameters() if part.requires_grad]
@@ -129,12 +130,11 @@ def train_steps(
     begun = Checkpoint(0, settings, [])
     if run.resume:
         begun = resume_checkpoint(run.checkpoint_path, trained, raw, settings)
+    schedule = torch.optim.lr_scheduler.LambdaLR(raw, lambda done: lr_factor(
+        begun.step + done, config.steps, config.warmup_steps))
     learner.train()
     with held_interrupts() as raise_if_asked:
         for step in range(begun.step, min(config.steps, run.until or config.steps)):
-            for group in raw.param_groups:
-                group['lr'] = config.learning_rate * learning_rate_share(
-                    step, config.steps, config.warm_up)
             drawn = draw(step)
             losses = wrapped(*fabric.to_device(drawn.arguments))
             _refuse_divergence(fabric, step, losses['loss'], views, drawn.objects)
@@ -142,6 +142,7 @@ def train_steps(
             fabric.backward(losses['loss'])
             fabric.clip_gradients(wrapped, optimizer, max_norm=1.0)
             optimizer.step()
+            schedule.step()
             measured = {name: value.item() for name, value in losses.items()}
             last = step + 1 == config.steps
             stopping = not last and _is_asked_to_stop(fabric, raise_if_asked)
@@ -165,21 +166,21 @@ def train_steps(
 
 
 def _is_asked_to_stop(fabric: Fabric, raise_if_asked: Callable[[], None]) -> bool:
-    """Return whether any process was asked, the same on all of them."""
+    """Return whether any process was asked to stop, the same on all of them."""
     try:
         raise_if_asked()
         asked = False
     except KeyboardInterrupt:
         asked = True
     if fabric.world_size > 1:
-        told = fabric.all_reduce(torch.tensor(float(asked)), reduce_op='sum')
-        asked = bool(torch.as_tensor(told) > 0)
+        count = fabric.all_reduce(torch.tensor(float(asked)), reduce_op='sum')
+        asked = bool(torch.as_tensor(count) > 0)
     return asked
 
 
 def _refuse_divergence(fabric: Fabric, step: int, loss: Tensor, views: ViewSet,
                        objects: Tensor) -> None:
-    """Raise TrainingDivergedError on every process alike, each naming its own batch (B,)."""
+    """Raise TrainingDivergedError on every process, each naming its own batch (B,)."""
     finite = torch.isfinite(loss.detach())
     if fabric.world_size > 1:
         finite = torch.as_tensor(fabric.all_reduce(finite.float(), reduce_op='sum')

@@ -11,8 +11,8 @@ def volume_loss(logits: Tensor, voxels: Tensor, kind: str) -> Tensor:
     """
     Return L(V), a scalar: logits and voxels (B, R, R, R); kind is one of VOLUME_LOSSES.
 
-    Squared error (mse, the paper's) weighs every voxel alike, and most are empty; Dice looks at
-    the share of the object that is met, so that thin objects count as much as solid ones.
+    Squared error (mse, the paper's) gives every voxel the same weight, and most are empty. Dice
+    measures the overlap with the object, so that thin objects count as much as solid ones.
     """
     if kind == 'bce':
         return functional.binary_cross_entropy_with_logits(logits, voxels)

@@ -37,10 +37,10 @@ class Plan:
     """
     What is trained, and how.
 
-    `policy` None leaves the view policy out; `joint` trains both together, as `reconstruction`
-    says. `begun` are weights whose reconstruction network is taken, as it is if `frozen`, else to
-    be trained further. `view_separation`, radians, is how far the policy's goals are to stay from
-    the views taken; None is what `begun` says, else 0.
+    `policy` None trains no view policy; `joint` trains both together, with the settings of
+    `reconstruction`. `begun` are weights whose reconstruction network is used, frozen or as the
+    initial weights. `view_separation`, radians, is the smallest angle between the policy's goals
+    and the views taken; None is that of `begun`, else 0.
     """
 
     model: str
@@ -55,7 +55,7 @@ class Plan:
     view_separation: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be trained together."""
+        """Reject what cannot be trained together."""
         if network_entry(self.model).policy is None and (self.joint or self.policy):
             raise ConfigError(f'{self.model}: expected a model with an attentive part for a view '
                               'policy; leave the policy out, or train 2d3d-attention')
@@ -66,12 +66,12 @@ class Plan:
 
     @property
     def config(self) -> Config:
-        """Return the sizes of the network, and how far apart the views of its policy stay."""
+        """The sizes of the network, with its policy's view separation."""
         config = self.begun.config if self.begun else network_config(self.model, self.size)
         if self.view_separation is None or not (self.policy or self.joint):
             return config
         if not hasattr(config, 'view_separation'):
-            raise ConfigError(f'{self.model}: its policy keeps no separation of views; leave '
+            raise ConfigError(f'{self.model}: its policy has no view separation; leave '
                               '--view-separation-deg out')
         return type(config).from_dict(
             {**config.to_dict(), 'view_separation': self.view_separation})
@@ -83,8 +83,8 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
     """
     Train as planned, with checkpoints of every stage in `out`; return what is to be saved.
 
-    The threshold is chosen on validation. A stage whose checkpoint is there goes on with it if
-    `resume` is set. `show` is given the network whenever it was validated.
+    The threshold is chosen on validation. With `resume` a stage continues from its checkpoint, if
+    there is one. `show` gets the network after every validation.
     """
     entry = network_entry(plan.model)
     config = plan.config

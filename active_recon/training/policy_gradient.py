@@ -13,7 +13,7 @@ from active_recon.geometry.cameras import AZIMUTHS, orbit_camera, TURN, VIEW_COU
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.weights import state_hash
-from active_recon.policies.attention import kept_apart
+from active_recon.policies.attention import enforce_separation
 from active_recon.training.loop import (
     Draw,
     Measured,
@@ -37,7 +37,7 @@ def distance_reward(azimuth: Tensor, taken: Tensor, config: RewardConfig) -> Ten
 
     -lambda exp(-d^2 / 2 tau^2), d the shortest way to the nearest view taken: near views cost.
     The paper's 1 / d^2 to the last view, unwrapped, rewards near views, against its own text; it
-    stands behind `paper_distance`.
+    is used with `paper_distance`.
     """
     if config.paper_distance:
         return 1 / (azimuth % TURN - taken[:, -1] % TURN).square().clamp(min=1e-4)
@@ -54,10 +54,10 @@ def returns_to_go(rewards: Tensor) -> Tensor:
 @dataclass(frozen=True, eq=False)
 class Episode:
     """
-    What T - 1 choices of B episodes brought, (T - 1, B) each.
+    The outcome of the T - 1 choices of B episodes, (T - 1, B) each.
 
-    `azimuth` are the means that the policy proposed, radians; `states` the network's after
-    each of the T views, for who learns from them.
+    `azimuth` are the policy's mean azimuths, radians; `states` the network's states after each of
+    the T views.
     """
 
     log_probability: Tensor
@@ -83,11 +83,11 @@ def run_episodes(
     """
     Run an episode for each object (B,), sampling every azimuth from the policy.
 
-    The sample is kept as far from the views taken as the policy says, the nearest rendered view is
-    taken, and log pi is that of the sample before both. The first view was not chosen and earns
-    nothing. r_2D compares silhouettes from two random cameras. The network's gradients are kept
-    where it has any; the policy's do not reach into it. `show` makes images (B, 3, S, S) and their
-    cameras of objects and views (B,); by default they stand on white.
+    The policy's separation from the views taken is enforced on the sample, then the nearest
+    rendered view is taken; log pi is that of the sample itself. The first view was not chosen and
+    has no reward. r_2D compares silhouettes from two random cameras. The network's gradients are
+    kept where it has any; the policy's do not flow into it. `show` returns images (B, 3, S, S)
+    and their cameras of objects and views (B,); by default the images have a white background.
     """
     device = next(attention.parameters()).device
     truth = views.voxels[objects].to(device)
@@ -112,7 +112,7 @@ def run_episodes(
         steps['log'].append(-((sample - mean) / config.policy_sigma).square() / 2)
         steps['baseline'].append(proposal.baseline)
         steps['azimuth'].append(mean.detach())
-        goal = kept_apart(sample.double().cpu().numpy(), taken.double().numpy(),
+        goal = enforce_separation(sample.double().cpu().numpy(), taken.double().numpy(),
                           every.double().numpy(), attention.view_separation)
         chosen = nearest_views(every.numpy(), goal)
         steps['distance'].append(distance_reward(
@@ -136,7 +136,7 @@ def run_episodes(
 
 
 class _Shown:
-    """Shows a network views of a set as a training wants them shown, with gradients."""
+    """Shows a network the views of a set as `show` renders them, with gradients."""
 
     def __init__(self, network: ReconstructionNetwork, views: ViewSet,
                  show: Callable[[Tensor, Tensor], tuple[Tensor, Cameras]] | None,
@@ -151,29 +151,29 @@ class _Shown:
         return self._network.initial_state(batch)
 
     def update(self, objects: Tensor, chosen: Tensor, state: State) -> State:
-        """Take in views (B,) of objects (B,)."""
+        """Update the state by views (B,) of objects (B,)."""
         images, cameras = self._show(objects, chosen)
         return self._network.step(images.to(self._device), cameras.to(self._device), state)
 
 
-def policy_losses(episode: Episode, alike: int = 1) -> dict[str, Tensor]:
+def policy_losses(episode: Episode, group_size: int = 1) -> dict[str, Tensor]:
     """
     Return J(theta) of section 3.3 and the baseline's squared error, summed as `loss`; and a log.
 
-    J sums -log pi (R_t - b_t) over the steps, R_t the reward to go: a choice answers for what
-    follows it. Where so many episodes after one another are `alike` at their start, the mean of
-    the others' R_t - b_t is taken off (Kool et al. 2019, "Buy 4 REINFORCE samples, get a baseline
-    for free"): how hard an object is then no longer hides what a choice was worth.
+    J sums -log pi (R_t - b_t) over the steps, where R_t is the reward-to-go. Each `group_size`
+    consecutive episodes have the same start, and the mean R_t - b_t of the others in the group is
+    subtracted (Kool et al. 2019, "Buy 4 REINFORCE samples, get a baseline for free"): the
+    advantage then does not depend on how hard an object is.
 
     The log: the return of an episode and its three parts, the baseline of the first choice, and
-    how widely the proposals of the batch are spread: the entropy of their histogram over 24
-    azimuths, nats (a policy that always goes one way has 0, one that goes anywhere 3.18).
+    the entropy of the histogram of the batch's proposals over 24 azimuths, nats (0 where all are
+    in one direction, 3.18 where they are uniform).
     """
     returns = returns_to_go(episode.reward.detach())
     advantage = returns - episode.baseline.detach()
-    if alike > 1:
-        groups = advantage.reshape(len(advantage), -1, alike)
-        others = (groups.sum(dim=2, keepdim=True) - groups) / (alike - 1)
+    if group_size > 1:
+        groups = advantage.reshape(len(advantage), -1, group_size)
+        others = (groups.sum(dim=2, keepdim=True) - groups) / (group_size - 1)
         advantage = (groups - others).flatten(1)
     objective = -(episode.log_probability * advantage).sum(0).mean()
     error = (returns - episode.baseline).square().mean()
@@ -194,7 +194,7 @@ def azimuth_entropy(azimuths: Tensor) -> Tensor:
 
 
 class PolicyLearner(nn.Module):
-    """Episodes on a frozen reconstruction network to the policy's losses."""
+    """The losses of a view policy over episodes on a frozen reconstruction network."""
 
     def __init__(self, network: ReconstructionNetwork, attention: AttentionModel, views: ViewSet,
                  threshold: float, length: int, rewards: RewardConfig) -> None:
@@ -209,22 +209,23 @@ class PolicyLearner(nn.Module):
         """Run an episode of each object (B,) from the view it starts at (B,)."""
         return policy_losses(run_episodes(
             self.network, self.attention, self._views, objects.cpu(), starts.cpu(), self._length,
-            self._threshold, self._rewards, rng), self._rewards.episodes_alike)
+            self._threshold, self._rewards, rng), self._rewards.group_size)
 
 
-def draw_episodes(views: ViewSet, size: int, key: list[int], alike: int = 1) -> Draw:
+def draw_episodes(views: ViewSet, size: int, key: list[int], group_size: int = 1) -> Draw:
     """
-    Return what episodes start from: objects and views (size,), and the generator after.
+    Return the starts of episodes: objects and views (size,), and the generator for the rest.
 
-    So many after one another are alike. Raises ConfigError where that does not divide the size.
+    Each `group_size` consecutive episodes have the same start. Raises ConfigError where that does
+    not divide the size.
     """
-    if size % alike:
-        raise ConfigError(f'episodes_alike: expected a divisor of the {size} episodes that a '
-                          f'process runs at once, got {alike}')
+    if size % group_size:
+        raise ConfigError(f'group_size: expected a divisor of the {size} episodes that a '
+                          f'process runs at once, got {group_size}')
     rng = np.random.default_rng(key)
-    objects = torch.from_numpy(rng.integers(len(views), size=size // alike).repeat(alike))
-    starts = torch.from_numpy(
-        rng.integers(views.images.shape[1], size=size // alike).repeat(alike))
+    objects, starts = (
+        torch.from_numpy(rng.integers(count, size=size // group_size).repeat(group_size))
+        for count in views.images.shape[:2])
     return Draw((objects, starts, rng), objects)
 
 
@@ -241,5 +242,5 @@ def train_policy(
         run, PolicyLearner(network, attention, views, threshold, config.max_views, rewards),
         attention, config, settings, views,
         lambda step: draw_episodes(views, size, [config.seed, 1, step, run.fabric.global_rank],
-                                   rewards.episodes_alike),
+                                   rewards.group_size),
         lambda: validate(attention), weight_decay=0.0)

@@ -1,4 +1,4 @@
-"""The first stage: a reconstruction network under section 3.2's losses, on random views."""
+"""The first stage: a reconstruction network under the losses of section 3.2, on random views."""
 
 from collections.abc import Callable
 
@@ -24,10 +24,10 @@ from torch import nn, Tensor
 
 class ReconstructionLearner(nn.Module):
     """
-    A sequence of views to the losses after one of them.
+    The losses of a network after a sequence of views.
 
     The loss after one random view of a sequence is an unbiased estimate of the mean over its
-    views, at a fraction of the price: decoding costs more than updating.
+    views, at a fraction of the cost: decoding costs more than updating.
     """
 
     def __init__(self, network: ReconstructionNetwork, loss: LossConfig) -> None:
@@ -41,9 +41,10 @@ class ReconstructionLearner(nn.Module):
     def forward(self, images: Tensor, cameras: Cameras, voxels: Tensor,
                 seen_from: Tensor) -> dict[str, Tensor]:
         """
-        Take in images (T, B, 3, S, S) of cameras (T, B, ...); compare with voxels after the last.
+        Return the losses after the last of images (T, B, 3, S, S) of cameras (T, B, ...).
 
-        `seen_from`, (B,), are the cameras out of 24 whose silhouettes are compared.
+        `voxels` are (B, R, R, R); `seen_from`, (B,), the indices of the cameras, out of 24, whose
+        silhouettes are compared.
         """
         every = Cameras(*(part.flatten(0, 1) for part in cameras))
         encoded = self.network.encode(images.flatten(0, 1), every)
@@ -67,35 +68,36 @@ class ReconstructionLearner(nn.Module):
 
 def longest_sequence(step: int, config: TrainingConfig) -> int:
     """
-    Return how many views a sequence has at most: two in the first part of a training.
+    Return the largest number of views of a sequence: two in the first part of a training.
 
-    What one view says is learned first, and learned faster where no later views are paid for.
+    A single view is learned first, and faster if no time is spent on later views.
     """
-    short = step < config.short_share * config.steps
+    short = step < config.curriculum_fraction * config.steps
     return min(2, config.max_views) if short else config.max_views
 
 
 def drawn_length(step: int, config: TrainingConfig,
                  rank: int) -> tuple[int, np.random.Generator]:
     """
-    Return how many views the sequences of a step have, and what its other draws come from.
+    Return the number of views of a step's sequences, and the generator of its other draws.
 
-    The length is the same for every process; the generator is that of the process of a rank.
+    The length is the same for all processes; the generator is that of the process of a rank.
     """
     shared = np.random.default_rng([config.seed, step])
     length = int(shared.integers(1, longest_sequence(step, config) + 1))
     return length, np.random.default_rng([config.seed, step, rank])
 
 
-def steps_for(samples: int, batch_size: int, max_views: int, short_share: float = 0.5) -> int:
+def steps_for(samples: int, batch_size: int, max_views: int,
+              curriculum_fraction: float = 0.5) -> int:
     """Return the steps in which a training sees about so many views."""
-    return max(1, round(samples / (batch_size * mean_length(max_views, short_share))))
+    return max(1, round(samples / (batch_size * mean_length(max_views, curriculum_fraction))))
 
 
-def mean_length(max_views: int, short_share: float = 0.5) -> float:
+def mean_length(max_views: int, curriculum_fraction: float = 0.5) -> float:
     """Return how many views a sequence has on average, over a whole training."""
     short, long = (min(2, max_views) + 1) / 2, (max_views + 1) / 2
-    return short_share * short + (1 - short_share) * long
+    return curriculum_fraction * short + (1 - curriculum_fraction) * long
 
 
 def train_reconstruction(
@@ -107,7 +109,7 @@ def train_reconstruction(
 
     def draw(step: int) -> Draw:
         length, own = drawn_length(step, config, run.fabric.global_rank)
-        batch = draw_batch(views, size, length, own, config.varied)
+        batch = draw_batch(views, size, length, own, config.augment)
         seen_from = torch.from_numpy(own.integers(len(AZIMUTHS), size=size))
         return Draw((batch.images, batch.cameras, batch.voxels, seen_from), batch.objects)
 

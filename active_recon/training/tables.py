@@ -12,7 +12,7 @@ _SHADOW_SIDE, _SOLID_SIDE, _TEXTURE_SIDE = 96, 32, 64
 _NARROWEST, _WIDEST = 0.6, 4.0  # half sides of tables, in sides of the grid
 
 
-def tables(cameras: Cameras, voxels: Tensor, side: int, rng: np.random.Generator) -> Tensor:
+def draw_tables(cameras: Cameras, voxels: Tensor, side: int, rng: np.random.Generator) -> Tensor:
     """
     Return what cameras (T, B, ...) see of B tables, (T, B, 4, S, S) premultiplied, in [0, 1].
 

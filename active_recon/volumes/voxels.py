@@ -72,7 +72,7 @@ class VoxelGrid:
     size: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no cube."""
+        """Reject what is no cube."""
         shape = self.occupancy.shape
         if len(shape) != 3 or len(set(shape)) != 1:
             raise DataError(f'expected a cube of voxels, got the shape {shape}')
@@ -90,12 +90,12 @@ class VoxelGrid:
         return above
 
     def above(self, threshold: float) -> 'VoxelGrid':
-        """Return the grid with 0 where it is not above the threshold: what a cloud tells."""
+        """Return the grid with 0 where it is not above the threshold: what a point cloud holds."""
         occupancy = np.where(self.occupied(threshold), self.occupancy, np.float32(0))
         return VoxelGrid(np.ascontiguousarray(occupancy), self.size)
 
     def as_fine_as(self, other: 'VoxelGrid') -> 'VoxelGrid':
-        """Return an empty grid with the other's cells: no cloud told its own; any other stays."""
+        """Return an empty grid at the other's resolution; a grid with cells stays as it is."""
         return self if self.occupancy.any() else VoxelGrid(
             np.zeros_like(other.occupancy), self.size)
 
@@ -168,9 +168,9 @@ def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
                         'cube of another size', 'cloud')
     x, y, z = index.T
     cells = (x * side + y) * side + z
-    occupancy, told = np.zeros(side ** 3, np.float32), np.zeros(side ** 3, bool)
-    occupancy[cells], told[cells] = points[:, 3], True
-    if (count := np.count_nonzero(told)) < len(points):
+    occupancy, filled = np.zeros(side ** 3, np.float32), np.zeros(side ** 3, bool)
+    occupancy[cells], filled[cells] = points[:, 3], True
+    if (count := np.count_nonzero(filled)) < len(points):
         raise DataError(f'expected one point a cell, got {len(points)} in {count} cells of '
                         f'{side} a side', 'cloud')
     return VoxelGrid(occupancy.reshape((side,) * 3), size)
@@ -214,9 +214,9 @@ def read_binvox(path: Path) -> VoxelGrid:
     """
     Read a binvox file as R2N2 writes it, turned upright: z up, front +x.
 
-    The data runs x, z, y, and the model turns upright by (x, y, z) -> (x, -z, y). The grid is
-    centred at the origin with the header's scale as its side; the header's translate says where
-    the model once stood and is ignored. Raises DataError on what is no whole binvox file.
+    The data are ordered x, z, y, and (x, y, z) -> (x, -z, y) turns the model upright. The grid is
+    centred at the origin with the header's scale as its side; the header's translate is ignored.
+    Raises DataError on an incomplete binvox file.
     """
     try:
         raw = path.read_bytes()
@@ -244,7 +244,7 @@ def read_binvox(path: Path) -> VoxelGrid:
 
 
 def binvox_side(path: Path) -> float:
-    """Return the side of a binvox file's grid; raises DataError where its header tells none."""
+    """Return the side of a binvox file's grid; raises DataError where its header has none."""
     try:
         with path.open('rb') as file:
             header = file.read(1024).partition(b'\ndata\n')[0]
@@ -256,7 +256,11 @@ def binvox_side(path: Path) -> float:
 
 
 def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
-    """Write the occupied cells as binvox, the way `read_binvox` reads them."""
+    """
+    Write the occupied cells as binvox, as `read_binvox` reads them.
+
+    Not by trimesh: it writes other bytes, and its run lengths overflow for grids that it has read.
+    """
     cells = grid.occupied(threshold)[:, ::-1, :].reshape(-1).astype(np.uint8)
     starts = np.flatnonzero(np.r_[True, cells[1:] != cells[:-1]])
     runs = bytearray()

@@ -35,60 +35,61 @@ class _Cells:
 
 
 @dataclass(eq=False)
-class _Heard:
-    """What validation objects tell of an entrant: IoU at thresholds, and some cells."""
+class _Totals:
+    """Sums over validation objects of an entrant: IoU at thresholds, and some cells."""
 
     iou: dict[int, NDArray[np.float64]]  # by cells a side, a sum over objects and counts
     near: _Cells
     anywhere: _Cells
 
 
-def choose(scene: Scene, entrants: Sequence[Entrant], plan: Plan, told: str,
+def choose(scene: Scene, entrants: Sequence[Entrant], plan: Plan, source: str,
            advance: Callable[[int], None] = lambda done: None) -> list[Entrant]:
     """
     Return the entrants with the thresholds and temperatures that are best on validation objects.
 
     Thresholds have the highest mean IoU over all counts of random views; temperatures make the
     cells near the surface, or anywhere, most likely. An entrant that the objects cannot be shown
-    to stays as it is. `told` says what it was chosen on.
+    to stays as it is. `source` names the validation objects.
     """
-    return [_chosen(scene, entrant, plan, told, advance)
+    return [_chosen(scene, entrant, plan, source, advance)
             if scene.shown_to(entrant.network) is not None else entrant for entrant in entrants]
 
 
-def _chosen(scene: Scene, entrant: Entrant, plan: Plan, told: str,
+def _chosen(scene: Scene, entrant: Entrant, plan: Plan, source: str,
             advance: Callable[[int], None]) -> Entrant:
     counts, orders = plan.within(scene.view_count), orders_of(scene, plan)['random']
     sides = [side for side in entrant.sides if side in scene.truths]
-    heard = _Heard({side: np.zeros(len(THRESHOLDS)) for side in sides},
-                   _Cells({count: [] for count in counts}, []),
-                   _Cells({count: [] for count in counts}, []))
+    totals = _Totals({side: np.zeros(len(THRESHOLDS)) for side in sides},
+                     _Cells({count: [] for count in counts}, []),
+                     _Cells({count: [] for count in counts}, []))
     for rows in batches(len(scene), _BATCH):
         targets = targets_of(scene, rows, surface=False)
         cells = [_some_cells(truth, plan.seed + row)
                  for row, truth in zip(rows.tolist(), targets, strict=True)]
         for truth, own in zip(targets, cells, strict=True):
-            for kind, some in zip((heard.near, heard.anywhere), own, strict=True):
+            for kind, some in zip((totals.near, totals.anywhere), own, strict=True):
                 kind.truth.append(truth.cells[truth.finest].ravel()[some])
         steps = logits_of(scene, entrant, rows, orders, plan.bfloat16)
         for count, logits in zip(counts, steps, strict=True):
             for one, truth, own in zip(logits, targets, cells, strict=True):
-                _hear(heard, count, one, truth, own, tuple(sides))
+                _add_scores(totals, count, one, truth, own, tuple(sides))
         advance(len(rows))
     thresholds = dict(entrant.thresholds) | {
-        side: float(THRESHOLDS[total.argmax()]) for side, total in heard.iou.items()}
-    return replace(entrant, thresholds=thresholds, temperatures=heard.near.temperatures(),
-                   grid_temperatures=heard.anywhere.temperatures(), chosen_on=told)
+        side: float(THRESHOLDS[total.argmax()]) for side, total in totals.iou.items()}
+    return replace(entrant, thresholds=thresholds, temperatures=totals.near.temperatures(),
+                   grid_temperatures=totals.anywhere.temperatures(), chosen_on=source)
 
 
-def _hear(heard: _Heard, count: int, logits: NDArray[np.float32], truth: Target,
-          cells: tuple[NDArray[np.int64], NDArray[np.int64]], sides: tuple[int, ...]) -> None:
+def _add_scores(totals: _Totals, count: int, logits: NDArray[np.float32], truth: Target,
+                cells: tuple[NDArray[np.int64], NDArray[np.int64]],
+                sides: tuple[int, ...]) -> None:
     for place, threshold in enumerate(THRESHOLDS):
         at = dict.fromkeys(sides, float(logit(threshold)))
         for name, value in iou_scores(logits, truth, sides, at, '').items():
-            heard.iou[int(name.strip('_'))][place] += value
+            totals.iou[int(name.strip('_'))][place] += value
     if len(logits) == truth.finest:
-        for kind, some in zip((heard.near, heard.anywhere), cells, strict=True):
+        for kind, some in zip((totals.near, totals.anywhere), cells, strict=True):
             kind.logits[count].append(logits.ravel()[some])
 
 

@@ -45,7 +45,7 @@ class Plan:
     bfloat16: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse counts that are none."""
+        """Reject counts that are none."""
         if not self.counts or min(self.counts) < 1 or list(self.counts) != sorted(
                 set(self.counts)):
             raise ConfigError('counts: expected rising numbers of views from 1 on, such as 1,3,5, '

@@ -5,17 +5,18 @@ from active_recon.shapes.airplane.military import fighter, flying_wing
 from active_recon.shapes.airplane.parts import Livery
 from active_recon.shapes.airplane.props import biplane, glider, light, twin, warbird
 from active_recon.shapes.common import materials
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble
 import numpy as np
 import trimesh
 
-_KINDS = (airliner, fighter, flying_wing, transport, biplane, glider, light, twin, warbird)
-_WEIGHTS = (0.33, 0.21, 0.04, 0.06, 0.06, 0.04, 0.11, 0.08, 0.07)
+_KINDS = {airliner: 0.33, fighter: 0.21, flying_wing: 0.04, transport: 0.06, biplane: 0.06,
+          glider: 0.04, light: 0.11, twin: 0.08, warbird: 0.07}
 
 
 def airplane(rng: np.random.Generator) -> trimesh.Trimesh:
     """Return a random aeroplane, its nose at +x."""
-    kind = _KINDS[rng.choice(len(_KINDS), p=_WEIGHTS)]
+    kind = choose(rng, _KINDS)
     mesh = assemble(kind(rng, _livery(rng, military=kind in (fighter, flying_wing, warbird))))
     # Toys are stubbier than what they are modelled on.
     mesh.apply_transform(np.diag([1, rng.uniform(0.85, 1.2), rng.uniform(0.9, 1.35), 1]))

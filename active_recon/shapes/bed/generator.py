@@ -3,6 +3,7 @@
 from active_recon.shapes.bed.frames import base, bedding, board, Livery, Plan, post
 from active_recon.shapes.bed.tall import bunk, four_poster
 from active_recon.shapes.common import materials
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, box, lathe, Mesh, mirrored, rod
 from active_recon.shapes.common.soft_parts import cushion, shell, smoothed, wall
 import numpy as np
@@ -14,9 +15,9 @@ _HARD_BOARDS = _BOARDS[:6]
 
 def bed(rng: np.random.Generator) -> Mesh:
     """Return a random bed about two metres long, standing on z = 0."""
-    makers = (_standard, bunk, four_poster, _sleigh, _crib, _daybed, _hospital, _round)
-    chances = [0.58, 0.13, 0.08, 0.05, 0.06, 0.05, 0.03, 0.02]
-    maker = makers[rng.choice(len(makers), p=chances)]
+    maker = choose(rng, {
+        _standard: 0.58, bunk: 0.13, four_poster: 0.08, _sleigh: 0.05, _crib: 0.06,
+        _daybed: 0.05, _hospital: 0.03, _round: 0.02})
     return assemble(maker(rng, _plan(rng), _livery(rng)))
 
 

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from active_recon.shapes.cabinet.bays import Bay
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.materials import fabric, paint, plastic, wood
 from active_recon.shapes.common.parts import box, Color, lathe, Mesh
 import numpy as np
@@ -22,10 +23,11 @@ class Load(NamedTuple):
 
 def draw_load(rng: np.random.Generator) -> Load:
     """Return an empty bookshelf more often than not, else sparse, mixed or crammed ones."""
-    kinds: list[tuple[str, ...]] = [
-        ('empty',), ('books', 'books', 'empty', 'pile', 'vase'), ('books', 'books', 'pile'),
-        ('books',), ('crate', 'crate', 'empty'), ('vase', 'empty', 'empty', 'pile')]
-    kind = kinds[rng.choice(len(kinds), p=[0.52, 0.16, 0.08, 0.12, 0.05, 0.07])]
+    kinds: dict[tuple[str, ...], float] = {
+        ('empty',): 0.52, ('books', 'books', 'empty', 'pile', 'vase'): 0.16,
+        ('books', 'books', 'pile'): 0.08, ('books',): 0.12, ('crate', 'crate', 'empty'): 0.05,
+        ('vase', 'empty', 'empty', 'pile'): 0.07}
+    kind = choose(rng, kinds)
     draw = [fabric, paint][rng.integers(2)]
     palette = np.array([draw(rng) for _ in range(int(rng.integers(1, 7)))])
     low = rng.uniform(0.25, 0.9)

@@ -9,6 +9,7 @@ from active_recon.shapes.cabinet.bays import Bay, carcass
 from active_recon.shapes.cabinet.fronts import fronts, left_open
 from active_recon.shapes.cabinet.style import draw_style, Style
 from active_recon.shapes.cabinet.trims import base, lift, top
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.materials import metal, plastic
 from active_recon.shapes.common.parts import assemble, Mesh
 from active_recon.shapes.table.legs import Room
@@ -58,9 +59,7 @@ def cabinet(rng: np.random.Generator) -> Mesh:
     """Return a random cabinet; its doors and drawers are at +x."""
     if rng.random() < 0.16:
         return special.special(rng)
-    names = list(_KINDS)
-    weights = np.array([kind.weight for kind in _KINDS.values()])
-    name = rng.choice(names, p=weights / weights.sum())
+    name = choose(rng, {name: kind.weight for name, kind in _KINDS.items()})
     kind = _KINDS[name]
     room = Room(*(rng.uniform(*limits) for limits in (kind.depth, kind.width, kind.height)))
     style = draw_style(rng, max(room))

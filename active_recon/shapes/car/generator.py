@@ -7,6 +7,7 @@ from active_recon.shapes.car.bodies import greenhouse, hull, Livery, Stance, wal
 from active_recon.shapes.car.open import formula, roadster_fittings
 from active_recon.shapes.car.working import lorry, pickup_fittings, vintage
 from active_recon.shapes.common import materials
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, box, Mesh
 import numpy as np
 import trimesh
@@ -48,9 +49,7 @@ _TALL = ('suv', 'van', 'bus', 'pickup', 'jeep')
 
 def car(rng: np.random.Generator) -> trimesh.Trimesh:
     """Return a random car: about four metres long, its bonnet at +x, standing on z = 0."""
-    kinds = list(_WEIGHTS)
-    weights = np.array([_WEIGHTS[kind] for kind in kinds], np.float64)
-    kind = kinds[rng.choice(len(kinds), p=weights / weights.sum())]
+    kind = choose(rng, _WEIGHTS)
     livery = _livery(rng)
     if kind in _SPECIAL:
         return assemble(_SPECIAL[kind](rng, livery))

@@ -20,6 +20,7 @@ from active_recon.shapes.chair.columns import foot_ring, pedestal, star
 from active_recon.shapes.chair.easy import draw_colors, lounge, sling, tub
 from active_recon.shapes.chair.parts import arms, seat_parts
 from active_recon.shapes.common import materials
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, beam, box, Mesh
 from active_recon.shapes.common.soft_parts import cushion, shell, smoothed
 from active_recon.shapes.sofa.generator import armchair
@@ -32,8 +33,7 @@ def chair(rng: np.random.Generator) -> trimesh.Trimesh:
     kinds: dict[Callable[[np.random.Generator], list[Mesh]], float] = {
         _side_chair: 0.34, _stool: 0.15, armchair: 0.11, tub: 0.1, _moulded: 0.08,
         _office: 0.07, lounge: 0.07, sling: 0.08}
-    pick = rng.choice(len(kinds), p=list(kinds.values()))
-    return assemble(list(kinds)[pick](rng))
+    return assemble(choose(rng, kinds)(rng))
 
 
 def _seat(rng: np.random.Generator, round_share: float = 0.15) -> Seat:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, box, Mesh, mirrored, rod
 from active_recon.shapes.firearm.parts import (
     barrel,
@@ -19,12 +20,10 @@ import numpy as np
 
 def firearm(rng: np.random.Generator) -> Mesh:
     """Return a random firearm; its barrel points along +x."""
-    kinds: list[tuple[float, Callable[[np.random.Generator, Coats], Mesh]]] = [
-        (0.34, _assault), (0.2, _hunting), (0.09, _shotgun), (0.1, _carbine), (0.08, _pistol),
-        (0.04, _revolver), (0.06, _bullpup), (0.05, _machine_gun), (0.04, _musket)]
-    chances, makers = zip(*kinds, strict=True)
-    mesh: Mesh = makers[rng.choice(len(makers), p=chances)](rng, draw_coats(rng))
-    return mesh
+    kinds: dict[Callable[[np.random.Generator, Coats], Mesh], float] = {
+        _assault: 0.34, _hunting: 0.2, _shotgun: 0.09, _carbine: 0.1, _pistol: 0.08,
+        _revolver: 0.04, _bullpup: 0.06, _machine_gun: 0.05, _musket: 0.04}
+    return choose(rng, kinds)(rng, draw_coats(rng))
 
 
 def _receiver(rng: np.random.Generator, low: float, high: float, back: float, front: float,

@@ -1,6 +1,7 @@
 """Motorbikes: cruisers, choppers, tourers, sport, naked and dirt bikes, scooters; off to +x."""
 
 from active_recon.shapes.common import materials
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, Mesh
 from active_recon.shapes.motorbike.light import dirt, scooter
 from active_recon.shapes.motorbike.parts import Chassis, Livery
@@ -33,9 +34,7 @@ _WEIGHTS = {'cruiser': 5, 'chopper': 3, 'tourer': 3, 'sport': 6, 'naked': 5, 'di
 
 def motorbike(rng: np.random.Generator) -> Mesh:
     """Return a random motorbike, about two metres long, standing on z = 0."""
-    kinds = list(_WEIGHTS)
-    weights = np.array([_WEIGHTS[kind] for kind in kinds], np.float64)
-    kind = kinds[rng.choice(len(kinds), p=weights / weights.sum())]
+    kind = choose(rng, _WEIGHTS)
     chassis = _chassis(rng, kind)
     livery = _livery(rng, kind)
     if kind == 'scooter':

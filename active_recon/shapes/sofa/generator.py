@@ -5,6 +5,7 @@ from dataclasses import replace
 import math
 
 from active_recon.shapes.common import materials
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, box, Mesh, mirrored, prism, rod, tube
 from active_recon.shapes.common.soft_parts import cushion, filleted, wall
 from active_recon.shapes.sofa.frames import futon, settee
@@ -27,8 +28,7 @@ def sofa(rng: np.random.Generator) -> trimesh.Trimesh:
     kinds: dict[Callable[[np.random.Generator], list[Mesh]], float] = {
         _straight: 0.42, _sectional: 0.2, settee: 0.1, _chesterfield: 0.07, _curved: 0.08,
         futon: 0.06, _daybed: 0.07}
-    pick = rng.choice(len(kinds), p=list(kinds.values()))
-    return assemble(list(kinds)[pick](rng))
+    return assemble(choose(rng, kinds)(rng))
 
 
 def upholstered(rng: np.random.Generator, seats: int) -> list[Mesh]:

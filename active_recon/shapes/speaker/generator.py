@@ -3,6 +3,7 @@
 from collections.abc import Callable
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.materials import fabric, metal, paint, plastic, wood
 from active_recon.shapes.common.parts import (
     assemble,
@@ -22,12 +23,10 @@ import numpy as np
 
 def speaker(rng: np.random.Generator) -> Mesh:
     """Return a random loudspeaker; its cones face +x."""
-    kinds: list[tuple[float, Callable[[np.random.Generator], Mesh]]] = [
-        (0.3, _bookshelf), (0.26, _tower), (0.09, _subwoofer), (0.06, _soundbar), (0.09, _stage),
-        (0.07, _cylinder), (0.04, _ball), (0.06, _wedge), (0.03, _horn)]
-    chances, makers = zip(*kinds, strict=True)
-    mesh: Mesh = makers[rng.choice(len(makers), p=chances)](rng)
-    return mesh
+    kinds: dict[Callable[[np.random.Generator], Mesh], float] = {
+        _bookshelf: 0.3, _tower: 0.26, _subwoofer: 0.09, _soundbar: 0.06, _stage: 0.09,
+        _cylinder: 0.07, _ball: 0.04, _wedge: 0.06, _horn: 0.03}
+    return choose(rng, kinds)(rng)
 
 
 def _coat(rng: np.random.Generator) -> Color:

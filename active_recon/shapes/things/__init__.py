@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble
 from active_recon.shapes.things.assembled import ASSEMBLED
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import chance, choose, Generator
+from active_recon.shapes.things.drawing import chance, Generator
 from active_recon.shapes.things.extruded import EXTRUDED
 from active_recon.shapes.things.lathed import LATHED
 from active_recon.shapes.things.machined import MACHINED

@@ -3,9 +3,10 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import Color
 from active_recon.shapes.things.colors import draw_palette, furry
-from active_recon.shapes.things.drawing import chance, choose
+from active_recon.shapes.things.drawing import chance
 from active_recon.shapes.things.fields import ball, Body, limb, molten
 import numpy as np
 from numpy.typing import NDArray

@@ -2,11 +2,12 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, box, Color, ellipsoid, Mesh, mirrored, rod
 from active_recon.shapes.common.soft_parts import cushion
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.devices import device, plant
-from active_recon.shapes.things.drawing import chance, choose, Generator
+from active_recon.shapes.things.drawing import chance, Generator
 from active_recon.shapes.things.solids import moved, painted, superquadric, torus
 from active_recon.shapes.things.tools import hammer, handled, pincers, spanner
 from active_recon.shapes.things.toys import figure, peg_toy, vehicle

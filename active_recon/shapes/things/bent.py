@@ -2,16 +2,11 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, Color, Mesh, rod
 from active_recon.shapes.common.soft_parts import filleted
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import (
-    arc,
-    chance,
-    choose,
-    section,
-    smooth_profile,
-)
+from active_recon.shapes.things.drawing import arc, chance, section, smooth_profile
 from active_recon.shapes.things.solids import (
     extruded,
     hollow,

@@ -1,8 +1,7 @@
-"""Small draws that all kinds of things share: choices by weight, smooth profiles, paths."""
+"""Small draws that all kinds of things share: chances, smooth profiles, paths."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 import math
-from typing import TypeVar
 
 from active_recon.shapes.common.soft_parts import smoothed
 from active_recon.shapes.things.solids import circle
@@ -12,13 +11,6 @@ import trimesh
 
 Generator = Callable[[np.random.Generator], trimesh.Trimesh]
 Points = NDArray[np.float64]
-T = TypeVar('T')
-
-
-def choose(rng: np.random.Generator, weights: Mapping[T, float]) -> T:
-    """Return one of the keys, drawn by their weights."""
-    shares = np.array([*weights.values()], np.float64)
-    return list(weights)[rng.choice(len(shares), p=shares / shares.sum())]
 
 
 def chance(rng: np.random.Generator, share: float) -> bool:

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, box, Mesh
 from active_recon.shapes.things import outlines
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import chance, choose, Generator, section
+from active_recon.shapes.things.drawing import chance, Generator, section
 from active_recon.shapes.things.letters import letters
 from active_recon.shapes.things.solids import circle, extruded, moved, revolved
 import numpy as np

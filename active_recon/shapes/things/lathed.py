@@ -2,11 +2,11 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, box
 from active_recon.shapes.things.colors import draw_palette
 from active_recon.shapes.things.drawing import (
     chance,
-    choose,
     Generator,
     globe,
     random_profile,

@@ -2,10 +2,11 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, beam, box, Mesh
 from active_recon.shapes.things import outlines
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import chance, choose, Generator, helix, smooth_profile
+from active_recon.shapes.things.drawing import chance, Generator, helix, smooth_profile
 from active_recon.shapes.things.milled import housing, milled
 from active_recon.shapes.things.solids import circle, extruded, moved, revolved, swept
 import numpy as np

@@ -1,8 +1,9 @@
 """Blocks with what a mill takes away: holes, slots, pockets, steps, chamfers; cast cases."""
 
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import chance, choose
+from active_recon.shapes.things.drawing import chance
 from active_recon.shapes.things.fields import block, Body, column, half_space, molten
 import numpy as np
 from numpy.typing import NDArray

@@ -2,7 +2,8 @@
 
 import math
 
-from active_recon.shapes.things.drawing import arc, chance, choose
+from active_recon.shapes.common.drawing import choose
+from active_recon.shapes.things.drawing import arc, chance
 from active_recon.shapes.things.solids import circle
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

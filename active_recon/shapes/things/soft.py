@@ -2,11 +2,12 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, Mesh, rod
 from active_recon.shapes.common.soft_parts import smoothed
 from active_recon.shapes.things.animals import beast, bird, fish, plush
 from active_recon.shapes.things.colors import draw_palette, ripe
-from active_recon.shapes.things.drawing import chance, choose, Generator
+from active_recon.shapes.things.drawing import chance, Generator
 from active_recon.shapes.things.fields import ball, Body, half_space, limb, molten, waves
 from active_recon.shapes.things.solids import circle, extruded, moved, painted, revolved, swept
 import numpy as np

@@ -2,10 +2,11 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, beam, box, ellipsoid, Mesh, rod
 from active_recon.shapes.common.soft_parts import filleted, smoothed
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import arc, chance, choose, Generator, helix, section
+from active_recon.shapes.things.drawing import arc, chance, Generator, helix, section
 from active_recon.shapes.things.frames import frame, whisk
 from active_recon.shapes.things.solids import circle, moved, pipe, revolved, swept, torus
 import numpy as np

@@ -2,10 +2,11 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, beam, box, Color, ellipsoid, Mesh, rod
 from active_recon.shapes.common.soft_parts import smoothed
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import chance, choose, section, smooth_profile
+from active_recon.shapes.things.drawing import chance, section, smooth_profile
 from active_recon.shapes.things.solids import circle, extruded, moved, revolved, swept
 import numpy as np
 import trimesh

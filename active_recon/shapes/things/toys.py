@@ -2,10 +2,11 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, beam, box, Color, ellipsoid, loft, Mesh, rod
 from active_recon.shapes.common.soft_parts import cushion
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import chance, choose, globe, section
+from active_recon.shapes.things.drawing import chance, globe, section
 from active_recon.shapes.things.outlines import rounded
 from active_recon.shapes.things.solids import (
     moved,

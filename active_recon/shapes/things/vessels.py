@@ -2,17 +2,11 @@
 
 import math
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, Color, Mesh
 from active_recon.shapes.common.soft_parts import smoothed
 from active_recon.shapes.things.colors import draw_palette
-from active_recon.shapes.things.drawing import (
-    arc,
-    chance,
-    choose,
-    globe,
-    section,
-    smooth_profile,
-)
+from active_recon.shapes.things.drawing import arc, chance, globe, section, smooth_profile
 from active_recon.shapes.things.solids import circle, hollow, moved, pipe, revolved, swept
 import numpy as np
 from numpy.typing import NDArray

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from active_recon.shapes.common.drawing import choose
 from active_recon.shapes.common.parts import assemble, Mesh
 from active_recon.shapes.watercraft import cargo as watercraft_cargo
 from active_recon.shapes.watercraft import floats as watercraft_floats
@@ -45,8 +46,7 @@ _KINDS: list[tuple[float, str, Callable[[np.random.Generator, Livery], list[Mesh
 
 def watercraft(rng: np.random.Generator) -> Mesh:
     """Return a random boat or ship, its bow at +x."""
-    weights = np.array([weight for weight, _, _ in _KINDS])
-    _, style, kind = _KINDS[rng.choice(len(_KINDS), p=weights / weights.sum())]
+    style, kind = choose(rng, {(style, kind): weight for weight, style, kind in _KINDS})
     if rng.random() < {'yacht': 0.15, 'wood': 0.2}.get(style, 0):
         style = 'ship'
     return assemble(kind(rng, livery(rng, style)))

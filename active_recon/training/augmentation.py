@@ -1,4 +1,4 @@
-"""What a camera would vary and a renderer does not: background, light, colours and aim."""
+"""Augmentation of rendered views: background, light, colours, shift and scale."""
 
 from collections.abc import Callable, Mapping
 
@@ -19,28 +19,28 @@ Background = Callable[[ViewSet, int, int, np.random.Generator], Tensor]
 """Draws T views of n sequences' backgrounds; see `BACKGROUNDS`."""
 
 
-def vary(images: Tensor, intrinsics: Tensor, views: ViewSet,
+def augment(images: Tensor, intrinsics: Tensor, views: ViewSet,
          rng: np.random.Generator) -> tuple[Tensor, Tensor]:
     """
-    Return premultiplied images (T, B, S, S, 4) uint8 as pictures (T, B, 3, S, S) in [0, 1].
+    Return augmented images (T, B, 3, S, S) in [0, 1], and their intrinsics (T, B, 3, 3).
 
-    And with them what became of the intrinsics, (T, B, 3, 3), as the pictures moved. Half of the
-    sequences stay where they are, on white; the others, in the shares of `SHARES`, stand before
-    another background, are moved and scaled a little in each view, and lit unevenly. Every
-    object's colours change. What is random comes from `rng` alone.
+    Takes premultiplied images (T, B, S, S, 4) uint8 and their intrinsics. Half of the sequences
+    keep a white background. The others, in the proportions of `SHARES`, get another background,
+    a small shift and scale in each view, and uneven light. The colours of every object are
+    jittered. `rng` is the only source of randomness.
     """
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
-    planes[:, :, :3] = recolored(planes, rng)
+    planes[:, :, :3] = jitter_colors(planes, rng)
     kinds = draw_kinds(SHARES, size, rng)
     away = torch.from_numpy(np.flatnonzero(kinds != 'white'))
     if len(away):
         shown = planes[:, away]
-        pictured, motion = moved(shown.flatten(0, 1), rng)
-        planes[:, away] = pictured.view_as(shown)
+        shifted, motion = shift_and_scale(shown.flatten(0, 1), rng)
+        planes[:, away] = shifted.view_as(shown)
         intrinsics = intrinsics.clone()
         intrinsics[:, away] = motion.reshape(length, -1, 3, 3) @ intrinsics[:, away]
-    behind = drawn_backgrounds(kinds, BACKGROUNDS, views, length, rng)
+    behind = draw_backgrounds(kinds, BACKGROUNDS, views, length, rng)
     pictures = behind.mul_(1 - planes[:, :, 3:]).add_(planes[:, :, :3])
     pictures[:, away] *= light(len(away), side, rng)
     return pictures.clamp_(0, 1), intrinsics
@@ -52,7 +52,7 @@ def draw_kinds(shares: Mapping[str, float], size: int,
     return rng.choice(list(shares), size, p=list(shares.values()))
 
 
-def drawn_backgrounds(kinds: NDArray[np.str_], backgrounds: Mapping[str, Background],
+def draw_backgrounds(kinds: NDArray[np.str_], backgrounds: Mapping[str, Background],
                       views: ViewSet, length: int, rng: np.random.Generator) -> Tensor:
     """Return T = `length` views of a background of each of kinds (B,), (T, B, 3, S, S)."""
     side = views.image_size
@@ -65,13 +65,13 @@ def drawn_backgrounds(kinds: NDArray[np.str_], backgrounds: Mapping[str, Backgro
     return behind
 
 
-def moved(planes: Tensor, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
+def shift_and_scale(planes: Tensor, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
     """
     Return premultiplied planes (N, 4, S, S), each shifted and scaled about its middle.
 
-    By up to 1/32 of the side each way and 4 %; the object's alpha moves with its colours, and
-    what comes in at the border is empty. And with them where pixels went, (N, 3, 3) float64: what
-    the intrinsics of their cameras are to be multiplied by from the left.
+    The shift is at most 1/32 of the side along each axis, the scale at most 4 %. Alpha moves with
+    the colours, and what comes in at the border is empty. The second value, (N, 3, 3) float64,
+    maps old pixels to new ones: new intrinsics are this matrix times the old ones.
     """
     side = planes.shape[-1]
     scale = 1 / rng.uniform(1 - MOST_SCALE, 1 + MOST_SCALE, len(planes))
@@ -88,8 +88,8 @@ def moved(planes: Tensor, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
     return functional.grid_sample(planes, grid, align_corners=False), torch.from_numpy(motion)
 
 
-def recolored(planes: Tensor, rng: np.random.Generator) -> Tensor:
-    """Return the colours of planes (T, B, 4, S, S) under a gain and a saturation of each b."""
+def jitter_colors(planes: Tensor, rng: np.random.Generator) -> Tensor:
+    """Return the colours of planes (T, B, 4, S, S) under one gain and saturation per sequence."""
     size = planes.shape[1]
     gains = rng.uniform(0.75, 1.25, (size, 1)) * rng.uniform(0.85, 1.15, (size, 3))
     saturation = _tensor(rng.uniform(0.5, 1.4, (size, 1, 1)))
@@ -201,4 +201,4 @@ expand to (T, n, 3, S, S).
 """
 SHARES = {'white': 0.5, 'plain': 0.15, 'gradient': 0.08, 'noise': 0.07, 'clutter': 0.1,
           'pieces': 0.1}
-"""The share of the sequences that stand before each kind of background."""
+"""The fraction of the sequences that have each kind of background."""

@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 
-from active_recon.training import appearance, variation
-from active_recon.training.variation import (
+from active_recon.training import augmentation, posed_augmentation
+from active_recon.training.augmentation import (
+    augment,
     BACKGROUNDS,
     draw_kinds,
     MOST_SCALE,
     MOST_SHIFT,
-    moved,
-    vary,
+    shift_and_scale,
 )
 import numpy as np
 import pytest
@@ -20,10 +20,10 @@ from torch.testing import assert_close
 LENGTH, SIZE = 3, 60
 
 
-def varied(images, views, generator):
+def augmented(images, views, generator):
     """Return pictures and intrinsics of images (T, B, ...), all of the same camera before."""
     intrinsics = views.intrinsics[0, 0].expand(*images.shape[:2], 3, 3)
-    return vary(images, intrinsics, views, generator)
+    return augment(images, intrinsics, views, generator)
 
 
 def rng(seed=0):
@@ -43,14 +43,14 @@ def planes(images):
 
 
 def test_the_same_numbers_vary_alike_and_others_otherwise(images, views):
-    first, again, other = (varied(images, views, rng(seed)) for seed in (0, 0, 1))
+    first, again, other = (augmented(images, views, rng(seed)) for seed in (0, 0, 1))
     assert_close(again, first, rtol=0, atol=0)
     assert (other[0] != first[0]).any()
 
 
 def test_pictures_are_in_range_and_their_originals_are_untouched(images, views):
     before = images.clone()
-    pictures, _ = varied(images, views, rng())
+    pictures, _ = augmented(images, views, rng())
     assert pictures.shape == (LENGTH, SIZE, 3, 64, 64)
     assert pictures.isfinite().all()
     assert 0 <= pictures.min() < pictures.max() <= 1
@@ -60,11 +60,11 @@ def test_pictures_are_in_range_and_their_originals_are_untouched(images, views):
 @pytest.mark.parametrize('size', [1, 2, 3])
 def test_the_smallest_batches_can_be_varied(size, images, views):
     for seed in range(8):
-        pictures, _ = varied(images[:1, :size], views, rng(seed))
+        pictures, _ = augmented(images[:1, :size], views, rng(seed))
         assert pictures.shape == (1, size, 3, 64, 64)
 
 
-@pytest.mark.parametrize('module', [variation, appearance])
+@pytest.mark.parametrize('module', [augmentation, posed_augmentation])
 def test_every_kind_of_background_occurs_in_its_share(module):
     kinds = draw_kinds(module.SHARES, 4000, rng())
     assert set(module.BACKGROUNDS) == set(module.SHARES) - {'white'}
@@ -74,7 +74,7 @@ def test_every_kind_of_background_occurs_in_its_share(module):
 
 
 def test_half_of_the_sequences_stay_in_place_on_pure_white(images, views):
-    pictures, _ = varied(images, views, rng())
+    pictures, _ = augmented(images, views, rng())
     alpha = images[..., 3].float()[:, :, None] / 255
     white = ((pictures == 1) | (alpha > 0)).all((0, 2, 3, 4))
     assert 0.35 < white.float().mean() < 0.65
@@ -94,14 +94,14 @@ def centers_of(planes):
 def test_a_camera_told_of_the_motion_sees_a_point_where_its_image_went():
     dot = torch.zeros(200, 4, 64, 64)
     dot[:, :, 14:16, 44:46] = 1
-    shown, motion = moved(dot, rng())
+    shown, motion = shift_and_scale(dot, rng())
     went = motion @ torch.tensor([45.0, 15.0, 1.0], dtype=torch.float64)  # (200, 3)
     assert_close(centers_of(shown), went[:, :2].T.float(), rtol=0, atol=0.1)
     assert (went[:, :2] - torch.tensor([45.0, 15.0])).abs().amax() > 1
 
 
 def test_the_intrinsics_move_with_the_pictures_and_stay_where_they_stay(images, views):
-    pictures, intrinsics = varied(images, views, rng())
+    pictures, intrinsics = augmented(images, views, rng())
     stayed = (intrinsics == views.intrinsics[0, 0]).all((0, 2, 3))
     alpha = images[..., 3].float()[:, :, None] / 255
     white = ((pictures == 1) | (alpha > 0)).all((0, 2, 3, 4))
@@ -109,7 +109,7 @@ def test_the_intrinsics_move_with_the_pictures_and_stay_where_they_stay(images, 
 
 
 def test_a_moved_object_keeps_its_shape_and_stays_within_the_shift(planes):
-    shifted, _ = moved(planes, rng())
+    shifted, _ = shift_and_scale(planes, rng())
     assert (shifted[:, :3] <= shifted[:, 3:] + 1e-5).all()  # the colours moved with the alpha
     reach = 1 + int(np.ceil(64 * MOST_SHIFT + MOST_SCALE * 32))
     grown = max_pool2d(planes[:, 3:], 2 * reach + 1, 1, reach)
@@ -122,16 +122,17 @@ def test_a_moved_object_keeps_its_shape_and_stays_within_the_shift(planes):
 def test_objects_are_moved_each_in_its_own_way_and_by_up_to_two_pixels():
     dot = torch.zeros(400, 4, 64, 64)
     dot[:, :, 31:33, 31:33] = 1  # about the middle, which a change of scale leaves where it is
-    centers = centers_of(moved(dot, rng())[0])
+    centers = centers_of(shift_and_scale(dot, rng())[0])
     away = (centers - 32).abs().amax(dim=1)
     assert (away <= 64 * MOST_SHIFT + 0.1).all()
     assert (away > 64 * MOST_SHIFT - 0.3).all()
     assert len(centers.round(decimals=3).unique(dim=1)[0]) > 390
 
 
-@pytest.mark.parametrize('kind', sorted(set(appearance.BACKGROUNDS) - {'black'}))
+@pytest.mark.parametrize('kind', sorted(set(posed_augmentation.BACKGROUNDS) - {'black'}))
 def test_a_background_fills_every_view_and_no_two_sequences_are_alike(kind, views):
-    drawn = appearance.BACKGROUNDS[kind](views, LENGTH, 8, rng()).expand(LENGTH, 8, 3, 64, 64)
+    draw = posed_augmentation.BACKGROUNDS[kind]
+    drawn = draw(views, LENGTH, 8, rng()).expand(LENGTH, 8, 3, 64, 64)
     assert 0 <= drawn.min() < drawn.max() <= 1
     for other in range(1, 8):
         assert (drawn[:, 0] != drawn[:, other]).any()

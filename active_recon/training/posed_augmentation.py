@@ -1,9 +1,9 @@
-"""What cameras of any kind would see of rendered views: rooms, darkness, noise, cut images."""
+"""Augmentation of posed views: backgrounds, tables, light, noise, cropped images, pose errors."""
 
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.network import Cameras
-from active_recon.training import variation
-from active_recon.training.tables import tables
+from active_recon.training import augmentation
+from active_recon.training.tables import draw_tables
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -12,32 +12,32 @@ from torch.nn import functional
 
 SHARES = {'white': 0.16, 'plain': 0.12, 'gradient': 0.08, 'noise': 0.1, 'clutter': 0.14,
           'pieces': 0.12, 'tiles': 0.1, 'black': 0.11, 'dark': 0.07}
-"""The share of the sequences that stand before each kind of background."""
+"""The fraction of the sequences that have each kind of background."""
 MOST_TURN, MOST_SHIFT = np.radians(1.0), 0.01
-"""How far poses are off: radians, and shares of the distance."""
+"""The largest pose errors: radians, and a fraction of the distance."""
 _CUT_SHARE, _MOST_CUT = 0.12, 0.4  # of the views, and of a view's side
 _TABLE_SHARE = 0.3  # of the sequences
 _NOISE, _DARKEST, _BRIGHTEST = 0.03, 0.6, 2.2
 
 
-def pictured(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, views: ViewSet,
-             rng: np.random.Generator) -> Tensor:
+def augment_posed(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, views: ViewSet,
+                  rng: np.random.Generator) -> Tensor:
     """
-    Return premultiplied images (T, B, S, S, 4) uint8 as pictures (T, B, 4, S, S) in [0, 1].
+    Return augmented images (T, B, 4, S, S) in [0, 1] of premultiplied ones (T, B, S, S, 4) uint8.
 
-    Some objects, of voxels (B, R, R, R), stand on a table. The fourth channel is `seen`
-    (T, B, S, S) bool, which pixels there are, of which some views lose more: their image ends
-    earlier. What is random comes from `rng` alone.
+    Some objects, of voxels (B, R, R, R), stand on a table. The fourth channel is 1 where the
+    image has the pixel: `seen` (T, B, S, S) bool, less what is cropped from some views. `rng` is
+    the only source of randomness.
     """
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
-    planes[:, :, :3] = variation.recolored(planes, rng)
-    kinds = variation.draw_kinds(SHARES, size, rng)
-    behind = variation.drawn_backgrounds(kinds, BACKGROUNDS, views, length, rng)
+    planes[:, :, :3] = augmentation.jitter_colors(planes, rng)
+    kinds = augmentation.draw_kinds(SHARES, size, rng)
+    behind = augmentation.draw_backgrounds(kinds, BACKGROUNDS, views, length, rng)
     on_table = torch.from_numpy(np.flatnonzero(rng.random(size) < _TABLE_SHARE))
     if len(on_table):
-        table = tables(Cameras(cameras.poses[:, on_table], cameras.intrinsics[:, on_table]),
-                       voxels[on_table], side, rng)
+        table = draw_tables(Cameras(cameras.poses[:, on_table], cameras.intrinsics[:, on_table]),
+                            voxels[on_table], side, rng)
         behind[:, on_table] = behind[:, on_table] * (1 - table[:, :, 3:]) + table[:, :, :3]
     # Shadows are deepened or lifted on the object alone, so that black stays black
     gamma = _tensor(np.exp(rng.uniform(np.log(_DARKEST), np.log(_BRIGHTEST), (size, 1, 1, 1))))
@@ -45,7 +45,7 @@ def pictured(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, vie
     color = (planes[:, :, :3] / alpha.clamp(min=1e-3)).clamp_(1e-4, 1).pow(gamma) * alpha
     pictures = behind.mul_(1 - alpha).add_(color)
     away = torch.from_numpy(np.flatnonzero(kinds != 'white'))
-    pictures[:, away] *= variation.light(len(away), side, rng)
+    pictures[:, away] *= augmentation.light(len(away), side, rng)
     pictures = _blurred(pictures, rng)
     level = _tensor(rng.uniform(0, _NOISE, (size, 1, 1, 1)) * (rng.random((size, 1, 1, 1)) < 0.5))
     grain = rng.standard_normal((length, size, 1, side, side), np.float32)
@@ -53,8 +53,8 @@ def pictured(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, vie
     return with_seen(pictures.clamp_(0, 1), seen & _uncut(length, size, side, rng))
 
 
-def misplaced(cameras: Cameras, rng: np.random.Generator) -> Cameras:
-    """Return cameras (T, B, ...) with poses a little off, as real rigs are; half of the rows."""
+def perturb_poses(cameras: Cameras, rng: np.random.Generator) -> Cameras:
+    """Return cameras (T, B, ...) with small pose errors in half of the sequences."""
     shape = cameras.poses.shape[:2]
     off = np.where(rng.random(shape[1]) < 0.5, 1.0, 0.0)[None, :, None]
     angles = rng.uniform(-1, 1, (*shape, 3)) / np.sqrt(3) * MOST_TURN * off
@@ -99,7 +99,7 @@ def _black(views: ViewSet, length: int, count: int, rng: np.random.Generator) ->
 
 def _dark(views: ViewSet, length: int, count: int, rng: np.random.Generator) -> Tensor:
     """Return noise in the dark, (T, count, 3, S, S)."""
-    return variation.BACKGROUNDS['noise'](views, length, count, rng) * _tensor(
+    return augmentation.BACKGROUNDS['noise'](views, length, count, rng) * _tensor(
         rng.uniform(0.02, 0.3, (count, 1, 1, 1)))
 
 
@@ -122,6 +122,6 @@ def _tensor(numbers: NDArray[np.float64]) -> Tensor:
     return torch.from_numpy(numbers.astype(np.float32))
 
 
-BACKGROUNDS: dict[str, variation.Background] = {
-    **variation.BACKGROUNDS, 'black': _black, 'dark': _dark, 'tiles': _tiles}
-"""See `variation.BACKGROUNDS`."""
+BACKGROUNDS: dict[str, augmentation.Background] = {
+    **augmentation.BACKGROUNDS, 'black': _black, 'dark': _dark, 'tiles': _tiles}
+"""See `augmentation.BACKGROUNDS`."""
