@@ -112,8 +112,10 @@ def _image_msg(pixels: NDArray[Any], encoding: str,
 def _layout(msg: Image) -> tuple[np.dtype[Any], int]:
     """Return the type of the values and their number in a pixel."""
     if msg.encoding not in ENCODINGS:
+        hint = ('; debayer it first, for example with image_proc'
+                if msg.encoding.startswith('bayer_') else '')
         raise MessageError(f'unknown image encoding: expected one of {", ".join(ENCODINGS)}, '
-                           f'got {msg.encoding!r}', 'encoding')
+                           f'got {msg.encoding!r}{hint}', 'encoding')
     return ENCODINGS[msg.encoding]
 
 

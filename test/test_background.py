@@ -1,6 +1,12 @@
 """The object is told from the room by a mask, by an image of the empty scene, or by a colour."""
 
-from active_recon.acquisition.background import Background, off_color, off_reference, on_white
+from active_recon.acquisition.background import (
+    Background,
+    main_part_share,
+    off_color,
+    off_reference,
+    on_white,
+)
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.geometry.canonical import canonical_image
@@ -97,6 +103,15 @@ def test_holes_through_the_object_show_the_background():
     found = off_color(composite(ring, uneven(GREEN)), GREEN)
     assert not found[160, 160]
     assert iou(found, truth(ring), (-2, -1)) > 0.99
+
+
+def test_an_object_partly_of_the_background_s_color_is_in_pieces():
+    pillar = np.full((SIDE, SIDE, 3), GREEN, np.uint8)
+    pillar[40:280, 140:180] = (200, 30, 30)
+    whole = Background('color', GREEN).cleared(pillar)
+    assert main_part_share(whole) == 1
+    pillar[140:180, 140:180] = GREEN
+    assert main_part_share(Background('color', GREEN).cleared(pillar)) == pytest.approx(0.5, 0.02)
 
 
 def test_a_speck_of_noise_is_no_part_of_the_object():

@@ -46,6 +46,11 @@ def encoded(image, encoding, bigendian):
     return np.dstack([pixels, opaque]) if encoding.endswith('a8') else pixels
 
 
+def test_a_raw_sensor_s_image_is_rejected_with_what_to_do():
+    with pytest.raises(MessageError, match="got 'bayer_rggb8'; debayer it first"):
+        image_from_msg(message(np.zeros((2, 3), np.uint8), 'bayer_rggb8'))
+
+
 @pytest.mark.parametrize('seed', range(6))
 @pytest.mark.parametrize('bigendian', [False, True])
 @pytest.mark.parametrize('encoding', ENCODINGS)

@@ -22,6 +22,8 @@ _SHADES = 0.4, 1.6  # the background's brightness in the weakest and the stronge
 _EDGE = 0.35  # of what its neighbours stand out: less is a pixel that shows a bit of the object
 _SMALLEST_PART = 0.02  # of the object's largest part; smaller ones are noise
 _LARGEST_HOLE = 0.005  # of the object; through a larger one the background is seen
+WHOLE_SHARE = 0.7
+"""Less than this in one part (see `main_part_share`) is worth a warning."""
 _SMALLEST_OBJECT, _LARGEST_OBJECT = 0.0005, 0.95  # of the image
 
 
@@ -65,6 +67,17 @@ class Background:
             raise ViewError('expected an image of the empty scene before the first view, got '
                             'none; empty the scene and call capture_background', 'no_reference')
         return on_white(image, off_reference(image, reference))
+
+
+def main_part_share(cleared: NDArray[np.uint8]) -> float:
+    """
+    Return the share of the largest connected part in what is not white, in (0, 1].
+
+    Far below 1 where parts of the object were taken for background: an object of the background's
+    colour falls to pieces.
+    """
+    _, areas = _parts(np.asarray((cleared < 255).any(axis=2)))
+    return float(areas.max(initial=0) / max(areas.sum(), 1))
 
 
 def check_color(color: Sequence[int], tolerance: float) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import time
 import uuid
 
+from active_recon.acquisition.background import main_part_share, WHOLE_SHARE
 from active_recon.acquisition.view_gate import ViewGate
 from active_recon.errors import DataError, MessageError
 from active_recon.geometry.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
@@ -35,6 +36,8 @@ from msg_tools.goals import view_goal_from_msg
 from msg_tools.images import mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.views import View, ViewJoiner
+import numpy as np
+from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -225,6 +228,7 @@ class ReconstructorNode(ManagedNode):
         mask = None if view.mask is None else mask_from_msg(view.mask)
         image = self._background.cleared(view.image, mask, self._capture.reference)
         reconstruction = self._reconstructor.add_view(image, view.camera)
+        self._check_background(image)
         self._gate.took(view.camera)
         self._check_elevation(view.camera)
         self._reconstruction = reconstruction
@@ -236,6 +240,14 @@ class ReconstructorNode(ManagedNode):
                                     at_once=False)
         self._publisher.publish_view(
             view.stamp, view.camera.pose, reconstruction, None if image is view.image else image)
+
+    def _check_background(self, image: NDArray[np.uint8]) -> None:
+        if self._background.how in ('color', 'reference') and (
+                share := main_part_share(image)) < WHOLE_SHARE:
+            self._diagnostics.warn('background', (
+                'the object is in pieces once its background is removed, the largest of them '
+                f'{share:.0%} of it: is part of the object of the same colour as the background? '
+                'see view_image; a mask or another background colour may help'))
 
     def _check_elevation(self, camera: Camera) -> None:
         away = camera.elevation - CANONICAL_ELEVATION

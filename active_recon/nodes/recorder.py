@@ -124,14 +124,20 @@ class RecorderNode(QosWarnings):
             self._diagnostics.warn(f'lost{topic}', (
                 f'{topic}: expected every message that was published, {lost} were lost in '
                 "transport; is the connection too slow, or the middleware's buffer too small?"))
-        if self._stop_when_done and info['source_timestamp'] >= self._begun_at:
+        if info['source_timestamp'] >= self._begun_at:
             self._check_done(topic, data)
 
     def _check_done(self, topic: str, data: bytes) -> None:
         if topic in self._topics.named('done') and self._inputs.message_type(topic) is Header:
             with self._diagnostics.rejecting():
                 _, reason = done_from_msg(deserialize_message(data, Header))
-                self._updates_left = _UPDATES_AFTER_DONE if reason else 0
+                if self._stop_when_done:
+                    self._updates_left = _UPDATES_AFTER_DONE if reason else 0
+                elif reason:
+                    self.get_logger().info(
+                        'the episode is done; the recording goes on with '
+                        f'{self._disk.megabytes_per_s:.1f} MB/s until `stop` is called; '
+                        'stop_when_done:=true ends it with the episode')
 
     def _stop_if_done(self) -> None:
         """End the recording some time after the episode is done."""

@@ -34,7 +34,7 @@ class ViewerNode(QosWarnings):
         super().__init__('viewer')
         self._params = Parameters(self, ViewerParameters).values
         self._diagnostics = Diagnostics(self)
-        self._loop = self._with_overrides(Loop(self.get_namespace()))
+        self._loop = self._with_overrides(Loop(self.get_namespace(), has_size=False))
         self._page = Page('active_recon, live', self._loop.object_size, self._params.port)
         for label, hint in BUTTONS.values():
             self._page.add_button(label, hint)
@@ -57,6 +57,7 @@ class ViewerNode(QosWarnings):
         own = {name: self.resolve_topic_name(name) for name in (*TOPICS, *BUTTONS)}
         return replace(
             loop, object_size=loop.object_size if math.isnan(size) else size,
+            has_size=loop.has_size or not math.isnan(size),
             object_frame=frame or loop.object_frame,
             names={name: loop.full_name(name) if full == f'{own_namespace}/{name}' else full
                    for name, full in own.items()})

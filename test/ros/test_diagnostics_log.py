@@ -43,6 +43,13 @@ def test_a_trouble_that_comes_and_goes_is_said_with_its_end_once_in_a_while(benc
                         'INFO over: nothing comes']
 
 
+def test_the_end_of_a_trouble_is_said_without_what_was_to_be_done(bench, clock, said):
+    diagnostics = Diagnostics(bench.node)
+    diagnostics.raise_warning('silent', 'nothing comes; is the camera on?')
+    diagnostics.clear_warning('silent')
+    assert said == ['WARN nothing comes; is the camera on?', 'INFO over: nothing comes']
+
+
 def test_a_trouble_that_stays_is_said_although_one_of_its_kind_was_said_just_before(
         bench, clock, said):
     diagnostics = Diagnostics(bench.node)

@@ -357,6 +357,15 @@ def test_a_recording_that_shall_stop_by_itself_ends_with_its_episode(bench, star
     assert bench.call('start').success
 
 
+def test_a_recording_that_goes_on_after_its_episode_says_so(bench, start_node, tmp_path):
+    recorder = start_node('recorder', output_dir=tmp_path / 'bags', topics="['done']")
+    done = publish(bench, Header, 'done', LATCHED_QOS, [])
+    done.publish(Header(frame_id='max_views'))
+    recorded(bench, 1)
+    bench.until(lambda: recorder.log('INFO.*the episode is done; the recording goes on'), 'it')
+    assert bench.counts('recorder').get('recording') == 1
+
+
 def test_the_recorder_tells_how_fast_it_fills_the_disk(bench, start_node, tmp_path):
     start_node('recorder', output_dir=tmp_path / 'bags', topics="['camera/image_raw']")
     publisher = publish(bench, Image, 'camera/image_raw', STREAM_QOS)

@@ -19,13 +19,15 @@ class Loop:
     """
     A loop as its nodes' parameters describe it; what is not known has its default.
 
-    `object_size` is in metres; `names` are the full names of topics, by the nodes' own names.
+    `object_size` is in metres, a guess unless the loop `has_size`; `names` are the full names of
+    topics, by the nodes' own names.
     """
 
     namespace: str
     object_size: float = 1.0
     object_frame: str = OBJECT_FRAME
     names: Mapping[str, str] = field(default_factory=dict)
+    has_size: bool = True
 
     def full_name(self, name: str) -> str:
         """Return the full name of a topic or a service."""

@@ -142,12 +142,16 @@ class LoopSubscriber:
         self._join('view', msg.header, self._camera(msg))
 
     def _on_occupancy(self, msg: PointCloud2) -> None:
+        if not self._loop.has_size:  # it is latched: the next subscriber receives it again
+            return
         latency = (self._message_received - nanoseconds_from_stamp(msg.header.stamp)) / 1e9
         grid = voxel_grid_from_msg(msg, self._loop.object_size)
         self._join('occupancy', msg.header, (grid, latency))
 
     def _on_probabilities(self, msg: PointCloud2) -> None:
-        self._join('probabilities', msg.header, voxel_grid_from_msg(msg, self._loop.object_size))
+        if self._loop.has_size:
+            self._join(
+                'probabilities', msg.header, voxel_grid_from_msg(msg, self._loop.object_size))
 
     def _join(self, name: str, header: Header, part: object) -> None:
         stamp = nanoseconds_from_stamp(header.stamp)

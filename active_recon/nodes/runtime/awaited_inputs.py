@@ -54,8 +54,9 @@ class AwaitedInputs:
 
     def clear(self) -> None:
         """Expect nothing any more."""
-        for name in list(self._awaited):
-            self.received(name)
+        for name in self._awaited:
+            self._diagnostics.clear_warning(_warning(name), log=False)
+        self._awaited.clear()
 
     def _check(self) -> None:
         self._checks += 1

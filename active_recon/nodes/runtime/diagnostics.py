@@ -95,15 +95,16 @@ class Diagnostics:
         if kind not in self._logged_warnings and self._log(f'warned/{kind}', message):
             self._logged_warnings.add(kind)
 
-    def clear_warning(self, kind: str) -> None:
-        """Clear a warning, and log that it is over if it was logged."""
+    def clear_warning(self, kind: str, log: bool = True) -> None:
+        """Clear a warning, and log that it is over if it was logged and `log`."""
         message = self._warnings.pop(kind, None)
         if message is None:
             return
         self._changed = True
         if kind in self._logged_warnings:
             self._logged_warnings.discard(kind)
-            self._node.get_logger().info(f'over: {message}')
+            if log:  # what was to be done about it is no longer of interest
+                self._node.get_logger().info(f'over: {message.partition("; ")[0]}')
         else:
             self._unlogged[f'warned/{kind}'] += 1
 
