@@ -75,6 +75,17 @@ def test_mesh_that_sticks_out_of_the_cube_is_cut_and_the_page_says_so(run, tmp_p
         TruthFile(tmp_path / 'far.ply').read(run)
 
 
+def test_a_mesh_with_a_hole_is_a_shell_and_the_page_says_so(run, tmp_path):
+    box = trimesh.creation.box((0.6, 0.6, 0.6))
+    box.export(tmp_path / 'whole.ply')
+    box.update_faces(np.arange(len(box.faces)) > 1)
+    box.export(tmp_path / 'open.ply')
+    whole, shell = (TruthFile(tmp_path / f'{name}.ply').read(run) for name in ('whole', 'open'))
+    assert shell.cells.sum() < whole.cells.sum() / 4
+    assert 'only its surface counts as solid' in shell.placed
+    assert 'surface' not in whole.placed
+
+
 def test_axes_of_the_true_mesh_are_options(run, tmp_path):
     box = trimesh.creation.box(bounds=[(0, 0, 0), (0.1, 0.1, 0.4)])
     box.export(tmp_path / 'stick.ply')

@@ -72,8 +72,8 @@ def report(
                 read_run(bag, topics, scene), scene, named, episode, model, len(subjects))
             advance(1, bag.name)
     for subject in subjects if files else ():
-        typer.echo(f'{subject.letter}: IoU ' + ' '.join(
-            f'{value:.2f}' for value in subject.ious if value is not None))
+        ious = ' '.join(f'{value:.2f}' for value in subject.ious if value is not None)
+        typer.echo(f'{subject.letter}: IoU {ious}. {subject.placed}')
     write_page(report_page(subjects), path)
     typer.echo(f'wrote {path} ({path.stat().st_size / 1e6:.1f} MB)')
 

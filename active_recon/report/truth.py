@@ -13,6 +13,7 @@ from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import read_binvox, RESOLUTION, turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 import trimesh
 
 _SAME_SIDE = 0.01  # of a binvox and of the run's cube, as a share
@@ -68,9 +69,12 @@ class TruthFile:
                 f"reaches from {low} to {high} m. Meshes are in metres and in the object's "
                 'frame; --fit centres and scales one, --object-size sets the cube')
         outside = f' {100 * (1 - inside):.0f} % of its surface is outside of the cube.'
-        return Truth(_in_place(mesh, _resolution(run)),
-                     f'The true shape is {file.name}, in metres and in the '
-                     f"object's frame.{outside if inside < 1 else ''}")
+        cells = _in_place(mesh, _resolution(run))
+        hollow = ('' if mesh.is_watertight or binary_erosion(cells).any() else
+                  ' The mesh has holes and encloses nothing: only its surface counts as solid, '
+                  'and the IoU is too low; close its holes.')
+        return Truth(cells, f'The true shape is {file.name}, in metres and in the '
+                            f"object's frame.{outside if inside < 1 else ''}{hollow}")
 
     def _of_binvox(self, run: RecordedRun, size: float) -> Truth:
         grid, resolution = read_binvox(self.path), _resolution(run)
