@@ -156,12 +156,12 @@ def test_a_click_is_heard_once_and_a_button_can_be_out_of_reach(page, chromium):
 def test_the_last_view_is_shown_as_the_network_saw_it(page, chromium):
     opened(chromium, page.url)
     chromium.driver.find_element('css selector', '[role=tab][title="Network image"]').click()
-    chromium.until(lambda: 'as the network saw it' in chromium.text(), 'the tab')
+    chromium.until(lambda: 'as the network received it' in chromium.text(), 'the tab')
     observer = Observer()
     observer.set_network_image(1, np.full((96, 96, 3), (200, 30, 60), np.uint8))
     chromium.until(lambda: (page.draw(observer.state), chromium.run(_IMAGES))[1] == [[96, 96]],
                    'the image')
-    assert 'as the network saw it' not in chromium.text()
+    assert 'as the network received it' not in chromium.text()
     observer.begin_episode('next', 2)
     chromium.until(lambda: (page.draw(observer.state), chromium.run(_IMAGES))[1] == [],
                    'no image of the next episode yet')
@@ -258,5 +258,5 @@ def test_a_bag_plays_to_its_end_and_then_from_the_first_view(playback, chromium)
 
 
 def test_a_run_without_a_view_is_refused(tmp_path):
-    with pytest.raises(DataError, match='no view was taken'):
+    with pytest.raises(DataError, match='the run has none'):
         Playback(recorded_run(tmp_path, []))

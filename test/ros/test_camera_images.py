@@ -146,7 +146,7 @@ def test_a_damaged_image_is_refused_and_the_next_one_is_a_view(
             2.0, lambda: shared_bench.counts('reconstructor').get('refused/encoding'))
 
     shared_bench.until(refused, 'the damaged image to be refused')
-    assert reconstructor.log('refused: expected a compressed image as JPEG or PNG')
+    assert reconstructor.log('refused: compressed image not readable: expected JPEG or PNG')
 
     def send():
         image, info, pose = camera.messages()

@@ -58,7 +58,7 @@ def test_what_is_refused_is_told_at_once_but_not_in_a_flood_and_its_warning_ends
     stamps = [nanoseconds_from_stamp(msg.header.stamp) / 1e9 for msg in told]
     assert min(np.diff(stamps)) < 0.5  # without news it is a second
     assert len(stamps) <= 10 * (stamps[-1] - stamps[0]) + 3
-    said = "frame 'object', got 'map'"
+    said = "expected 'object', got 'map'"
     assert said in bench.state('reconstructor').problem
     bench.until(lambda: said not in bench.state('reconstructor').problem, 'its end')
 

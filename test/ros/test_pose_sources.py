@@ -178,7 +178,7 @@ def test_a_joint_that_is_not_there_or_nowhere_is_refused_and_said(bench, start_n
         return counted
 
     bench.until(refused('arm', 1.0), 'the other joint to be refused')
-    assert node.log('refused: expected a position of table, got 1 of arm')
+    assert node.log('refused: no joint position: expected one of table, got 1 of arm')
     bench.until(refused('table', float('nan')), 'the position to be refused')
 
 

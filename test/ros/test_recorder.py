@@ -382,11 +382,11 @@ def test_the_recorder_tells_how_fast_it_fills_the_disk(bench, start_node, tmp_pa
 
 def test_messages_that_were_lost_in_transport_are_told():
     gaps = SequenceGaps()
-    gaps.published_by('view', {b'one'})
+    gaps.set_publishers('view', {b'one'})
     assert [gaps.before('view', number) for number in (4, 5, 8)] == [0, 0, 2]
-    gaps.published_by('view', {b'one', b'two'})
+    gaps.set_publishers('view', {b'one', b'two'})
     assert [gaps.before('view', number) for number in (9, 3, 30)] == [0, 0, 0]
-    gaps.published_by('view', {b'two'})
+    gaps.set_publishers('view', {b'two'})
     assert [gaps.before('view', number) for number in (31, 33)] == [0, 1]
-    gaps.listened_anew('view')
+    gaps.restart('view')
     assert gaps.before('view', 33) == 0
