@@ -22,7 +22,7 @@ from active_recon.evaluation.posed.robustness import (
 from active_recon.evaluation.posed.scene import chosen_folders, read_scene
 from active_recon.evaluation.posed.scoring import pooled, scored, target
 from active_recon.evaluation.posed.study import Extent, study_set
-from active_recon.evaluation.posed.summary import markdown, robustness_figures, told
+from active_recon.evaluation.posed.summary import figure, markdown, robustness_figures
 from active_recon.models.carving import Carving
 from active_recon.models.lifted import projected, projection
 from active_recon.volumes.voxels import iou, turned
@@ -219,9 +219,9 @@ def test_the_nearest_image_of_a_known_object_is_its_own(made, scene):
 
 def test_intervals_leave_out_what_was_not_measured():
     values = np.array([0.2, np.nan, 0.4])
-    assert told(values)['objects'] == 2 and told(values)['mean'] == pytest.approx(0.3)
-    assert told(values, np.array([0.1, 0.1, np.nan]))['objects'] == 1
-    assert told(np.full(3, np.nan)) is None
+    assert figure(values)['objects'] == 2 and figure(values)['mean'] == pytest.approx(0.3)
+    assert figure(values, np.array([0.1, 0.1, np.nan]))['objects'] == 1
+    assert figure(np.full(3, np.nan)) is None
 
 
 def test_a_study_says_all_of_a_folder_and_can_be_written(made, carving, paper):

@@ -30,7 +30,7 @@ _SMALLEST_OBJECT, _LARGEST_OBJECT = 0.0005, 0.95  # of the image
 @dataclass(frozen=True)
 class Background:
     """
-    How the object is told from its background: one of `BACKGROUNDS`.
+    How the object is separated from its background: one of `BACKGROUNDS`.
 
     `color` (red, green, blue, 0 to 255) and `tolerance` are of the colour key. Raises ConfigError
     where one of them cannot be used.

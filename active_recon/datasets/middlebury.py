@@ -84,12 +84,12 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
 def _box(folder: Path, box: Sequence[float] | None) -> NDArray[np.float64]:
     """Return the least and the greatest corner, (2, 3)."""
     if box is None:
-        told = [found for path in sorted(folder.glob('README*'))
+        read = [found for path in sorted(folder.glob('README*'))
                 for found in _CORNER.findall(path.read_text(errors='replace'))]
-        if len(told) != 2:
+        if len(read) != 2:
             raise DataError(f"{folder}: expected the corners of the object's box as two lines "
-                            f'(x y z) in README.txt, found {len(told)}; give them by --box')
-        box = [float(number) for corner in told for number in corner]
+                            f'(x y z) in README.txt, found {len(read)}; give them by --box')
+        box = [float(number) for corner in read for number in corner]
     corners = np.array(box, np.float64)
     if corners.size != 6 or not np.isfinite(corners).all() or (
             corners[:3] >= corners[3:]).any():

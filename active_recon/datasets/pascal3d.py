@@ -35,7 +35,7 @@ def list_photographs(root: Path, categories: Sequence[str] = ()) -> tuple[
     Return the photographed objects of some categories (default: all), and what was left out.
 
     Objects that are truncated, occluded or difficult are left out, as is usual, and what lacks a
-    viewpoint or cannot be read; each is told with its reason. Raises DataError where the folder
+    viewpoint or cannot be read; each is reported with its reason. Raises DataError if the folder
     is not PASCAL3D+, or has no such category.
     """
     for name in ('Annotations', 'Images', 'CAD'):

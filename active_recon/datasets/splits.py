@@ -33,7 +33,7 @@ def list_split(root: Path, split: Path | str, part: str) -> Listed:
     `split` is a published split file or 'sorted', which cuts every category's sorted ids by
     `PORTIONS`; `part` is train, val or test. A file holds, for each category, a record of
     `taxonomy_id` (the folder's name) and of lists of ids `train`, `val` and `test`: a list of
-    records, or an object of them by their id. Each object that is missing is told in a line of
+    records, or an object of them by their id. Each object that is missing is reported in a line of
     its own. Raises DataError where the file is none such or none of its objects is there,
     ConfigError on another part.
     """

@@ -44,8 +44,8 @@ def reliability(occupancy: NDArray[np.floating], truth: Cells,
 
 def calibration_error(diagram: NDArray[np.float64]) -> float:
     """Return the expected calibration error of a diagram (3, bins): 0 is perfect, 1 the worst."""
-    count, told, full = diagram
-    return float(np.abs(told - full).sum() / count.sum()) if count.any() else 0.0
+    count, expected, full = diagram
+    return float(np.abs(expected - full).sum() / count.sum()) if count.any() else 0.0
 
 
 def fit_temperatures(logits_by_count: Mapping[int, NDArray[np.floating]],

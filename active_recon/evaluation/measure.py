@@ -141,7 +141,7 @@ def iou_by_yaw(
     Return the single-view IoU where the front stands turned by each of YAWS_DEG.
 
     Every other episode's is turned to the right. The images stay as they are; the truth turns,
-    and so does the azimuth that the network is told, if it listens.
+    and so does the azimuth that the network is given, if it uses it.
     """
     found: dict[int, list[float]] = {yaw: [] for yaw in YAWS_DEG}
     observer = Observer(network, views)

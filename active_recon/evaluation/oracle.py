@@ -1,4 +1,4 @@
-"""What a policy could gain: views chosen by one who is told the truth."""
+"""What a policy could gain: views chosen with knowledge of the truth."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

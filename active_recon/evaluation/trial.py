@@ -116,8 +116,8 @@ def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
 
 
 def _folder(cache: Path, identity: dict[str, Any]) -> Path:
-    told = json.dumps(identity, indent=1)
-    folder = cache / hashlib.sha256(told.encode()).hexdigest()[:16]
+    text = json.dumps(identity, indent=1)
+    folder = cache / hashlib.sha256(text.encode()).hexdigest()[:16]
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / 'identity.json').write_text(told + '\n')
+    (folder / 'identity.json').write_text(text + '\n')
     return folder

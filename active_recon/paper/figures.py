@@ -103,14 +103,14 @@ def make9(study: Study) -> Result:
 def claims9(found: Mapping[str, Measured]) -> list[Claim]:
     """Return whether entropy falls and IoU rises faster under attention than at random."""
     chosen, random = (found[policy] for policy in _POLICIES)
-    told = [larger(
+    results = [larger(
         f'{label} falls more under attention than at random',
         mean_interval(getattr(random, kind)[..., -1] - getattr(chosen, kind)[..., -1]),
         'at random minus under attention after the last view, nats')
         for label, kind in (("The paper's entropy", 'paper_entropy'), ('Entropy', 'entropy'))]
-    return [*told, larger('IoU is higher under attention than at random',
-                          mean_interval(chosen.iou[..., -1] - random.iou[..., -1]),
-                          'attention minus random after the last view')]
+    return [*results, larger('IoU is higher under attention than at random',
+                             mean_interval(chosen.iou[..., -1] - random.iou[..., -1]),
+                             'attention minus random after the last view')]
 
 
 def inputs10(study: Study) -> dict[str, Any]:

@@ -61,9 +61,9 @@ def make(study: Study) -> Result:
     tables += [yaw_table(study, rows), cost_table(study, rows)]
     octree = octree_table(study, rows)
     tables += [octree] if octree else []
-    told = [same_training({row.label: read_card(row.weights) for row in rows
-                           if row.rival or row.label in (_OWN, JOINT.label)}),
-            *claims(rows, found)]
+    results = [same_training({row.label: read_card(row.weights) for row in rows
+                              if row.rival or row.label in (_OWN, JOINT.label)}),
+               *claims(rows, found)]
     text = (
         'IoU of a single view on objects that were not trained on, by category. All systems are '
         'asked about the same views; what each learned from stands in the last tables. The mean '
@@ -74,7 +74,7 @@ def make(study: Study) -> Result:
         f'is one, and not compared. {_last_row(rows)}Where the published columns have a mean, it '
         'is ours, of the thirteen printed figures. Brackets are 95 % intervals over '
         'objects and starts. Over several views, all systems see the same random ones.')
-    return Result('Table 3: single-view reconstruction by category', text, tables, told,
+    return Result('Table 3: single-view reconstruction by category', text, tables, results,
                   _picture(found['test'], categories), {
                       'iou': {name: {label: [plain(value) for value in per_view(one.iou)]
                                      for label, one in own.items()}
@@ -89,24 +89,24 @@ def _last_row(rows: Sequence[Compared]) -> str:
 
 def claims(rows: Sequence[Compared], found: Mapping[str, Mapping[str, Measured]]) -> list[Claim]:
     """Return what follows from the paired differences to every rival."""
-    told: list[Claim] = []
+    results: list[Claim] = []
     rivals = [row.label for row in rows if row.rival]
     for name, own in found.items():
         where = REAL.get(name, 'parametric test')
         for rival in rivals:
             gaps = own[_OWN].iou - own[rival].iou
-            told.append(all_larger(
+            results.append(all_larger(
                 f'2D-3D-attention is ahead of {rival} at every count of views ({where})',
                 {f'{view + 1}': mean_interval(gaps[..., view]) for view in range(gaps.shape[2])},
                 f'{_OWN} minus {rival} by the number of views'))
     test = found['test']
-    told.append(best_categories({label: test[label].iou[..., 0] for label in (_OWN, *rivals)},
-                                test[_OWN].categories))
-    told.append(larger(
+    results.append(best_categories({label: test[label].iou[..., 0] for label in (_OWN, *rivals)},
+                                   test[_OWN].categories))
+    results.append(larger(
         'Joint training is ahead of two stages at a single view',
         mean_interval(test[JOINT.label].iou[..., 0] - test[_OWN].iou[..., 0]),
         'joint minus two-stage at one view, parametric test'))
-    return told
+    return results
 
 
 def best_categories(single: Mapping[str, Values], categories: NDArray[np.str_]) -> Claim:

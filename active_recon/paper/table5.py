@@ -49,7 +49,7 @@ def claims(name: str, found: Mapping[str, Measured]) -> list[Claim]:
     """Return what follows for one folder of objects."""
     where, chosen = _NAMES[name], found['attention']
     last = chosen.iou[..., -1]
-    told = [
+    results = [
         larger(f'IoU rises with the views ({where})', mean_interval(last - chosen.iou[..., 0]),
                'last minus first view'),
         reaches(f'IoU of {AIM:g} at {chosen.iou.shape[2]} views ({where})',
@@ -58,11 +58,11 @@ def claims(name: str, found: Mapping[str, Measured]) -> list[Claim]:
              for category in np.unique(chosen.categories)}
     if 'bed' in means:
         lowest = min(means, key=lambda category: means[category])
-        told.append(Claim(
+        results.append(Claim(
             f'Beds are reconstructed the most poorly ({where})',
             HOLDS if lowest == 'bed' else FAILS,
             ', '.join(f'{category} {mean:.3f}' for category, mean in means.items()) + '.'))
-    return told
+    return results
 
 
 def _table(name: str, found: Mapping[str, Measured], views: list[int]) -> Table:

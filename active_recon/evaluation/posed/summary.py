@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Values = NDArray[np.float64]
-Told = dict[str, float] | None
+Figure = dict[str, float] | None
 """Mean, low, high (95 % over objects) and how many objects; None where nothing was measured."""
 
 
-def told(values: Values, others: Values | None = None) -> Told:
+def figure(values: Values, others: Values | None = None) -> Figure:
     """Return the interval of values (N,), or of how far they are ahead of others; NaN is none."""
     there = np.isfinite(values) if others is None else np.isfinite(values) & np.isfinite(others)
     if not there.any():
@@ -36,7 +36,7 @@ def entrant_figures(entrant: Entrant, measured: Measured) -> dict[str, Any]:
         'temperatures': {str(count): at for count, at in entrant.temperatures.items()},
         'grid_temperatures': {str(count): at
                               for count, at in entrant.grid_temperatures.items()},
-        **{kind: {name: [told(of_count) for of_count in values.T]
+        **{kind: {name: [figure(of_count) for of_count in values.T]
                   for name, values in of_kind.items()}
            for kind, of_kind in measured.values.items()},
         'own_ahead': _own_ahead(measured.values.get('random', {})),
@@ -44,24 +44,24 @@ def entrant_figures(entrant: Entrant, measured: Measured) -> dict[str, Any]:
                         for name, diagrams in measured.diagrams.items()}}
 
 
-def _own_ahead(values: Mapping[str, Values]) -> dict[str, list[Told]]:
+def _own_ahead(values: Mapping[str, Values]) -> dict[str, list[Figure]]:
     """Return by how much each object's own threshold is ahead of the fixed one, by name."""
-    return {name: [told(*pair) for pair in zip(own.T, values[f'iou_{name.rpartition("_")[2]}'].T,
+    return {name: [figure(*pair) for pair in zip(own.T, values[f'iou_{name.rpartition("_")[2]}'].T,
                                                strict=True)]
             for name, own in values.items() if 'own_iou_' in name}
 
 
 def ahead_figures(first: Measured, other: Measured) -> dict[str, Any]:
     """Return by how much the first entrant is ahead of another, paired, where both have it."""
-    return {kind: {name: [told(*pair) for pair in zip(values.T, other.values[kind][name].T,
+    return {kind: {name: [figure(*pair) for pair in zip(values.T, other.values[kind][name].T,
                                                       strict=True)]
                    for name, values in of_kind.items() if name in other.values[kind]}
             for kind, of_kind in first.values.items() if kind in other.values}
 
 
-def baseline_figures(rows: Sequence[Scores]) -> dict[str, Told]:
+def baseline_figures(rows: Sequence[Scores]) -> dict[str, Figure]:
     """Return the means of scores of objects, by name."""
-    return {name: told(np.array([row.get(name, np.nan) for row in rows]))
+    return {name: figure(np.array([row.get(name, np.nan) for row in rows]))
             for name in sorted({name for row in rows for name in row})}
 
 
@@ -92,7 +92,8 @@ def _beside(found: Sequence[Found]) -> dict[str, Any]:
     for name in found[0].disturbed:
         own, clean = (np.array([each[name] for each in part]) for part in (
             [one.disturbed for one in found], [one.clean for one in found]))
-        result[name] = {'figure': told(own), 'clean': told(clean), 'change': told(own, clean)}
+        result[name] = {'figure': figure(own), 'clean': figure(clean),
+                        'change': figure(own, clean)}
     return result
 
 
@@ -195,6 +196,6 @@ def _of_starts(values: Mapping[str, Sequence[float]]) -> list[str]:
         values['iou'], values['least'], values['greatest'], strict=True)]
 
 
-def _cell(values: Told) -> str:
+def _cell(values: Figure) -> str:
     return '-' if values is None else (
         f'{values["mean"]:.3f} [{values["low"]:.3f}, {values["high"]:.3f}]')
