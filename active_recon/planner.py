@@ -102,14 +102,15 @@ class Planner:
                  motion_weight: float = 0.0, elevation: float | None = None,
                  distance: float = CANONICAL_DISTANCE) -> None:
         if max_views < 1:
-            raise ConfigError(f'max_views: expected 1 or more, got {max_views}')
+            raise ConfigError(f'max_views: too few: expected 1 or more, got {max_views}')
         if not 0 <= entropy_tolerance < 1:
-            raise ConfigError(f'entropy_tolerance: expected a share in [0, 1), got '
+            raise ConfigError('entropy_tolerance: out of range: expected a share in [0, 1), got '
                               f'{entropy_tolerance}')
         if not math.isfinite(object_yaw):
-            raise ConfigError(f'object_yaw: expected finite radians, got {object_yaw}')
+            raise ConfigError(f'object_yaw: not finite: expected radians, got {object_yaw}')
         if not 0 <= motion_weight < math.inf:
-            raise ConfigError(f'motion_weight: expected 0 or more, got {motion_weight}')
+            raise ConfigError('motion_weight: out of range: expected 0 or more, got '
+                              f'{motion_weight}')
         self._policy = policy
         self._max_views = max_views
         self._entropy_tolerance = entropy_tolerance
@@ -185,8 +186,8 @@ class Planner:
         The arguments are those of `PlannerView`. Raises ViewError, and then nothing has changed.
         """
         if not (math.isfinite(entropy) and np.isfinite(latent).all()):
-            raise ViewError(f'expected a finite latent and entropy, got entropy {entropy}',
-                            'latent')
+            raise ViewError('latent or entropy not finite: expected finite numbers, got entropy '
+                            f'{entropy}', 'latent')
         before = self._ring
         self._look_from(camera)
         views = [*self._views, PlannerView(latent, camera, entropy, volume)]
@@ -213,7 +214,8 @@ class Planner:
         nothing was asked for yet.
         """
         if self._wanted is None:
-            raise ViewError('expected a goal before it is given up, got none', 'plan')
+            raise ViewError('no goal to give up: expected one before it is given up, got none',
+                            'plan')
         self._failed.append(goal)
         if camera is None:
             camera = self._views[-1].camera if self._views else goal
@@ -229,9 +231,9 @@ class Planner:
         """Return the goal after the views so far, whether or not the episode is done."""
         if self._goal is None:
             raise ViewError(
-                'expected an azimuth that can be reached; every one was given up in this episode'
+                'no azimuth can be reached: every one was given up in this episode'
                 if self._wanted else
-                'expected a view before a plan; this episode has none yet', 'plan')
+                'no view in this episode yet: expected one before a plan', 'plan')
         return self._goal
 
     def next_goal(self) -> Decision:
@@ -260,8 +262,8 @@ class Planner:
         """Let the policy choose after the last of some views."""
         last = views[-1]
         if last.volume is None and self._policy.wants_volume:
-            raise ViewError('expected the probabilities beside the latent, which this policy '
-                            'looks at, got none', 'volume')
+            raise ViewError('no probabilities: expected them beside the latent, as this policy '
+                            'looks at them, got none', 'volume')
         taken, candidates = (
             np.stack([each.turned(-self._yaw).pose for each in cameras])[None]
             for cameras in ([view.camera for view in views], self._ring))

@@ -41,9 +41,10 @@ class Reconstructor:
     def __init__(self, runtime: Runtime, object_size: float = 1.0, object_yaw: float = 0.0,
                  threshold: float | None = None) -> None:
         if not object_size > 0:
-            raise ConfigError(f'object_size: expected metres above 0, got {object_size}')
+            raise ConfigError('object_size: out of range: expected metres above 0, got '
+                              f'{object_size}')
         if not math.isfinite(object_yaw):
-            raise ConfigError(f'object_yaw: expected finite radians, got {object_yaw}')
+            raise ConfigError(f'object_yaw: not finite: expected radians, got {object_yaw}')
         self._runtime = runtime
         self.set_threshold(threshold)
         self.object_size = object_size
@@ -78,7 +79,8 @@ class Reconstructor:
         """Set the occupancy above which a cell is occupied; None is that of the weights."""
         threshold = self._runtime.threshold if threshold is None else threshold
         if not 0 < threshold < 1:
-            raise ConfigError(f'threshold: expected a probability in (0, 1), got {threshold}')
+            raise ConfigError('threshold: out of range: expected a probability in (0, 1), got '
+                              f'{threshold}')
         self.threshold = threshold
 
     def warm_up(self) -> None:

@@ -197,7 +197,7 @@ def test_an_image_that_is_to_stay_as_it_is_stays_so():
 
 
 @pytest.mark.parametrize(('how', 'kind', 'said'), [
-    ('mask', 'no_mask', "a mask of the image's stamp, got none"),
+    ('mask', 'no_mask', "no mask: expected a mask of the image's stamp, got none"),
     ('reference', 'no_reference', 'empty the scene and call capture_background')])
 def test_what_is_needed_to_tell_the_background_is_asked_for(how, kind, said):
     with pytest.raises(ViewError, match=said) as refusal:
@@ -206,5 +206,6 @@ def test_what_is_needed_to_tell_the_background_is_asked_for(how, kind, said):
 
 
 def test_a_way_to_tell_the_background_that_nobody_knows_is_refused():
-    with pytest.raises(ConfigError, match="background: expected one of as_is.*got 'magic'"):
+    with pytest.raises(ConfigError, match="background: unknown value: expected one of as_is.*got "
+                                          "'magic'"):
         Background('magic')

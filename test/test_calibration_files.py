@@ -24,7 +24,7 @@ def test_images_come_in_the_order_of_their_numbers(tmp_path):
 
 
 def test_folders_without_images_and_names_twice_are_refused(tmp_path):
-    with pytest.raises(DataError, match='found none'):
+    with pytest.raises(DataError, match='no images: .* found none'):
         image_paths([tmp_path])
     for folder in ('a', 'b'):
         (tmp_path / folder).mkdir()
@@ -36,7 +36,7 @@ def test_folders_without_images_and_names_twice_are_refused(tmp_path):
 def test_a_file_that_is_no_image_is_refused_by_name(tmp_path):
     (tmp_path / 'no.png').write_bytes(b'nothing')
     for path in (tmp_path / 'no.png', tmp_path / 'nowhere.png'):
-        with pytest.raises(DataError, match=f'{path.name}: expected an image'):
+        with pytest.raises(DataError, match=f'{path.name}: not readable: expected an image'):
             read_image(path)
 
 
@@ -60,9 +60,10 @@ def test_angles_belong_to_their_images(tmp_path, text):
 
 @pytest.mark.parametrize(('text', 'said'), [
     ('a2.png,45\n', 'none of a10.png'),
-    ('45\n', 'for each of the 2 images, .* got 1'),
+    ('45\n', 'rows do not fit the images: .* each of the 2 images, .* got 1'),
     ('a2.png,45\n90\n', 'rows that begin with their names'),
-    ('a2.png,45\na10.png,ninety\n', r'line 2: expected 1 numbers, .* got a10.png, ninety'),
+    ('a2.png,45\na10.png,ninety\n', r'line 2: wrong row: expected 1 numbers, .* got a10.png, '
+                                    r'ninety'),
     ('a2.png,45\na10.png,inf\n', 'line 2'),
     ('a2.png,45,3\na10.png,90,3\n', 'line 1'),
     ('', 'none of a2.png, a10.png'),
@@ -88,5 +89,5 @@ def test_a_quaternion_that_is_no_unit_is_refused(tmp_path):
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(DataError, match='nowhere.csv: expected a CSV file'):
+    with pytest.raises(DataError, match='nowhere.csv: not readable: expected a CSV file'):
         read_angles(tmp_path / 'nowhere.csv', NAMES)

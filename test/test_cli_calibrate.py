@@ -126,7 +126,7 @@ def test_a_lens_of_other_images_is_refused(folder):
     text = (folder / 'lens.yaml').read_text()
     (folder / 'large.yaml').write_text(text.replace('image_width: 640', 'image_width: 1280'))
     said = refusal(folder / 'images', *OPTIONS, '--camera-info', folder / 'large.yaml')
-    assert 'large.yaml: expected the size of the other images, 640 x 480' in said
+    assert 'large.yaml: wrong image size: expected that of the other images, 640 x 480' in said
 
 
 def test_the_board_to_print_comes_with_its_size(tmp_path):

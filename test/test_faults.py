@@ -144,13 +144,16 @@ def test_the_same_seed_gives_the_same_stream_and_another_one_another():
 
 
 @pytest.mark.parametrize(('entries', 'said'), [
-    (['drop_pictures:0.3'], "a name of drop_images, .*, got 'drop_pictures:0.3'"),
-    (['drop_images'], "of drop_images a number from 0 to 1 .*, got 'drop_images'"),
+    (['drop_pictures:0.3'], "unknown fault: expected NAME:AMOUNT with a name of drop_images, .*, "
+                            "got 'drop_pictures:0.3'"),
+    (['drop_images'], "wrong amount of drop_images: expected a number from 0 to 1 .*, got "
+                      "'drop_images'"),
     (['drop_images:30%'], "number from 0 to 1 .*, got 'drop_images:30%'"),
     (['drop_images:1.1'], "number from 0 to 1 .*, got 'drop_images:1.1'"),
     (['delay_images:-1'], "number from 0 to 10 .*, got 'delay_images:-1'"),
     (['pose_noise:nan'], "number from 0 to 3.14.*, got 'pose_noise:nan'"),
-    (['restart:0.1', 'restart:0.2'], "restart once, got it again: 'restart:0.2'"),
+    (['restart:0.1', 'restart:0.2'], "restart given twice: expected it once, got it again: "
+                                     "'restart:0.2'"),
 ])
 def test_a_fault_that_cannot_be_is_refused_with_the_reason(entries, said):
     with pytest.raises(ConfigError, match=said) as refused:

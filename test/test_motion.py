@@ -261,12 +261,12 @@ def test_the_ends_of_a_range_can_be_reached_and_those_of_a_sector_cannot():
 
 
 @pytest.mark.parametrize(('limits', 'message'), [
-    ({'azimuth_range': (1.0, 1.0)}, 'azimuth_range: expected low and high'),
-    ({'azimuth_range': (1.0,)}, 'azimuth_range: expected low and high'),
+    ({'azimuth_range': (1.0, 1.0)}, 'azimuth_range: not a range: expected low and high'),
+    ({'azimuth_range': (1.0,)}, 'azimuth_range: not a range: expected low and high'),
     ({'azimuth_range': (1.0, math.nan)}, 'azimuth_range: .*nan'),
-    ({'forbidden_sectors': [1.0, 2.0, 3.0]}, 'forbidden_sectors: expected pairs'),
+    ({'forbidden_sectors': [1.0, 2.0, 3.0]}, 'forbidden_sectors: not sectors: expected pairs'),
     ({'forbidden_sectors': [1.0, math.inf]}, 'forbidden_sectors: .*inf'),
-    ({'reachable_azimuths': [0.1, math.nan]}, 'reachable_azimuths: expected finite'),
+    ({'reachable_azimuths': [0.1, math.nan]}, 'reachable_azimuths: not finite: expected azimuths'),
     ({'forbidden_sectors': [0.0, 7.0]}, 'together they leave none'),
     ({'azimuth_range': (1.0, 2.0), 'forbidden_sectors': [0.9, 2.1]}, 'together they leave none'),
     ({'azimuth_range': (1.0, 2.0), 'reachable_azimuths': [2.5]}, 'together they leave none'),
@@ -318,7 +318,7 @@ def test_the_way_to_the_next_best_is_counted_from_where_the_camera_is(planner):
 
 
 def test_what_was_never_asked_for_cannot_be_given_up(planner):
-    with pytest.raises(ViewError, match='expected a goal before it is given up'):
+    with pytest.raises(ViewError, match='no goal to give up: expected one before it'):
         planner('farthest').give_up(1.0)
 
 

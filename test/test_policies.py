@@ -230,7 +230,7 @@ def test_what_is_too_near_to_a_view_is_worth_less_than_all_else(attention, laten
 
 @pytest.mark.parametrize('shape', [(1, 3, 4, 4), (1, 8, 5, 4), (1, 8, 4)])
 def test_a_latent_of_another_model_is_refused(attention, shape):
-    with pytest.raises(ViewError, match=r'expected a latent of the shape \(8, 4, 4\).*got'):
+    with pytest.raises(ViewError, match=r'wrong shape of the latent: expected \(8, 4, 4\).*got'):
         choose(made_of(attention), np.zeros(shape, np.float32), np.zeros((1, 1)))
 
 

@@ -318,7 +318,7 @@ def scaled(msg, factor):
 
 def test_a_recorded_parameter_of_another_type_is_refused(loop, tmp_path):
     folder = write_bag(tmp_path / 'run', loop.messages, parameters={'object_size': 'large'})
-    with pytest.raises(DataError, match='parameter object_size: expected a number'):
+    with pytest.raises(DataError, match='parameter object_size: invalid value: expected a number'):
         read_run(folder)
 
 

@@ -310,7 +310,7 @@ def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
     ('view_planner', 'azimuth_range', 'all'), ('view_planner', 'forbidden_sectors', ['a', 'b'])])
 def test_a_recorded_parameter_that_cannot_be_is_refused_by_its_name(node, parameter, value):
     bag = replace(run_of([]), parameters={f'/robot/{node}': {parameter: value}})
-    with pytest.raises(DataError, match=f'parameter {parameter}: expected'):
+    with pytest.raises(DataError, match=f'parameter {parameter}: invalid value: expected'):
         recorded_setup(bag)
 
 

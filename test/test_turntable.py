@@ -49,17 +49,19 @@ def test_the_same_goal_again_changes_nothing():
 def test_a_goal_that_is_not_finite_is_refused_and_the_last_one_stays(goal):
     turntable = Turntable()
     turntable.turn_to(1.0, now=0.0)
-    with pytest.raises(ViewError, match='finite, got -?(nan|inf)'):
+    with pytest.raises(ViewError, match='azimuth goal not finite: got -?(nan|inf)'):
         turntable.turn_to(goal, now=0.5)
     assert turntable.azimuth_at(2.0) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(('settings', 'said'), [
-    ({'speed': 0.0}, 'a finite speed and time scale above 0, got 0.0 and 1.0'),
-    ({'time_scale': -1.0}, 'a finite speed and time scale above 0, got 1.0 and -1.0'),
-    ({'azimuth': math.nan}, 'a finite azimuth, got nan')])
+    ({'speed': 0.0}, 'speed or time scale out of range: expected both finite and above 0, got '
+                     '0.0 and 1.0'),
+    ({'time_scale': -1.0}, 'speed or time scale out of range: expected both finite and above 0, '
+                           'got 1.0 and -1.0'),
+    ({'azimuth': math.nan}, 'azimuth not finite: expected radians, got nan')])
 def test_a_turntable_that_cannot_turn_is_refused(settings, said):
-    with pytest.raises(ConfigError, match=f'expected {said}'):
+    with pytest.raises(ConfigError, match=f'turntable: {said}'):
         Turntable(**settings)
 
 

@@ -125,7 +125,8 @@ def test_after_a_motion_the_camera_settles_before_an_image_becomes_a_view(settle
 
 
 def test_an_unknown_way_to_take_views_is_refused():
-    with pytest.raises(ConfigError, match="expected one of auto.*got 'sometimes'"):
+    with pytest.raises(ConfigError, match="take_views: unknown value: expected one of auto.*got "
+                                          "'sometimes'"):
         ViewGate('sometimes')
 
 

@@ -43,8 +43,8 @@ class Background:
     def __post_init__(self) -> None:
         """Reject a word that is none of them, and a colour that is no colour."""
         if self.how not in BACKGROUNDS:
-            raise ConfigError(f'background: expected one of {", ".join(BACKGROUNDS)}, '
-                              f'got {self.how!r}')
+            raise ConfigError('background: unknown value: expected one of '
+                              f'{", ".join(BACKGROUNDS)}, got {self.how!r}')
         check_color(self.color, self.tolerance)
 
     def cleared(self, image: NDArray[np.uint8], mask: NDArray[np.bool_] | None = None,
@@ -61,11 +61,13 @@ class Background:
             return on_white(image, off_color(image, self.color, self.tolerance))
         if self.how == 'mask':
             if mask is None:
-                raise ViewError("expected a mask of the image's stamp, got none", 'no_mask')
+                raise ViewError("no mask: expected a mask of the image's stamp, got none",
+                                'no_mask')
             return on_white(image, mask)
         if reference is None:
-            raise ViewError('expected an image of the empty scene before the first view, got '
-                            'none; empty the scene and call capture_background', 'no_reference')
+            raise ViewError('no image of the empty scene: expected one before the first view, '
+                            'got none; empty the scene and call '
+                            'capture_background', 'no_reference')
         return on_white(image, off_reference(image, reference))
 
 
@@ -83,10 +85,11 @@ def main_part_share(cleared: NDArray[np.uint8]) -> float:
 def check_color(color: Sequence[int], tolerance: float) -> None:
     """Raise ConfigError where a colour key, as of `off_color`, cannot be used."""
     if len(color) != 3 or not all(0 <= value <= 255 for value in color) or not any(color):
-        raise ConfigError('background_color: expected red, green and blue, each from 0 to 255 '
-                          f'and one above 0, got {list(color)}')
+        raise ConfigError('background_color: not a usable color: expected red, green and blue, '
+                          f'each from 0 to 255 and one above 0, got {list(color)}')
     if not 0 < tolerance < np.inf:
-        raise ConfigError(f'background_tolerance: expected a number above 0, got {tolerance}')
+        raise ConfigError('background_tolerance: out of range: expected a number above 0, got '
+                          f'{tolerance}')
 
 
 def on_white(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -96,11 +99,11 @@ def on_white(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.ui
     Raises ViewError where the mask is of another size, or has no object at all.
     """
     if mask.shape != image.shape[:2]:
-        raise ViewError(f"expected a mask of the image's size, {_size(image)}, "
+        raise ViewError(f"wrong mask size: expected the image's size, {_size(image)}, "
                         f'got {_size(mask)}', 'mask')
     if not mask.any():
-        raise ViewError('expected a mask with an object, got one that is all background',
-                        'no_object')
+        raise ViewError('empty mask: expected a mask with an object, got one that is all '
+                        'background', 'no_object')
     white = np.full_like(image, 255)
     return np.asarray(cv2.copyTo(image, mask.view(np.uint8), white), np.uint8)
 
@@ -113,8 +116,8 @@ def off_reference(image: NDArray[np.uint8], reference: NDArray[np.uint8]) -> NDA
     stands out from the reference, and where all but everything does.
     """
     if image.shape != reference.shape:
-        raise ViewError(f"expected an image of the reference's size, {_size(reference)}, got "
-                        f'{_size(image)}; empty the scene and call capture_background again',
+        raise ViewError(f"wrong image size: expected the reference's size, {_size(reference)}, "
+                        f'got {_size(image)}; empty the scene and call capture_background again',
                         'reference')
     apart = _apart(_smoothed(_searched(image)), _smoothed(_searched(reference)), _SHADOW_DISCOUNT)
     return _object(apart, _STANDS_OUT, image, 'the empty scene; where '
@@ -175,11 +178,11 @@ def _object(apart: NDArray[np.float32], threshold: float, image: NDArray[np.uint
     parts |= (areas < _LARGEST_HOLE * parts.sum())[labels]
     share = float(parts.mean())
     if share < _SMALLEST_OBJECT:
-        raise ViewError(f'expected an object that stands out; nothing does from {background}',
-                        'no_object')
+        raise ViewError('no object found: expected one that stands out, but nothing does from '
+                        f'{background}', 'no_object')
     if share > _LARGEST_OBJECT:
-        raise ViewError('expected some background around the object, but all of the image stands '
-                        f'out from {background}', 'no_background')
+        raise ViewError('no background found: expected some around the object, but all of the '
+                        f'image stands out from {background}', 'no_background')
     if parts.shape != image.shape[:2]:
         height, width = image.shape[:2]
         parts = np.asarray(cv2.resize(parts * np.uint8(255), (width, height)) > 127)

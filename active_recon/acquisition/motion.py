@@ -34,18 +34,18 @@ class MotionLimits:
     def __post_init__(self) -> None:
         """Reject invalid values, and those that leave no azimuth."""
         if len(self.azimuth_range) != 2 or not _are_sectors(self.azimuth_range):
-            raise ConfigError('azimuth_range: expected low and high, two azimuths that differ, '
-                              f'rad, got {list(self.azimuth_range)}')
+            raise ConfigError('azimuth_range: not a range: expected low and high, two azimuths '
+                              f'that differ, rad, got {list(self.azimuth_range)}')
         if not _are_sectors(self.forbidden_sectors):
-            raise ConfigError('forbidden_sectors: expected pairs of low and high, rad, that '
-                              f'differ, got {list(self.forbidden_sectors)}')
+            raise ConfigError('forbidden_sectors: not sectors: expected pairs of low and high, '
+                              f'rad, that differ, got {list(self.forbidden_sectors)}')
         if not np.isfinite(self.reachable_azimuths).all():
-            raise ConfigError('reachable_azimuths: expected finite azimuths, rad, got '
+            raise ConfigError('reachable_azimuths: not finite: expected azimuths, rad, got '
                               f'{list(self.reachable_azimuths)}')
         if not self.allows(self.candidates(AZIMUTHS)).any():
             raise ConfigError(
-                'azimuth_range, forbidden_sectors, reachable_azimuths: expected to leave an '
-                'azimuth where the camera can go, but together they leave none')
+                'azimuth_range, forbidden_sectors, reachable_azimuths: no azimuth left: expected '
+                'one where the camera can go, but together they leave none')
 
     def allows(self, azimuths: ArrayLike) -> NDArray[np.bool_]:
         """Return for each azimuth whether the camera can go there."""

@@ -47,11 +47,12 @@ class MotionMonitor:
         jumps = self._stillness.jumps(_JUMPS_S)
         if jumps >= _JUMPS:
             faults['noisy_poses'] = (
-                f'expected poses of a camera that moves and rests, they jumped {jumps} times in '
-                f'{_JUMPS_S:g} s; no view is taken until they are steady')
+                f'noisy poses: expected a camera that moves and rests, they jumped {jumps} times '
+                f'in {_JUMPS_S:g} s; no view is taken until they are steady')
         stood = min(self._stillness.rested, (self._last - self._goal_since) / 1e9)
         if self._away > self.goal_tolerance and stood >= self.stall_timeout:
             faults['stalled'] = (
-                f'expected the camera to move to its goal, {np.degrees(self._away):.0f} degrees '
-                f'away, it has stood still for {stood:.1f} s; does the motor turn?')
+                'camera stalled: expected it to move to its goal, '
+                f'{np.degrees(self._away):.0f} degrees away, but it has stood still for '
+                f'{stood:.1f} s; does the motor turn?')
         return faults

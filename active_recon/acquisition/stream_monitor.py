@@ -116,11 +116,11 @@ class StreamMonitor:
                   if self._quiet[stream] > max(SILENT_S, 3 * period)}
         if len(silent) == len(STREAMS):
             return {'silent_camera': (
-                'expected images, camera info and poses of a camera that streamed so far, nothing '
-                f'has arrived for {min(silent.values()):.1f} s; is it running and connected?')}
+                f'nothing from the camera for {min(silent.values()):.1f} s: expected images, '
+                'camera info and poses as before; is it running and connected?')}
         return {f'silent_{stream}': (
-            f'expected {_NAMES[stream]} every {self._periods[stream]:.2g} s as before, none '
-            f'arrived for {time:.1f} s; is what sends them still running?')
+            f'no {_NAMES[stream]} for {time:.1f} s: expected one every '
+            f'{self._periods[stream]:.2g} s as before; is what sends them still running?')
             for stream, time in silent.items()}
 
     def _since(self, begin: float) -> _Moments:
@@ -144,8 +144,8 @@ def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
         lost = len(due - stamps[stream])
         if lost >= max(_AT_LEAST, _SHARE * len(due)):
             yield stream, (
-                f'expected {_NAMES[stream]} of the same stamps as the rest that the camera '
-                f'sends, {lost} of the last {len(due)} did not arrive')
+                f'{_NAMES[stream]} missing: expected one for each stamp of the rest that the '
+                f'camera sends, {lost} of the last {len(due)} did not arrive')
 
 
 def _late(moments: _Moments) -> Iterator[tuple[str, str]]:
@@ -154,5 +154,5 @@ def _late(moments: _Moments) -> Iterator[tuple[str, str]]:
     late = [time for time in behind if time > LATE_S]
     if len(late) >= max(_AT_LEAST, _SHARE * len(behind)):
         yield 'late_images', (
-            f'expected images soon after what else has their stamp, {len(late)} of the last '
-            f'{len(behind)} came {median(late):.2f} s later; views are taken that much later')
+            f'late images: expected them soon after what else has their stamp, {len(late)} of the '
+            f'last {len(behind)} came {median(late):.2f} s later; views are taken that much later')

@@ -31,8 +31,8 @@ class ViewGate:
     def __init__(self, take_views: str = 'auto', goal_tolerance: float = GOAL_TOLERANCE,
                  min_view_separation: float = 0.2, settle_time: float = STILL_TIME) -> None:
         if take_views not in TAKE_VIEWS:
-            raise ConfigError(f'take_views: expected one of {", ".join(TAKE_VIEWS)}, '
-                              f'got {take_views!r}')
+            raise ConfigError('take_views: unknown value: expected one of '
+                              f'{", ".join(TAKE_VIEWS)}, got {take_views!r}')
         self.take_views = take_views
         self.goal_tolerance = goal_tolerance
         self.min_view_separation = min_view_separation

@@ -42,8 +42,8 @@ def fit_arm(seen: Sequence[Detection], lens: Intrinsics, mounts: NDArray[np.floa
     few, the poses do not tell it, or contradict the images.
     """
     if len(seen) < FEWEST_IMAGES:
-        raise DataError(f'expected {FEWEST_IMAGES} images from known poses or more, got '
-                        f'{len(seen)}', 'too_few_images')
+        raise DataError(f'too few images: expected {FEWEST_IMAGES} images from known poses or '
+                        f'more, got {len(seen)}', 'too_few_images')
     boards = np.stack([board_pose(lens, one) for one in seen])
     mount_from_camera = _hand_eye(mounts, boards)
     start = np.concatenate([parameters_of(mount_from_camera),
@@ -82,16 +82,17 @@ def _hand_eye(mounts: NDArray[np.float64], boards: NDArray[np.float64]) -> NDArr
     turn_b = Rotation.from_matrix(b[:, :3, :3]).as_rotvec()
     clear = np.linalg.norm(turn_b, axis=1) < math.radians(170)  # a half turn has two axes
     if not clear.any() or np.linalg.svd(turn_b[clear])[1][1] < _LEAST_TURN:
-        raise DataError('expected poses that turn the camera about two axes, by '
-                        f'{math.degrees(_LEAST_TURN):.0f} degrees or more about each', 'poses')
+        raise DataError('poses too much alike: expected some that turn the camera about two '
+                        f'axes, by {math.degrees(_LEAST_TURN):.0f} degrees or more about '
+                        'each', 'poses')
     rotation = Rotation.align_vectors(turn_a[clear], turn_b[clear])[0].as_matrix()
     # (R_a - 1) t_x - scale R_x t_b = -t_a: were the squares of another size, it would show
     left = np.concatenate([a[:, :3, :3] - np.eye(3),
                            -(b[:, :3, 3] @ rotation.T)[..., None]], axis=2)
     solved = np.linalg.lstsq(left.reshape(-1, 4), -a[:, :3, 3].ravel(), rcond=None)[0]
     if abs(solved[3] - 1) > _SCALE_TOLERANCE:
-        raise DataError("expected the arm's poses and the board to have one scale, but by the "
-                        f'poses the squares are {solved[3]:.3g} times as large as given; '
+        raise DataError("wrong scale: expected the arm's poses and the board to have one, but by "
+                        f'the poses the squares are {solved[3]:.3g} times as large as given; '
                         'measure a square, and see that the poses are those of the mount in the '
                         "arm's base frame, in metres, their quaternions x y z w", 'scale')
     pose = np.eye(4)

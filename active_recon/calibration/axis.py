@@ -40,14 +40,15 @@ def find_axis(poses: NDArray[np.float64]) -> Axis:
     first, second = np.triu_indices(len(poses), 1)
     between = (turns[second] * turns[first].inv()).as_rotvec()
     if np.linalg.norm(between, axis=1).max() < _LEAST_TURN:
-        raise DataError(f'expected a table that turns by {math.degrees(_LEAST_TURN):.0f} degrees '
-                        'or more between the images, but the board hardly turned', 'angles')
+        raise DataError('the board hardly turned: expected a table that turns by '
+                        f'{math.degrees(_LEAST_TURN):.0f} degrees or more between the '
+                        'images', 'angles')
     up = np.linalg.eigh(between.T @ between)[1][:, -1]
     facing = -poses[:, :3, 2].mean(0)  # the board's z points into the paper
     up *= np.sign(facing @ up)
     if facing @ up < math.cos(_LARGEST_TILT) * np.linalg.norm(facing):
-        raise DataError('expected a board that lies on the table, but it stands at '
-                        f'{_angle_deg(facing, up):.0f} degrees to it', 'board_tilt')
+        raise DataError('the board is tilted: expected one that lies on the table, but it stands '
+                        f'at {_angle_deg(facing, up):.0f} degrees to it', 'board_tilt')
     x, y, z, w = (turns * turns[0].inv()).as_quat().T
     turned = 2 * np.arctan2(np.stack([x, y, z], axis=1) @ up, w)
     return Axis(up, _center(poses, up, turned), np.asarray(azimuth_difference(turned, 0)))
@@ -94,13 +95,14 @@ def compare_angles(turned: NDArray[np.float64], angles: NDArray[np.float64],
     worst = int(np.argmax(np.abs(off)))
     if abs(off[worst]) > _ANGLE_TOLERANCE:
         raise DataError(
-            f'{names[worst]}: expected the table at {math.degrees(angles[worst]):.1f} degrees, '
-            f'as given, but the board stands {abs(math.degrees(off[worst])):.1f} degrees off '
+            f'{names[worst]}: wrong angle: expected the table at '
+            f'{math.degrees(angles[worst]):.1f} degrees, as given, but the board stands '
+            f'{abs(math.degrees(off[worst])):.1f} degrees off '
             'that; are the angles or the step right, and are the images in the order of their '
             'names?', 'angles')
     if agreement[direction] - agreement[-direction] < 0.01:
-        raise DataError('expected angles that tell which way the table turns; half turns alone '
-                        'do not', 'direction')
+        raise DataError('direction unknown: expected angles that tell which way the table turns; '
+                        'half turns alone do not', 'direction')
     return AngleFit(direction, offset, off)
 
 

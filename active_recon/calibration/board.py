@@ -38,20 +38,20 @@ class Board:
     def __post_init__(self) -> None:
         """Reject what OpenCV would crash on."""
         if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) < 4:
-            raise ConfigError('board: expected 4 x 3 squares or more, got '
+            raise ConfigError('board: too few squares: expected 4 x 3 or more, got '
                               f'{self.columns} x {self.rows}')
         if not 0 < self.marker < self.square < np.inf:
-            raise ConfigError('board: expected markers smaller than the squares, and both above '
-                              f'0, got markers of {self.marker * 1e3:g} mm in squares of '
-                              f'{self.square * 1e3:g} mm')
+            raise ConfigError('board: wrong sizes: expected markers smaller than the squares, and '
+                              f'both above 0, got markers of {self.marker * 1e3:g} mm in squares '
+                              f'of {self.square * 1e3:g} mm')
         if self.dictionary not in DICTIONARIES:
-            raise ConfigError(f'board: expected a dictionary out of {", ".join(DICTIONARIES)}, '
-                              f'got {self.dictionary!r}')
+            raise ConfigError('board: unknown dictionary: expected one of '
+                              f'{", ".join(DICTIONARIES)}, got {self.dictionary!r}')
         there = len(self._dictionary.bytesList)
         if self.columns * self.rows // 2 > there:
-            raise ConfigError(f'board: expected at most {there} markers, as {self.dictionary} '
-                              f'has, got {self.columns * self.rows // 2}; take a larger '
-                              'dictionary or fewer squares')
+            raise ConfigError(f'board: too many markers: expected at most {there}, as '
+                              f'{self.dictionary} has, got {self.columns * self.rows // 2}; take '
+                              'a larger dictionary or fewer squares')
 
     @property
     def _dictionary(self) -> cv2.aruco.Dictionary:
@@ -99,7 +99,8 @@ class Board:
             path.parent.mkdir(parents=True, exist_ok=True)
             Image.fromarray(sheet).save(path, dpi=(density, density))
         except (OSError, ValueError) as error:
-            raise DataError(f'{path}: expected a place for a picture (PNG): {error}') from error
+            raise DataError(f'{path}: picture not written: expected a place for a PNG file: '
+                            f'{error}') from error
 
     def detect(self, image: NDArray[np.uint8], name: str) -> 'Detection | None':
         """
@@ -112,9 +113,9 @@ class Board:
         known = self.columns * self.rows // 2
         strange = [] if markers is None else [int(one) for one in markers.ravel() if one >= known]
         if len(strange) >= _FEWEST_CORNERS:
-            raise DataError(f'{name}: expected a board of {self.columns} x {self.rows} squares '
-                            f'with markers 0 to {known - 1}, but it has marker {max(strange)}; '
-                            'say how many squares the board has')
+            raise DataError(f'{name}: another board: expected one of {self.columns} x {self.rows} '
+                            f'squares with markers 0 to {known - 1}, but it has marker '
+                            f'{max(strange)}; say how many squares the board has')
         if ids is None or len(ids) < _FEWEST_CORNERS:
             return None
         ids = np.asarray(ids).ravel()
@@ -157,13 +158,13 @@ def detect_all(board: Board, images: Iterable[tuple[str, NDArray[np.uint8]]], fe
             found.append(seen)
     if len(found) < fewest:
         lost = f' It is not seen in {", ".join(missing)}.' if missing else ''
-        raise DataError(f'expected the board in {fewest} images or more, it is seen in '
+        raise DataError(f'too few images: expected the board in {fewest} or more, it is seen in '
                         f'{len(found)} of {len(found) + len(missing)}.{lost} Are the squares '
                         f'({board.columns} x {board.rows}) and the dictionary '
                         f'({board.dictionary}) those of the board? Is it sharp, flat, and large '
                         f'in the image ({_FEWEST_CORNERS} corners at least)?', 'too_few_images')
     for other in found:
         if other.size != found[0].size:
-            raise DataError(f'expected images of one size, got {found[0].size} of '
+            raise DataError(f'images differ in size: expected one size, got {found[0].size} of '
                             f'{found[0].name} and {other.size} of {other.name}', 'image_size')
     return found, missing

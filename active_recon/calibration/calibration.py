@@ -137,9 +137,9 @@ def _detect(board: Board, paths: Sequence[Path], fewest: int
 
 def _same_size(first: Detection, size: tuple[int, int], name: str) -> None:
     if size != first.size:
-        raise DataError(f'{name}: expected the size of the other images, {first.size[0]} x '
-                        f'{first.size[1]} of {first.name}, got {size[0]} x {size[1]}',
-                        'image_size')
+        raise DataError(f'{name}: wrong image size: expected that of the other images, '
+                        f'{first.size[0]} x {first.size[1]} of {first.name}, got {size[0]} x '
+                        f'{size[1]}', 'image_size')
 
 
 def _calibration(images: list[ImageFit], lens: Intrinsics, board_from_object: NDArray[np.float64],

@@ -24,11 +24,11 @@ def image_paths(places: list[Path]) -> list[Path]:
              for path in (place.iterdir() if place.is_dir() else [place])
              if not place.is_dir() or path.suffix.lower() in SUFFIXES]
     if not paths:
-        raise DataError(f'{", ".join(map(str, places))}: expected images '
+        raise DataError(f'{", ".join(map(str, places))}: no images: expected some '
                         f'({", ".join(SUFFIXES)}), found none')
     names = [path.name for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise DataError(f'expected images of different names, got {twice[0]} twice')
+        raise DataError(f'images of one name: expected different names, got {twice[0]} twice')
     return sorted(paths, key=_in_order)
 
 
@@ -42,7 +42,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     # As the camera's driver publishes it: a viewer's turn by EXIF is not for the network's eyes
     image = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
-        raise DataError(f'{path}: expected an image, got a file that OpenCV cannot read')
+        raise DataError(f'{path}: not readable: expected an image that OpenCV can read')
     return np.asarray(image, np.uint8)
 
 
@@ -56,7 +56,8 @@ def read_poses(path: Path, names: list[str]) -> dict[str, NDArray[np.float64]]:
     poses = {}
     for name, row in _rows(path, names, 7).items():
         if abs(np.linalg.norm(row[3:]) - 1) > 0.01:
-            raise DataError(f'{path}: expected a unit quaternion of {name}, got {row[3:]}')
+            raise DataError(f'{path}: no rotation: expected a unit quaternion of {name}, got '
+                            f'{row[3:]}')
         pose = np.eye(4)
         pose[:3, :3] = Rotation.from_quat(row[3:]).as_matrix()
         pose[:3, 3] = row[:3]
@@ -76,25 +77,26 @@ def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
             rows = [(number, [cell.strip() for cell in row])
                     for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f'{path}: expected a CSV file: {error}') from error
+        raise DataError(f'{path}: not readable: expected a CSV file: {error}') from error
     if rows and _numbers(rows[0][1][-1:]) is None:
         rows = rows[1:]
     named, unnamed = {}, []
     for number, row in rows:
         values = _numbers(row[-count:])
         if values is None or not count <= len(row) <= count + 1:
-            raise DataError(f'{path}, line {number}: expected {count} numbers, or an image and '
-                            f'{count} numbers, got {", ".join(row)}')
+            raise DataError(f'{path}, line {number}: wrong row: expected {count} numbers, or an '
+                            f'image and {count} numbers, got {", ".join(row)}')
         if len(row) > count:
             named[Path(row[0]).name] = values
         else:
             unnamed.append(values)
     if unnamed and (named or len(unnamed) != len(names)):
-        raise DataError(f'{path}: expected a row for each of the {len(names)} images, or rows '
-                        f'that begin with their names, got {len(unnamed)} without a name')
+        raise DataError(f'{path}: rows do not fit the images: expected one for each of the '
+                        f'{len(names)} images, or rows that begin with their names, got '
+                        f'{len(unnamed)} without a name')
     found = dict(zip(names, unnamed, strict=True)) if unnamed else named
     if missing := [name for name in names if name not in found]:
-        raise DataError(f'{path}: expected a row of every image, found none of '
+        raise DataError(f'{path}: rows missing: expected one of every image, found none of '
                         f'{", ".join(missing)}')
     return {name: found[name] for name in names}
 

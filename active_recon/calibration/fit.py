@@ -84,8 +84,9 @@ def fitted_images(seen: Sequence[Detection], lens: Intrinsics,
     if not (error := overall_error(images)) <= largest:
         worst = max(images, key=lambda one: one.error)
         raise DataError(
-            f'expected the board to be where the motion says, within {largest:.0f} pixels, got '
-            f'{error:.1f} (worst: {worst.error:.1f} in {worst.seen.name}); are the squares, '
+            'images contradict the motion: expected the board to be where the motion says, within '
+            f'{largest:.0f} pixels, got {error:.1f} (worst: {worst.error:.1f} in '
+            f'{worst.seen.name}); are the squares, '
             'the poses and the camera info those of these images, and did neither the camera nor '
             'the board slip?', 'reprojection')
     return images

@@ -65,13 +65,13 @@ def read_lens(path: Path) -> Intrinsics:
         distortion = Distortion(content['distortion_model'], coefficients)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError,
             ValueError) as error:
-        raise DataError(f"{path}: expected a camera's calibration as ROS's camera_calibration "
-                        f'writes it (YAML): {error!r}') from error
+        raise DataError(f"{path}: no calibration: expected that of a camera as ROS's "
+                        f'camera_calibration writes it (YAML): {error!r}') from error
     except ViewError as error:
         raise DataError(f'{path}: {error}') from error
     if not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1], *size) <= 0:
-        raise DataError(f'{path}: expected a calibrated camera, got the matrix {matrix.tolist()} '
-                        f'for images of {size[0]} x {size[1]}')
+        raise DataError(f'{path}: camera not calibrated: expected focal lengths and sizes above '
+                        f'0, got the matrix {matrix.tolist()} for images of {size[0]} x {size[1]}')
     return _lens(matrix, distortion if any(coefficients) else None, size)
 
 

@@ -54,7 +54,8 @@ class Calibration:
             write_lens(self.lens, folder / 'camera_info.yaml')
             (folder / 'calibration.png').write_bytes(cv2.imencode('.png', picture)[1].tobytes())
         except OSError as error:
-            raise DataError(f'{folder}: expected a folder to write to: {error}') from error
+            raise DataError(f'{folder}: calibration not written: expected a folder to write to: '
+                            f'{error}') from error
 
     def as_yaml(self) -> str:
         """Return the parameters as a ROS parameters file."""

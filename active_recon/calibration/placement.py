@@ -29,7 +29,7 @@ class Placement:
     def __post_init__(self) -> None:
         """Reject a cube without a size."""
         if not 0 < self.object_size < np.inf:
-            raise ConfigError('object_size: expected metres above 0, got '
+            raise ConfigError('object_size: out of range: expected metres above 0, got '
                               f'{self.object_size}')
 
     @property
@@ -46,7 +46,7 @@ class Placement:
         height = found.board_height + self.above_board
         camera = Camera(_moved(0, 0, -height) @ np.linalg.inv(found.camera_from_table))
         if camera.position[2] < -self.object_size / 2:
-            raise DataError('expected a camera above the plate, got one '
+            raise DataError('camera below the plate: expected it above, got one '
                             f'{-camera.position[2] - self.object_size / 2:.3f} m below it',
                             'below')
         turn = np.eye(4)

@@ -55,8 +55,8 @@ def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
     contradict the angles.
     """
     if len(seen) < FEWEST_IMAGES:
-        raise DataError(f'expected {FEWEST_IMAGES} images of the turning board or more, got '
-                        f'{len(seen)}', 'too_few_images')
+        raise DataError(f'too few images: expected {FEWEST_IMAGES} images of the turning board or '
+                        f'more, got {len(seen)}', 'too_few_images')
     poses = np.stack([board_pose(lens, one) for one in seen])
     axis = find_axis(poses)
     table = _table_frame(axis.up, axis.center, poses[0])

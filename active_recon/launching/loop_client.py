@@ -28,7 +28,7 @@ class LoopClient:
         deadline = time.monotonic() + budget_s
         while not condition():
             if time.monotonic() > deadline:
-                raise ActiveReconError(f'expected {awaited} within {budget_s:g} s, '
+                raise ActiveReconError(f'timed out: expected {awaited} within {budget_s:g} s, '
                                        'but it did not arrive')
             self._executor.spin_once(timeout_sec=_SPIN_S)
             meanwhile()

@@ -44,8 +44,8 @@ def _free_domain_id() -> int:
             except OSError:
                 continue
             return domain
-    raise NodeError(f'expected a free ROS domain from {_DOMAINS[0]} to {_DOMAINS[-1]}, but other '
-                    'nodes use them all')
+    raise NodeError(f'no free ROS domain: expected one from {_DOMAINS[0]} to {_DOMAINS[-1]}, but '
+                    'other nodes use them all')
 
 
 class NodeProcesses:

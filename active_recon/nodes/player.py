@@ -43,8 +43,9 @@ class PlayerNode(Node):
             try:
                 kind = message_class(topic.type_name)
             except (ImportError, AttributeError, ValueError) as error:
-                raise ConfigError(f'{topic.name}: expected an installed message type, got '
-                                  f'{topic.type_name}; leave it out with topics') from error
+                raise ConfigError(f'{topic.name}: message type not installed: expected an '
+                                  f'installed one, got {topic.type_name}; leave it out with '
+                                  'topics') from error
             profile = common_profile(topic.qos, _QUEUE)
             if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
                 profile.depth = 1

@@ -164,7 +164,7 @@ class ReconstructorNode(ManagedNode):
             self._capture.on_image(stamp, partial(pixels_from_msg, msg))
             if stamp < self._episode.begin or self.clock_monitor.is_ahead(stamp):
                 raise MessageError(
-                    'expected an image of this episode, which began at '
+                    'image of another episode: expected one of this episode, which began at '
                     f'{self._episode.begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
                     'recording, play its clock and set use_sim_time', 'last_episode')
             self._joiner.add_image(stamp, msg, time.monotonic())
@@ -253,13 +253,14 @@ class ReconstructorNode(ManagedNode):
         away = camera.elevation - CANONICAL_ELEVATION
         if self._reconstructor.spec.needs_front and abs(away) > ELEVATION_TOLERANCE:
             self._diagnostics.warn('elevation', (
-                'expected views from an elevation of 30 degrees, as the network was trained with, '
-                f'got {math.degrees(camera.elevation):.1f}; the reconstruction will be worse'))
+                'wrong elevation of the camera: expected 30 degrees, as the network was trained '
+                f'with, got {math.degrees(camera.elevation):.1f}; the reconstruction will be '
+                'worse'))
 
     def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the new episode's id."""
         if not self.is_active:
-            response.message = 'expected an active node to begin an episode; this one is inactive'
+            response.message = 'this node is inactive: expected an active one to begin an episode'
             return response
         self._begin_episode()
         response.success = True
@@ -269,7 +270,7 @@ class ReconstructorNode(ManagedNode):
     def _on_save(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the path of the mesh."""
         if self._reconstruction is None:
-            response.message = 'expected a view before a mesh; this episode has none yet'
+            response.message = 'no view in this episode yet: expected one before a mesh'
             return response
         params = self._params.values
         name = f'{self._episode.id}-{self._reconstructor.view_count}.{params.mesh_format}'

@@ -122,8 +122,9 @@ class RecorderNode(QosWarnings):
         if lost:
             self._diagnostics.count('lost', lost)
             self._diagnostics.warn(f'lost{topic}', (
-                f'{topic}: expected every message that was published, {lost} were lost in '
-                "transport; is the connection too slow, or the middleware's buffer too small?"))
+                f'{topic}: messages lost: expected every one that was published, {lost} were '
+                'lost in transport; is the connection too slow, or the '
+                "middleware's buffer too small?"))
         if info['source_timestamp'] >= self._begun_at:
             self._check_done(topic, data)
 
@@ -204,7 +205,7 @@ class RecorderNode(QosWarnings):
     def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the folder of the complete bag."""
         if self._bag is None:
-            response.message = 'expected a recording to stop, but there is none'
+            response.message = 'no recording to stop: expected a running one, there is none'
             return response
         folder = self._bag.folder
         response.message = self._complete() or str(folder)

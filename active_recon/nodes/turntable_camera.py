@@ -130,8 +130,9 @@ class TurntableCameraNode(QosWarnings):
         begun = await self._begin_episode()
         if not begun:
             self._shown = shown
-            response.message = ('expected the reconstructor to begin an episode, but it did not '
-                                f'answer within {ANSWER_S:g} s; the object is still the same')
+            response.message = ('no new episode: expected the reconstructor to begin one, but it '
+                                f'did not answer within {ANSWER_S:g} s; the object is still the '
+                                'same')
             return response
         self._index, self._shown = index, following
         response.success = True
@@ -162,7 +163,7 @@ def _objects(params: TurntableCameraParameters) -> list[partial[ShownObject]]:
                         params.up or None, params.front or None)]
     folders = list_objects(Path(params.dataset))
     if not folders:
-        raise DataError(f'{params.dataset}: expected a dataset with objects, got none')
+        raise DataError(f'{params.dataset}: no objects: expected a dataset with some, got none')
     return [partial(stored_object, folder, size, background) for folder in folders]
 
 

@@ -228,14 +228,14 @@ class ViewPlannerNode(ManagedNode):
         instead = ('no reachable goal is left' if decision.goal is None else
                    f'the next best is {math.degrees(decision.goal.camera.azimuth):.1f} degrees')
         self._diagnostics.warn('goal_timeout', (
-            f'expected a view from {math.degrees(failed.azimuth):.1f} degrees within '
+            f'no view from {math.degrees(failed.azimuth):.1f} degrees: expected one within '
             f'{timeout:g} s, got none; it is left out of this episode, {instead}'))
         self._follow(decision, self.get_clock().now().nanoseconds)
 
     def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Publish the goal after the views so far with a new stamp; answer with its azimuth."""
         if not self.is_active:
-            response.message = 'expected an active node to plan; this one is inactive'
+            response.message = 'this node is inactive: expected an active one to plan'
             return response
         try:
             goal = self._planner.plan()
@@ -253,7 +253,7 @@ class ViewPlannerNode(ManagedNode):
     def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """End the episode; the next one goes on as usual."""
         if not self.is_active or self._episode is None:
-            response.message = 'expected an episode to stop; there is none'
+            response.message = 'no episode to stop: expected a running one, there is none'
             return response
         response.success = True
         response.message = 'already done' if self._done else 'stopped'

@@ -68,7 +68,8 @@ class Declared:
                 return elements
         elif self.of is None and self._allows(_as(self.kind, value)):
             return _as(self.kind, value)
-        raise ConfigError(f'parameter {self.name}: expected {self.expected}, got {value!r}')
+        raise ConfigError(
+            f'parameter {self.name}: invalid value: expected {self.expected}, got {value!r}')
 
     @property
     def may_be_nan(self) -> bool:

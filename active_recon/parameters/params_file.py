@@ -28,18 +28,19 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
         name = str(key).rpartition('/')[2]
         values = _mapping(path, str(key), entry)
         if list(values) != ['ros__parameters']:
-            raise ConfigError(f'{path}: {key}: expected ros__parameters and nothing else, got '
-                              f'{", ".join(map(str, values)) or "nothing"}')
+            raise ConfigError(f'{path}: {key}: wrong keys: expected ros__parameters and nothing '
+                              f'else, got {", ".join(map(str, values)) or "nothing"}')
         values = _mapping(path, str(key), values['ros__parameters'])
         if name == '**':
             shared.update(values)
         elif name not in NODE_PARAMETERS:
             raise ConfigError(
-                f'{path}: expected nodes among {", ".join(NODE_PARAMETERS)}, got {key}')
+                f'{path}: unknown node: expected one of {", ".join(NODE_PARAMETERS)}, got {key}')
         else:
             given.setdefault(name, {}).update(values)
     if not given:
-        raise ConfigError(f'{path}: expected a node among {", ".join(NODE_PARAMETERS)}, got none')
+        raise ConfigError(
+            f'{path}: no node: expected one or more of {", ".join(NODE_PARAMETERS)}, got none')
     for node, values in given.items():
         _check(path, node, values, shared)
     return {node: {**_own(node, shared), **values} for node, values in given.items()}
@@ -68,7 +69,8 @@ def _parsed(path: Path) -> object:
 
 def _mapping(path: Path, where: str, value: object) -> Mapping[Any, Any]:
     if not isinstance(value, Mapping):
-        raise ConfigError(f'{path}: {where}: expected names with values, got {value!r}')
+        raise ConfigError(f'{path}: {where}: not a mapping: expected names with values, got '
+                          f'{value!r}')
     return value
 
 

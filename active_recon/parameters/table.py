@@ -28,8 +28,8 @@ def with_tables(text: str) -> str:
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise DataError(f'expected the lines {BEGIN.strip()} and {END.strip()} around the '
-                        'parameter tables, found no such lines')
+        raise DataError(f'no place for the parameter tables: expected the lines {BEGIN.strip()} '
+                        f'and {END.strip()} around them, found no such lines')
     return f'{before}{BEGIN}{parameter_tables()}{END}{after}'
 
 

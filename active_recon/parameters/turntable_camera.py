@@ -33,5 +33,5 @@ class TurntableCameraParameters(CubeParameters):
     def __post_init__(self) -> None:
         """Reject contradictory parameters."""
         if bool(self.mesh) == bool(self.dataset):
-            raise ConfigError('parameters mesh, dataset: expected one of them, got '
-                              f'{"both" if self.mesh else "neither"}')
+            raise ConfigError(f'parameters mesh, dataset: {"both" if self.mesh else "neither"} '
+                              'given: expected one of them')

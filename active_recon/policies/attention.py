@@ -42,8 +42,8 @@ class AttentionPolicy:
         latents are those of another model.
         """
         if seen.latent.shape[1:] != self._latent_shape:
-            raise ViewError(f'expected a latent of the shape {self._latent_shape}, as the policy '
-                            f'was trained on, got {seen.latent.shape[1:]}', 'latent')
+            raise ViewError(f'wrong shape of the latent: expected {self._latent_shape}, as the '
+                            f'policy was trained on, got {seen.latent.shape[1:]}', 'latent')
         taken, candidates = pose_azimuths(seen.taken), pose_azimuths(seen.candidates)
         proposal, state = self._runtime.step(
             {'latent': seen.latent, 'azimuth': taken[:, -1].astype(np.float32)}, state)

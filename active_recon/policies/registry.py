@@ -63,8 +63,8 @@ LEARNED: dict[str, Callable[[PolicyRuntime], Policy]] = {'2d3d-attention': Atten
 def learned_policy(model: str, runtime: PolicyRuntime) -> Policy:
     """Return the policy of a network's name; WeightsError where it brings none."""
     if model not in LEARNED:
-        raise WeightsError(f'{model}: expected a network with a view policy of its own, out of '
-                           f'{", ".join(LEARNED)}; choose another policy')
+        raise WeightsError(f'{model}: network without a view policy: expected one with its own, '
+                           f'out of {", ".join(LEARNED)}; choose another policy')
     return LEARNED[model](runtime)
 
 

@@ -102,5 +102,6 @@ def load_policy_runtime(weights: Path | None = None, runtime: str = 'torch', dev
 
 def _module(runtime: str) -> Any:
     if runtime not in RUNTIMES:
-        raise ConfigError(f'runtime: expected one of {", ".join(RUNTIMES)}, got {runtime!r}')
+        raise ConfigError(f'runtime: unknown value: expected one of {", ".join(RUNTIMES)}, '
+                          f'got {runtime!r}')
     return import_module(RUNTIMES[runtime])

@@ -96,8 +96,8 @@ def load_policy(weights: Path | None, device: str, threads: int | None) -> Torch
 
 def _load(weights: Path | None, device: str) -> Bundle:
     if device == 'cuda' and not torch.cuda.is_available():
-        raise ConfigError('parameter device: expected a device that torch can use, got cuda, but '
-                          'this torch finds none; use cpu')
+        raise ConfigError('parameter device: cuda not available: expected a device that torch can '
+                          'use, but this torch finds no GPU; use cpu')
     return load_weights(weights, device)
 
 

@@ -38,18 +38,19 @@ def read_faults(entries: Iterable[str]) -> dict[str, float]:
     for entry in filter(None, entries):
         name, _, text = entry.partition(':')
         if name not in FAULTS:
-            raise ConfigError('faults: expected NAME:AMOUNT with a name of '
+            raise ConfigError('faults: unknown fault: expected NAME:AMOUNT with a name of '
                               f'{", ".join(FAULTS)}, got {entry!r}', 'faults')
         if name in amounts:
-            raise ConfigError(f'faults: expected {name} once, got it again: {entry!r}', 'faults')
+            raise ConfigError(f'faults: {name} given twice: expected it once, got it again: '
+                              f'{entry!r}', 'faults')
         most, meaning = FAULTS[name]
         try:
             amount = float(text)
         except ValueError:
             amount = math.nan
         if not 0 <= amount <= most:
-            raise ConfigError(f'faults: expected of {name} a number from 0 to {most:g} ({meaning}'
-                              f'), got {entry!r}', 'faults')
+            raise ConfigError(f'faults: wrong amount of {name}: expected a number from 0 to '
+                              f'{most:g} ({meaning}), got {entry!r}', 'faults')
         amounts[name] = amount
     return amounts
 

@@ -44,7 +44,7 @@ def stored_object(folder: ObjectFolder, object_size: float = 1.0,
     """Return an object of a dataset in R2N2's layout; raises DataError where it is not whole."""
     cameras = folder.cameras()
     if not cameras:
-        raise DataError(f'{folder.images_folder}: expected views, got none')
+        raise DataError(f'{folder.images_folder}: no views: expected one or more, got none')
     images = [composite(folder.image(index), background) for index in range(len(cameras))]
     return ShownObject(f'{folder.category}/{folder.name}', images,
                        [_scaled(camera, object_size) for camera in cameras])

@@ -16,7 +16,7 @@ class Turntable:
 
     def __init__(self, azimuth: float = 0.0, speed: float = 1.0, time_scale: float = 1.0) -> None:
         if not math.isfinite(azimuth):
-            raise ConfigError(f'turntable: expected a finite azimuth, got {azimuth}')
+            raise ConfigError(f'turntable: azimuth not finite: expected radians, got {azimuth}')
         self._start = wrap_azimuth(azimuth)
         self._way = 0.0
         self._left_at = 0.0
@@ -25,8 +25,8 @@ class Turntable:
     def set_speed(self, speed: float, time_scale: float, now: float) -> None:
         """Go on at another speed from where the camera is now."""
         if not (0 < speed < math.inf and 0 < time_scale < math.inf):
-            raise ConfigError('turntable: expected a finite speed and time scale above 0, got '
-                              f'{speed} and {time_scale}')
+            raise ConfigError('turntable: speed or time scale out of range: expected both finite '
+                              f'and above 0, got {speed} and {time_scale}')
         if self._way:
             here = self.azimuth_at(now)
             self._way -= float(azimuth_difference(here, self._start))
@@ -36,7 +36,7 @@ class Turntable:
     def turn_to(self, azimuth: float, now: float) -> None:
         """Leave for an azimuth from where the camera is now; raises ViewError if not finite."""
         if not math.isfinite(azimuth):
-            raise ViewError(f'expected an azimuth goal that is finite, got {azimuth}', 'goal')
+            raise ViewError(f'azimuth goal not finite: got {azimuth}', 'goal')
         self._start = self.azimuth_at(now)
         self._way = float(azimuth_difference(azimuth, self._start))
         self._left_at = now

@@ -51,7 +51,8 @@ class Page:
 
     def __init__(self, title: str, object_size: float = 1.0, port: int = 0) -> None:
         if not 0 <= port <= HIGHEST_PORT:
-            raise ConfigError(f'port: expected 0 (any) to {HIGHEST_PORT}, got {port}')
+            raise ConfigError(f'port: out of range: expected 0 (any) to {HIGHEST_PORT}, '
+                              f'got {port}')
         # viser prints its address on rich's global console, which is not used otherwise
         rich.get_console().quiet = True
         self._server = ViserServer(HOST, port, label=title, verbose=False)

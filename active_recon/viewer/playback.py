@@ -55,7 +55,7 @@ class Playback:
     def __init__(self, run: RecordedRun, port: int = 0) -> None:
         self._states = recorded_states(run)
         if not self._states:
-            raise DataError(f'{run.path}: expected a view, the run has none')
+            raise DataError(f'{run.path}: no view: expected one or more, the run has none')
         grid = self._states[-1].grid
         self.page = Page(run.path.name, grid.size if grid is not None else 1.0, port)
         self._step = self.page.add_steps(len(self._states), 'View')

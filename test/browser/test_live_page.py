@@ -193,7 +193,7 @@ def test_two_pages_take_two_ports(page):
 
 
 def test_a_port_that_cannot_be_is_refused():
-    with pytest.raises(ConfigError, match='expected 0 .* to 65000, got 70000'):
+    with pytest.raises(ConfigError, match='port: out of range: expected 0 .* to 65000, got 70000'):
         Page('a page', port=70000)
 
 

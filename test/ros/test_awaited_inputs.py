@@ -33,8 +33,8 @@ def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
     reconstructor = start_node('reconstructor')
     problem = said(
         'reconstructor', 'camera/image_raw', '/usb_cam/image_raw has', '/thermal has', '/front')
-    assert ('/camera/image_raw or /camera/image_raw/compressed: expected messages, none has '
-            'arrived; nothing publishes there') in problem
+    assert ('/camera/image_raw or /camera/image_raw/compressed: no messages: expected some, '
+            'none has arrived; nothing publishes there') in problem
     for topic, name, other in (
             ('/usb_cam/image_raw', 'camera/image_raw', '/usb_cam/image_raw'),
             ('/front/color/compressed', 'camera/image_raw', '/front/color'),
@@ -42,7 +42,7 @@ def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
         assert f'{topic} has a publisher: remap with -r {name}:={other}' in problem
     assert '/latent has' not in problem  # its own
     for name in ('camera/camera_info', 'camera/pose'):
-        assert f'/{name}: expected messages' in said('reconstructor', name)
+        assert f'/{name}: no messages: expected' in said('reconstructor', name)
     assert len(reconstructor.log('WARN.*none has arrived')) == 3
 
 
@@ -80,15 +80,15 @@ def test_a_compressed_image_is_an_image_that_was_heard(start_node, bench, said):
 
 def test_a_planner_without_a_reconstructor_says_so(start_node, bench, said):
     start_node('view_planner', policy='farthest')
-    said('view_planner', 'episode', '/episode: expected messages, none has arrived')
-    assert '/camera/pose: expected' in said('view_planner', 'camera/pose')
+    said('view_planner', 'episode', '/episode: no messages: expected some, none has arrived')
+    assert '/camera/pose: no messages: expected' in said('view_planner', 'camera/pose')
     FakeReconstructor(bench).begin('first')
     bench.until(lambda: '/episode' not in bench.state('view_planner').problem, 'no warning')
 
 
 def test_a_planner_that_is_told_where_to_start_awaits_no_camera(start_node, bench, said):
     start_node('view_planner', policy='farthest', start_azimuth=1.0)
-    problem = said('view_planner', 'episode', '/episode: expected messages')
+    problem = said('view_planner', 'episode', '/episode: no messages: expected some')
     assert '/camera/pose' not in problem
 
 

@@ -117,7 +117,8 @@ def image_of_the_last_episode(camera):
     (camera_info_of_another_size, 'camera_info', 'camera info: expected 137 x 137, got 480 x 640'),
     (image_that_arrives_twice, 'duplicate', 'duplicate image: got that of'),
     (image_older_than_the_last, 'out_of_order', 'expected increasing stamps, got .* after'),
-    (image_of_the_last_episode, 'last_episode', 'expected an image of this episode.*got one of'),
+    (image_of_the_last_episode, 'last_episode', 'image of another episode: expected one of this '
+                                                'episode.*got one of'),
 ], ids=lambda value: value.__name__ if callable(value) else '')
 def test_bad_input_is_said_once_counted_and_survived(
         reconstructor, shared_bench, camera, spoil, kind, said):

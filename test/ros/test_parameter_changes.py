@@ -47,9 +47,10 @@ def test_a_threshold_counts_from_the_next_view_and_what_is_refused_changes_nothi
                      take_views='some', mesh_format='stl')
     assert {name: each.successful for name, each in results.items()} == {
         'threshold': False, 'weights': False, 'take_views': False, 'mesh_format': True}
-    assert 'expected a number from 0.01 to 0.99, or nan, got 1.5' in results['threshold'].reason
+    assert ('invalid value: expected a number from 0.01 to 0.99, or nan, got 1.5'
+            in results['threshold'].reason)
     assert 'read-only' in results['weights'].reason
-    assert 'expected one of auto' in results['take_views'].reason
+    assert 'invalid value: expected one of auto' in results['take_views'].reason
     assert not change_together(
         bench, 'reconstructor', threshold=0.99, max_pose_gap=-1.0).successful
     camera.show()

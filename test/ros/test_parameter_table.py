@@ -31,5 +31,5 @@ def test_tables_replace_those_before_and_nothing_else():
 
 @pytest.mark.parametrize('text', ['', BEGIN, END, 'no marks'])
 def test_a_text_without_the_marks_is_rejected(text):
-    with pytest.raises(DataError, match='expected the lines'):
+    with pytest.raises(DataError, match='no place for the parameter tables: expected the lines'):
         with_tables(text)

@@ -63,7 +63,7 @@ WORDS = tuple[str, ...], parameter(('a',), 'words')
     ('abc', WORDS, "a list, each a string, got 'abc'"),
     ([1, 2], WORDS, r'a list, each a string, got \[1, 2\]')])
 def test_a_value_of_another_kind_or_out_of_range_is_refused(make_node, given, declared, said):
-    with pytest.raises(ConfigError, match=f'parameter it: expected {said}'):
+    with pytest.raises(ConfigError, match=f'parameter it: invalid value: expected {said}'):
         Parameters(make_node(it=given), parameters_of(it=declared))
 
 
@@ -125,8 +125,8 @@ def test_changes_that_come_together_are_checked_together_and_applied_as_one(make
 
 @pytest.mark.parametrize(('changes', 'said'), [
     ({'low': 9}, 'expected low below high'),
-    ({'low': 'x'}, "parameter low: expected an integer from 0 to 9, got 'x'"),
-    ({'low': None}, 'parameter low: expected an integer from 0 to 9, got None'),
+    ({'low': 'x'}, "parameter low: invalid value: expected an integer from 0 to 9, got 'x'"),
+    ({'low': None}, 'parameter low: invalid value: expected an integer from 0 to 9, got None'),
     ({'high': 10}, 'out of range'),
     ({'low': 2, 'fixed': 1}, 'read-only')])
 def test_a_change_that_is_refused_says_why_and_changes_nothing(make_node, changes, said):

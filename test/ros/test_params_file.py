@@ -48,17 +48,23 @@ def test_what_is_given_to_all_is_given_to_each_unless_it_has_its_own(tmp_path):
 
 
 @pytest.mark.parametrize(('text', 'said'), [
-    ('', 'expected names with values, got None'),
-    ('- a', 'expected names with values'),
+    ('', 'not a mapping: expected names with values, got None'),
+    ('- a', 'not a mapping: expected names with values'),
     ('{', 'no ROS parameters file in YAML'),
-    ('/**: {ros__parameters: {a: 1}}', 'expected a node among reconstructor.*, got none'),
-    ('grasper: {ros__parameters: {a: 1}}', 'expected nodes among reconstructor.*, got grasper'),
-    ('recorder: {topics: [a]}', 'recorder: expected ros__parameters and nothing else, got topics'),
-    ('recorder: {}', 'recorder: expected ros__parameters and nothing else, got nothing'),
-    ('recorder: {ros__parameters: 1}', 'recorder: expected names with values, got 1'),
+    ('/**: {ros__parameters: {a: 1}}', 'no node: expected one or more of reconstructor.*, got '
+                                       'none'),
+    ('grasper: {ros__parameters: {a: 1}}', 'unknown node: expected one of reconstructor.*, got '
+                                           'grasper'),
+    ('recorder: {topics: [a]}', 'recorder: wrong keys: expected ros__parameters and nothing '
+                                'else, got topics'),
+    ('recorder: {}', 'recorder: wrong keys: expected ros__parameters and nothing else, got '
+                     'nothing'),
+    ('recorder: {ros__parameters: 1}', 'recorder: not a mapping: expected names with values, got '
+                                       '1'),
     ('recorder: {ros__parameters: {output: a}}', 'no parameter output; did you mean output_dir'),
     ('recorder: {ros__parameters: {max_bag_size_mb: 0}}',
-     'recorder: parameter max_bag_size_mb: expected an integer from 1 to 1000000, got 0')])
+     'recorder: parameter max_bag_size_mb: invalid value: expected an integer from 1 to 1000000, '
+     'got 0')])
 def test_a_file_that_cannot_be_used_is_refused_with_its_name(tmp_path, text, said):
     path = tmp_path / 'some.yaml'
     path.write_text(text)

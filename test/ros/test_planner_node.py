@@ -42,7 +42,7 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
     bench.until(lambda: any(key.startswith('refused/') for key in bench.counts('view_planner')),
                 'the refusal of a latent of another network')
     line, = planner.log('refused|ERROR|Traceback')
-    assert 'refused: expected a latent of the shape' in line
+    assert 'refused: wrong shape of the latent: expected' in line
     fake.show_entropy(math.nan)
     bench.until(lambda: bench.counts('view_planner').get('refused/entropy') == 1,
                 'the refusal of an entropy that is none')

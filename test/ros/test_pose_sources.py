@@ -107,7 +107,8 @@ def test_an_image_whose_transform_does_not_come_is_refused_once_with_tf_s_reason
 
 def test_where_tf2_is_missing_it_is_said_what_to_do(bench, monkeypatch):
     monkeypatch.setitem(sys.modules, 'tf2_ros', None)
-    with pytest.raises(ConfigError, match='pose_source: expected tf2_ros.*ros-jazzy-tf2-ros-py'):
+    with pytest.raises(ConfigError, match='pose_source: tf2_ros is not installed: '
+                                          '.*ros-jazzy-tf2-ros-py'):
         TfPoses(bench.node, print, None, 'object')
 
 
@@ -227,7 +228,7 @@ def test_a_node_that_is_to_ask_a_tf2_that_is_missing_does_not_start(start_node, 
     node = start_node('reconstructor', ready=False, pose_source='tf')
     assert node.wait() == 1
     line, = node.log()
-    assert 'pose_source: expected tf2_ros to be installed' in line
+    assert 'pose_source: tf2_ros is not installed: expected it' in line
 
 
 @pytest.mark.parametrize(('parameters', 'said'), [

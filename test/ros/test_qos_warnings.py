@@ -45,14 +45,14 @@ def test_an_endpoint_that_does_not_fit_is_named_with_both_profiles_while_it_is_t
     def told():
         """Return what is said of QoS; a node that is alone misses its inputs, too."""
         return next((part for part in bench.state(name).problem.split('; ')
-                     if part.startswith((f'/{topic}: expected subscribers',
-                                         f'/{topic}: expected publishers'))), '')
+                     if part.startswith((f'/{topic}: incompatible QoS: expected subscribers',
+                                         f'/{topic}: incompatible QoS: expected publishers'))), '')
 
     said = bench.until(told, 'the warning')
     assert f'/bench {theirs}' in said
     assert ours in said.partition('but')[0]
     assert bench.counts(name)[f'warned/qos/{topic}'] == 1
-    line, = node.log('WARN.*expected (subscribers|publishers) to')
+    line, = node.log('WARN.*incompatible QoS: expected (subscribers|publishers) to')
     assert said in line
     take_away()
     bench.until(lambda: not told(), 'the warning to be taken back')

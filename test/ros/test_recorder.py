@@ -278,7 +278,7 @@ def noise(size):
 
 
 @pytest.mark.parametrize(('parameters', 'said'), [
-    ({'topics': '7'}, 'parameter topics: expected a list, each a string, got 7'),
+    ({'topics': '7'}, 'parameter topics: invalid value: expected a list, each a string, got 7'),
     ({'output_dir': '/proc/bags'}, 'cannot start a bag in /proc/bags'),
 ])
 def test_what_cannot_be_recorded_is_refused_at_start(start_node, parameters, said):
@@ -327,7 +327,7 @@ def test_what_has_no_publisher_is_told_until_it_has_one(bench, start_node, tmp_p
     recorder = start_node('recorder', output_dir=tmp_path / 'bags')
     bench.until(lambda: '/camera/image_raw' in bench.state('recorder').problem, 'the warning')
     said, = recorder.log('WARN')
-    assert ('expected publishers on /camera/camera_info, /camera/image_raw, /camera/pose'
+    assert ('no publishers on /camera/camera_info, /camera/image_raw, /camera/pose'
             in said)
     for kind, topic in ((CompressedImage, 'camera/image_raw/compressed'),
                         (CameraInfo, 'camera/camera_info'), (PoseStamped, 'camera/pose')):

@@ -21,14 +21,19 @@ def refusal(start_node, name, **parameters):
 
 
 @pytest.mark.parametrize(('name', 'parameters', 'said'), [
-    ('turntable_camera', {'speed': 0.0}, 'speed: expected a number from 0.001 to 100, got 0.0'),
-    ('turntable_camera', {'rate': '.inf'}, 'rate: expected a number from 0.1 to 1000, got inf'),
-    ('turntable_camera', {}, 'mesh, dataset: expected one of them, got neither'),
-    ('view_planner', {'policy': 'guess'}, "policy: expected one of attention.*, got 'guess'"),
+    ('turntable_camera', {'speed': 0.0}, 'speed: invalid value: expected a number from 0.001 to '
+                                         '100, got 0.0'),
+    ('turntable_camera', {'rate': '.inf'}, 'rate: invalid value: expected a number from 0.1 to '
+                                           '1000, got inf'),
+    ('turntable_camera', {}, 'mesh, dataset: neither given: expected one of them'),
+    ('view_planner', {'policy': 'guess'}, "policy: invalid value: expected one of attention.*, "
+                                          "got 'guess'"),
     ('view_planner', {'policy': 'random', 'max_views': 0},
-     'max_views: expected an integer from 1 to 1000, got 0'),
-    ('reconstructor', {'object_size': -1}, 'object_size: expected a number.*, got -1'),
-    ('reconstructor', {'threshold': 1.5}, 'threshold: expected.*0.01 to 0.99, or nan, got 1.5'),
+     'max_views: invalid value: expected an integer from 1 to 1000, got 0'),
+    ('reconstructor', {'object_size': -1}, 'object_size: invalid value: expected a number.*, got '
+                                           '-1'),
+    ('reconstructor', {'threshold': 1.5}, 'threshold: invalid value: expected.*0.01 to 0.99, or '
+                                          'nan, got 1.5'),
 ])
 def test_a_parameter_out_of_range_is_refused_with_its_range(start_node, name, parameters, said):
     assert re.search(f'parameters? {said}', refusal(start_node, name, **parameters))

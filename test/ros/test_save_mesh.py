@@ -18,7 +18,7 @@ def test_the_mesh_is_written_where_the_answer_says(start_node, bench, tmp_path, 
                output_dir=tmp_path / 'meshes')
     answer = bench.call('save_mesh')
     assert not answer.success
-    assert 'expected a view before a mesh' in answer.message
+    assert 'no view in this episode yet: expected one before a mesh' in answer.message
     FakeCamera(bench, qos_profile_sensor_data).show()
     answer = bench.call('save_mesh')
     assert answer.success

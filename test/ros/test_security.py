@@ -64,5 +64,5 @@ def test_what_is_missing_or_too_much_is_named():
 def test_a_file_that_is_no_policy_is_refused(tmp_path, text):
     path = Path(tmp_path, 'policies.xml')
     path.write_text(text)
-    with pytest.raises(DataError, match='expected SROS2 policies'):
+    with pytest.raises(DataError, match='not readable: expected SROS2 policies'):
         read_policies(path)

@@ -73,5 +73,5 @@ def test_a_view_from_an_unusual_elevation_is_used_and_warned_of(
     shared_bench.until(
         lambda: shared_bench.counts('reconstructor').get('warned/elevation') == 1, 'the warning')
     line, = reconstructor.log('elevation')
-    assert 'expected views from an elevation of 30 degrees' in line
+    assert 'wrong elevation of the camera: expected 30 degrees' in line
     assert 'got 50.0' in line

@@ -132,7 +132,7 @@ class TfPoses:
                     self._waiting.append((header, since))
                 else:
                     self._diagnostics.reject(MessageError(
-                        f"expected tf to have the pose of the image's frame {header.frame_id!r} "
+                        f"no pose in tf: expected that of the image's frame {header.frame_id!r} "
                         f'in {self._object_frame!r} at its stamp: {error}', 'tf'))
             else:
                 self._publish(found.transform, header)
@@ -152,6 +152,6 @@ def _tf2_ros() -> Any:
         return import_module('tf2_ros')  # part of a full ROS, but not of the wheels
     except ImportError as error:
         raise ConfigError(
-            'parameter pose_source: expected tf2_ros to be installed where it is tf, but there is '
-            f'none ({error}); install ros-jazzy-tf2-ros-py, or use topic or turntable_joint'
+            'parameter pose_source: tf2_ros is not installed: expected it where pose_source is tf '
+            f'({error}); install ros-jazzy-tf2-ros-py, or use topic or turntable_joint'
         ) from error

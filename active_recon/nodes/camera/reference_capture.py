@@ -55,8 +55,8 @@ class ReferenceCapture:
         self._node.destroy_timer(late)
         self._image = None
         if captured is None:
-            response.message = ('expected an image of the empty scene that was taken after the '
-                                f'call, none came within {IMAGE_TIMEOUT_S:g} s; is the camera '
+            response.message = ('no image of the empty scene: expected one that was taken after '
+                                f'the call, none came within {IMAGE_TIMEOUT_S:g} s; is the camera '
                                 'running and the node active?')
             return response
         self.reference = captured

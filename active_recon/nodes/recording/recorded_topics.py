@@ -64,7 +64,7 @@ class RecordedTopics:
         if silent and self._checks > _CHECKS:
             topics = sorted(full for name in silent for full in self.named(name))
             self._diagnostics.raise_warning('no_publisher', (
-                f'expected publishers on {", ".join(topics)}, none was found, so nothing of '
+                f'no publishers on {", ".join(topics)}: expected one on each, so nothing of '
                 'them is recorded; remap with -r NAME:=TOPIC where they have other names'))
         else:
             self._diagnostics.clear_warning('no_publisher')

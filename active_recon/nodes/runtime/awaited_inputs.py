@@ -67,7 +67,7 @@ class AwaitedInputs:
     def _message(self, name: str, suffixes: Mapping[str, str]) -> str:
         topics = [f'{self._node.resolve_topic_name(name)}{suffix}' for suffix in suffixes.values()]
         publishers = [text for topic in topics for text in self._publishers(topic, suffixes)]
-        message = (f'{" or ".join(topics)}: expected messages, none has arrived; '
+        message = (f'{" or ".join(topics)}: no messages: expected some, none has arrived; '
                    f'{", ".join(publishers) or "nothing publishes there"}')
         candidates = sorted(self._candidates(name, suffixes), key=_similarity_to(topics[0]))
         return '; '.join([message, *(

@@ -52,8 +52,9 @@ def _message_file(package: str, name: str) -> str:
         path = Path(prefix, 'share', package, 'msg', f'{name}.msg')
         if path.is_file():
             return path.read_text()
-    raise RecordingError(f'expected the message file of {package}/msg/{name} under share/ in one '
-                         f'of {", ".join(prefixes)}, but it is in none', 'message_definition')
+    raise RecordingError(f'no definition of {package}/msg/{name}: expected its message file under '
+                         f'share/ in one of {", ".join(prefixes)}, but it is in '
+                         'none', 'message_definition')
 
 
 def _named_types(package: str, text: str) -> list[str]:

@@ -67,7 +67,7 @@ def read_policies(path: Path) -> dict[str, Access]:
                 f"{kind}s[@{rule}='ALLOW']/{kind}")) for kind, rule in _QUERIES}
             for profile in profiles}
     except (OSError, ElementTree.ParseError, KeyError) as error:
-        raise DataError(f'{path}: expected SROS2 policies, got: {error}') from error
+        raise DataError(f'{path}: not readable: expected SROS2 policies, got: {error}') from error
 
 
 def differences(allowed: Mapping[str, Access], live: Mapping[str, Access]) -> list[str]:

@@ -16,6 +16,6 @@ def output_path(output_dir: Path, name: str) -> Path:
     path = root / name
     if (not parts or Path(name).is_absolute() or '..' in parts or '\0' in name
             or not path.resolve().is_relative_to(root.resolve())):
-        raise ConfigError(f'expected a relative name that stays under {root}, got {name!r}',
-                          'output')
+        raise ConfigError('invalid output name: expected a relative name that stays under '
+                          f'{root}, got {name!r}', 'output')
     return path

@@ -79,11 +79,13 @@ class QosWarnings(Node):
                     continue
                 profiles = profile_words(offered.qos_profile), profile_words(requested.qos_profile)
                 yield topic, (
-                    'expected subscribers to request no more than this node offers '
-                    f'({profiles[0]}), but {names[1]} requests ({profiles[1]}), so nothing arrives'
+                    'incompatible QoS: expected subscribers to request no more than this node '
+                    f'offers ({profiles[0]}), but {names[1]} requests ({profiles[1]}), so nothing '
+                    'arrives'
                     if names[0] == me else
-                    'expected publishers to offer at least what this node requests '
-                    f'({profiles[1]}), but {names[0]} offers ({profiles[0]}), so nothing arrives')
+                    'incompatible QoS: expected publishers to offer at least what this node '
+                    f'requests ({profiles[1]}), but {names[0]} offers ({profiles[0]}), so nothing '
+                    'arrives')
 
 
 def _is_compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
