@@ -49,10 +49,10 @@ class LossConfig(Config):
         """Reject weights that train nothing."""
         if min(self.volume_weight, self.silhouette_weight) < 0 or not (
                 self.volume_weight + self.silhouette_weight > 0):
-            raise ConfigError('LossConfig: expected weights of 0 or more, not both 0, got '
+            raise ConfigError('LossConfig: invalid weights: expected 0 or more, not both 0, got '
                               f'{self.volume_weight} and {self.silhouette_weight}')
         if self.volume_loss not in VOLUME_LOSSES:
-            raise ConfigError(f'LossConfig: expected a volume loss out of '
+            raise ConfigError('LossConfig: unknown volume loss: expected one of '
                               f'{", ".join(VOLUME_LOSSES)}, got {self.volume_loss!r}')
 
 
@@ -75,8 +75,8 @@ class RewardConfig(Config):
     def __post_init__(self) -> None:
         """Reject widths that divide by 0."""
         if not (self.distance_tau > 0 and self.policy_sigma > 0 and self.distance_weight >= 0):
-            raise ConfigError('RewardConfig: expected tau and sigma above 0 and a weight of 0 or '
-                              f'more, got {self.to_dict()}')
+            raise ConfigError('RewardConfig: invalid tau, sigma or weight: expected tau and sigma '
+                              f'above 0 and a weight of 0 or more, got {self.to_dict()}')
         if self.group_size < 1:
-            raise ConfigError('RewardConfig: expected group_size of 1 or more, got '
+            raise ConfigError('RewardConfig: invalid group_size: expected 1 or more, got '
                               f'{self.group_size}')

@@ -93,14 +93,14 @@ def test_cameras_that_are_none_are_refused_by_their_path(text, made, tmp_path):
     path = tmp_path / 'ShapeNetRendering' / 'a' / 'b' / 'rendering' / 'cameras.json'
     path.parent.mkdir(parents=True)
     path.write_text(text)
-    with pytest.raises(DataError, match='cameras.json: expected a list of cameras'):
+    with pytest.raises(DataError, match='cameras.json: no readable cameras: expected a list'):
         ObjectFolder(tmp_path, 'a', 'b').cameras()
 
 
 def test_a_binvox_file_without_a_side_is_refused(tmp_path):
     path = tmp_path / 'model.binvox'
     path.write_bytes(b'#binvox 1\ndim 2 2 2\ndata\n')
-    with pytest.raises(DataError, match='with a scale'):
+    with pytest.raises(DataError, match='no readable scale: expected a binvox'):
         binvox_side(path)
 
 

@@ -234,7 +234,7 @@ def test_a_fisheye_that_is_known_serves_too():
 
 
 @pytest.mark.parametrize(('old', 'new', 'said'), [
-    ('plumb_bob', 'equidistant', 'expected 4 coefficients of equidistant, got 5'),
+    ('plumb_bob', 'equidistant', 'coefficients: expected 4 of equidistant, got 5'),
     ('camera_matrix', 'matrix', 'no calibration: .* as ROS.s camera_calibration writes it'),
     ('[530.0', '[.nan', 'camera not calibrated: expected'),
     ('[530.0', '[0.0', 'camera not calibrated: expected'),

@@ -120,7 +120,8 @@ def test_a_lens_on_another_size_of_image_sees_the_same():
     np.eye(3), np.full((4, 4), np.nan), np.diag([2.0, 1, 1, 1]), np.diag([-1.0, 1, 1, 1])],
     ids=['3 x 3', 'nan', 'stretched', 'mirrored'])
 def test_a_pose_that_is_not_rigid_is_refused(pose):
-    with pytest.raises(ViewError, match='expected a (finite|rotation)') as refusal:
+    with pytest.raises(ViewError, match='invalid camera pose: expected a '
+                       '(finite|rotation)') as refusal:
         Camera(pose)
     assert refusal.value.kind == 'pose'
 

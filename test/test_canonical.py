@@ -99,7 +99,8 @@ def test_an_object_of_another_size_is_shown_at_the_same_size(renderer):
     np.zeros((137, 136, 3), np.uint8), np.zeros((137, 137), np.uint8),
     np.zeros((137, 137, 4), np.uint8), np.zeros((137, 137, 3), np.float32)])
 def test_an_image_that_is_not_the_camera_s_is_refused(image):
-    with pytest.raises(ViewError, match='expected an image of 137 x 137 x 3 uint8') as refusal:
+    with pytest.raises(ViewError, match='wrong image size or type: expected 137 x 137 x 3 '
+                       'uint8') as refusal:
         shown_of(image, orbit_camera(0.0))
     assert refusal.value.kind == 'image_size'
 
@@ -107,7 +108,7 @@ def test_an_image_that_is_not_the_camera_s_is_refused(image):
 def test_a_camera_straight_above_has_no_canonical_one_and_is_refused():
     pose = np.diag([1.0, -1, -1, 1])
     pose[2, 3] = 2
-    with pytest.raises(ViewError, match='expected an elevation within'):
+    with pytest.raises(ViewError, match='invalid elevation: expected one within'):
         shown_of(np.zeros((137, 137, 3), np.uint8), Camera(pose))
 
 

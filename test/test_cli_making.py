@@ -75,7 +75,7 @@ def test_render_turns_files_by_their_axes(meshes, tmp_path):
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['--up', 'w'], "up: 'w' is no axis"),
     (['--up', 'x'], 'one axis, x and x: name both'),
-    (['--split', 'train'], 'expected a manifest')])
+    (['--split', 'train'], 'no manifest: expected a manifest')])
 def test_render_refuses_options_that_cannot_be_used(arguments, message, meshes, tmp_path):
     with pytest.raises(ConfigError, match=message):
         run('render', meshes, tmp_path / 'out', *arguments)
@@ -92,9 +92,9 @@ def test_render_takes_the_rows_of_a_manifest_that_are_asked_for(meshes, tmp_path
     result = run('render', manifest, tmp_path / 'out', *asked, *ONE_WORKER)
     assert '1 objects of 1 are there' in result.stdout
     assert [folder.category for folder in list_objects(tmp_path / 'out')] == ['chair']
-    with pytest.raises(DataError, match='expected objects to make'):
+    with pytest.raises(DataError, match='no objects to make: expected some'):
         run('render', manifest, tmp_path / 'out', '--split', 'tests')
-    with pytest.raises(ConfigError, match='expected neither --up nor --front'):
+    with pytest.raises(ConfigError, match='--up or --front with a manifest: expected neither'):
         run('render', manifest, tmp_path / 'out', '--up', 'y')
 
 
@@ -139,14 +139,14 @@ def test_the_same_seeds_make_the_same_files(tmp_path):
 
 def test_dataset_does_not_go_on_with_objects_of_other_generators(tmp_path):
     (tmp_path / 'generators.sha256').write_text('0123456789abcdef\n')
-    with pytest.raises(DataError, match='was made by others .*choose another folder'):
+    with pytest.raises(DataError, match='shapes of other generators: .*choose another folder'):
         run('dataset', 'build', tmp_path, '--train', 1, '--val', 0, '--test', 0)
 
 
 def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp_path):
-    with pytest.raises(ConfigError, match="expected a category out of .*, got 'castle'"):
+    with pytest.raises(ConfigError, match="unknown category: expected one of .*, got 'castle'"):
         run('dataset', 'build', tmp_path, '--category', 'castle')
-    with pytest.raises(DataError, match='expected objects to make'):
+    with pytest.raises(DataError, match='no objects to make: expected some'):
         run('dataset', 'build', tmp_path, '--train', 0, '--val', 0, '--test', 0, '--unseen', 0)
 
 
@@ -169,5 +169,5 @@ def test_two_processes_make_what_one_makes(meshes, tmp_path):
 def test_a_refusal_is_one_line_and_exit_code_2(tmp_path):
     result = command('render', tmp_path / 'none', tmp_path / 'out')
     assert result.returncode == 2
-    assert result.stderr == (f'active-recon: {tmp_path}/none: expected a mesh file or a folder of '
-                             '<category>/<mesh>, but there is neither\n')
+    assert result.stderr == (f'active-recon: {tmp_path}/none: no such file or folder: expected a '
+                             'mesh file or a folder of <category>/<mesh>\n')

@@ -64,9 +64,9 @@ def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypa
     assert 'got neither' in refused()
     assert 'whole numbers' in refused(made, '--counts', '1,two')
     assert 'got none' in refused(made, '--models', ',')
-    assert 'expected other objects than those measured' in refused(
+    assert 'same objects twice: expected other objects than those measured' in refused(
         made, '--models', 'carving', '--validation', made)
     assert "R2N2's layout" in refused(tmp_path, '--models', 'carving')
     assert '_par.txt' in refused('--photos', tmp_path, '--models', 'carving')
-    assert 'box: expected six numbers' in refused(
+    assert 'box: invalid corners: expected six numbers' in refused(
         '--photos', tmp_path, '--box', '1 a', '--models', 'carving')

@@ -202,7 +202,7 @@ def test_a_model_without_a_view_policy_is_measured_under_the_others(
     assert set(found['policies']) == {'random', 'uniform', 'farthest'}
     assert not {'latent_swap', 'yaw'} & found.keys()  # nobody asked for them
     assert '--latent-study: needs' in refusal(monkeypatch, capsys, *arguments, '--latent-study')
-    assert 'expected weights with a view policy' in refusal(
+    assert 'no view policy: expected weights with one' in refusal(
         monkeypatch, capsys, *arguments, '--policy', 'attention')
 
 
@@ -270,9 +270,9 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
 
 
 @pytest.mark.parametrize(('option', 'value', 'words'), [
-    ('--volume-loss', 'mae', 'expected a volume loss out of mse, bce'),
-    ('--silhouette-weight', -1, 'expected weights of 0 or more'),
-    ('--learning-rate', 0, 'expected numbers above 0')])
+    ('--volume-loss', 'mae', 'unknown volume loss: expected one of mse, bce'),
+    ('--silhouette-weight', -1, 'invalid weights: expected 0 or more'),
+    ('--learning-rate', 0, 'number too small: expected numbers above 0')])
 def test_settings_that_train_nothing_are_refused(
         dataset, tmp_path, monkeypatch, capsys, option, value, words):
     assert words in refusal(monkeypatch, capsys, *training(dataset, tmp_path, option, value))

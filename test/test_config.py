@@ -42,7 +42,7 @@ def test_unknown_keys_are_named_beside_the_known_ones():
     (TrainingConfig, {'steps': 1, 'batch_size': 0}),
 ])
 def test_what_makes_or_trains_nothing_is_refused(kind, values):
-    with pytest.raises(ConfigError, match=f'{kind.__name__}: expected .* got'):
+    with pytest.raises(ConfigError, match=f'{kind.__name__}: .+: expected .* got'):
         kind(**values)
 
 

@@ -58,7 +58,8 @@ def test_finer_voxels_stand_beside_and_are_read_where_asked_for(folder):
 
 def test_voxels_of_another_resolution_than_their_folder_s_are_refused(folder):
     write_binvox(GRID, folder.voxels_path(64))
-    with pytest.raises(DataError, match=r'expected 64 cells a side, got \(32, 32, 32\)'):
+    with pytest.raises(DataError, match=r'wrong resolution: expected 64 cells a side, got \(32, '
+                       r'32, 32\)'):
         folder.voxels(64)
 
 
@@ -92,7 +93,8 @@ def test_a_folder_in_another_layout_is_refused(tmp_path):
     b'0 30 0 0 25\n', b'0 90 0 1.2 25\n', b'\xff\xfe\n'])
 def test_metadata_that_tells_no_cameras_is_refused(content, folder):
     (folder.images_folder / 'rendering_metadata.txt').write_bytes(content)
-    with pytest.raises(DataError, match='rendering_metadata.txt: expected rows of five numbers'):
+    with pytest.raises(DataError, match='rendering_metadata.txt: no readable cameras: expected '
+                       'rows of five numbers'):
         folder.cameras()
 
 
@@ -106,15 +108,18 @@ def test_missing_metadata_is_refused(folder):
     np.zeros((4, 4, 3), np.uint8), np.zeros((4, 4), np.uint8), np.zeros((4, 4, 4), np.uint16)])
 def test_an_image_that_is_not_rgba_of_eight_bits_is_refused(picture, folder):
     cv2.imwrite(str(folder.images_folder / '00.png'), picture)
-    with pytest.raises(DataError, match='00.png: expected four channels .* of 8 bits'):
+    with pytest.raises(DataError, match='00.png: wrong image format: expected four channels .* of '
+                       '8 bits'):
         folder.image(0)
 
 
 def test_a_missing_or_broken_image_is_refused(folder):
-    with pytest.raises(DataError, match='03.png: expected an image, found no file'):
+    with pytest.raises(DataError, match='03.png: no readable image: expected a PNG, found no '
+                       'file'):
         folder.image(3)
     (folder.images_folder / '00.png').write_bytes(b'\x89PNG\r\n')
-    with pytest.raises(DataError, match='00.png: expected an image, found no whole PNG'):
+    with pytest.raises(DataError, match='00.png: no readable image: expected a PNG, found no '
+                       'whole PNG'):
         folder.image(0)
 
 

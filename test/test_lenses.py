@@ -76,10 +76,10 @@ def test_a_curve_that_turns_back_is_followed_to_where_it_does():
 @pytest.mark.parametrize(('model', 'coefficients', 'said'), [
     ('kannala_brandt', (0.1,) * 4, "plumb_bob.*got 'kannala_brandt'; publish rectified"),
     ('', (0.1,) * 5, "got ''"),
-    ('plumb_bob', (0.1,) * 3, 'expected 4 or 5 coefficients of plumb_bob, got 3'),
-    ('equidistant', (0.1,) * 5, 'expected 4 coefficients of equidistant, got 5'),
-    ('plumb_bob', (math.nan,) * 5, 'finite coefficients.*nan'),
-    ('plumb_bob', (1e30,) * 5, 'finite coefficients')])
+    ('plumb_bob', (0.1,) * 3, 'coefficients: expected 4 or 5 of plumb_bob, got 3'),
+    ('equidistant', (0.1,) * 5, 'coefficients: expected 4 of equidistant, got 5'),
+    ('plumb_bob', (math.nan,) * 5, 'coefficients: expected finite.*nan'),
+    ('plumb_bob', (1e30,) * 5, 'coefficients: expected finite')])
 def test_what_no_lens_has_is_refused(model, coefficients, said):
     with pytest.raises(ViewError, match=said) as caught:
         Distortion(model, coefficients)

@@ -198,7 +198,7 @@ def test_half_precision_changes_little(lifting):
 
 
 def test_sizes_that_make_no_network_are_refused():
-    with pytest.raises(ConfigError, match='channels of 1 or more'):
+    with pytest.raises(ConfigError, match='invalid channels: expected 1 or more'):
         LiftingConfig(head_channels=0)
 
 

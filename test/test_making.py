@@ -56,14 +56,14 @@ def test_two_meshes_that_would_become_one_object_are_refused(tmp_path):
 
 
 def test_bad_axes_and_folders_without_meshes_are_refused_before_the_work(tmp_path):
-    with pytest.raises(DataError, match='there is neither'):
+    with pytest.raises(DataError, match='none: no such file or folder: expected a mesh file'):
         mesh_jobs(tmp_path / 'none', tmp_path, None, None)
-    with pytest.raises(DataError, match='expected meshes .*found none'):
+    with pytest.raises(DataError, match='no meshes there: expected files .*found none'):
         mesh_jobs(tmp_path, tmp_path, None, None)
     save(tmp_path, 'chair/a.obj')
     with pytest.raises(ConfigError, match="up: 'w' is no axis"):
         mesh_jobs(tmp_path, tmp_path, 'w', None)
-    with pytest.raises(ConfigError, match="category out of .*'castle'"):
+    with pytest.raises(ConfigError, match="unknown category: expected one of .*'castle'"):
         shape_jobs('castle', range(2), tmp_path)
 
 

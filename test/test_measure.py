@@ -193,5 +193,5 @@ def test_a_policy_that_knows_its_object_goes_elsewhere_by_anothers_latent(views)
 
 def test_the_latent_swap_ablation_needs_two_objects(network, attention, views):
     one = part_of(views, slice(1))
-    with pytest.raises(DataError, match='two objects or more'):
+    with pytest.raises(DataError, match='too few objects: expected two or more'):
         latent_swap_ablation(network, followed(attention), one, *episodes(one, 2), 0.1)

@@ -103,7 +103,8 @@ def test_the_parts_of_a_scene_are_one_mesh_and_keep_their_places(tmp_path):
 def test_what_holds_no_face_with_an_area_is_refused_with_its_path(name, content, tmp_path):
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(MeshError, match=f'{name}: (no mesh|a mesh without|expected faces)'):
+    with pytest.raises(MeshError, match=f'{name}: (no mesh|a mesh without|no surface: expected '
+                       'faces)'):
         load_mesh(path)
 
 

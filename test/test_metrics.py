@@ -42,7 +42,7 @@ def test_no_object_stands_in_for_itself_and_each_does_so_once(count, starts):
 
 
 def test_a_single_object_has_no_stand_in():
-    with pytest.raises(DataError, match='two objects or more.*got 1'):
+    with pytest.raises(DataError, match='too few objects: expected two or more.*got 1'):
         swapped_objects(torch.zeros(4, dtype=torch.int64), 1)
 
 

@@ -128,12 +128,14 @@ def test_a_network_of_canonical_cameras_sees_no_photographs(folder, network):
 
 
 @pytest.mark.parametrize(('line', 'expected'), [
-    ('box0.png 1 2', 'line 2: expected a name and 21 numbers'),
-    ('box0.png ' + ' '.join('x' * 21), 'line 2: expected a name and 21 numbers'),
-    ('box0.png ' + ' '.join(['0'] * 21), 'line 2: expected focal lengths above 0'),
-    ('box0.png 100 0 50 0 100 50 0 0 1 ' + ' '.join(['2'] * 12), 'expected a rotation'),
-    ('none.png ' + ' '.join(['1'] * 21), 'none.png: expected a photograph, found no file'),
-    ('', 'expected a line for each image')])
+    ('box0.png 1 2', 'line 2: not a camera: expected a name and 21 numbers'),
+    ('box0.png ' + ' '.join('x' * 21), 'line 2: not a camera: expected a name and 21 numbers'),
+    ('box0.png ' + ' '.join(['0'] * 21), 'line 2: invalid lens: expected focal lengths above 0'),
+    ('box0.png 100 0 50 0 100 50 0 0 1 ' + ' '.join(['2'] * 12),
+     'invalid rotation: expected an orthogonal matrix'),
+    ('none.png ' + ' '.join(['1'] * 21),
+     'none.png: no readable photograph: expected an image file, found no file'),
+    ('', 'no cameras: expected a line for each image')])
 def test_what_is_no_camera_is_refused_by_its_line(line, expected, box, tmp_path):
     written(tmp_path, box, 1)
     (tmp_path / 'box_par.txt').write_text(f'1\n{line}\n')
@@ -142,14 +144,14 @@ def test_what_is_no_camera_is_refused_by_its_line(line, expected, box, tmp_path)
 
 
 def test_a_folder_without_cameras_or_box_is_refused(folder, box, tmp_path):
-    with pytest.raises(DataError, match=r'one file \*_par.txt'):
+    with pytest.raises(DataError, match=r'wrong number of camera files: expected one \*_par.txt'):
         read_photographs(tmp_path)
     written(tmp_path, box, 1)
     (tmp_path / 'README.txt').unlink()
     with pytest.raises(DataError, match='give them by --box'):
         read_photographs(tmp_path)
     for wrong in ([1, 2, 3], [0, 0, 0, 0, 1, 1], [0, 0, 0, 1, 1, math.nan]):
-        with pytest.raises(ConfigError, match='box: expected the least'):
+        with pytest.raises(ConfigError, match='box: invalid corners: expected the least'):
             read_photographs(tmp_path, wrong)
     with pytest.raises(ActiveReconError, match='no axis: expected x, y or z'):
         read_photographs(folder, up='w')
@@ -159,7 +161,7 @@ def test_a_mask_of_another_size_is_refused(box, tmp_path):
     written(tmp_path, box, 1)
     (tmp_path / 'masks').mkdir()
     cv2.imwrite(str(tmp_path / 'masks' / 'box0.png'), np.zeros((5, 6), np.uint8))
-    with pytest.raises(DataError, match='expected a mask of 120 x 100 pixels'):
+    with pytest.raises(DataError, match='no mask of the right size: expected 120 x 100 pixels'):
         read_photographs(tmp_path)
 
 

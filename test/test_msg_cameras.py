@@ -79,10 +79,10 @@ def test_coefficients_that_are_all_zero_are_a_pinhole(model, count):
 
 
 @pytest.mark.parametrize(('model', 'coefficients', 'said'), [
-    ('', [0.1] * 5, "model out of plumb_bob.*got ''"),
-    ('fov', [0.0] * 5, "model out of plumb_bob.*got 'fov'"),
-    ('plumb_bob', [0.1], 'expected 4 or 5 coefficients of plumb_bob, got 1'),
-    ('equidistant', [math.nan] * 4, 'finite coefficients')])
+    ('', [0.1] * 5, "model: expected one of plumb_bob.*got ''"),
+    ('fov', [0.0] * 5, "model: expected one of plumb_bob.*got 'fov'"),
+    ('plumb_bob', [0.1], 'coefficients: expected 4 or 5 of plumb_bob, got 1'),
+    ('equidistant', [math.nan] * 4, 'coefficients: expected finite')])
 def test_a_distortion_of_no_known_lens_is_refused(model, coefficients, said):
     info = intrinsics_to_msg(CANONICAL_INTRINSICS, OBJECT)
     info.distortion_model, info.d = model, coefficients

@@ -96,7 +96,8 @@ def test_an_object_without_mixed_cells_has_an_objective_too():
 
 
 def test_voxels_of_another_resolution_are_refused_in_words():
-    with pytest.raises(ConfigError, match='expected voxels of 64 cells a side .* got 32'):
+    with pytest.raises(ConfigError, match='wrong resolution: expected voxels of 64 cells a side '
+                       '.* got 32'):
         tiny_ogn().objective(of_codes(torch.rand(1, 16)), torch.zeros(1, 32, 32, 32))
 
 

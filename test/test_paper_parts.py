@@ -139,7 +139,7 @@ def test_figure_7_shows_photographs_where_pascal3d_is_given(study, tmp_path, mon
 
 
 def test_an_unknown_part_is_refused(study):
-    with pytest.raises(ConfigError, match=r"part out of table1, .*got 'table6'"):
+    with pytest.raises(ConfigError, match=r"no such part: expected one of table1, .*got 'table6'"):
         run_part(study, 'table6')
 
 
@@ -168,7 +168,7 @@ def test_the_command_refuses_parts_that_there_are_not(study, monkeypatch, capsys
     assert command(monkeypatch, study, 'table6') == 2
     assert 'expected some of table1,' in capsys.readouterr().err
     assert command(monkeypatch, study, 'table1', '--device', 'tpu') == 2
-    assert 'expected cpu, or cuda' in capsys.readouterr().err
+    assert '--device: no such device: expected cpu, or cuda' in capsys.readouterr().err
 
 
 def test_the_document_tells_every_part(study):

@@ -46,7 +46,8 @@ def test_published_figures_and_measured_ones_never_share_a_column():
 
 
 def test_columns_of_another_length_are_refused():
-    with pytest.raises(ConfigError, match="expected 3 cells in the column 'PTN', got 1"):
+    with pytest.raises(ConfigError, match="wrong number of cells: expected 3 in the column 'PTN', "
+                       'got 1'):
         Table('IoU', 'category', ['car', 'lamp', 'sofa'], [Column('PTN', [0.3], published=True)])
 
 

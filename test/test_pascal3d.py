@@ -170,21 +170,24 @@ def test_classes_bear_the_names_of_our_categories_and_can_be_chosen(root):
     photograph(root, 'tvmonitor_pascal/two.jpg', np.full((400, 400, 3), 60, np.uint8))
     assert list(read(root).categories) == ['car', 'monitor']
     assert list(read(root, 'monitor').categories) == ['monitor']
-    with pytest.raises(DataError, match='annotations of sofa, there are those of car, monitor'):
+    with pytest.raises(DataError, match='annotations: expected those of sofa, got those of car, '
+                       'monitor'):
         list_photographs(root, ['sofa'])
 
 
 @pytest.mark.parametrize(('changes', 'reason'), [
     ({'truncated': 1}, 'it is truncated'),
     ({'occluded': 1, 'difficult': 1}, 'it is occluded and difficult'),
-    ({'viewpoint': EMPTY}, 'expected the field viewpoint, found none'),
-    ({'viewpoint': {'px': 1.0}}, 'expected the field azimuth_coarse, found none'),
-    ({'viewpoint': viewpoint(azimuth=math.nan)}, 'expected finite angles'),
-    ({'viewpoint': viewpoint(elevation=90.0)}, r'expected an elevation within \+-90 degrees'),
-    ({'bbox': [[5.0, 5.0, 2.0, 9.0]]}, 'expected a box of left, top, right, bottom'),
+    ({'viewpoint': EMPTY}, 'missing field: expected viewpoint, found none'),
+    ({'viewpoint': {'px': 1.0}}, 'missing field: expected azimuth_coarse, found none'),
+    ({'viewpoint': viewpoint(azimuth=math.nan)}, 'invalid viewpoint: expected finite angles'),
+    ({'viewpoint': viewpoint(elevation=90.0)},
+     r'invalid elevation: expected one within \+-90 degrees'),
+    ({'bbox': [[5.0, 5.0, 2.0, 9.0]]}, 'invalid box: expected left, top, right, bottom'),
     ({'bbox': [[5.0, 5.0]]}, 'not enough values'),
-    ({'bbox': [[900.0, 900.0, 950.0, 950.0]]}, 'expected a box within the image of 400 x 400'),
-    ({'cad_index': EMPTY}, 'expected the field cad_index, found none'),
+    ({'bbox': [[900.0, 900.0, 950.0, 950.0]]},
+     'box out of the image: expected one within 400 x 400'),
+    ({'cad_index': EMPTY}, 'missing field: expected cad_index, found none'),
     ({'cad_index': 7}, '07.off: no such mesh file')])
 def test_what_cannot_be_measured_is_left_out_and_told_why(changes, reason, root):
     annotate(root, 'car_imagenet/bad', annotated(**changes))
@@ -205,15 +208,15 @@ def test_an_image_that_is_missing_or_truncated_is_left_out_and_told(root):
     views = read(root)
     assert len(views) == 1
     missing, truncated = views.unreadable
-    assert 'expected the image none.jpg (or .JPEG)' in missing
-    assert 'short.JPEG: expected a whole image: ' in truncated
+    assert 'no image: expected none.jpg (or .JPEG)' in missing
+    assert 'short.JPEG: unreadable image: expected a whole one, got: ' in truncated
 
 
 @pytest.mark.parametrize('content', [b'', b'no MATLAB file', b'MATLAB 5.0 MAT-file' + bytes(400)])
 def test_a_file_that_is_no_annotation_is_left_out_and_told(content, root):
     (root / 'Annotations/car_imagenet/bad.mat').write_bytes(content)
     _, (told,) = list_photographs(root)
-    assert 'bad.mat: expected a MATLAB file with record.objects' in told
+    assert 'bad.mat: no readable annotation: expected a MATLAB file with record.objects' in told
 
 
 def test_an_annotation_of_another_form_is_left_out_and_told(root):
@@ -227,7 +230,7 @@ def test_an_annotation_of_another_form_is_left_out_and_told(root):
 @pytest.mark.parametrize('name', ['Annotations', 'Images', 'CAD'])
 def test_a_folder_that_is_not_pascal3d_is_refused(name, root):
     (root / name).rename(root / 'elsewhere')
-    with pytest.raises(DataError, match=f'it has no folder {name}'):
+    with pytest.raises(DataError, match=f'not the PASCAL3D.* found no folder {name}'):
         list_photographs(root)
 
 

@@ -51,7 +51,7 @@ def test_topics_are_chosen_by_name_with_or_without_the_slash(bag):
 
 @pytest.mark.parametrize('rate', [0.0, -1.0, float('nan'), float('inf')])
 def test_a_rate_that_is_not_above_0_is_refused(bag, rate):
-    with pytest.raises(ConfigError, match='expected a rate above 0'):
+    with pytest.raises(ConfigError, match='--rate: invalid rate: expected one above 0'):
         played_topics(bag.folder, rate)
 
 

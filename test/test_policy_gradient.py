@@ -121,7 +121,8 @@ def test_the_episodes_of_a_group_have_the_same_start(views):
         groups = part.reshape(4, 3)
         assert (groups == groups[:, :1]).all()
         assert len(groups[:, 0].unique()) > 1
-    with pytest.raises(ConfigError, match='expected a divisor of the 12 episodes.*got 5'):
+    with pytest.raises(ConfigError, match='uneven groups: expected a divisor of the 12 '
+                       'episodes.*got 5'):
         draw_episodes(views, 12, [5], 5)
 
 

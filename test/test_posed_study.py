@@ -132,7 +132,8 @@ def test_random_views_measure_what_a_loop_by_hand_does(scene, carving):
 
 def test_a_network_that_needs_the_front_joins_in_on_a_turntable_alone(dataset, scene, carving,
                                                                        paper):
-    with pytest.raises(ConfigError, match='paper: expected objects that are seen from 24'):
+    with pytest.raises(ConfigError, match='paper: cannot be shown these views: expected objects '
+                       'that are seen from 24'):
         next(logits_of(scene, paper, torch.arange(1), orders_of(scene, PLAN)['random']))
     turntable = read_scene(list_objects(dataset), [carving.network, paper.network])
     plan = Plan((1, 3), ())
@@ -246,7 +247,7 @@ def test_a_study_says_all_of_a_folder_and_can_be_written(made, carving, paper):
 
 
 def test_a_study_that_nothing_can_be_shown_is_refused(made, paper):
-    with pytest.raises(ConfigError, match='expected a model that can be shown these views'):
+    with pytest.raises(ConfigError, match='no model for these views: expected one'):
         study_set(made, [paper], PLAN, EXTENT)
 
 
@@ -261,10 +262,11 @@ def test_objects_are_chosen_by_their_category(dataset):
 
 def test_counts_rise():
     assert Plan().within(12) == (1, 2, 3, 5, 8, 12)
-    with pytest.raises(ConfigError, match='4 or fewer, as the objects have, got 5,8'):
+    with pytest.raises(ConfigError, match='too many views: expected 4 or fewer, as the objects '
+                       'have, got 5,8'):
         Plan((5, 8)).within(4)
     for wrong in ((), (0, 1), (3, 2), (1, 1)):
-        with pytest.raises(ConfigError, match='counts: expected rising'):
+        with pytest.raises(ConfigError, match='counts: invalid numbers of views: expected rising'):
             Plan(wrong)
 
 
@@ -274,7 +276,7 @@ def test_entrants_are_named_apart():
     assert first.thresholds == {64: 0.5, 32: 0.5} and first.sides == (64, 32)
     with pytest.raises(ConfigError, match="got 'carving' twice"):
         load_entrants('carving,carving')
-    with pytest.raises(ConfigError, match='got none'):
+    with pytest.raises(ConfigError, match='models: empty list: .* got none'):
         load_entrants(' , ')
     with pytest.raises(WeightsError, match='no such file'):
         load_entrants('carving,x=none.safetensors')

@@ -98,4 +98,4 @@ def test_an_image_that_was_cut_off_leaves_its_object_out_and_is_told(tmp_path):
     path.write_bytes(path.read_bytes()[:-9])
     views = read_views(folders)
     assert views.folders == (folders[1],)
-    assert '17.png: expected an image, found no whole PNG' in views.unreadable[0]
+    assert '17.png: no readable image: expected a PNG, found no whole PNG' in views.unreadable[0]

@@ -70,7 +70,7 @@ def test_a_view_that_is_refused_changes_nothing(runtime, wrong):
     undisturbed, disturbed = Reconstructor(runtime), Reconstructor(runtime)
     add(undisturbed, 0)
     add(disturbed, 0)
-    with pytest.raises(ViewError, match='expected an image of 137 x 137 x 3'):
+    with pytest.raises(ViewError, match='wrong image size or type: expected 137 x 137 x 3'):
         disturbed.add_view(wrong, orbit_camera(1.0))
     assert disturbed.view_count == 1
     np.testing.assert_array_equal(add(disturbed, 1).grid.occupancy,
@@ -80,7 +80,7 @@ def test_a_view_that_is_refused_changes_nothing(runtime, wrong):
 def test_a_camera_that_looks_away_is_refused(runtime):
     away = orbit_camera(0.0).pose.copy()
     away[:3, :3] = away[:3, :3] @ np.diag([-1, 1, -1])
-    with pytest.raises(ViewError, match='looks at the object'):
+    with pytest.raises(ViewError, match='looks away from the object: expected one that looks'):
         Reconstructor(runtime).add_view(image_of(0), Camera(away))
 
 
@@ -120,7 +120,7 @@ def test_an_image_of_another_size_is_seen_alike(runtime):
     ({'threshold': math.nan}, r'probability in \(0, 1\), got nan'),
     ({'object_size': 0.0}, 'metres above 0, got 0'),
     ({'object_size': math.nan}, 'metres above 0, got nan'),
-    ({'object_yaw': math.inf}, 'finite radians, got inf'),
+    ({'object_yaw': math.inf}, 'not finite: expected radians, got inf'),
 ])
 def test_settings_out_of_range_are_refused_with_the_range(runtime, settings, message):
     with pytest.raises(ConfigError, match=message):

@@ -36,7 +36,8 @@ def test_two_processes_write_one_set_of_weights_and_one_log(dataset, tmp_path):
 
 
 def test_a_batch_that_cannot_be_shared_is_refused(dataset, tmp_path):
-    with pytest.raises(AssertionError, match='batch_size: expected a multiple of the 2 processes'):
+    with pytest.raises(AssertionError, match='batch_size: not divisible: expected a multiple of '
+                       'the 2 processes'):
         train(dataset, tmp_path / 'run', 2, 1, '--batch-size', '3')
 
 

@@ -97,7 +97,7 @@ def test_categories_do_not_share_their_draws():
 
 
 def test_an_unknown_category_is_refused():
-    with pytest.raises(ConfigError, match="out of airplane, .*, got 'castle'"):
+    with pytest.raises(ConfigError, match="one of airplane, .*, got 'castle'"):
         make_shape('castle', 0)
 
 

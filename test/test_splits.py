@@ -63,13 +63,14 @@ def test_what_the_split_names_and_the_disk_lacks_is_told_one_by_one(root):
     path = write(root, [record(CHAIR, test=['2a', 'ffff']), record('02691156', test=['1a'])])
     found, missing = list_split(root, path, 'test')
     assert names(found) == [f'{CHAIR}/2a']
-    assert missing == [f'{root}: expected {CHAIR}/ffff of test, found no such folder',
-                       f'{root}: expected 02691156/1a of test, found no such folder']
+    assert missing == [f'{root}: no such folder: expected {CHAIR}/ffff of test',
+                       f'{root}: no such folder: expected 02691156/1a of test']
 
 
 def test_a_split_of_which_nothing_is_there_is_refused(root):
     path = write(root, [record(CHAIR, test=['eeee', 'ffff'])])
-    with pytest.raises(DataError, match='the 2 objects .* found none of them; are its folders'):
+    with pytest.raises(DataError, match="none of the split's objects: expected the 2 objects .*; "
+                       'are its folders'):
         list_split(root, path, 'test')
     with pytest.raises(DataError, match='the 0 objects'):
         list_split(root, path, 'val')
@@ -88,7 +89,8 @@ def test_the_sorted_parts_share_nothing_and_leave_nothing_out(root):
 
 
 def test_another_part_is_refused(root):
-    with pytest.raises(ConfigError, match="expected one of train, val, test, got 'tests'"):
+    with pytest.raises(ConfigError, match="part: no such part: expected one of train, val, test, "
+                       "got 'tests'"):
         list_split(root, 'sorted', 'tests')
 
 
@@ -97,12 +99,15 @@ def test_another_part_is_refused(root):
     '[{"taxonomy_id": 3, "test": []}]', '[{"taxonomy_id": "03001627", "test": [3]}]',
     '[{"taxonomy_id": "03001627", "test": "2a"}]', '\x00'])
 def test_a_file_that_is_no_split_is_refused_with_its_path(content, root):
-    with pytest.raises(DataError, match=r'ShapeNet\.json: expected .*(split|record)'):
+    with pytest.raises(DataError, match=r'ShapeNet\.json: (no readable split file: expected JSON|'
+                       r'invalid split: expected a record|'
+                       r'invalid record: expected a taxonomy_id)'):
         list_split(root, write(root, content), 'test')
 
 
 def test_a_missing_split_or_dataset_is_refused(root, tmp_path):
-    with pytest.raises(DataError, match=r'none\.json: expected a split file .*No such file'):
+    with pytest.raises(DataError, match=r'none\.json: no readable split file: expected JSON.*No '
+                       r'such file'):
         list_split(root, root / 'none.json', 'test')
     with pytest.raises(DataError, match='has no folder ShapeNetRendering'):
         list_split(tmp_path / 'none', 'sorted', 'test')

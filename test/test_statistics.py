@@ -135,9 +135,11 @@ def test_small_headroom_is_said(mean, words):
 
 
 def test_what_is_not_paired_is_not_compared():
-    with pytest.raises(DataError, match='same objects and starts'):
+    with pytest.raises(DataError, match='not paired: expected those of the same objects and '
+                       'starts'):
         difference(np.zeros((4, 2)), np.zeros((5, 2)))
-    with pytest.raises(DataError, match='same objects and starts'):
+    with pytest.raises(DataError, match='not paired: expected those of the same objects and '
+                       'starts'):
         gap_closed(np.zeros((4, 2)), np.zeros((4, 2)), np.ones((4, 3)))
 
 
@@ -150,5 +152,5 @@ def test_episodes_are_gathered_by_object():
 
 @pytest.mark.parametrize('objects', [[0, 0, 0, 1], [0, 1, 1], [0, 1, 0, 1]])
 def test_episodes_that_differ_in_number_or_are_mixed_are_refused(objects):
-    with pytest.raises(DataError, match='as many episodes of every object'):
+    with pytest.raises(DataError, match='mixed episodes: expected as many of every object'):
         by_object(np.zeros(len(objects)), np.array(objects))

@@ -51,7 +51,8 @@ def test_a_camera_is_made_of_the_parameters_that_a_calibration_writes():
 
 @pytest.mark.parametrize('angle', [math.nan, math.inf])
 def test_an_angle_that_is_not_finite_is_refused(angle):
-    with pytest.raises(ViewError, match="finite angle of the turntable's joint") as refusal:
+    with pytest.raises(ViewError, match="invalid joint position: expected a finite angle of the "
+                       "turntable's joint") as refusal:
         FixedCamera(START).pose_at(angle)
     assert refusal.value.kind == 'joint'
 
@@ -63,7 +64,8 @@ def test_an_angle_that_is_not_finite_is_refused(angle):
     ([1, 2, 3], [0, 0, 0], 1, 'camera_orientation: .*got .*calibrate'),
     ([1, 2, 3], [0, 0, 0, 0], 1, 'camera_orientation'),
     ([1, 2, 3], [0, 0, 0, math.nan], 1, 'camera_orientation'),
-    ([1, 2, 3], [0, 0, 0, 1], 0, 'turntable_direction: expected 1 or -1, got 0'),
+    ([1, 2, 3], [0, 0, 0, 1], 0,
+     'turntable_direction: invalid direction: expected 1 or -1, got 0'),
 ])
 def test_parameters_of_no_camera_are_refused(position, orientation, direction, said):
     with pytest.raises(ConfigError, match=said):

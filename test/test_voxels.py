@@ -166,19 +166,20 @@ def test_a_point_is_the_centre_of_its_cell():
 
 @pytest.mark.parametrize('x', [0.6, -0.6, math.nan, math.inf])
 def test_a_point_outside_the_cube_is_refused(x):
-    with pytest.raises(DataError, match=r'inside a cube of 1\.0 m'):
+    with pytest.raises(DataError, match=r'point out of the cube: expected all inside a cube of '
+                       r'1\.0 m'):
         grid_from_points(np.array([[x, 0, 0, 1]], np.float32))
 
 
 @pytest.mark.parametrize('shape', [(4, 4), (4, 4, 5), (1, 4, 4, 4)])
 def test_what_is_no_cube_is_refused(shape):
-    with pytest.raises(DataError, match='expected a cube of voxels'):
+    with pytest.raises(DataError, match='not a cube: expected as many voxels'):
         VoxelGrid(np.zeros(shape, np.float32))
 
 
 @pytest.mark.parametrize('size', [0.0, -1.0, math.nan, math.inf])
 def test_a_cube_without_a_side_is_refused(size):
-    with pytest.raises(DataError, match='expected a finite side'):
+    with pytest.raises(DataError, match='invalid size: expected a finite side'):
         VoxelGrid(np.zeros((2, 2, 2), np.float32), size)
 
 

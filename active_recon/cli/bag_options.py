@@ -105,5 +105,6 @@ def _numbers(option: str, text: str | None, count: int) -> list[float] | None:
     except ValueError:
         numbers = []
     if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise ConfigError(f'{option}: expected {count} numbers separated by commas, got {text!r}')
+        raise ConfigError(f'{option}: invalid list: expected {count} numbers separated by commas, '
+                          f'got {text!r}')
     return numbers

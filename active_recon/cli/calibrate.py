@@ -111,5 +111,6 @@ def calibrate(
 def _squares(words: str) -> tuple[int, int]:
     columns, _, rows = words.lower().partition('x')
     if not (columns.isdecimal() and rows.isdecimal()):
-        raise ConfigError(f'--squares: expected COLUMNSxROWS, such as 7x5, got {words!r}')
+        raise ConfigError('--squares: invalid size of the board: expected COLUMNSxROWS, such as '
+                          f'7x5, got {words!r}')
     return int(columns), int(rows)

@@ -68,15 +68,15 @@ def render(
     viewing = Viewing(cameras, views, turned)
     if meshes.suffix == '.csv':
         if up or front:
-            raise ConfigError('expected neither --up nor --front with a manifest, which tells '
+            raise ConfigError('--up or --front with a manifest: expected neither, since it tells '
                               'them for each model')
         rows = [row for row in read_manifest(meshes)
                 if split in (None, row.split)
                 and (row.is_open or not explicit_licence)]
         jobs = manifest_jobs(rows, out)
     elif split or explicit_licence:
-        raise ConfigError('expected a manifest (CSV) with --split or --explicit-licence, '
-                          f'got {meshes}')
+        raise ConfigError('no manifest: expected a manifest (CSV) with --split or '
+                          f'--explicit-licence, got {meshes}')
     else:
         jobs = mesh_jobs(meshes, out, up, front)
     _make('rendering', jobs, samples, workers, fine, viewing)
@@ -122,8 +122,8 @@ def build(
                                   out / split)]
     made_by, code = out / 'generators.sha256', generators_hash()
     if made_by.is_file() and made_by.read_text().strip() != code:
-        raise DataError(f'{out}: expected shapes of these generators ({code[:12]}), but what is '
-                        f'there was made by others ({made_by}); choose another folder')
+        raise DataError(f'{out}: shapes of other generators: expected those of the present ones '
+                        f'({code[:12]}), got what others made ({made_by}); choose another folder')
     out.mkdir(parents=True, exist_ok=True)
     made_by.write_text(code + '\n')
     _make('making', jobs, samples, workers, fine, Viewing(cameras, views, turned))
@@ -134,7 +134,7 @@ def _make(title: str, jobs: 'list[Job]', samples: int, workers: int, fine: bool,
     from active_recon.datasets.making import make_dataset
 
     if not jobs:
-        raise DataError('expected objects to make; what was asked for leaves none')
+        raise DataError('no objects to make: expected some, but what was asked for leaves none')
     refused = []
     with progress_bar(title, len(jobs)) as advance:
         for outcome in make_dataset(jobs, samples, workers, fine, viewing):

@@ -75,7 +75,8 @@ def paper(
         raise ConfigError(f'no such parts: {", ".join(unknown)}; expected some of '
                           f'{", ".join(known)}')
     if device != 'cpu' and not (device == 'cuda' and torch.cuda.is_available()):
-        raise ConfigError(f'--device: expected cpu, or cuda where there is a card, got {device}')
+        raise ConfigError('--device: no such device: expected cpu, or cuda where there is a card, '
+                          f'got {device}')
     torch.set_num_threads(threads)
     study = Study(data, models, out, model, pascal3d, tuple(training or ('train',)), samples,
                   starts, seed, threads, policy_seeds, policy_starts, subset_objects, device,

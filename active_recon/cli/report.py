@@ -58,8 +58,8 @@ def report(
 
     truths = truth or []
     if len(truths) not in (0, 1, len(bags)):
-        raise ConfigError('--truth: expected one for all bags, or one for each of '
-                          f'{len(bags)}, got {len(truths)}')
+        raise ConfigError('--truth: wrong number of files: expected one for all bags, or one for '
+                          f'each of {len(bags)}, got {len(truths)}')
     if not truths and (fit or up or front):
         raise ConfigError('--fit, --up and --front need --truth: give it too')
     files = [TruthFile(each, fit, up, front) for each in truths]

@@ -83,16 +83,16 @@ def study(
     import torch
 
     if not data and photos is None:
-        raise ConfigError('study: expected folders of objects, or --photos with a folder of '
-                          'photographs, got neither')
+        raise ConfigError('study: nothing to measure: expected folders of objects, or --photos '
+                          'with a folder of photographs, got neither')
     torch.set_num_threads(threads)
     plan = Plan(_numbers('counts', counts), _numbers('surfaces', surfaces), seed, bf16)
     extent = Extent(category, objects, disturbed_views, disturbed_objects)
     entrants = load_entrants(models or _those_that_ship())
     if validation is not None:
         if any(validation.resolve() == each.resolve() for each in data or []):
-            raise ConfigError(f'validation: expected other objects than those measured, got '
-                              f'{validation} for both')
+            raise ConfigError('validation: same objects twice: expected other objects than those '
+                              f'measured, got {validation} for both')
         entrants = choose_on(validation, entrants, plan, Extent(most=objects), progress_bar)
     library = None
     if training and data:
@@ -121,8 +121,8 @@ def _numbers(option: str, text: str) -> tuple[int, ...]:
     try:
         return tuple(int(part) for part in text.split(',') if part.strip())
     except ValueError as error:
-        raise ConfigError(f'{option}: expected whole numbers, separated by commas, got '
-                          f'{text!r}') from error
+        raise ConfigError(f'{option}: invalid list: expected whole numbers, separated by commas, '
+                          f'got {text!r}') from error
 
 
 def _photographs(folder: Path, box: str | None, up: str, entrants: list[Any]) -> dict[str, Any]:
@@ -132,7 +132,7 @@ def _photographs(folder: Path, box: str | None, up: str, entrants: list[Any]) ->
     try:
         corners = None if box is None else [float(part) for part in box.replace(',', ' ').split()]
     except ValueError as error:
-        raise ConfigError(f'box: expected six numbers, got {box!r}') from error
+        raise ConfigError(f'box: invalid corners: expected six numbers, got {box!r}') from error
     photographs = read_photographs(folder, corners, up)
     with progress_bar('photographs', len(entrants) * len(BACKGROUNDS)) as advance:
         return photograph_figures(photographs, entrants, advance=lambda done: advance(done, ''))

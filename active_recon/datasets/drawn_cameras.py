@@ -39,8 +39,9 @@ class Viewing:
     def __post_init__(self) -> None:
         """Reject what nothing is seen from."""
         if self.cameras not in KINDS or not 1 <= self.count <= 99:
-            raise ConfigError(f'cameras: expected one of {", ".join(KINDS)}, and 1 to 99 views, '
-                              f'got {self.cameras!r} and {self.count}')
+            raise ConfigError('cameras: unknown kind or wrong number of views: expected one of '
+                              f'{", ".join(KINDS)}, and 1 to 99 views, got {self.cameras!r} and '
+                              f'{self.count}')
 
     def yaw(self, name: str) -> float:
         """Return the yaw at which an object of a name stands, radians."""

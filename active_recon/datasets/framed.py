@@ -90,7 +90,8 @@ def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],
         try:
             cameras = folder.cameras()
             if not cameras:
-                raise DataError(f'{folder.images_folder}: expected views, got none')
+                raise DataError(f'{folder.images_folder}: no views: expected one or more, got '
+                                'none')
             good.append(folder)
             shown.append(cameras)
         except DataError as error:

@@ -72,7 +72,8 @@ class ObjectFolder:
                                  distance * _DISTANCE_UNIT)
                     for azimuth, elevation, _, distance, _ in rows]
         except (OSError, ValueError, ViewError) as error:
-            raise DataError(f'{path}: expected rows of five numbers, got: {error}') from error
+            raise DataError(f'{path}: no readable cameras: expected rows of five numbers, got: '
+                            f'{error}') from error
 
     def image(self, index: int) -> NDArray[np.uint8]:
         """Return one image, (H, W, 4) uint8 RGBA."""
@@ -80,10 +81,10 @@ class ObjectFolder:
         bgra = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         if bgra is None:
             found = 'no whole PNG' if path.is_file() else 'no file'
-            raise DataError(f'{path}: expected an image, found {found}')
+            raise DataError(f'{path}: no readable image: expected a PNG, found {found}')
         if bgra.ndim != 3 or bgra.shape[2] != 4 or bgra.dtype != np.uint8:
-            raise DataError(f'{path}: expected four channels (RGBA) of 8 bits, got the shape '
-                            f'{bgra.shape} {bgra.dtype}')
+            raise DataError(f'{path}: wrong image format: expected four channels (RGBA) of 8 '
+                            f'bits, got the shape {bgra.shape} {bgra.dtype}')
         return np.asarray(cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA), np.uint8)
 
     def voxels(self, resolution: int = RESOLUTION) -> VoxelGrid:
@@ -91,8 +92,8 @@ class ObjectFolder:
         path = self._voxels_file(resolution)
         grid = read_binvox(path)
         if grid.occupancy.shape != (resolution,) * 3:
-            raise DataError(f'{path}: expected {resolution} cells a side, '
-                            f'got {grid.occupancy.shape}')
+            raise DataError(f'{path}: wrong resolution: expected {resolution} cells a side, got '
+                            f'{grid.occupancy.shape}')
         return grid
 
     def grid_side(self, resolution: int = RESOLUTION) -> float:
@@ -166,7 +167,7 @@ def _read_cameras(path: Path) -> list[Camera]:
                                   float(row['cy']), int(row['width']), int(row['height'])))
                 for row in json.loads(path.read_text())]
     except (OSError, ValueError, KeyError, TypeError, ViewError) as error:
-        raise DataError(f'{path}: expected a list of cameras, each with pose, '
+        raise DataError(f'{path}: no readable cameras: expected a list, each with pose, '
                         f'{", ".join(_LENS)}, got: {error}') from error
 
 

@@ -62,11 +62,11 @@ def mesh_jobs(meshes: Path, out: Path, up: str | None, front: str | None) -> lis
         files = sorted(path for path in meshes.rglob('*') if path.suffix.lower() in MESH_SUFFIXES)
         top = meshes
     else:
-        raise DataError(f'{meshes}: expected a mesh file or a folder of <category>/<mesh>, '
-                        'but there is neither')
+        raise DataError(f'{meshes}: no such file or folder: expected a mesh file or a folder of '
+                        '<category>/<mesh>')
     if not files:
-        raise DataError(f'{meshes}: expected meshes ({", ".join(sorted(MESH_SUFFIXES))}), '
-                        'found none')
+        raise DataError(f'{meshes}: no meshes there: expected files '
+                        f'({", ".join(sorted(MESH_SUFFIXES))}), found none')
     for path in files:
         file_rotation(path, up, front)  # a bad option is refused once, before the work
     folders = [_mesh_folder(out, top, path) for path in files]
@@ -116,7 +116,8 @@ def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int, viewing: 
     images = [renderer.render(camera, samples, light)
               for camera, light in zip(cameras, lights, strict=True)]
     if not np.any(images):
-        raise DataError('expected a surface, but none of it is seen from any azimuth')
+        raise DataError('no visible surface: expected one that is seen from some azimuth, got '
+                        'none')
     write_object(folder, images, cameras, voxelise(mesh))
 
 
@@ -133,8 +134,8 @@ def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool
     """
     for folder, count in Counter(job.folder for job in jobs).most_common(1):
         if count > 1:
-            raise DataError(f'expected each object once, but {count} would become '
-                            f'{folder.category}/{folder.name}; rename their files')
+            raise DataError(f'several meshes of one name: expected each object once, but {count} '
+                            f'would become {folder.category}/{folder.name}; rename their files')
     if workers == 1:
         yield from (make_object(job, samples, fine, viewing) for job in jobs)
         return

@@ -54,15 +54,16 @@ def read_manifest(path: Path) -> list[ModelRow]:
         with path.open(newline='') as file:
             rows = list(csv.DictReader(file))
     except (OSError, ValueError, csv.Error) as error:
-        raise DataError(f'{path}: expected a manifest (CSV): {error}') from error
+        raise DataError(f'{path}: no readable manifest: expected a CSV file, got: '
+                        f'{error}') from error
     missing = _COLUMNS - set(rows[0] if rows else ())
     if missing:
-        raise DataError(f'{path}: expected the columns {", ".join(sorted(_COLUMNS))}; missing: '
-                        f'{", ".join(sorted(missing))}')
+        raise DataError(f'{path}: missing columns: expected {", ".join(sorted(_COLUMNS))}; '
+                        f'missing: {", ".join(sorted(missing))}')
     for number, row in enumerate(rows, start=2):
         if any(row[column] is None for column in _COLUMNS) or not _HEX.fullmatch(row['sha256']):
-            raise DataError(f'{path}: expected every column and a hexadecimal sha256 in line '
-                            f'{number}, got {row}')
+            raise DataError(f'{path}: invalid row: expected every column and a hexadecimal sha256 '
+                            f'in line {number}, got {row}')
     return [ModelRow(row['category'], path.parent / row['file'], row['split'], row['source'],
                      row['licence'], row['licence_evidence'], row['front_axis'], row['sha256'])
             for row in rows]

@@ -58,7 +58,7 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
     """
     files = sorted(folder.glob('*_par.txt'))
     if len(files) != 1:
-        raise DataError(f'{folder}: expected one file *_par.txt with the cameras, found '
+        raise DataError(f'{folder}: wrong number of camera files: expected one *_par.txt, found '
                         f'{len(files)}')
     least, greatest = _box(folder, box)
     side = MARGIN * float((greatest - least).max())
@@ -77,7 +77,7 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
         except ViewError as error:
             raise DataError(f'{files[0]}, line {number}: {error}') from error
     if not images:
-        raise DataError(f'{files[0]}: expected a line for each image, got none')
+        raise DataError(f'{files[0]}: no cameras: expected a line for each image, got none')
     return PosedPhotographs(folder, tuple(names), tuple(images), tuple(masks), tuple(cameras))
 
 
@@ -87,14 +87,14 @@ def _box(folder: Path, box: Sequence[float] | None) -> NDArray[np.float64]:
         read = [found for path in sorted(folder.glob('README*'))
                 for found in _CORNER.findall(path.read_text(errors='replace'))]
         if len(read) != 2:
-            raise DataError(f"{folder}: expected the corners of the object's box as two lines "
+            raise DataError(f'{folder}: no box of the object: expected its corners as two lines '
                             f'(x y z) in README.txt, found {len(read)}; give them by --box')
         box = [float(number) for corner in read for number in corner]
     corners = np.array(box, np.float64)
     if corners.size != 6 or not np.isfinite(corners).all() or (
             corners[:3] >= corners[3:]).any():
-        raise ConfigError('box: expected the least x, y, z and then the greatest, six numbers, '
-                          f'got {" ".join(map(str, box))}')
+        raise ConfigError('box: invalid corners: expected the least x, y, z and then the '
+                          f'greatest, six numbers, got {" ".join(map(str, box))}')
     return corners.reshape(2, 3)
 
 
@@ -105,8 +105,8 @@ def _fields(path: Path, number: int, line: str) -> tuple[str, NDArray[np.float64
     except ValueError:
         numbers = np.empty(0)
     if numbers.size != _NUMBERS or not np.isfinite(numbers).all():
-        raise DataError(f'{path}, line {number}: expected a name and {_NUMBERS} numbers (K, R, '
-                        f't), got {line[:60]!r}')
+        raise DataError(f'{path}, line {number}: not a camera: expected a name and {_NUMBERS} '
+                        f'numbers (K, R, t), got {line[:60]!r}')
     return name, numbers
 
 
@@ -114,11 +114,12 @@ def _camera(numbers: NDArray[np.float64], turn: NDArray[np.float64],
             centre: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Camera:
     lens, rotation, moved = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3), numbers[18:]
     if abs(lens[0, 1]) > 1e-3 * lens[0, 0] or min(lens[0, 0], lens[1, 1]) <= 0:
-        raise ViewError('expected focal lengths above 0 and no skew, got the lens '
+        raise ViewError('invalid lens: expected focal lengths above 0 and no skew, got '
                         f'{lens.tolist()}')
     left, _, right = np.linalg.svd(rotation)
     if not np.allclose(left @ right, rotation, atol=1e-3):
-        raise ViewError(f'expected a rotation, got {rotation.tolist()}')
+        raise ViewError('invalid rotation: expected an orthogonal matrix, got '
+                        f'{rotation.tolist()}')
     rotation = left @ right  # to the last bit, which files round off
     pose = np.eye(4)
     pose[:3, :3] = turn @ rotation.T
@@ -131,7 +132,7 @@ def _image(path: Path) -> NDArray[np.uint8]:
     bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if bgr is None:
         found = 'no whole image' if path.is_file() else 'no file'
-        raise DataError(f'{path}: expected a photograph, found {found}')
+        raise DataError(f'{path}: no readable photograph: expected an image file, found {found}')
     return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)
 
 
@@ -139,8 +140,9 @@ def _mask(path: Path, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
     if path.is_file():
         mask = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         if mask is None or mask.shape != image.shape[:2]:
-            raise DataError(f'{path}: expected a mask of {image.shape[1]} x {image.shape[0]} '
-                            f'pixels, got {None if mask is None else mask.shape[::-1]}')
+            raise DataError(f'{path}: no mask of the right size: expected {image.shape[1]} x '
+                            f'{image.shape[0]} pixels, got '
+                            f'{None if mask is None else mask.shape[::-1]}')
         return np.asarray(mask > 127)
     bright = (image.max(axis=2) > _DARK * 255).astype(np.uint8)
     grown, shrunk = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2)

@@ -40,8 +40,8 @@ def list_photographs(root: Path, categories: Sequence[str] = ()) -> tuple[
     """
     for name in ('Annotations', 'Images', 'CAD'):
         if not (root / name).is_dir():
-            raise DataError(f'{root}: expected PASCAL3D+, its folders Annotations, Images and '
-                            f'CAD, but it has no folder {name}')
+            raise DataError(f'{root}: not the PASCAL3D+ dataset: expected its folders '
+                            f'Annotations, Images and CAD, found no folder {name}')
     folders = [(folder, CLASSES.get(kind, kind))
                for folder in sorted((root / 'Annotations').iterdir())
                if folder.is_dir() and (kind := folder.name.rpartition('_')[0])]
@@ -49,7 +49,8 @@ def list_photographs(root: Path, categories: Sequence[str] = ()) -> tuple[
     if missing or not folders:
         wanted = ', '.join(sorted(missing)) or 'any category'
         there = ', '.join(sorted({category for _, category in folders})) or 'none'
-        raise DataError(f'{root}: expected annotations of {wanted}, there are those of {there}')
+        raise DataError(f'{root}: no such annotations: expected those of {wanted}, got those of '
+                        f'{there}')
     outcomes = [outcome for folder, category in folders
                 if not categories or category in categories
                 for path in sorted(folder.glob('*.mat'))
@@ -66,8 +67,8 @@ def _photographs(root: Path, path: Path, category: str) -> Iterator[Photograph |
         record = loadmat(path, squeeze_me=True, struct_as_record=False)['record']
         objects = np.atleast_1d(record.objects)
     except Exception as error:  # scipy's reader raises whatever its parser raised
-        yield (f'{path}: expected a MATLAB file with record.objects, but reading it failed with '
-               f'{type(error).__name__}: {error}')
+        yield (f'{path}: no readable annotation: expected a MATLAB file with record.objects, but '
+               f'reading it failed with {type(error).__name__}: {error}')
         return
     for number, item in enumerate(objects, start=1):
         try:
@@ -90,14 +91,15 @@ def _photograph(root: Path, path: Path, folder: ObjectFolder, item: Any) -> Phot
                           for angle in ('azimuth', 'elevation'))
     left, top, right, bottom = map(float, _field(item, 'bbox'))
     if not (0 < right - left < math.inf and 0 < bottom - top < math.inf):
-        raise DataError(f'expected a box of left, top, right, bottom, got {item.bbox}')
+        raise DataError(f'invalid box: expected left, top, right, bottom, got {item.bbox}')
     if not (math.isfinite(azimuth) and math.isfinite(elevation)):
-        raise DataError(f'expected finite angles, got {azimuth} and {elevation}')
+        raise DataError(f'invalid viewpoint: expected finite angles, got {azimuth} and '
+                        f'{elevation}')
     images = root / 'Images' / path.parent.name
     image = next((images / f'{path.stem}{suffix}' for suffix in _SUFFIXES
                   if (images / f'{path.stem}{suffix}').is_file()), None)
     if image is None:
-        raise DataError(f'expected the image {path.stem}.jpg (or .JPEG) in {images}, found none')
+        raise DataError(f'no image: expected {path.stem}.jpg (or .JPEG) in {images}, found none')
     kind = path.parent.name.rpartition('_')[0]
     cad = root / 'CAD' / kind / f'{int(_field(item, "cad_index")):02d}.off'
     # MATLAB's pixels count from 1, both ends of the box included
@@ -108,5 +110,5 @@ def _photograph(root: Path, path: Path, folder: ObjectFolder, item: Any) -> Phot
 def _field(item: Any, name: str) -> Any:
     value = getattr(item, name, None)
     if value is None or np.size(value) == 0:
-        raise DataError(f'expected the field {name}, found none')
+        raise DataError(f'missing field: expected {name}, found none')
     return value

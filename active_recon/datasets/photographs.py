@@ -101,7 +101,7 @@ def _read_picture(path: Path) -> NDArray[np.uint8]:
         with Image.open(path) as image:
             return np.asarray(image.convert('RGB'))
     except (OSError, SyntaxError) as error:
-        raise DataError(f'{path}: expected a whole image: {error}') from error
+        raise DataError(f'{path}: unreadable image: expected a whole one, got: {error}') from error
 
 
 def _canonical_camera(photograph: Photograph) -> Camera:
@@ -126,7 +126,7 @@ def _cut_out(picture: NDArray[np.uint8], box: Box, place: Box) -> NDArray[np.uin
     left, right = (min(max(round(at), 0), width) for at in box[::2])
     top, bottom = (min(max(round(at), 0), height) for at in box[1::2])
     if left >= right or top >= bottom:
-        raise DataError(f'expected a box within the image of {width} x {height}, got {box}')
+        raise DataError(f'box out of the image: expected one within {width} x {height}, got {box}')
     across, down = right - left, bottom - top
     scale = math.hypot(place[2] - place[0], place[3] - place[1]) / math.hypot(across, down)
     scale = min(scale, IMAGE_SIZE / max(across, down))

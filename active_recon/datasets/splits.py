@@ -38,7 +38,8 @@ def list_split(root: Path, split: Path | str, part: str) -> Listed:
     ConfigError on another part.
     """
     if part not in PORTIONS:
-        raise ConfigError(f'part: expected one of {", ".join(PORTIONS)}, got {part!r}')
+        raise ConfigError(f'part: no such part: expected one of {", ".join(PORTIONS)}, got '
+                          f'{part!r}')
     there = list_objects(root)
     if str(split) == SORTED:
         return list(_sorted_part(there, part)), []
@@ -47,10 +48,10 @@ def list_split(root: Path, split: Path | str, part: str) -> Listed:
     by_name = {(folder.category, folder.name): folder for folder in there}
     found = [by_name[key] for key in wanted if key in by_name]
     if not found:
-        raise DataError(f'{root}: expected the {len(wanted)} objects that {split} names for '
-                        f'{part}, found none of them; are its folders named as the file does, by '
-                        'their synset?')
-    return found, [f'{root}: expected {category}/{name} of {part}, found no such folder'
+        raise DataError(f"{root}: none of the split's objects: expected the {len(wanted)} "
+                        f'objects that {split} names for {part}; are its folders named as the '
+                        'file does, by their synset?')
+    return found, [f'{root}: no such folder: expected {category}/{name} of {part}'
                    for category, name in wanted if (category, name) not in by_name]
 
 
@@ -66,18 +67,19 @@ def _read_split(path: Path, part: str) -> dict[str, list[str]]:
     try:
         content = json.loads(path.read_bytes())
     except (OSError, ValueError) as error:
-        raise DataError(f'{path}: expected a split file (JSON): {error}') from error
+        raise DataError(f'{path}: no readable split file: expected JSON, got: {error}') from error
     if isinstance(content, dict):
         content = [{'taxonomy_id': key, **record} if isinstance(record, dict) else record
                    for key, record in content.items()]
     if not isinstance(content, list) or not content:
-        raise DataError(f'{path}: expected a record for each category, got {content!r:.80}')
+        raise DataError(f'{path}: invalid split: expected a record for each category, got '
+                        f'{content!r:.80}')
     split = {}
     for record in content:
         category, names = _fields(record, part)
         if not isinstance(category, str) or not isinstance(names, list) or not all(
                 isinstance(name, str) for name in names):
-            raise DataError(f'{path}: expected records of a taxonomy_id and a list of ids '
+            raise DataError(f'{path}: invalid record: expected a taxonomy_id and a list of ids '
                             f'{part!r}, got {record!r:.80}')
         split[category] = names
     return split

@@ -178,7 +178,7 @@ def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
     """Read one object into (V, S, S, 4) and (R, R, R); return its cameras, the grid's side 1."""
     cameras = folder.cameras()
     if len(cameras) != len(images):
-        raise DataError(f'{folder.images_folder}: expected {len(images)} views, '
+        raise DataError(f'{folder.images_folder}: wrong number of views: expected {len(images)}, '
                         f'got {len(cameras)}')
     grid = folder.voxels(len(voxels))
     voxels[:] = grid.occupied(0.5)

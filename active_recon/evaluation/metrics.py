@@ -49,5 +49,6 @@ def swapped_objects(objects: Tensor, count: int) -> Tensor:
     fewer than two objects.
     """
     if count < 2:
-        raise DataError(f'expected two objects or more to swap their latents, got {count}')
+        raise DataError('too few objects: expected two or more to swap their latents, got '
+                        f'{count}')
     return (objects + count // 2) % count

@@ -70,15 +70,15 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
     made: list[Contender] = []
     for name in names:
         if name not in contender_names():
-            raise ConfigError(f'policy: expected some of {", ".join(contender_names())}, '
-                              f'got {name!r}')
+            raise ConfigError('policy: no such policy: expected some of '
+                              f'{", ".join(contender_names())}, got {name!r}')
         if name not in POLICIES:
             made.append(Contender(name, name, None))
         elif POLICIES[name].is_learned:
             if not attentions:
-                raise WeightsError(f'{name}: expected weights with a view policy in them, as '
-                                   '`active-recon train --model 2d3d-attention` makes; there is '
-                                   'none')
+                raise WeightsError(f'{name}: no view policy: expected weights with one in them, '
+                                   'as `active-recon train --model 2d3d-attention` makes; there '
+                                   'is none')
             made += [Contender(name, f'{name}-{_model_hash(each)}', partial(_learned, model, each))
                      for each in attentions]
         elif POLICIES[name].draws:
@@ -100,11 +100,12 @@ def load_attentions(files: Sequence[Path], network: ReconstructionNetwork) -> li
     for file in files:
         bundle = load_weights(file)
         if bundle.attention is None:
-            raise WeightsError(f'{file}: expected weights with a view policy in them, got none')
+            raise WeightsError(f'{file}: no view policy: expected weights with one in them, got '
+                               'none')
         if state_hash(bundle.reconstruction) != state_hash(network):
-            raise WeightsError(f'{file}: expected a view policy trained on the network that is '
-                               'measured, got one trained on another; train it with '
-                               '`active-recon train --freeze-from` that network')
+            raise WeightsError(f'{file}: view policy of another network: expected one trained on '
+                               'the network that is measured, got one trained on another; train '
+                               'it with `active-recon train --freeze-from` that network')
         models.append(bundle.attention)
     return models
 

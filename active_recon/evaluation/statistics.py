@@ -38,7 +38,8 @@ def by_object(values: Values, objects: NDArray[np.int64]) -> Values:
     count = int(np.unique(objects).size)
     grid = objects.reshape(count, -1) if len(objects) % count == 0 else objects[None]
     if (grid != grid[:, :1]).any():
-        raise DataError('expected as many episodes of every object, one after the other')
+        raise DataError('uneven or mixed episodes: expected as many of every object, one after '
+                        'the other')
     return values.reshape(*grid.shape, *values.shape[1:])
 
 
@@ -108,5 +109,5 @@ def _weights(count: int, rounds: int, seed: int, level: int) -> Values:
 def _refuse_others(*samples: Values) -> None:
     shapes = {np.shape(sample)[:2] for sample in samples}
     if len(shapes) > 1:
-        raise DataError('expected values of the same objects and starts, so that they are '
-                        f'paired, got {", ".join(map(str, shapes))}')
+        raise DataError('values not paired: expected those of the same objects and starts, got '
+                        f'{", ".join(map(str, shapes))}')

@@ -103,8 +103,9 @@ def read_arrays(path: Path, names: set[str]) -> dict[str, NDArray[np.float64]]:
         with np.load(path) as stored:
             return {name: stored[name] for name in names}
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise DataError(f'{path}: expected the arrays {", ".join(sorted(names))} of an earlier '
-                        f'run, got: {error}; delete it to have it made anew') from error
+        raise DataError(f'{path}: no readable result of an earlier run: expected the arrays '
+                        f'{", ".join(sorted(names))}, got: {error}; delete it to have it made '
+                        'anew') from error
 
 
 def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:

@@ -86,11 +86,13 @@ class Camera:
     def __post_init__(self) -> None:
         """Reject what is no rigid pose."""
         if self.pose.shape != (4, 4) or not np.isfinite(self.pose).all():
-            raise ViewError(f'expected a finite 4 x 4 camera pose, got\n{self.pose}', 'pose')
+            raise ViewError('invalid camera pose: expected a finite 4 x 4 matrix, '
+                            f'got\n{self.pose}', 'pose')
         rotation = self.pose[:3, :3]
         if (not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
                 or np.linalg.det(rotation) < 0):  # a mirror is no rotation
-            raise ViewError(f'expected a rotation in the camera pose, got\n{rotation}', 'pose')
+            raise ViewError('invalid camera pose: expected a rotation in it, '
+                            f'got\n{rotation}', 'pose')
 
     @property
     def position(self) -> NDArray[np.float64]:
@@ -230,10 +232,12 @@ def orbit_camera(
     Angles in radians, distance in metres. An elevation of exactly +-pi/2 has no upright.
     """
     if not all(map(math.isfinite, (azimuth, elevation, distance))) or distance <= 0:
-        raise ViewError('expected finite angles and a distance above 0, got azimuth '
-                        f'{azimuth}, elevation {elevation}, distance {distance}', 'pose')
+        raise ViewError('invalid camera position: expected finite angles and a distance above 0, '
+                        f'got azimuth {azimuth}, elevation {elevation}, distance '
+                        f'{distance}', 'pose')
     if abs(elevation) >= math.pi / 2 - 1e-6:
-        raise ViewError(f'expected an elevation within +-90 degrees, got {elevation} rad', 'pose')
+        raise ViewError(f'invalid elevation: expected one within +-90 degrees, got {elevation} '
+                        'rad', 'pose')
     backward = np.array([math.cos(elevation) * math.cos(azimuth),
                          math.cos(elevation) * math.sin(azimuth), math.sin(elevation)])
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])

@@ -133,8 +133,9 @@ def framing_camera(camera: Camera, object_size: float = 1.0, image_size: int = 6
 def _require_size(image: NDArray[np.uint8], camera: Camera) -> None:
     lens = camera.intrinsics
     if image.dtype != np.uint8 or image.shape != (lens.height, lens.width, 3):
-        raise ViewError(f'expected an image of {lens.height} x {lens.width} x 3 uint8, as the '
-                        f'camera says, got {image.shape} {image.dtype}', 'image_size')
+        raise ViewError(f'wrong image size or type: expected {lens.height} x {lens.width} x 3 '
+                        f'uint8, as the camera says, got {image.shape} '
+                        f'{image.dtype}', 'image_size')
 
 
 def _seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,

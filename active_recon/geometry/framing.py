@@ -20,18 +20,18 @@ def require_in_image(camera: Camera, object_size: float,
     """
     _, depth = camera.project(_EDGES * object_size)
     if depth.max() <= 0:
-        raise ViewError('expected a camera that looks at the object; it looks away from it: '
-                        'check the pose, which is that of the optical frame (z forward, y down)',
+        raise ViewError('camera looks away from the object: expected one that looks at it; check '
+                        'the pose, which is that of the optical frame (z forward, y down)',
                         'out_of_image')
     if depth.min() <= 1e-3 * object_size:
         raise ViewError(
-            f"expected a camera outside of the object's cube of {object_size:g} m and in front of "
-            f'it, got one at {camera.distance:.3g} m that stands in it or beside it; move it back '
-            'or set object_size', 'out_of_image')
+            "camera in the object's cube or beside it: expected one outside of the cube of "
+            f'{object_size:g} m and in front of it, got one at {camera.distance:.3g} m; move it '
+            'back or set object_size', 'out_of_image')
     outside = share_outside(camera, object_size)
     if outside > tolerated:
         raise ViewError(
-            f"expected the object's cube of {object_size:g} m in the image, got "
+            f'object out of the image: expected its cube of {object_size:g} m in the image, got '
             f'{100 * outside:.0f} % of it outside; move the camera back, turn it to the object, '
             'or set object_size', 'out_of_image')
 

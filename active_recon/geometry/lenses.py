@@ -31,14 +31,15 @@ class Distortion:
     def __post_init__(self) -> None:
         """Reject what no lens has."""
         if self.model not in MODELS:
-            raise ViewError(f'expected a distortion model out of {", ".join(MODELS)}, got '
+            raise ViewError(f'unknown distortion model: expected one of {", ".join(MODELS)}, got '
                             f'{self.model!r}; publish rectified images instead', 'camera_info')
         counts, given = MODELS[self.model], len(self.coefficients)
         if given not in counts:
-            raise ViewError(f'expected {" or ".join(map(str, counts))} coefficients of '
-                            f'{self.model}, got {given}', 'camera_info')
+            raise ViewError('wrong number of distortion coefficients: expected '
+                            f'{" or ".join(map(str, counts))} of {self.model}, got '
+                            f'{given}', 'camera_info')
         if not all(abs(value) <= _LARGEST for value in self.coefficients):
-            raise ViewError('expected finite coefficients of distortion, got '
+            raise ViewError('invalid distortion coefficients: expected finite ones, got '
                             f'{self.coefficients}', 'camera_info')
 
     def distort(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

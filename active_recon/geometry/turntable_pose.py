@@ -31,7 +31,8 @@ class FixedCamera:
         """Reject what is no pose, and no direction."""
         Camera(self.pose_at_zero)
         if self.direction not in DIRECTIONS:
-            raise ConfigError(f'turntable_direction: expected 1 or -1, got {self.direction}')
+            raise ConfigError('turntable_direction: invalid direction: expected 1 or -1, got '
+                              f'{self.direction}')
 
     @classmethod
     def from_parameters(cls, position: Sequence[float], orientation: Sequence[float],
@@ -42,13 +43,13 @@ class FixedCamera:
         Raises ConfigError that names `camera_position` or `camera_orientation`.
         """
         if len(position) != 3 or not np.isfinite(position).all() or not np.any(position):
-            raise ConfigError('camera_position: expected x, y, z of the camera in the object '
-                              f'frame, metres, away from its origin, got {list(position)}; '
-                              'active-recon calibrate finds them')
+            raise ConfigError('camera_position: invalid position: expected x, y, z of the camera '
+                              'in the object frame, metres, away from its origin, got '
+                              f'{list(position)}; active-recon calibrate finds them')
         if len(orientation) != 4 or not abs(np.linalg.norm(orientation) - 1) < 0.01:
-            raise ConfigError("camera_orientation: expected x, y, z, w of the optical frame's "
-                              f'unit quaternion, got {list(orientation)}; active-recon calibrate '
-                              'finds them')
+            raise ConfigError('camera_orientation: invalid orientation: expected x, y, z, w of '
+                              f"the optical frame's unit quaternion, got {list(orientation)}; "
+                              'active-recon calibrate finds them')
         pose = np.eye(4)
         pose[:3, :3] = Rotation.from_quat(orientation).as_matrix()
         pose[:3, 3] = position
@@ -62,8 +63,8 @@ class FixedCamera:
         ViewError where the angle is not finite.
         """
         if not math.isfinite(angle):
-            raise ViewError(f"expected a finite angle of the turntable's joint, got {angle}",
-                            'joint')
+            raise ViewError("invalid joint position: expected a finite angle of the turntable's "
+                            f'joint, got {angle}', 'joint')
         turn = np.eye(4)
         turn[:3, :3] = Rotation.from_euler('z', -self.direction * angle).as_matrix()
         pose: NDArray[np.float64] = turn @ self.pose_at_zero

@@ -26,7 +26,7 @@ class CarvingConfig(Config):
     def __post_init__(self) -> None:
         """Reject an invalid number of pixels."""
         if not 0 <= self.dilation <= 16:
-            raise ConfigError(f'CarvingConfig: expected a dilation from 0 to 16 pixels, got '
+            raise ConfigError('CarvingConfig: invalid dilation: expected 0 to 16 pixels, got '
                               f'{self.dilation}')
 
 

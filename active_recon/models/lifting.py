@@ -51,7 +51,7 @@ class LiftingConfig(Config):
         sizes = [size for value in self.to_dict().values()
                  for size in (value if isinstance(value, tuple) else (value,))]
         if min(sizes) < 1:
-            raise ConfigError('LiftingConfig: expected channels of 1 or more, got '
+            raise ConfigError('LiftingConfig: invalid channels: expected 1 or more, got '
                               f'{min(sizes)}')
 
 

@@ -36,10 +36,10 @@ class Network2d3dConfig(Config):
         sizes = [size for name, value in self.to_dict().items() if name.endswith('channels')
                  for size in (value if isinstance(value, tuple) else (value,))]
         if min(sizes) < 1:
-            raise ConfigError('Network2d3dConfig: expected channels of 1 or more, got '
+            raise ConfigError('Network2d3dConfig: invalid channels: expected 1 or more, got '
                               f'{min(sizes)}')
         if not 0 <= self.view_separation <= math.pi:
-            raise ConfigError('Network2d3dConfig: expected a view_separation from 0 to pi, got '
+            raise ConfigError('Network2d3dConfig: invalid view_separation: expected 0 to pi, got '
                               f'{self.view_separation}')
 
 

@@ -67,7 +67,7 @@ def expand(levels: Iterable[tuple[Tensor, Tensor]], batch: int, resolution: int)
                 else _doubled(grid))
         grid[cells.unbind(dim=1)] = values
     if grid is None:
-        raise ValueError('expected the levels of an octree, got none')
+        raise ValueError('octree without levels: expected one or more, got none')
     while grid.shape[-1] < resolution:
         grid = _doubled(grid)
     return grid

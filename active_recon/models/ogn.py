@@ -47,13 +47,14 @@ class OgnConfig(Config):
         """Reject sizes that make no network."""
         parts = (self.image_channels, self.code_channels, self.level_channels)
         if any(not part or min(part) < 1 for part in parts) or len(self.image_channels) > 6:
-            raise ConfigError('OgnConfig: expected channels of 1 or more in every part, six at '
-                              f'most of the image, got {self.to_dict()}')
+            raise ConfigError('OgnConfig: invalid channels: expected 1 or more in every part, six '
+                              f'at most of the image, got {self.to_dict()}')
         finest = COARSEST * 2 ** (len(self.level_channels) - 1)
         if finest != self.resolution or self.resolution <= COARSEST:
-            raise ConfigError('OgnConfig: expected channels for every level from 8 cells a side '
-                              f'to the resolution, 16 or more, got {len(self.level_channels)} '
-                              f'levels, which end at {finest}, and {self.resolution}')
+            raise ConfigError('OgnConfig: invalid levels: expected channels for every level from '
+                              '8 cells a side to the resolution, 16 or more, got '
+                              f'{len(self.level_channels)} levels, which end at {finest}, and '
+                              f'{self.resolution}')
 
 
 SIZES = {
@@ -179,8 +180,9 @@ class Ogn(MeanCodeNetwork):
         Raises ConfigError on voxels of another resolution.
         """
         if voxels.shape[-1] != self.resolution:
-            raise ConfigError(f'expected voxels of {self.resolution} cells a side for this size '
-                              f'of the network, got {voxels.shape[-1]}; choose another size')
+            raise ConfigError(f'wrong resolution: expected voxels of {self.resolution} cells a '
+                              f'side for this size of the network, got {voxels.shape[-1]}; choose '
+                              'another size')
         truth, codes = states_of(voxels), state['latent'].flatten(1)
         return torch.stack([
             functional.cross_entropy(level.logits.float(), at(known, level.cells))

@@ -28,8 +28,8 @@ class PtnConfig(Config):
         """Reject sizes that make no network."""
         sizes = (self.image_channels, self.code_channels, self.volume_channels)
         if any(len(part) != 3 or min(part) < 1 for part in sizes):
-            raise ConfigError('PtnConfig: expected three channels of 1 or more in every part, '
-                              f'got {self.to_dict()}')
+            raise ConfigError('PtnConfig: invalid channels: expected three of 1 or more in every '
+                              f'part, got {self.to_dict()}')
 
 
 SIZES = {

@@ -34,8 +34,8 @@ class R2n2Config(Config):
                  *self.decoder_channels)
         if (min(sizes) < 1 or len(self.encoder_channels) != 6
                 or len(self.decoder_channels) < _DOUBLINGS - 1):
-            raise ConfigError('R2n2Config: expected channels of 1 or more, six in the encoder and '
-                              f'two or more in the decoder, got {self.to_dict()}')
+            raise ConfigError('R2n2Config: invalid channels: expected 1 or more, six in the '
+                              f'encoder and two or more in the decoder, got {self.to_dict()}')
 
 
 SIZES = {

@@ -37,8 +37,8 @@ class ShapeBasisConfig(Config):
         """Reject what holds no shapes."""
         if len(set(self.categories)) != len(self.categories) or not (
                 self.categories and self.modes >= 1):
-            raise ConfigError('ShapeBasisConfig: expected different categories and modes of 1 or '
-                              f'more, got {self.to_dict()}')
+            raise ConfigError('ShapeBasisConfig: invalid categories or modes: expected different '
+                              f'categories and modes of 1 or more, got {self.to_dict()}')
 
 
 # It is fitted in one go, so one size is fast enough for all uses
@@ -150,7 +150,8 @@ def fit_shapes(model: ShapeBasis, voxels: Tensor, categories: NDArray[np.str_]) 
     categories that the model does not know are left out; raises DataError where none is known.
     """
     if not set(categories.tolist()) & set(model.categories):
-        raise DataError(f'shape-basis: expected objects of {", ".join(model.categories)}, got '
+        raise DataError('shape-basis: no objects of its categories: expected '
+                        f'{", ".join(model.categories)}, got '
                         f'{", ".join(sorted(set(categories.tolist())))}')
     frusta = frustum([orbit_camera(azimuth) for azimuth in AZIMUTHS])
     for index, category in enumerate(model.categories):

@@ -29,7 +29,7 @@ def write_document(study: Study) -> bool:
         except DataError:
             continue
     if not there:
-        raise DataError(f'{study.out}: expected results to put together, found none; '
+        raise DataError(f'{study.out}: no results: expected some to put together, found none; '
                         '`active-recon paper all` makes them')
     blocks = [_INTRODUCTION, '## What holds, and what does not']
     claims = {name: claims_of(found) for name, found in there.items()}

@@ -176,8 +176,8 @@ def _first_of_each(views: ViewSet, categories: Sequence[str] | None = None) -> l
     there = [str(name) for name in views.categories]
     wanted = [name for name in categories or dict.fromkeys(there) if name in there]
     if not wanted:
-        raise DataError(f'expected objects of one of {", ".join(categories or ())}, '
-                        f'got {", ".join(dict.fromkeys(there))}')
+        raise DataError(f'no such objects: expected some of {", ".join(categories or ())}, got '
+                        f'{", ".join(dict.fromkeys(there))}')
     return [there.index(name) for name in wanted]
 
 

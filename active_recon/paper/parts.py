@@ -44,7 +44,7 @@ def run_part(study: Study, name: str, again: bool = False) -> bool:
     unknown part.
     """
     if name not in PARTS:
-        raise ConfigError(f'expected a part out of {", ".join(PARTS)}, got {name!r}')
+        raise ConfigError(f'no such part: expected one of {", ".join(PARTS)}, got {name!r}')
     part = PARTS[name]
     for earlier in part.after:
         run_part(study, earlier)

@@ -30,8 +30,8 @@ class Column:
         """Reject figures of ours under the heading of the published, and the other way round."""
         intervals = any(isinstance(cell, Interval) for cell in self.cells)
         if self.heading.startswith(PUBLISHED) or (self.published and intervals):
-            raise ConfigError(f'{self.heading}: expected published figures and measured ones in '
-                              'columns of their own')
+            raise ConfigError(f'{self.heading}: published and measured figures in one column: '
+                              'expected each in columns of their own')
 
     @property
     def title(self) -> str:
@@ -54,8 +54,9 @@ class Table:
         """Reject columns of another length."""
         for column in self.columns:
             if len(column.cells) != len(self.rows):
-                raise ConfigError(f'{self.title}: expected {len(self.rows)} cells in the column '
-                                  f'{column.heading!r}, got {len(column.cells)}')
+                raise ConfigError(f'{self.title}: wrong number of cells: expected '
+                                  f'{len(self.rows)} in the column {column.heading!r}, got '
+                                  f'{len(column.cells)}')
 
     def markdown(self) -> str:
         """Return the table in Markdown."""

@@ -33,8 +33,9 @@ class Objects:
         folders = [folder for folder in list_objects(self.root)
                    if self.category in ('', SYNSETS.get(folder.category, folder.category))]
         if not folders:
-            raise DataError(f'{self.root}: expected objects of the category {self.category}, '
-                            'found none; `active-recon dataset build` makes them')
+            raise DataError(f'{self.root}: no such objects: expected those of the category '
+                            f'{self.category}, found none; `active-recon dataset build` makes '
+                            'them')
         return folders
 
     @property
@@ -101,7 +102,7 @@ class Study:
         """Where the weights of the paper's network lie; raises WeightsError if there are none."""
         path = find_weights(self.model or PAPER_MODEL)
         if not path.is_file():
-            raise WeightsError(f"{path}: expected weights of the paper's network, found no file; "
+            raise WeightsError(f"{path}: no such file: expected weights of the paper's network; "
                                'name some by --model, or train them with `active-recon train`')
         return path
 

@@ -38,8 +38,8 @@ def objects(study: Study) -> dict[str, Objects]:
         with study.progress(f'making {CATEGORY}', len(jobs)) as advance:
             for outcome in make_dataset(jobs, workers=study.threads):
                 if outcome.refusal:
-                    raise DataError(f'{outcome.folder.name}: expected a shape that can be '
-                                    f'rendered, got: {outcome.refusal}')
+                    raise DataError(f'{outcome.folder.name}: cannot be rendered: '
+                                    f'{outcome.refusal}')
                 advance(1, '')
     return {part: Objects(root / part) for part in COUNTS}
 

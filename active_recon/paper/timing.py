@@ -35,8 +35,8 @@ def timed_runs(study: Study) -> list[dict[str, Any]]:
                 capture_output=True, text=True, timeout=_BUDGET_S, check=False,
                 env=os.environ | {'PYTHONPATH': os.pathsep.join(filter(None, sys.path))})
             if ended.returncode:
-                raise DataError(f'{study.weights}: expected a reconstruction of {folder.name}, '
-                                f'got: {ended.stderr.strip()[-400:]}')
+                raise DataError(f'{study.weights}: no reconstruction of {folder.name}: '
+                                f'{ended.stderr.strip()[-400:]}')
             found.append(json.loads(ended.stdout))
             advance(1, '')
     return found[1:]

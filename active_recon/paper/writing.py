@@ -40,8 +40,8 @@ def read_result(study: Study, name: str) -> dict[str, Any]:
     try:
         found: dict[str, Any] = json.loads(path.read_bytes())
     except (OSError, ValueError) as error:
-        raise DataError(f'{path}: expected the result of `active-recon paper {name}`, got: '
-                        f'{error}') from error
+        raise DataError(f'{path}: no readable result: expected that of `active-recon paper '
+                        f'{name}`, got: {error}') from error
     return found
 
 

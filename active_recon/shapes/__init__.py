@@ -22,7 +22,7 @@ THINGS = ('thing',)
 def check_category(category: str) -> None:
     """Raise ConfigError unless shapes of a category can be made."""
     if category not in ALL_CATEGORIES + THINGS:
-        raise ConfigError('expected a category out of '
+        raise ConfigError('unknown category: expected one of '
                           f'{", ".join(ALL_CATEGORIES + THINGS)}, got {category!r}')
 
 

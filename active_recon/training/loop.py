@@ -43,9 +43,10 @@ class TrainingConfig(Config):
         """Reject what trains nothing."""
         if min(self.steps, self.batch_size, self.max_views, self.warmup_steps,
                self.checkpoint_every, self.validate_every) < 1 or not self.learning_rate > 0:
-            raise ConfigError(f'TrainingConfig: expected numbers above 0, got {self.to_dict()}')
+            raise ConfigError('TrainingConfig: number too small: expected numbers above 0, got '
+                              f'{self.to_dict()}')
         if not 0 <= self.curriculum_fraction <= 1:
-            raise ConfigError('TrainingConfig: expected a curriculum_fraction from 0 to 1, got '
+            raise ConfigError('TrainingConfig: invalid curriculum_fraction: expected 0 to 1, got '
                               f'{self.curriculum_fraction}')
 
 
@@ -102,8 +103,8 @@ def lr_factor(step: int, steps: int, warmup_steps: int = 200) -> float:
 def share_of_batch(config: TrainingConfig, fabric: Fabric) -> int:
     """Return how many objects of a batch this process draws; raises ConfigError on a remainder."""
     if config.batch_size % fabric.world_size:
-        raise ConfigError(f'batch_size: expected a multiple of the {fabric.world_size} processes,'
-                          f' got {config.batch_size}')
+        raise ConfigError('batch_size: not divisible: expected a multiple of the '
+                          f'{fabric.world_size} processes, got {config.batch_size}')
     return config.batch_size // fabric.world_size
 
 

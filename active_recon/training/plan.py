@@ -57,12 +57,14 @@ class Plan:
     def __post_init__(self) -> None:
         """Reject what cannot be trained together."""
         if network_entry(self.model).policy is None and (self.joint or self.policy):
-            raise ConfigError(f'{self.model}: expected a model with an attentive part for a view '
-                              'policy; leave the policy out, or train 2d3d-attention')
+            raise ConfigError(f'{self.model}: no view policy in this model: expected one with an '
+                              'attentive part; leave the policy out, or train 2d3d-attention')
         if self.joint and self.policy:
-            raise ConfigError('expected the joint scheme or a policy stage, got both')
+            raise ConfigError('two ways to train a policy: expected the joint scheme or a policy '
+                              'stage, got both')
         if self.begun and self.frozen and not self.policy:
-            raise ConfigError('expected a policy stage on a frozen reconstruction, got none')
+            raise ConfigError('nothing to train: expected a policy stage on a frozen '
+                              'reconstruction, got none')
 
     @property
     def config(self) -> Config:

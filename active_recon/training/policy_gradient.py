@@ -220,8 +220,8 @@ def draw_episodes(views: ViewSet, size: int, key: list[int], group_size: int = 1
     not divide the size.
     """
     if size % group_size:
-        raise ConfigError(f'group_size: expected a divisor of the {size} episodes that a '
-                          f'process runs at once, got {group_size}')
+        raise ConfigError(f'group_size: uneven groups: expected a divisor of the {size} episodes '
+                          f'that a process runs at once, got {group_size}')
     rng = np.random.default_rng(key)
     objects, starts = (
         torch.from_numpy(rng.integers(count, size=size // group_size).repeat(group_size))

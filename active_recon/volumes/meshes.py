@@ -62,8 +62,8 @@ def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise MeshError(f'{path}: a mesh without faces')
     if not np.isfinite(mesh.vertices).all() or not mesh.extents.max() > 0 or not mesh.area > 0:
-        raise MeshError(f'{path}: expected faces with finite corners and an area, got extents '
-                        f'{mesh.extents}')
+        raise MeshError(f'{path}: no surface: expected faces with finite corners and an area, got '
+                        f'extents {mesh.extents}')
     transform = np.eye(4)
     transform[:3, :3] = rotation
     mesh.apply_transform(transform)

@@ -75,9 +75,11 @@ class VoxelGrid:
         """Reject what is no cube."""
         shape = self.occupancy.shape
         if len(shape) != 3 or len(set(shape)) != 1:
-            raise DataError(f'expected a cube of voxels, got the shape {shape}')
+            raise DataError('not a cube: expected as many voxels along every axis, got the shape '
+                            f'{shape}')
         if not 0 < self.size < np.inf:
-            raise DataError(f'expected a finite side of the cube above 0 m, got {self.size}')
+            raise DataError('invalid size: expected a finite side of the cube above 0 m, got '
+                            f'{self.size}')
 
     @property
     def cell_size(self) -> float:
@@ -153,26 +155,28 @@ def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
     with np.errstate(invalid='ignore', over='ignore'):  # what is not finite is refused below
         shares = points[:, :3] / size + np.float32(0.5)
     if not ((shares >= 0) & (shares < 1)).all():  # also where a coordinate is NaN
-        raise DataError(f'expected points inside a cube of {size} m about the origin', 'cloud')
+        raise DataError(f'point out of the cube: expected all inside a cube of {size} m about the '
+                        'origin', 'cloud')
     if not ((points[:, 3] >= 0) & (points[:, 3] <= 1)).all():
-        raise DataError('expected occupancies in [0, 1], got '
-                        f'{points[:, 3].min()} to {points[:, 3].max()}', 'cloud')
+        raise DataError(f'invalid occupancy: expected values in [0, 1], got {points[:, 3].min()} '
+                        f'to {points[:, 3].max()}', 'cloud')
     side = _cells_a_side(shares)
     if side is None:
-        raise DataError(f'expected points at the centres of at most {_MOST_CELLS} cells a side '
-                        f'of a cube of {size} m, got {len(points)} that are at no such', 'cloud')
+        raise DataError('points between cell centres: expected them at the centres of at '
+                        f'most {_MOST_CELLS} cells a side of a cube of {size} m, got '
+                        f'{len(points)} elsewhere', 'cloud')
     index = (shares * side).astype(np.intp)
     if (spacing := _spacing(index)) > 1:
-        raise DataError(f'expected the cells of a cube of {size} m beside each other, got '
-                        f'{len(points)} that are {spacing} of {side} a side apart: they are of a '
-                        'cube of another size', 'cloud')
+        raise DataError('points of a cube of another size: expected the cells of a cube of '
+                        f'{size} m beside each other, got {len(points)} that are {spacing} of '
+                        f'{side} a side apart', 'cloud')
     x, y, z = index.T
     cells = (x * side + y) * side + z
     occupancy, filled = np.zeros(side ** 3, np.float32), np.zeros(side ** 3, bool)
     occupancy[cells], filled[cells] = points[:, 3], True
     if (count := np.count_nonzero(filled)) < len(points):
-        raise DataError(f'expected one point a cell, got {len(points)} in {count} cells of '
-                        f'{side} a side', 'cloud')
+        raise DataError(f'several points in a cell: expected one point a cell, got {len(points)} '
+                        f'in {count} cells of {side} a side', 'cloud')
     return VoxelGrid(occupancy.reshape((side,) * 3), size)
 
 
@@ -252,7 +256,8 @@ def binvox_side(path: Path) -> float:
                 if line.startswith(b'scale')][0]
         return VoxelGrid(np.zeros((1, 1, 1), np.float32), side).size
     except (OSError, ValueError, IndexError) as error:
-        raise DataError(f'{path}: expected a binvox file with a scale, got: {error}') from error
+        raise DataError(f'{path}: no readable scale: expected a binvox file with one, got: '
+                        f'{error}') from error
 
 
 def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:

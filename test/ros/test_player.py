@@ -113,7 +113,7 @@ def test_live_nodes_take_the_recorded_camera_for_one(bench, play, start_node, ba
 def test_a_rate_of_0_is_refused_in_one_line(play, bag, tmp_path):
     assert play(bag, '--rate', '0').wait(60) == 2
     (line,) = (tmp_path / 'said').read_text().splitlines()
-    assert 'expected a rate above 0' in line
+    assert '--rate: invalid rate: expected one above 0' in line
 
 
 def test_a_bag_that_was_cut_off_is_refused_with_the_cure(play, bag, tmp_path):

@@ -232,9 +232,9 @@ def test_a_node_that_is_to_ask_a_tf2_that_is_missing_does_not_start(start_node, 
 
 
 @pytest.mark.parametrize(('parameters', 'said'), [
-    ({}, 'camera_position: expected x, y, z'),
+    ({}, 'camera_position: invalid position: expected x, y, z'),
     ({'camera_position': (1.0, 0.0, 1.0), 'camera_orientation': (0.0, 0.0, 0.0, 2.0)},
-     'camera_orientation: expected'),
+     'camera_orientation: invalid orientation: expected x, y, z, w'),
 ])
 def test_a_turntable_whose_camera_nobody_placed_is_refused(parameters, said):
     with pytest.raises(ConfigError, match=said):

@@ -95,5 +95,5 @@ def text(folder):
 @pytest.mark.parametrize('make', [missing_mesh, empty_mesh, mesh_without_faces, text])
 def test_a_mesh_that_cannot_be_shown_is_refused(start_node, tmp_path, make):
     path = make(tmp_path)
-    assert re.search(f'{path}: (no mesh|no such mesh|a mesh|expected faces)', refusal(
+    assert re.search(f'{path}: (no mesh|no such mesh|a mesh|no surface: expected faces)', refusal(
         start_node, 'turntable_camera', mesh=path))

@@ -18,8 +18,8 @@ def played_topics(bag: Path, rate: float, names: str = '',
     or the bag has no such topic, DataError if the bag is missing or damaged.
     """
     if not 0 < rate < float('inf'):
-        raise ConfigError(f'--rate: expected a rate above 0, where 1 is that of the recording, '
-                          f'got {rate:g}')
+        raise ConfigError('--rate: invalid rate: expected one above 0, where 1 is that of the '
+                          f'recording, got {rate:g}')
     topics = {topic.name: Topic(topic.name, topic.type_name, topic.qos)
               for topic in open_bag(bag).summary(reporting).topics if topic.count}
     wanted = [f'/{name.strip().lstrip("/")}' for name in names.split(',') if name] or list(topics)

@@ -51,7 +51,7 @@ class Topics:
     def __post_init__(self) -> None:
         """Raise ConfigError on an invalid gap."""
         if not 0 <= self.max_pose_gap < math.inf:
-            raise ConfigError('max_pose_gap: expected 0 or more seconds, got '
+            raise ConfigError('max_pose_gap: invalid time: expected 0 or more seconds, got '
                               f'{self.max_pose_gap}')
 
 

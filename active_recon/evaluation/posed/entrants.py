@@ -56,10 +56,11 @@ def load_entrants(models: str) -> list[Entrant]:
         bundle = load_weights(path)
         name = name if named else Path(path).stem
         if any(other.name == name for other in entrants):
-            raise ConfigError(f'models: expected a name of its own for each, got {name!r} twice; '
-                              'name one as NAME=FILE')
+            raise ConfigError('models: ambiguous name: expected a name of its own for each, got '
+                              f'{name!r} twice; name one as NAME=FILE')
         entrants.append(Entrant(name, bundle.reconstruction, dict.fromkeys(
             SIDES, bundle.threshold), weights=weights_hash(path)))
     if not entrants:
-        raise ConfigError('models: expected one or more, separated by commas, got none')
+        raise ConfigError('models: empty list: expected one or more, separated by commas, got '
+                          'none')
     return entrants

@@ -48,15 +48,15 @@ class Plan:
         """Reject counts that are none."""
         if not self.counts or min(self.counts) < 1 or list(self.counts) != sorted(
                 set(self.counts)):
-            raise ConfigError('counts: expected rising numbers of views from 1 on, such as 1,3,5, '
-                              f'got {",".join(map(str, self.counts))}')
+            raise ConfigError('counts: invalid numbers of views: expected rising ones from 1 on, '
+                              f'such as 1,3,5, got {",".join(map(str, self.counts))}')
 
     def within(self, views: int) -> tuple[int, ...]:
         """Return the counts for which there are enough views; ConfigError where none is."""
         within = tuple(count for count in self.counts if count <= views)
         if not within:
-            raise ConfigError(f'counts: expected a number of views of {views} or fewer, as the '
-                              f'objects have, got {",".join(map(str, self.counts))}')
+            raise ConfigError(f'counts: too many views: expected {views} or fewer, as the objects '
+                              f'have, got {",".join(map(str, self.counts))}')
         return within
 
 
@@ -99,8 +99,9 @@ def logits_of(scene: Scene, entrant: Entrant, rows: Tensor, orders: Sequence[Ord
     """Yield an entrant's logits of objects (B,), (B, R, R, R), after each of the set's orders."""
     shown = scene.shown_to(entrant.network)
     if shown is None:
-        raise ConfigError(f'{entrant.name}: expected objects that are seen from 24 azimuths at an '
-                          'elevation of 30 degrees, as it was trained on')
+        raise ConfigError(f'{entrant.name}: cannot be shown these views: expected objects that '
+                          'are seen from 24 azimuths at an elevation of 30 degrees, as it was '
+                          'trained on')
     observer = Observer(entrant.network, some_objects(shown, rows), bfloat16)
     own = [order[rows.numpy()] for order in orders]
     for logits in walk(observer, torch.arange(len(rows)), own):

@@ -62,8 +62,8 @@ def chosen_folders(folders: Sequence[ObjectFolder], category: str | None = None,
             if fnmatchcase(folder.category, wanted.removeprefix('!')) != but]
     if not kept:
         found = ', '.join(sorted({folder.category for folder in folders})[:8])
-        raise ConfigError(f'category: expected a pattern that some objects match, such as '
-                          f'thing_*, got {wanted!r}; there are {found}')
+        raise ConfigError('category: no such objects: expected a pattern that some objects match, '
+                          f'such as thing_*, got {wanted!r}; there are {found}')
     if most is not None and most < len(kept):
         rows = np.random.default_rng(seed).choice(len(kept), most, replace=False)
         kept = [kept[row] for row in sorted(rows)]
@@ -93,7 +93,7 @@ def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[Reconstructio
             with reporting(f'reading {title} for the front', len(views)) as advance:
                 shown = read_views(views.folders, lambda: advance(1, ''), RESOLUTION, size)
             if shown.folders != views.folders:
-                raise DataError(f'expected the same objects at {size} pixels, but some cannot be '
-                                f'read: {"; ".join(shown.unreadable[:3])}')
+                raise DataError(f'objects missing at {size} pixels: expected the same as before, '
+                                f'but some cannot be read: {"; ".join(shown.unreadable[:3])}')
             turntable[size] = shown
     return Scene(views, truths, turntable)

@@ -71,7 +71,8 @@ def study_set(data: Path, entrants: Sequence[Entrant], plan: Plan, extent: Exten
     left_out = {each.name: _NO_TURNTABLE if each.network.needs_front else _OTHER_SIZE
                 for each in entrants if each not in taking}
     if not taking:
-        raise ConfigError(f'{data}: expected a model that can be shown these views, but '
+        raise ConfigError(f'{data}: no model for these views: expected one that can be '
+                          'shown them, but '
                           + '; '.join(f'{name}: {why}' for name, why in left_out.items()))
     with reporting(f'measuring {data.name}', len(taking) * len(scene)) as advance:
         measured = measure(scene, taking, plan, lambda done: advance(done, ''))
