@@ -31,7 +31,7 @@ def known_after(network: ReconstructionNetwork, images: Tensor,
     state = network.initial_state(batch)
     for t, view in enumerate(images):
         at = 0.5 * t if azimuths is None else azimuths[t]
-        state = network.step(view, cameras_at([at] * batch), state)
+        state = network.step(view, cameras_at([at] * batch, view.shape[-1]), state)
     return Known(network.decode(state), state['latent'], state)
 
 

@@ -11,14 +11,10 @@ from active_recon.models.carving import Carving
 from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.network import Cameras
 from active_recon.training.calibration import calibrate
-from active_recon.training.lifting import (
-    draw_posed_batch,
-    LiftingLearner,
-    train_lifting,
-    turned_by_quarters,
-)
+from active_recon.training.lifting import LiftingLearner, train_lifting
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
 from active_recon.training.posed_augmentation import augment_posed, perturb_poses
+from active_recon.training.posed_batches import draw_posed_batch, turned_by_quarters
 from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest

@@ -40,7 +40,7 @@ class Toy(ReconstructionNetwork):
         return {'dark': torch.ones(batch, 32, 32, 32), 'latent': torch.zeros(batch, 1, 4, 4)}
 
     def encode(self, images, cameras):
-        return 1 - images.mean(dim=1, keepdim=True)
+        return 1 - images[:, :3].mean(dim=1, keepdim=True)
 
     def update(self, encoded, cameras, state):
         place = (torch.arange(32, dtype=torch.float64) + 0.5) / 32 - 0.5

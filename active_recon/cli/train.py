@@ -24,9 +24,9 @@ def train(
     out: Annotated[Path, typer.Option(
         help='Run folder: checkpoints, TensorBoard log, weights.')] = Path('runs/default'),
     model: Annotated[str, typer.Option(
-        help='A network of the registry: 2d3d-attention, 2d3d, r2n2, ptn, ptn-combined, ogn, '
-             'shape-basis, lifting, carving; one that an installed package offers; or one of '
-             'your own, as my_file.py:Net.')] = '2d3d-attention',
+        help='A network of the registry: 2d3d-attention, 2d3d, 2d3d-posed, r2n2, ptn, '
+             'ptn-combined, ogn, shape-basis, lifting, carving; one that an installed package '
+             'offers; or one of your own, as my_file.py:Net.')] = '2d3d-attention',
     size: Annotated[str, typer.Option(
         help="'small' (two CPU cores within an hour), 'published' (its paper's own); of ogn "
              "also 'small-64' and 'published-64'.")] = 'small',

@@ -41,7 +41,7 @@ class Encoder(nn.Module):
     """
     Three residual blocks, a ConvLSTM, and three convolutions to A_t.
 
-    - images: (B, 3, 64, 64) in [0, 1]
+    - images: (B, `image_channels`, 64, 64) in [0, 1]
     - latent A_t: (B, 4 C, 4, 4), the same numbers as a volume of C channels and 4 x 4 x 4 cells
 
     An image has no azimuth, and the object is reconstructed in its own frame, so a feature of one
@@ -50,12 +50,13 @@ class Encoder(nn.Module):
     """
 
     def __init__(self, stem_channels: int, block_channels: tuple[int, int, int],
-                 recurrent_channels: int, bottleneck_channels: int, latent_channels: int) -> None:
+                 recurrent_channels: int, bottleneck_channels: int, latent_channels: int,
+                 image_channels: int = 3) -> None:
         super().__init__()
         widths = (stem_channels, *block_channels)
         self.stem = nn.Sequential(
-            nn.Conv2d(3, stem_channels, 5, stride=2, padding=2), group_norm(stem_channels),
-            nn.LeakyReLU(0.1))
+            nn.Conv2d(image_channels, stem_channels, 5, stride=2, padding=2),
+            group_norm(stem_channels), nn.LeakyReLU(0.1))
         self.blocks = nn.Sequential(
             *(ResidualBlock(a, b) for a, b in zip(widths[:-1], widths[1:], strict=True)))
         self.memory = ConvLSTMCell(block_channels[-1], recurrent_channels, (LATENT_GRID,) * 2)

@@ -43,6 +43,12 @@ class Network2d3dConfig(Config):
                               f'{self.view_separation}')
 
 
+SIZES = {'small': Network2d3dConfig(), 'published': Network2d3dConfig(
+    stem_channels=64, block_channels=(128, 256, 256), recurrent_channels=256,
+    bottleneck_channels=1024, latent_channels=64, volume_channels=128, decoder_channels=(128, 64),
+    glimpse_channels=256)}
+
+
 class Network2d3d(ReconstructionNetwork):
     """
     The 2D-3D network of figure 2; with the attentive model beside it, 2D-3D-attention.
@@ -60,11 +66,11 @@ class Network2d3d(ReconstructionNetwork):
         self.decoder = decoder
 
     @classmethod
-    def from_config(cls, config: Network2d3dConfig) -> 'Network2d3d':
+    def from_config(cls, config: Network2d3dConfig, image_channels: int = 3) -> 'Network2d3d':
         """Build the network of a configuration, with fresh weights."""
         return cls(
             Encoder(config.stem_channels, config.block_channels, config.recurrent_channels,
-                    config.bottleneck_channels, config.latent_channels),
+                    config.bottleneck_channels, config.latent_channels, image_channels),
             Decoder(config.latent_channels, config.volume_channels, config.decoder_channels))
 
     def initial_state(self, batch: int) -> State:

@@ -14,6 +14,9 @@ from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.lifting import SIZES as SIZES_LIFTING
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.network_2d3d import Network2d3d, Network2d3dConfig
+from active_recon.models.network_2d3d import SIZES as SIZES_2D3D
+from active_recon.models.network_2d3d_posed import Network2d3dPosed, Network2d3dPosedConfig
+from active_recon.models.network_2d3d_posed import SIZES as SIZES_2D3D_POSED
 from active_recon.models.ogn import Ogn, OgnConfig
 from active_recon.models.ogn import SIZES as SIZES_OGN
 from active_recon.models.ptn import PerspectiveTransformerNet, PtnConfig
@@ -52,19 +55,15 @@ class NetworkEntry:
     fit: Callable[[Any, Tensor, NDArray[np.str_]], None] | None = None
 
 
-_SIZES_2D3D = {
-    'small': Network2d3dConfig(),
-    'published': Network2d3dConfig(
-        stem_channels=64, block_channels=(128, 256, 256), recurrent_channels=256,
-        bottleneck_channels=1024, latent_channels=64, volume_channels=128,
-        decoder_channels=(128, 64), glimpse_channels=256),
-}
+_POSED_LOSS = LossConfig(volume_weight=1, silhouette_weight=0, volume_loss='bce+dice')
 
 NETWORKS: Mapping[str, NetworkEntry] = {
     '2d3d-attention': NetworkEntry(
-        Network2d3dConfig, Network2d3d.from_config, _SIZES_2D3D,
+        Network2d3dConfig, Network2d3d.from_config, SIZES_2D3D,
         policy=AttentionModel.from_config),
-    '2d3d': NetworkEntry(Network2d3dConfig, Network2d3d.from_config, _SIZES_2D3D),
+    '2d3d': NetworkEntry(Network2d3dConfig, Network2d3d.from_config, SIZES_2D3D),
+    '2d3d-posed': NetworkEntry(Network2d3dPosedConfig, Network2d3dPosed.from_config,
+                               SIZES_2D3D_POSED, _POSED_LOSS),
     'r2n2': NetworkEntry(R2n2Config, R2n2.from_config, SIZES_R2N2,
                          LossConfig(volume_weight=1, silhouette_weight=0, volume_loss='bce')),
     'ptn': NetworkEntry(PtnConfig, PerspectiveTransformerNet.from_config, SIZES_PTN,
@@ -74,9 +73,7 @@ NETWORKS: Mapping[str, NetworkEntry] = {
     'ogn': NetworkEntry(OgnConfig, Ogn.from_config, SIZES_OGN),  # learns from its own objective
     'shape-basis': NetworkEntry(ShapeBasisConfig, ShapeBasis.from_config, SIZES_SHAPE_BASIS,
                                 fit=fit_shapes),
-    'lifting': NetworkEntry(LiftingConfig, Lifting.from_config, SIZES_LIFTING,
-                            LossConfig(volume_weight=1, silhouette_weight=0,
-                                       volume_loss='bce+dice')),
+    'lifting': NetworkEntry(LiftingConfig, Lifting.from_config, SIZES_LIFTING, _POSED_LOSS),
     'carving': NetworkEntry(CarvingConfig, Carving.from_config, SIZES_CARVING,
                             fit=carve_nothing),
 }

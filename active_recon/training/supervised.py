@@ -16,6 +16,7 @@ from active_recon.training.loop import (
     TrainingConfig,
 )
 from active_recon.training.losses import reconstruction_loss
+from active_recon.training.posed_batches import draw_posed_batch
 from active_recon.volumes.silhouettes import frustum
 import numpy as np
 import torch
@@ -41,7 +42,7 @@ class ReconstructionLearner(nn.Module):
     def forward(self, images: Tensor, cameras: Cameras, voxels: Tensor,
                 seen_from: Tensor) -> dict[str, Tensor]:
         """
-        Return the losses after the last of images (T, B, 3, S, S) of cameras (T, B, ...).
+        Return the losses after the last of images (T, B, C, S, S) of cameras (T, B, ...).
 
         `voxels` are (B, R, R, R); `seen_from`, (B,), the indices of the cameras, out of 24, whose
         silhouettes are compared.
@@ -104,12 +105,17 @@ def train_reconstruction(
     network: ReconstructionNetwork, views: ViewSet, config: TrainingConfig, loss: LossConfig,
     run: Run, validate: Callable[[ReconstructionNetwork], Measured],
 ) -> None:
-    """Train a network in place on random views of random objects; see `train_steps`."""
+    """
+    Train a network in place on random views of random objects; see `train_steps`.
+
+    One that needs no front learns from posed views, as the lifting network does.
+    """
     size = share_of_batch(config, run.fabric)
 
     def draw(step: int) -> Draw:
         length, own = drawn_length(step, config, run.fabric.global_rank)
-        batch = draw_batch(views, size, length, own, config.augment)
+        drawn = draw_batch if network.needs_front else draw_posed_batch
+        batch = drawn(views, size, length, own, config.augment)
         seen_from = torch.from_numpy(own.integers(len(AZIMUTHS), size=size))
         return Draw((batch.images, batch.cameras, batch.voxels, seen_from), batch.objects)
 
