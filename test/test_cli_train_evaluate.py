@@ -111,6 +111,21 @@ def test_a_training_that_is_interrupted_says_where_and_how_to_go_on(
     assert command(monkeypatch, *asked, '--resume') == 0
 
 
+def test_the_paper_s_network_with_cameras_goes_from_data_to_figures(
+        dataset, tmp_path, monkeypatch):
+    asked = training(dataset, tmp_path, '--model', '2d3d-posed')
+    assert command(monkeypatch, *asked) == 0
+    card = json.loads((tmp_path / 'weights.json').read_text())
+    assert (card['reconstruction']['volume_loss'], card['policy']) == ('bce+dice', None)
+    weights = tmp_path / 'weights.safetensors'
+    assert not load_weights(weights).reconstruction.needs_front
+    out = tmp_path / 'figures.json'
+    assert command(monkeypatch, 'evaluate', dataset, '--model', weights, '--json', out,
+                   '--threads', 1) == 0
+    found = json.loads(out.read_text())['policies']
+    assert all(0 <= value['mean'] <= 1 for each in found.values() for value in each['iou'])
+
+
 def test_validation_objects_that_are_trained_on_are_told(dataset, tmp_path, monkeypatch, capsys):
     assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0)) == 0
     assert '6 of 6 validation objects are trained on too' in capsys.readouterr().err

@@ -10,11 +10,13 @@ from active_recon.datasets.views import read_views
 from active_recon.models.carving import Carving
 from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.network import Cameras
+from active_recon.models.network_2d3d_posed import Network2d3dPosed, Network2d3dPosedConfig
 from active_recon.training.calibration import calibrate
 from active_recon.training.lifting import LiftingLearner, train_lifting
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
 from active_recon.training.posed_augmentation import augment_posed, perturb_poses
 from active_recon.training.posed_batches import draw_posed_batch, turned_by_quarters
+from active_recon.training.supervised import train_reconstruction
 from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
@@ -24,6 +26,9 @@ from torch.testing import assert_close
 TINY = LiftingConfig(encoder_channels=(8, 8, 8, 8), pyramid_channels=8, coarse_hidden=8,
                      coarse_channels=4, fine_channels=2, volume_channels=(8, 8, 8),
                      head_channels=4)
+TINY_POSED = Network2d3dPosedConfig(
+    stem_channels=4, block_channels=(6, 8, 8), recurrent_channels=8, bottleneck_channels=16,
+    latent_channels=2, volume_channels=6, decoder_channels=(6, 4), camera_channels=8)
 LOSS = LossConfig(1, 0, 'bce+dice')
 
 
@@ -34,6 +39,12 @@ def seen_anyhow(tmp_path_factory):
     list(make_dataset(shape_jobs('chair', range(4), out), 1, fine=True,
                       viewing=Viewing('any', 8, turned=True)))
     return read_views(list_objects(out), resolution=64, image_size=128, framed=True)
+
+
+@pytest.fixture(scope='module')
+def seen_coarsely(seen_anyhow):
+    """Return the same views with voxels of 32 cells."""
+    return read_views(seen_anyhow.folders, resolution=32, image_size=128, framed=True)
 
 
 def carved(batch):
@@ -97,21 +108,27 @@ def test_poses_are_off_by_a_degree_and_a_hundredth_at_most(seen_anyhow):
     assert 0 < (moved / cameras.poses[..., :3, 3].norm(dim=-1)).max() <= 0.01 + 1e-9
 
 
-def learned_from(seen_anyhow, path, steps, until=None, resume=False):
-    torch.manual_seed(0)
-    network = Lifting.from_config(TINY)
-    config = TrainingConfig(steps, 2, 3e-3, 2, bfloat16=False, warmup_steps=1, checkpoint_every=2,
-                            validate_every=100)
-    train_lifting(network, seen_anyhow, config, LOSS,
-                  Run(make_fabric(False), path, lambda step, measured: None, resume, until),
-                  lambda model: {})
-    return network
+@pytest.mark.parametrize(('network_class', 'config', 'train', 'views'), [
+    (Lifting, TINY, train_lifting, 'seen_anyhow'),
+    (Network2d3dPosed, TINY_POSED, train_reconstruction, 'seen_coarsely')],
+    ids=['lifting', '2d3d-posed'])
+def test_a_training_that_was_cut_off_goes_on_as_if_it_was_not(
+        network_class, config, train, views, tmp_path, request):
+    seen = request.getfixturevalue(views)
 
+    def learned(path, until=None, resume=False):
+        torch.manual_seed(0)
+        network = network_class.from_config(config)
+        train(network, seen,
+              TrainingConfig(4, 2, 3e-3, 2, bfloat16=False, warmup_steps=1, checkpoint_every=2,
+                             validate_every=100), LOSS,
+              Run(make_fabric(False), path, lambda step, measured: None, resume, until),
+              lambda model: {})
+        return network
 
-def test_a_training_that_was_cut_off_goes_on_as_if_it_was_not(seen_anyhow, tmp_path):
-    whole = learned_from(seen_anyhow, tmp_path / 'whole.safetensors', 4)
-    learned_from(seen_anyhow, tmp_path / 'cut.safetensors', 4, until=2)
-    resumed = learned_from(seen_anyhow, tmp_path / 'cut.safetensors', 4, resume=True)
+    whole = learned(tmp_path / 'whole.safetensors')
+    learned(tmp_path / 'cut.safetensors', until=2)
+    resumed = learned(tmp_path / 'cut.safetensors', resume=True)
     for name, weight in whole.state_dict().items():
         assert_close(resumed.state_dict()[name], weight, rtol=1e-4, atol=1e-5)
 
