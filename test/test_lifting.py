@@ -18,6 +18,9 @@ from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.lifting_decoder import Conv3d, depth_to_space, space_to_depth
 from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras
+from active_recon.models.visibility import add_visible, visible_mean
+from active_recon.models.weights import load_weights
+from active_recon.models.weights_files import config_hash, read_metadata, SHIPPED
 import numpy as np
 import pytest
 import torch
@@ -29,10 +32,10 @@ TINY = LiftingConfig(encoder_channels=(4, 4, 8, 8), pyramid_channels=8, coarse_h
 LENS = Intrinsics(140, 140, 64, 64, 128, 128)
 
 
-@pytest.fixture
-def lifting():
+@pytest.fixture(params=[False, True], ids=['plain', 'visibility'])
+def lifting(request):
     torch.manual_seed(0)
-    return Lifting.from_config(TINY).eval()
+    return Lifting.from_config(replace(TINY, visibility=request.param)).eval()
 
 
 def cameras_at(*places):
@@ -62,6 +65,13 @@ def test_any_order_of_the_views_gives_the_same_occupancy(lifting):
     there, back = (lifting.decode(after(lifting, images, VIEWS, order)).sigmoid()
                    for order in ((0, 1, 2), (2, 0, 1)))
     assert_close(there, back, rtol=0, atol=1e-5)
+
+
+@torch.inference_mode()
+def test_views_at_once_and_one_by_one_give_the_same_state(lifting):
+    images = some_images(3)
+    at_once = lifting.update_from_maps(lifting.maps(images), VIEWS, lifting.initial_state(1))
+    assert_close(at_once, after(lifting, images, VIEWS, (0, 1, 2)), rtol=1e-5, atol=1e-4)
 
 
 @torch.inference_mode()
@@ -140,6 +150,34 @@ def test_view_statistics_are_mean_deviation_and_extremes():
     assert deviation == pytest.approx((4 + 0.01) ** 0.5)
 
 
+def test_the_visible_mean_is_a_softmax_over_views_and_an_empty_slot():
+    generator = torch.Generator().manual_seed(1)
+    features = torch.randn(3, 2, 4, 8, generator=generator)
+    logits = 3 * torch.randn(3, 2, 1, 8, generator=generator)
+    inside = (torch.rand(3, 2, 1, 8, generator=generator) > 0.3).float()
+    nothing = torch.zeros(2, 1, 2, 2, 2), torch.zeros(2, 4, 2, 2, 2)
+    found = visible_mean(*add_visible(*nothing, features, logits, inside))
+    shown = torch.where(inside > 0, logits, -torch.inf)
+    shares = torch.cat([shown, torch.zeros(1, 2, 1, 8)]).softmax(dim=0)[:-1]
+    assert_close(found, (shares * features).sum(dim=0).reshape(2, 4, 2, 2, 2))
+
+
+@pytest.mark.parametrize('logit', [1e4, -1e4])
+def test_no_logit_makes_a_visible_mean_overflow(logit):
+    known = torch.zeros(1, 1, 1, 1, 1), torch.zeros(1, 1, 1, 1, 1)
+    many = torch.full((1000, 1, 1, 1), 5.0)
+    found = visible_mean(*add_visible(*known, many, many / 5 * logit, many / 5))
+    assert 0 < found.item() <= 5
+
+
+def test_sizes_without_visibility_are_written_as_before_it_was_an_option():
+    plain, with_it = LiftingConfig(), LiftingConfig(visibility=True)
+    assert 'visibility' not in plain.to_dict()
+    for config in (plain, with_it):
+        assert LiftingConfig.from_dict(config.to_dict()) == config
+    assert config_hash(load_weights().config) == config_hash(read_metadata(SHIPPED).config)
+
+
 def test_view_statistics_have_the_gradients_that_torch_derives():
     generator = torch.Generator().manual_seed(1)
     found = torch.randn(3, 2, 4, 8, generator=generator, dtype=torch.float64).requires_grad_()
@@ -186,6 +224,7 @@ def test_gradients_reach_every_weight(lifting):
     lacking = [name for name, weight in lifting.named_parameters()
                if weight.grad is None or not weight.grad.any()]
     assert lacking == []
+    assert lifting.coarse.mix.weight.grad.flatten(1).any(dim=1).all()  # features, and the logit
 
 
 @torch.inference_mode()

@@ -1,4 +1,4 @@
-"""The 2D-3D network that is told of the camera: what it is told, and that it can make use of it."""
+"""The 2D-3D network that is told of the camera: what it is told, and that it can use it."""
 
 import math
 

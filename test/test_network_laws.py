@@ -206,7 +206,8 @@ def test_the_small_size_has_a_few_million_parameters_and_the_published_one_many(
     ('r2n2', {'hidden_channels': 0}), ('r2n2', {'encoder_channels': (8, 8)}),
     ('r2n2', {'decoder_channels': (8,)}), ('ptn', {'volume_channels': (8, 8)}),
     ('ptn', {'code_channels': (8, 8, 0)}), ('ogn', {'resolution': 64}),
-    ('2d3d-posed', {'camera_channels': 0}), ('ogn', {'level_channels': (8, 0, 8)}), ('ogn', {'image_channels': ()}),
+    ('ogn', {'level_channels': (8, 0, 8)}), ('ogn', {'image_channels': ()}),
+    ('2d3d-posed', {'camera_channels': 0}),
     ('shape-basis', {'modes': 0}), ('shape-basis', {'categories': ('box', 'box')})])
 def test_sizes_that_make_no_network_are_refused(model, wrong):
     with pytest.raises(ConfigError, match='expected'):

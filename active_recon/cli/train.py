@@ -29,7 +29,7 @@ def train(
              'offers; or one of your own, as my_file.py:Net.')] = '2d3d-attention',
     size: Annotated[str, typer.Option(
         help="'small' (two CPU cores within an hour), 'published' (its paper's own); of ogn "
-             "also 'small-64' and 'published-64'.")] = 'small',
+             "also 'small-64' and 'published-64', of lifting 'small-visibility'.")] = 'small',
     scheme: Annotated[str, typer.Option(
         help="'two-stage': reconstruction on random views, then the policy with it frozen; "
              "'joint': both together on the policy's views, as in the paper.")] = 'two-stage',

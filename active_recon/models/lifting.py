@@ -1,6 +1,7 @@
 """The lifting network: any cameras, image features lifted along their rays into the cells."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError
@@ -17,6 +18,7 @@ from active_recon.models.lifted import (
 from active_recon.models.lifting_decoder import FINE_SIDE, HullUnet
 from active_recon.models.lifting_encoder import IMAGE_SIZE, Maps, NO_EVIDENCE, PyramidEncoder
 from active_recon.models.network import Cameras, init_occupancy_bias, ReconstructionNetwork, State
+from active_recon.models.visibility import add_visible, visible_mean
 import torch
 from torch import Tensor
 from torch.nn import functional
@@ -36,6 +38,8 @@ class LiftingConfig(Config):
     - coarse_hidden, coarse_channels: of the features lifted to 16 cells a side; fine_channels: of
       those lifted to 32
     - volume_channels: at 16, 8 and 4 cells; head_channels: at 32
+    - visibility: whether the decoder also gets a mean of the features at 16 cells that is weighted
+      by how well each view shows a cell
     """
 
     encoder_channels: tuple[int, int, int, int] = (16, 48, 96, 160)
@@ -45,19 +49,30 @@ class LiftingConfig(Config):
     fine_channels: int = 8
     volume_channels: tuple[int, int, int] = (40, 80, 128)
     head_channels: int = 16
+    visibility: bool = False
 
     def __post_init__(self) -> None:
         """Reject sizes that make no network."""
-        sizes = [size for value in self.to_dict().values()
+        sizes = [size for name, value in self.to_dict().items() if name != 'visibility'
                  for size in (value if isinstance(value, tuple) else (value,))]
         if min(sizes) < 1:
             raise ConfigError('LiftingConfig: invalid channels: expected 1 or more, got '
                               f'{min(sizes)}')
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plain mapping; without `visibility` where off, as weights before it have."""
+        values = super().to_dict()
+        if not self.visibility:
+            del values['visibility']
+        return values
 
-SIZES = {'small': LiftingConfig(), 'published': LiftingConfig(
-    encoder_channels=(24, 64, 128, 192), pyramid_channels=48, coarse_hidden=64,
-    coarse_channels=48, fine_channels=12, volume_channels=(48, 96, 160), head_channels=24)}
+
+SIZES = {
+    'small': LiftingConfig(),
+    'small-visibility': LiftingConfig(visibility=True),
+    'published': LiftingConfig(
+        encoder_channels=(24, 64, 128, 192), pyramid_channels=48, coarse_hidden=64,
+        coarse_channels=48, fine_channels=12, volume_channels=(48, 96, 160), head_channels=24)}
 
 
 class Lifting(ReconstructionNetwork):
@@ -67,18 +82,21 @@ class Lifting(ReconstructionNetwork):
     The state has a fixed size and does not depend on the order of the views: count, sum, sum of
     squares, maximum and minimum of the lifted features at 16 and 32 cells a side; at 64, the two
     lowest foreground logits at a cell's projection, less 6 (`hull`); and the number of views, by
-    which the logits' temperature is chosen. All of it is 0 before the first view, and cells that
-    a camera does not see (outside its image, behind it) stay as they are. The network needs no
-    front.
+    which the logits' temperature is chosen. With `visibility`, each view and cell at 16 also get
+    a logit, and the state two sums more (see `add_visible`). All of it is 0 before the first
+    view, and cells that a camera does not see (outside its image, behind it) stay as they are.
+    The network needs no front.
     """
 
     image_size, resolution, needs_front = IMAGE_SIZE, 64, False
 
     def __init__(self, encoder: PyramidEncoder, coarse: GeometricLift, fine: Lift,
-                 decoder: HullUnet, fine_channels: int) -> None:
+                 decoder: HullUnet, coarse_channels: int, fine_channels: int,
+                 visibility: bool = False) -> None:
         super().__init__()
         self.encoder, self.coarse, self.fine, self.decoder = encoder, coarse, fine, decoder
-        self._fine_channels = fine_channels
+        self._coarse_channels, self._fine_channels = coarse_channels, fine_channels
+        self._visibility = visibility
         self.temperatures: Tensor  # of the logits after 1, 2, ... views; the last for all more
         self.register_buffer('temperatures', torch.ones(_COUNTS))
 
@@ -87,24 +105,28 @@ class Lifting(ReconstructionNetwork):
         """Build the network of a configuration, with fresh weights."""
         encoder = PyramidEncoder(config.encoder_channels, config.pyramid_channels,
                                  config.coarse_hidden, config.fine_channels)
-        decoder = HullUnet(4 * config.coarse_channels + 1, 4 * config.fine_channels + 1,
+        summaries = 5 if config.visibility else 4
+        decoder = HullUnet(summaries * config.coarse_channels + 1, 4 * config.fine_channels + 1,
                            config.volume_channels, config.head_channels)
         init_occupancy_bias(decoder.logit_32.bias)
+        lifted = config.coarse_channels + config.visibility  # a logit beside the features
         return cls(
-            encoder, GeometricLift(_COARSE_SIDE, config.coarse_hidden, config.coarse_channels),
-            Lift(FINE_SIDE), decoder, config.fine_channels)
+            encoder, GeometricLift(_COARSE_SIDE, config.coarse_hidden, lifted), Lift(FINE_SIDE),
+            decoder, config.coarse_channels, config.fine_channels, config.visibility)
 
     def initial_state(self, batch: int) -> State:
         """Return the state before any view: nothing seen."""
         device = self.device
-        coarse = initial_statistics(batch, self.coarse.mix.out_channels, _COARSE_SIDE, device)
+        coarse = initial_statistics(batch, self._coarse_channels, _COARSE_SIDE, device)
         fine = initial_statistics(batch, self._fine_channels, FINE_SIDE, device)
+        visible = {'visible_weight': coarse['count'], 'visible_sum': coarse['sum']}
         side = self.resolution
         return {'views': torch.zeros(batch, 1, device=device),
                 **_named('coarse', coarse), **_named('fine', fine),
+                **(visible if self._visibility else {}),
                 'hull': torch.zeros(batch, 2, side, side, side, device=device),
-                'latent': torch.zeros(batch, self.coarse.mix.out_channels, _LATENT_SIDE,
-                                      _LATENT_SIDE, device=device)}
+                'latent': torch.zeros(batch, self._coarse_channels, _LATENT_SIDE, _LATENT_SIDE,
+                                      device=device)}
 
     def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
         """Return the images' maps in one, (B, F); see `Maps`."""
@@ -128,15 +150,17 @@ class Lifting(ReconstructionNetwork):
         """
         matrices = projection(cameras, IMAGE_SIZE)
         batch = len(state['hull'])
-        coarse = self.coarse(maps.coarse, functional.avg_pool2d(maps.seen, 2), cameras, matrices)
-        fine = self.fine(maps.fine, maps.seen, cameras, matrices)
-        statistics = {part: aggregate(_of(part, state), *(
-            each.unflatten(0, (-1, batch)) for each in lifted))
-            for part, lifted in (('coarse', coarse), ('fine', fine))}
-        mean = statistics['coarse']['sum'] / statistics['coarse']['count'].clamp(min=1)
-        showing = coarse[1].amax(dim=2).unflatten(0, (-1, batch)).sum(dim=0)  # (B, 1)
+        coarse, inside = (each.unflatten(0, (-1, batch)) for each in self.coarse(
+            maps.coarse, functional.avg_pool2d(maps.seen, 2), cameras, matrices))
+        fine = (each.unflatten(0, (-1, batch)) for each in self.fine(
+            maps.fine, maps.seen, cameras, matrices))
+        features, logits = coarse.tensor_split((self._coarse_channels,), dim=2)
+        at_16 = aggregate(_of('coarse', state), features, inside)
+        mean = at_16['sum'] / at_16['count'].clamp(min=1)
+        showing = inside.amax(dim=3).sum(dim=0)  # (B, 1)
         return {'views': state['views'] + showing,
-                **_named('coarse', statistics['coarse']), **_named('fine', statistics['fine']),
+                **_named('coarse', at_16), **_named('fine', aggregate(_of('fine', state), *fine)),
+                **self._visible(state, features, logits, inside),
                 'hull': self._carved(maps.foreground, matrices, state['hull']),
                 'latent': functional.adaptive_avg_pool2d(mean.mean(dim=4), _LATENT_SIDE)}
 
@@ -147,10 +171,21 @@ class Lifting(ReconstructionNetwork):
 
     def logits(self, state: State) -> tuple[Tensor, Tensor]:
         """Return uncalibrated logits, (B, 64, 64, 64), and coarse logits, (B, 32, 32, 32)."""
+        coarse = summarise(_of('coarse', state))
+        if self._visibility:
+            visible = visible_mean(state['visible_weight'], state['visible_sum'])
+            coarse = torch.cat([coarse, visible], dim=1)
         found: tuple[Tensor, Tensor] = self.decoder(
-            summarise(_of('coarse', state)), summarise(_of('fine', state)),
-            state['hull'] + NO_EVIDENCE)
+            coarse, summarise(_of('fine', state)), state['hull'] + NO_EVIDENCE)
         return found
+
+    def _visible(self, state: State, features: Tensor, logits: Tensor, inside: Tensor) -> State:
+        """Return the sums by visibility with T more views, (T, B, ..., N); {} without."""
+        if not self._visibility:
+            return {}
+        weight, total = add_visible(state['visible_weight'], state['visible_sum'], features,
+                                    logits, inside)
+        return {'visible_weight': weight, 'visible_sum': total}
 
     @torch.no_grad()
     def _carved(self, foreground: Tensor, matrices: Tensor, hull: Tensor) -> Tensor:
