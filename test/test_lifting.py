@@ -1,5 +1,6 @@
 """What the lifting network promises, whatever it has learned."""
 
+import copy
 from dataclasses import replace
 import math
 
@@ -219,12 +220,23 @@ def test_gradients_reach_every_weight(lifting):
     maps = lifting.maps(images)
     for cameras in (VIEWS.rows(slice(0, 2)), VIEWS.rows(slice(1, 3))):
         state = lifting.update_from_maps(maps, cameras, state)
-    logits, coarse = lifting.logits(state)
+    logits, coarse, _ = lifting.logits(state)
     (logits.square().mean() + coarse.square().mean() + maps.foreground.mean()).backward()
     lacking = [name for name, weight in lifting.named_parameters()
                if weight.grad is None or not weight.grad.any()]
     assert lacking == []
     assert lifting.coarse.mix.weight.grad.flatten(1).any(dim=1).all()  # features, and the logit
+
+
+@torch.inference_mode()
+def test_weights_with_a_temperature_for_each_number_of_views_still_load(lifting):
+    weights = lifting.state_dict()
+    count = len(weights.pop('calibration'))
+    loaded = copy.deepcopy(lifting)
+    loaded.load_state_dict({**weights, 'temperatures': torch.linspace(1, 2, count)})
+    for views, temperature in ((1, 1.0), (2, 1 + 1 / (count - 1))):
+        state = after(lifting, some_images(2), VIEWS, range(views))
+        assert_close(loaded.decode(state), lifting.logits(state).logits / temperature)
 
 
 @torch.inference_mode()

@@ -151,11 +151,11 @@ def test_the_losses_fall(seen_anyhow, bfloat16):
     assert heard[-1]['silhouette'] < heard[0]['silhouette']
 
 
-def test_temperatures_make_the_truth_of_validation_more_likely(seen_anyhow):
+def test_calibration_makes_the_truth_of_validation_more_likely(seen_anyhow):
     torch.manual_seed(0)
     network = Lifting.from_config(TINY).eval()
     with torch.no_grad():
-        network.decoder.to_64.bias.mul_(8)  # far too sure
+        network.decoder.to_64.bias.mul_(8)  # far too confident
 
     def nats():
         state = network.initial_state(4)
@@ -168,8 +168,17 @@ def test_temperatures_make_the_truth_of_validation_more_likely(seen_anyhow):
 
     with torch.no_grad():
         before = nats()
-        found = calibrate(network, seen_anyhow)
+        calibrate(network, seen_anyhow)
         assert nats() < before
-    assert list(found) == list(range(1, 9))  # as many views as there are
-    assert_close(network.temperatures[7:], network.temperatures[7:8].expand(5))
-    assert_close(network.temperatures[:8], torch.tensor(list(found.values())).float())
+    fitted = network.calibration[:8]  # as many views as there are
+    assert len(fitted.unique(dim=0)) == 8
+    assert_close(network.calibration[7:], fitted[-1:].expand(5, 3))
+
+
+def test_calibration_twice_gives_what_it_gave_once(seen_anyhow):
+    torch.manual_seed(0)
+    network = Lifting.from_config(TINY).eval()
+    calibrate(network, seen_anyhow)
+    once = network.calibration.clone()
+    calibrate(network, seen_anyhow)
+    assert_close(network.calibration, once)

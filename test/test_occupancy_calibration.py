@@ -3,6 +3,7 @@
 from active_recon.evaluation.calibration import (
     brier,
     calibration_error,
+    fit_logistic,
     fit_temperatures,
     near_surface,
     negative_log_likelihood,
@@ -62,6 +63,22 @@ def test_temperatures_find_what_logits_were_multiplied_by(cells):
     logits, truth = cells
     found = fit_temperatures({1: 3 * logits, 2: logits, 5: 0.5 * logits}, truth)
     assert found == pytest.approx({1: 3, 2: 1, 5: 0.5}, rel=0.03)
+
+
+def test_a_logistic_fit_finds_the_line_that_made_the_truth():
+    rng = np.random.default_rng(3)
+    inputs = rng.normal(size=(200_000, 2))
+    truth = rng.random(len(inputs)) < expit(inputs @ [1.5, -0.5] + 0.25)
+    np.testing.assert_allclose(fit_logistic(inputs, truth), [1.5, -0.5, 0.25], atol=0.03)
+
+
+def test_with_a_logit_alone_a_logistic_fit_is_no_less_likely_than_a_temperature(cells):
+    logits, truth = cells
+    seen = 2.3 * logits + 0.4
+    scale, bias = fit_logistic(seen[:, None], truth)
+    cooled = seen / fit_temperatures({1: seen}, truth)[1]
+    assert (negative_log_likelihood(scale * seen + bias, truth)
+            <= negative_log_likelihood(cooled, truth))
 
 
 def test_no_other_temperature_is_more_likely(cells):

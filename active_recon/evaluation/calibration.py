@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
+from scipy.special import expit
 
 Cells = NDArray[np.bool_]
 BINS = 15
@@ -59,6 +60,25 @@ def fit_temperatures(logits_by_count: Mapping[int, NDArray[np.floating]],
     """
     return {count: _temperature(np.asarray(logits, np.float64), truth)
             for count, logits in logits_by_count.items()}
+
+
+def fit_logistic(inputs: NDArray[np.floating], truth: Cells) -> NDArray[np.float64]:
+    """
+    Return the weights (K,) and the bias of a logistic regression, (K + 1,).
+
+    Takes inputs (N, K) and their truth (N,). It minimises the negative log-likelihood, which has
+    one minimum; with a logit as the only input it is Platt scaling (Platt 1999).
+    """
+    design = np.column_stack([inputs, np.ones(len(inputs))]).astype(np.float64)
+
+    def loss(weights: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        logits = design @ weights
+        return (negative_log_likelihood(logits, truth),
+                design.T @ (expit(logits) - truth) / len(truth))
+
+    begun = np.zeros(design.shape[1])
+    begun[0] = 1
+    return np.asarray(minimize(loss, begun, jac=True, method='L-BFGS-B').x)
 
 
 def negative_log_likelihood(logits: NDArray[np.floating], truth: Cells) -> float:

@@ -15,7 +15,7 @@ from active_recon.models.lifted import (
     sampled,
     summarise,
 )
-from active_recon.models.lifting_decoder import FINE_SIDE, HullUnet
+from active_recon.models.lifting_decoder import Decoded, FINE_SIDE, HullUnet
 from active_recon.models.lifting_encoder import IMAGE_SIZE, Maps, NO_EVIDENCE, PyramidEncoder
 from active_recon.models.network import Cameras, init_occupancy_bias, ReconstructionNetwork, State
 from active_recon.models.visibility import add_visible, visible_mean
@@ -82,7 +82,7 @@ class Lifting(ReconstructionNetwork):
     The state has a fixed size and does not depend on the order of the views: count, sum, sum of
     squares, maximum and minimum of the lifted features at 16 and 32 cells a side; at 64, the two
     lowest foreground logits at a cell's projection, less 6 (`hull`); and the number of views, by
-    which the logits' temperature is chosen. With `visibility`, each view and cell at 16 also get
+    which the calibration is chosen. With `visibility`, each view and cell at 16 also get
     a logit, and the state two sums more (see `add_visible`). All of it is 0 before the first
     view, and cells that a camera does not see (outside its image, behind it) stay as they are.
     The network needs no front.
@@ -97,8 +97,9 @@ class Lifting(ReconstructionNetwork):
         self.encoder, self.coarse, self.fine, self.decoder = encoder, coarse, fine, decoder
         self._coarse_channels, self._fine_channels = coarse_channels, fine_channels
         self._visibility = visibility
-        self.temperatures: Tensor  # of the logits after 1, 2, ... views; the last for all more
-        self.register_buffer('temperatures', torch.ones(_COUNTS))
+        # After 1, 2, ... views (the last for all more): logit scale, hull weight, bias
+        self.calibration: Tensor
+        self.register_buffer('calibration', torch.tensor([1.0, 0, 0]).repeat(_COUNTS, 1))
 
     @classmethod
     def from_config(cls, config: LiftingConfig) -> 'Lifting':
@@ -165,19 +166,35 @@ class Lifting(ReconstructionNetwork):
                 'latent': functional.adaptive_avg_pool2d(mean.mean(dim=4), _LATENT_SIDE)}
 
     def decode(self, state: State) -> Tensor:
-        """Return the occupancy's logits, calibrated by the number of views, (B, 64, 64, 64)."""
-        count = (state['views'][:, 0].long() - 1).clamp(0, _COUNTS - 1)
-        return self.logits(state)[0] / self.temperatures[count][:, None, None, None]
+        """
+        Return the occupancy's logits, calibrated by the number of views, (B, 64, 64, 64).
 
-    def logits(self, state: State) -> tuple[Tensor, Tensor]:
-        """Return uncalibrated logits, (B, 64, 64, 64), and coarse logits, (B, 32, 32, 32)."""
+        That is Platt scaling with a second input: scale * logit + weight * evidence + bias, where
+        the evidence is the log of the lowest foreground probability over the views.
+        """
+        count = (state['views'][:, 0].long() - 1).clamp(0, _COUNTS - 1)
+        scale, weight, bias = self.calibration[count].T[..., None, None, None]  # (B, 1, 1, 1)
+        found = self.logits(state)
+        return scale * found.logits + weight * found.evidence + bias
+
+    def logits(self, state: State) -> Decoded:
+        """Return what the decoder gives, before calibration."""
         coarse = summarise(_of('coarse', state))
         if self._visibility:
             visible = visible_mean(state['visible_weight'], state['visible_sum'])
             coarse = torch.cat([coarse, visible], dim=1)
-        found: tuple[Tensor, Tensor] = self.decoder(
+        found: Decoded = self.decoder(
             coarse, summarise(_of('fine', state)), state['hull'] + NO_EVIDENCE)
         return found
+
+    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
+        """Load a state; weights of version 0.1 have one temperature for each number of views."""
+        temperatures = state_dict.pop(f'{prefix}temperatures', None)
+        if temperatures is not None:
+            none = torch.zeros_like(temperatures)
+            state_dict[f'{prefix}calibration'] = torch.stack(
+                [1 / temperatures, none, none], dim=1)
+        super()._load_from_state_dict(state_dict, prefix, *rest)
 
     def _visible(self, state: State, features: Tensor, logits: Tensor, inside: Tensor) -> State:
         """Return the sums by visibility with T more views, (T, B, ..., N); {} without."""

@@ -1,5 +1,7 @@
 """View statistics to occupancy: a small U-Net, and the visual hull at full resolution."""
 
+from typing import NamedTuple
+
 from active_recon.models.encoder import group_norm
 import torch
 from torch import nn, Tensor
@@ -7,6 +9,19 @@ from torch.nn import functional
 
 FINE_SIDE = 32
 _INITIAL_BIAS = (0.5, 0.5, -2.0)  # of the layer at 64 cells
+
+
+class Decoded(NamedTuple):
+    """
+    What the decoder gives for B objects.
+
+    - logits: of occupancy, (B, 64, 64, 64); coarse: (B, 32, 32, 32)
+    - evidence: log of the lowest foreground probability over the views, (B, 64, 64, 64)
+    """
+
+    logits: Tensor
+    coarse: Tensor
+    evidence: Tensor
 
 
 class Conv3d(nn.Conv3d):
@@ -96,9 +111,9 @@ class HullUnet(nn.Module):
         self.to_64.bias = nn.Parameter(torch.tensor(_INITIAL_BIAS).repeat_interleave(8))
         self.logit_32 = nn.Conv3d(head, 1, 1)
 
-    def forward(self, coarse: Tensor, fine: Tensor, hull: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, coarse: Tensor, fine: Tensor, hull: Tensor) -> Decoded:
         """
-        Return logits (B, 64, 64, 64), and coarse logits (B, 32, 32, 32).
+        Decode view statistics.
 
         Takes view statistics (B, coarse, 16, 16, 16) and (B, fine, 32, 32, 32), and the two
         lowest foreground logits over all views, (B, 2, 64, 64, 64).
@@ -117,4 +132,4 @@ class HullUnet(nn.Module):
         learned = depth_to_space(self.to_64(at_32))  # (B, 3, 64, 64, 64)
         scales = functional.softplus(learned[:, 1:])
         logits = learned[:, 0] + carved[:, 0] + (scales * carved).sum(dim=1)
-        return logits, self.logit_32(at_32)[:, 0]
+        return Decoded(logits, self.logit_32(at_32)[:, 0], carved[:, 0])

@@ -1,33 +1,32 @@
-"""Temperature calibration of a lifting network, for each number of views."""
+"""Calibration of a lifting network, for each number of views."""
 
 from collections.abc import Callable
 
 from active_recon.datasets.views import ViewSet
-from active_recon.evaluation.calibration import fit_temperatures
+from active_recon.evaluation.calibration import fit_logistic
 from active_recon.models.lifting import Lifting
 import numpy as np
 import torch
 
-MOST_OBJECTS, _BATCH = 64, 4
+MOST_OBJECTS, _BATCH = 104, 4
 _CELLS = 20_000  # of each object
 
 
 @torch.inference_mode()
 def calibrate(network: Lifting, validation: ViewSet,
-              advance: Callable[[int], None] = lambda done: None) -> dict[int, float]:
+              advance: Callable[[int], None] = lambda done: None) -> None:
     """
-    Set the temperature for each number of views, in place; return them.
+    Set the calibration for each number of views, in place; see `Lifting.decode`.
 
-    They are fitted on random cells of up to 64 objects of `validation`, with random views. The
+    It is fitted on random cells of up to 104 objects of `validation`, with random views. The
     cells are drawn from the whole grid, not near the surface only, so that confident empty cells
     stay confident. `advance` is called with the number of objects done.
     """
     network.eval()
-    network.temperatures.fill_(1)
     rng = np.random.default_rng(0)
     shown = validation.images.shape[1]
-    counts = range(1, min(len(network.temperatures), shown) + 1)
-    logits: dict[int, list[np.ndarray]] = {count: [] for count in counts}
+    counts = range(1, min(len(network.calibration), shown) + 1)
+    inputs: dict[int, list[np.ndarray]] = {count: [] for count in counts}
     truth: list[np.ndarray] = []
     chosen = np.sort(rng.permutation(len(validation))[:MOST_OBJECTS])
     for objects in torch.split(torch.from_numpy(chosen), _BATCH):
@@ -41,11 +40,13 @@ def calibrate(network: Lifting, validation: ViewSet,
             with torch.autocast('cpu', torch.bfloat16, enabled=network.device.type == 'cpu'):
                 state = network.step(validation.white(objects, view),
                                      validation.cameras(objects, view), state)
-                found = network.logits(state)[0].float().flatten(1).numpy()
-            logits[count].append(np.take_along_axis(found, cells, 1).ravel())
+                found = network.logits(state)
+            inputs[count].append(np.stack([
+                np.take_along_axis(each.float().flatten(1).numpy(), cells, 1).ravel()
+                for each in (found.logits, found.evidence)], axis=1))
         advance(min(len(truth) * _BATCH, len(chosen)))
-    fitted = fit_temperatures({count: np.concatenate(each) for count, each in logits.items()},
-                              np.concatenate(truth))
-    for count in range(1, len(network.temperatures) + 1):
-        network.temperatures[count - 1] = fitted[min(count, max(fitted))]
-    return fitted
+    whole = np.concatenate(truth)
+    for count in counts:
+        network.calibration[count - 1] = torch.from_numpy(
+            fit_logistic(np.concatenate(inputs[count]), whole))
+    network.calibration[len(counts):] = network.calibration[len(counts) - 1]

@@ -40,7 +40,7 @@ class LiftingLearner(nn.Module):
         state = self.network.update_from_maps(
             maps, Cameras(cameras.poses.flatten(0, 1), cameras.intrinsics.flatten(0, 1)),
             self.network.initial_state(len(voxels)))
-        logits, coarse_logits = self.network.logits(state)
+        logits, coarse_logits, _ = self.network.logits(state)
         with torch.autocast(logits.device.type, enabled=False):
             volume = volume_loss(logits.float(), voxels, self._kind)
             coarse = volume_loss(coarse_logits.float(),

@@ -112,7 +112,7 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
             train_lifting(network, training, plan.reconstruction, plan.loss,
                           run('reconstruction', report),
                           lambda model: reconstruction_iou(model, validation))
-        with reporting('temperatures', min(MOST_OBJECTS, len(validation))) as report:
+        with reporting('calibration', min(MOST_OBJECTS, len(validation))) as report:
             calibrate(network, validation, lambda done: report(done, {}))
     elif not frozen:
         with reporting('reconstruction', plan.reconstruction.steps) as report:
