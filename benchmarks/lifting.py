@@ -1,0 +1,120 @@
+"""
+The studies of the default network, and the tables of the documents that show their figures.
+
+`python -m benchmarks.lifting FOLDER [STUDY ...]` runs them on the data in a folder (doc/results.md
+lists the commands that make it); `python -m benchmarks.lifting` only updates the tables.
+"""
+
+from collections.abc import Iterator, Mapping
+import json
+from pathlib import Path
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / 'docs' / 'results' / 'lifting'
+DOCUMENTS = (ROOT / 'README.md', ROOT / 'doc' / 'results.md',
+             ROOT / 'active_recon' / 'weights' / 'MODEL_CARD.md')
+_BESIDE = '--models lifting,carving,2d3d-attention --threads 1'
+_KNOWN = '--surfaces 1,5 --disturbed-views 0'
+STUDIES: Mapping[str, str] = {
+    'parametric-test': f'data/test {_BESIDE} --surfaces 1,5 --disturbed-views 5 '
+                       '--disturbed-objects 12',
+    'parametric-unseen': f'data/unseen {_BESIDE} {_KNOWN}',
+    'real-val': f"data/real_val {_BESIDE} --category '!thing_*' --objects 60 {_KNOWN}",
+    'things-val': f"data/real_val {_BESIDE} --category 'thing_*' --objects 60 {_KNOWN}",
+    'any-cameras-unseen': 'any/unseen --models lifting,carving --threads 1 --disturbed-views 5 '
+                          '--disturbed-objects 24',
+    'photographs': f'--photos photos/dino_sparse_ring {_BESIDE}',
+    'r2n2-chairs': f"data/r2n2_sample {_BESIDE} --surfaces '' --disturbed-views 0",
+}
+SETS: Mapping[str, str] = {
+    'parametric-test': 'parametric test',
+    'parametric-unseen': 'categories never trained on',
+    'real-val': 'real models, known categories',
+    'things-val': 'real everyday things',
+}
+_COUNTS = (1, 2, 3, 5, 8, 24)
+_BOUNDED = (1, 24)
+"""Numbers of views whose intervals the long table has room for."""
+_SHORT_COUNTS = (1, 5, 24)
+_TABLE = re.compile(r'(<!-- (iou|iou-short): begin -->\n).*?(<!-- \2: end -->)', re.DOTALL)
+
+
+def run(folder: Path, name: str) -> None:
+    """Run a study in a folder and keep what it writes: JSON, Markdown, and the picture."""
+    out = folder / 'build' / name
+    shutil.rmtree(out, ignore_errors=True)
+    subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'study',
+                    *shlex.split(STUDIES[name]), '--out', f'build/{name}'], cwd=folder, check=True)
+    for suffix in ('json', 'md'):
+        shutil.copy(out / f'study.{suffix}', RESULTS / f'{name}.{suffix}')
+    for picture in out.glob('*.png'):
+        if (kept := RESULTS / f'{name}.png').exists():
+            shutil.copy(picture, kept)
+
+
+def figures_by_set() -> Iterator[tuple[str, Mapping[str, Mapping[int, Any]]]]:
+    """Yield each set's title, and every model's IoU at 32 cells by number of random views."""
+    for name, title in SETS.items():
+        figures = json.loads((RESULTS / f'{name}.json').read_text())['sets'][0]
+        yield f'{title} ({figures["objects"]})', {
+            model: dict(zip(figures['counts'], own['random']['iou_32'], strict=True))
+            for model, own in figures['models'].items()}
+
+
+def long_table() -> Iterator[str]:
+    """Yield a Markdown table with a row for each set and model."""
+    yield _row('objects', 'model', '1 view', *(f'{count} views' for count in _COUNTS[1:]))
+    yield '|---' * (len(_COUNTS) + 2) + '|'
+    for title, models in figures_by_set():
+        label = title
+        for model, values in models.items():
+            yield _row(label, f'**{model}**' if model == 'lifting' else model, *(
+                f'{_mean(values[count])} [{values[count]["low"]:.3f}, {values[count]["high"]:.3f}]'
+                if count in _BOUNDED else _mean(values[count]) for count in _COUNTS))
+            label = ''
+
+
+def short_table() -> Iterator[str]:
+    """Yield a Markdown table with a row for each set, and a column for each model."""
+    yield _row('objects', 'default network', 'visual hull (carving)', "the paper's network")
+    yield '|---|---|---|---|'
+    for title, models in figures_by_set():
+        yield _row(title, *(', '.join(_mean(models[model][count]) for count in _SHORT_COUNTS)
+                            for model in ('lifting', 'carving', '2d3d-attention')))
+
+
+def _row(*cells: str) -> str:
+    return f'| {" | ".join(cells)} |'
+
+
+def _mean(value: Mapping[str, Any]) -> str:
+    return f'{value["mean"]:.3f}'
+
+
+def with_tables(text: str) -> str:
+    """Return a document with the tables between its marks made anew from the results."""
+    tables = {'iou': long_table, 'iou-short': short_table}
+    return _TABLE.sub(
+        lambda found: found[1] + '\n'.join(tables[found[2]]()) + '\n' + found[3], text)
+
+
+def main() -> None:
+    """Run the studies named, or all, where a folder is given; then write the tables."""
+    folder, *names = sys.argv[1:] or [None]
+    if unknown := set(names) - set(STUDIES):
+        sys.exit(f'unknown study: expected some of {", ".join(STUDIES)}, got '
+                 f'{", ".join(sorted(unknown))}')
+    for name in (names or STUDIES) if folder else ():
+        run(Path(folder), name)
+    for path in DOCUMENTS:
+        path.write_text(with_tables(path.read_text()))
+
+
+if __name__ == '__main__':
+    main()
