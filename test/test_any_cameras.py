@@ -207,5 +207,5 @@ def test_objects_that_cannot_be_read_are_listed(made, tmp_path):
     views = read_views([*list_objects(made), *list_objects(tmp_path)], resolution=64,
                        image_size=128, framed=True)
     assert len(views) == 4 and len(views.unreadable) == 1
-    with pytest.raises(DataError, match='none can be read'):
+    with pytest.raises(DataError, match='no readable object'):
         read_views(list_objects(tmp_path), framed=True)

@@ -121,7 +121,7 @@ def test_poses_of_other_images_are_refused(seen):
 
 def test_poses_about_one_axis_alone_are_refused():
     views = [orbit_camera(azimuth, 0.9, 0.5).pose for azimuth in (0.0, 0.5, 1.0, 1.5, 2.0)]
-    with pytest.raises(DataError, match='turn the camera about two axes') as refusal:
+    with pytest.raises(DataError, match='rotate the camera about two axes') as refusal:
         fit_arm(seen_from(views), LENS, mounts_of(views))
     assert refusal.value.kind == 'poses'
 

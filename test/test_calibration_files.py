@@ -59,14 +59,14 @@ def test_angles_belong_to_their_images(tmp_path, text):
 
 
 @pytest.mark.parametrize(('text', 'said'), [
-    ('a2.png,45\n', 'none of a10.png'),
-    ('45\n', 'rows do not fit the images: .* each of the 2 images, .* got 1'),
+    ('a2.png,45\n', 'none for a10.png'),
+    ('45\n', 'rows do not match the images: .* each of the 2 images, .* got 1'),
     ('a2.png,45\n90\n', 'rows that begin with their names'),
     ('a2.png,45\na10.png,ninety\n', r'line 2: wrong row: expected 1 numbers, .* got a10.png, '
                                     r'ninety'),
     ('a2.png,45\na10.png,inf\n', 'line 2'),
     ('a2.png,45,3\na10.png,90,3\n', 'line 1'),
-    ('', 'none of a2.png, a10.png'),
+    ('', 'none for a2.png, a10.png'),
 ])
 def test_angles_that_do_not_tell_every_image_s_are_refused(tmp_path, text, said):
     with pytest.raises(DataError, match=said):

@@ -105,21 +105,21 @@ def test_angles_by_name_give_what_the_step_gives(written, folder):
 def test_without_angles_or_a_lens_it_says_what_is_not_known(folder):
     result = calibrate(folder / 'images', *OPTIONS, '--out', folder / 'bare')
     assert result.exit_code == 0, result.output
-    assert 'note: Which way the angle of the table grows is not known' in result.output
-    assert "note: The lens's centre and distortion are taken as ideal" in result.output
+    assert "note: The direction of the turntable's angle is unknown" in result.output
+    assert 'note: An ideal principal point and no lens distortion are assumed' in result.output
     given = yaml.safe_load((folder / 'bare' / 'calibration.yaml').read_text())
     assert 'turntable_direction' not in given['/**/reconstructor']['ros__parameters']
 
 
 def test_a_step_that_is_wrong_is_refused(folder):
     said = refusal(folder / 'images', *OPTIONS, '--step-deg', 30, '--out', folder / 'wrong')
-    assert 'are the angles or the step right' in said
+    assert 'check the angles or the step' in said
     assert not (folder / 'wrong').exists()
 
 
 def test_another_board_than_was_told_is_refused(folder):
     said = refusal(folder / 'images', '--squares', '5x4', '--object-size', 0.1)
-    assert 'say how many squares the board has' in said
+    assert 'give the number of squares by --squares' in said
 
 
 def test_a_lens_of_other_images_is_refused(folder):
@@ -139,7 +139,7 @@ def test_the_board_to_print_comes_with_its_size(tmp_path):
 
 @pytest.mark.parametrize(('options', 'said'), [
     ([], 'no images of the board, or no --object-size'),
-    (['--print-board', 'b.png', '--squares', '7by5'], "such as 7x5, got '7by5'"),
+    (['--print-board', 'b.png', '--squares', '7by5'], "e.g. 7x5, got '7by5'"),
     (['images', '--object-size', 1, '--step-deg', 15, '--angles-deg', 'a.csv'],
      'give one of them'),
     (['nowhere', '--object-size', 1], 'nowhere'),

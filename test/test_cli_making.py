@@ -34,7 +34,7 @@ def meshes(tmp_path):
 def test_render_makes_every_mesh_and_says_how_many(meshes, tmp_path):
     result = run('render', meshes, tmp_path / 'out', *ONE_WORKER)
     assert result.exit_code == 0
-    assert '2 objects of 2 are there' in result.stdout
+    assert '2 of 2 objects made' in result.stdout
     objects = list_objects(tmp_path / 'out')
     assert [(folder.category, folder.complete) for folder in objects] == [
         ('chair', True), ('table', True)]
@@ -44,8 +44,8 @@ def test_render_lists_what_was_refused_and_why_and_goes_on(meshes, tmp_path):
     (meshes / 'chair' / 'bad.obj').write_text('no mesh')
     result = run('render', meshes, tmp_path / 'out', *ONE_WORKER)
     assert result.exit_code == 0
-    assert '2 objects of 3 are there' in result.stdout
-    assert 'refused: chair/bad: ' in result.stderr
+    assert '2 of 3 objects made' in result.stdout
+    assert 'rejected: chair/bad: ' in result.stderr
     assert 'bad.obj: a mesh without faces' in result.stderr
 
 
@@ -53,14 +53,14 @@ def test_render_fails_where_nothing_could_be_read(tmp_path):
     (tmp_path / 'bad.obj').write_text('no mesh')
     result = run('render', tmp_path / 'bad.obj', tmp_path / 'out', *ONE_WORKER)
     assert result.exit_code == 2
-    assert '0 objects of 1 are there' in result.stdout
+    assert '0 of 1 objects made' in result.stdout
 
 
 def test_render_does_not_make_again_what_is_there(meshes, tmp_path):
     run('render', meshes, tmp_path / 'out', *ONE_WORKER)
     written = {path: path.stat().st_mtime_ns for path in (tmp_path / 'out').rglob('*.*')}
     trimesh.creation.box((1, 2, 1)).export(meshes / 'chair' / 'new.ply')
-    assert '3 objects of 3' in run('render', meshes, tmp_path / 'out', *ONE_WORKER).stdout
+    assert '3 of 3 objects' in run('render', meshes, tmp_path / 'out', *ONE_WORKER).stdout
     assert all(path.stat().st_mtime_ns == time for path, time in written.items())
 
 
@@ -73,8 +73,8 @@ def test_render_turns_files_by_their_axes(meshes, tmp_path):
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['--up', 'w'], "up: 'w' is no axis"),
-    (['--up', 'x'], 'one axis, x and x: name both'),
+    (['--up', 'w'], "up: not an axis: .*got 'w'"),
+    (['--up', 'x'], 'on the same axis: expected two, got x and x'),
     (['--split', 'train'], 'no manifest: expected a manifest')])
 def test_render_refuses_options_that_cannot_be_used(arguments, message, meshes, tmp_path):
     with pytest.raises(ConfigError, match=message):
@@ -90,9 +90,9 @@ def test_render_takes_the_rows_of_a_manifest_that_are_asked_for(meshes, tmp_path
                         'table,table/box.ply,val,a,?,of the collection,+Z,cd\n')
     asked = ('--split', 'train', '--explicit-licence')
     result = run('render', manifest, tmp_path / 'out', *asked, *ONE_WORKER)
-    assert '1 objects of 1 are there' in result.stdout
+    assert '1 of 1 objects made' in result.stdout
     assert [folder.category for folder in list_objects(tmp_path / 'out')] == ['chair']
-    with pytest.raises(DataError, match='no objects to make: expected some'):
+    with pytest.raises(DataError, match='no objects to make: expected at least one'):
         run('render', manifest, tmp_path / 'out', '--split', 'tests')
     with pytest.raises(ConfigError, match='--up or --front with a manifest: expected neither'):
         run('render', manifest, tmp_path / 'out', '--up', 'y')
@@ -101,7 +101,7 @@ def test_render_takes_the_rows_of_a_manifest_that_are_asked_for(meshes, tmp_path
 def test_dataset_makes_three_splits_that_share_no_object(tmp_path):
     counts = ('--train', 2, '--val', 1, '--test', 1)
     result = run('dataset', 'build', tmp_path, *counts, '--category', 'lamp', *ONE_WORKER)
-    assert '4 objects of 4 are there' in result.stdout
+    assert '4 of 4 objects made' in result.stdout
     names = {split: [folder.name for folder in list_objects(tmp_path / split)]
              for split in ('train', 'val', 'test')}
     assert [len(found) for found in names.values()] == [2, 1, 1]
@@ -120,7 +120,7 @@ def test_dataset_makes_every_category_unless_told(tmp_path):
 def test_dataset_keeps_unseen_categories_out_of_the_splits(tmp_path):
     asked = ('--category', 'bookshelf', '--unseen', 2, '--fine')
     result = run('dataset', 'build', tmp_path, *asked, *ONE_WORKER)
-    assert '2 objects of 2 are there' in result.stdout
+    assert '2 of 2 objects made' in result.stdout
     objects = list_objects(tmp_path / 'unseen')
     assert [folder.category for folder in objects] == ['bookshelf'] * 2
     assert all(folder.voxels(64).occupancy.any() for folder in objects)
@@ -146,7 +146,7 @@ def test_dataset_does_not_go_on_with_objects_of_other_generators(tmp_path):
 def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp_path):
     with pytest.raises(ConfigError, match="unknown category: expected one of .*, got 'castle'"):
         run('dataset', 'build', tmp_path, '--category', 'castle')
-    with pytest.raises(DataError, match='no objects to make: expected some'):
+    with pytest.raises(DataError, match='no objects to make: expected at least one'):
         run('dataset', 'build', tmp_path, '--train', 0, '--val', 0, '--test', 0, '--unseen', 0)
 
 

@@ -216,8 +216,9 @@ def test_a_model_without_a_view_policy_is_measured_under_the_others(
     found = json.loads(out.read_text())
     assert set(found['policies']) == {'random', 'uniform', 'farthest'}
     assert not {'latent_swap', 'yaw'} & found.keys()  # nobody asked for them
-    assert '--latent-study: needs' in refusal(monkeypatch, capsys, *arguments, '--latent-study')
-    assert 'no view policy: expected weights with one' in refusal(
+    assert '--latent-study: cannot swap latents' in refusal(
+        monkeypatch, capsys, *arguments, '--latent-study')
+    assert 'no view policy: expected weights that contain one' in refusal(
         monkeypatch, capsys, *arguments, '--policy', 'attention')
 
 
@@ -239,7 +240,7 @@ def test_two_weights_files_are_compared_on_the_same_episodes(
     random, farthest = (found['policies'][name]['auc']['mean'] for name in ('random', 'farthest'))
     assert found['paired']['auc']['mean'] == pytest.approx(random - farthest)
     told = capsys.readouterr().out
-    assert 'random above farthest: ' in told
+    assert 'random minus farthest: ' in told
     with rows.open() as file:
         lines = list(csv.DictReader(file))
     assert len(lines) == 2 * 2 * 12 * 2  # models, policies, episodes, views
@@ -248,7 +249,7 @@ def test_two_weights_files_are_compared_on_the_same_episodes(
              and line['view'] == '1']
     assert sum(first) / len(first) == pytest.approx(
         found['policies']['random']['iou'][0]['mean'], abs=1e-5)
-    assert '--paired: 0 policies are named' in refusal(
+    assert '--paired: wrong number of policies: expected two in --policy, got 0' in refusal(
         monkeypatch, capsys, *arguments, '--paired')
 
 
@@ -279,7 +280,7 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
         (('evaluate', dataset, '--model', '2d4d'), '2d4d: neither a weights file'),
         (('evaluate', dataset, '--model', weights, '--policy', 'random,best'), "'best'"),
         (('evaluate', dataset, '--model', weights, '--training', dataset),
-         '--training without --validation'),
+         '--training: no validation objects'),
     ]:
         assert words in refusal(monkeypatch, capsys, *arguments)
 

@@ -177,4 +177,4 @@ def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
 
 def test_a_place_for_a_bag_that_is_not_written_is_refused(tmp_path, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, 'replay', PAPER, '--out', tmp_path / 'new')
-    assert (code, '--out without --model' in said) == (2, True)
+    assert (code, '--out: no bag to write' in said) == (2, True)

@@ -48,7 +48,7 @@ def test_the_azimuths_of_a_turntable_come_back_in_their_order(tmp_path):
 
 def test_finer_voxels_stand_beside_and_are_read_where_asked_for(folder):
     fine = VoxelGrid((RNG.random((64, 64, 64)) > 0.5).astype(np.float32))
-    with pytest.raises(DataError, match='no voxels of 64 cells a side; .* with `--fine`'):
+    with pytest.raises(DataError, match='expected voxels of 64 cells a side; .* with `--fine`'):
         folder.voxels(64)
     write_voxels(folder, fine)
     assert (folder.root / 'ShapeNetVox64/chair/one/model.binvox').is_file()

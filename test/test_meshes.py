@@ -62,9 +62,9 @@ def test_every_pair_of_axes_is_a_rotation_that_brings_them_to_z_and_x(up, front)
 
 
 @pytest.mark.parametrize(('up', 'front', 'message'), [
-    ('w', 'x', "up: 'w' is no axis"),
-    ('z', '--x', "front: '--x' is no axis"),
-    ('z', '-z', 'one axis, z and -z')])
+    ('w', 'x', "up: not an axis: expected x, y or z, .*got 'w'"),
+    ('z', '--x', "front: not an axis: expected x, y or z, .*got '--x'"),
+    ('z', '-z', 'on the same axis: expected two, got z and -z')])
 def test_axes_that_make_no_frame_are_refused(up, front, message):
     with pytest.raises(ConfigError, match=message):
         upright(up, front)

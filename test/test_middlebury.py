@@ -151,9 +151,9 @@ def test_a_folder_without_cameras_or_box_is_refused(folder, box, tmp_path):
     with pytest.raises(DataError, match='give them by --box'):
         read_photographs(tmp_path)
     for wrong in ([1, 2, 3], [0, 0, 0, 0, 1, 1], [0, 0, 0, 1, 1, math.nan]):
-        with pytest.raises(ConfigError, match='box: invalid corners: expected the least'):
+        with pytest.raises(ConfigError, match='box: invalid corners: expected six numbers'):
             read_photographs(tmp_path, wrong)
-    with pytest.raises(ActiveReconError, match='no axis: expected x, y or z'):
+    with pytest.raises(ActiveReconError, match='not an axis: expected x, y or z'):
         read_photographs(folder, up='w')
 
 

@@ -236,10 +236,10 @@ def test_a_folder_that_is_not_pascal3d_is_refused(name, root):
 
 def test_photographs_of_which_none_can_be_read_are_refused_with_the_reasons(root):
     (root / 'CAD/car/01.off').unlink()
-    with pytest.raises(DataError, match='(?s)none can be read.*no such mesh file'):
+    with pytest.raises(DataError, match='(?s)no readable photograph.*no such mesh file'):
         read(root)
     annotate(root, 'car_imagenet/one', annotated(truncated=1))
-    with pytest.raises(DataError, match='(?s)none can be read.*it is truncated'):
+    with pytest.raises(DataError, match='(?s)no readable photograph.*it is truncated'):
         read(root)
 
 
@@ -265,9 +265,9 @@ def test_photographs_are_evaluated_at_their_single_view(root, tmp_path, monkeypa
     assert [len(figures['iou']) for figures in found['policies'].values()] == [1] * 4
     assert len(found['unreadable']) == 1
     told = capsys.readouterr().err
-    assert 'objects of 1 views: 1 views from 1 starts' in told
+    assert 'views per object: 1; measured views: 1; starts: 1' in told
     assert 'objects: 1 read, 0 missing, 1 left out' in told
     monkeypatch.setattr('sys.argv', asked)
     with pytest.raises(SystemExit) as end:
         main()
-    assert end.value.code == 2 and 'these photographs have no cameras' in capsys.readouterr().err
+    assert end.value.code == 2 and 'photographs without camera poses' in capsys.readouterr().err

@@ -167,7 +167,7 @@ def test_a_decision_takes_a_time_and_the_oracle_s_is_not_told(trial, attention):
 def test_a_policy_that_there_is_not_is_refused(attention):
     with pytest.raises(ConfigError, match="no such policy: expected some of random.*got 'best'"):
         contenders(['random', 'best'])
-    with pytest.raises(WeightsError, match='no view policy: expected weights with one'):
+    with pytest.raises(WeightsError, match='no view policy: expected weights that contain one'):
         contenders(['attention'])
 
 
@@ -182,7 +182,7 @@ def test_a_policy_is_measured_on_the_network_it_was_trained_on_alone(
         save_weights(path, bundle)
     stored = load_weights(paths[0]).reconstruction
     assert len(load_attentions(paths[:1] * 2, stored)) == 2
-    with pytest.raises(WeightsError, match='other.safetensors.*trained on another'):
+    with pytest.raises(WeightsError, match='other.safetensors.*got one of another'):
         load_attentions(paths[:2], stored)
     with pytest.raises(WeightsError, match='plain.safetensors: no view policy: expected weights'):
         load_attentions(paths[2:], stored)

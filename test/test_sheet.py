@@ -44,7 +44,7 @@ def test_the_command_draws_a_category_or_the_training_images_of_a_dataset(datase
 
 
 def test_a_folder_without_meshes_or_objects_is_refused(tmp_path):
-    with pytest.raises(DataError, match='no mesh files there'):
+    with pytest.raises(DataError, match='no mesh files: expected some'):
         run(tmp_path / 'none.png', '--meshes', tmp_path)
     with pytest.raises(DataError, match='has no folder ShapeNetRendering'):
         run(tmp_path / 'none.png', '--training', tmp_path)

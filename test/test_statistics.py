@@ -152,5 +152,5 @@ def test_episodes_are_gathered_by_object():
 
 @pytest.mark.parametrize('objects', [[0, 0, 0, 1], [0, 1, 1], [0, 1, 0, 1]])
 def test_episodes_that_differ_in_number_or_are_mixed_are_refused(objects):
-    with pytest.raises(DataError, match='mixed episodes: expected as many of every object'):
+    with pytest.raises(DataError, match='mixed episodes: expected the same number of'):
         by_object(np.zeros(len(objects)), np.array(objects))

@@ -107,7 +107,7 @@ def test_what_cannot_be_read_is_left_out_and_listed(copied, spoil, reason):
 def test_a_dataset_of_which_nothing_can_be_read_is_refused(copied):
     for folder in copied:
         drop_voxels(folder)
-    with pytest.raises(DataError, match='(?s)none can be read.*binvox'):
+    with pytest.raises(DataError, match='(?s)no readable object.*binvox'):
         read_views(copied)
-    with pytest.raises(DataError, match='none can be read'):
+    with pytest.raises(DataError, match='no readable object'):
         read_views([])

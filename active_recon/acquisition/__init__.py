@@ -1,1 +1,1 @@
-"""Which images of a camera become views, and what is wrong with its stream."""
+"""Selection of the images that become views, and detection of faults in a camera's stream."""

@@ -1,4 +1,4 @@
-"""What in an image is the object: by a mask, an image of the empty scene, or a colour key."""
+"""Background removal by a mask, an image of the empty scene, or a colour key."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,31 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 BACKGROUNDS = ('as_is', 'mask', 'reference', 'color')
-"""Left as it is; from a mask; from an image of the empty scene; from the background's colour."""
+"""No removal; by a mask; by an image of the empty scene; by the background's colour."""
 COLOR_TOLERANCE = 10.0
-"""A colour this near to a shade of the background's is background, CIE76 units of L*a*b*."""
+"""Largest distance of a background pixel from the background's colour, CIE76 in L*a*b*."""
 GREEN_SCREEN = (0, 177, 64)
-"""Red, green and blue of the usual cloth."""
+"""Red, green and blue of a common green screen."""
 
-_SEARCHED_SIDE = 1024  # pixels: in a larger image the object is found on a smaller one
-_STANDS_OUT = 7.0  # units of L*a*b*: above the noise of a camera
-_SHADOW_DISCOUNT = 0.7  # a shadow changes the lightness alone, an object mostly the colour too
-_SHADES = 0.4, 1.6  # the background's brightness in the weakest and the strongest light
-_EDGE = 0.35  # of what its neighbours stand out: less is a pixel that shows a bit of the object
-_SMALLEST_PART = 0.02  # of the object's largest part; smaller ones are noise
-_LARGEST_HOLE = 0.005  # of the object; through a larger one the background is seen
+_SEARCHED_SIDE = 1024  # pixels: larger images are downsampled to find the object
+_STANDS_OUT = 7.0  # distance in L*a*b*: above the noise of a camera
+_SHADOW_DISCOUNT = 0.7  # weight of lightness, since shadows change it and hardly the colour
+_SHADES = 0.4, 1.6  # brightness of the background in the weakest and the strongest light
+_EDGE = 0.35  # fraction of the neighbours' distance; below it a pixel is mostly background
+_SMALLEST_PART = 0.02  # area relative to the object's largest part; smaller ones are noise
+_LARGEST_HOLE = 0.005  # area relative to the object; larger holes show the background
 WHOLE_SHARE = 0.7
-"""Less than this in one part (see `main_part_share`) is worth a warning."""
-_SMALLEST_OBJECT, _LARGEST_OBJECT = 0.0005, 0.95  # of the image
+"""There is a warning if `main_part_share` is below this."""
+_SMALLEST_OBJECT, _LARGEST_OBJECT = 0.0005, 0.95  # area relative to the image
 
 
 @dataclass(frozen=True)
 class Background:
     """
-    How the object is separated from its background: one of `BACKGROUNDS`.
+    The method that separates the object from its background: `how` is one of `BACKGROUNDS`.
 
-    `color` (red, green, blue, 0 to 255) and `tolerance` are of the colour key. Raises ConfigError
-    where one of them cannot be used.
+    `color` (red, green, blue, 0 to 255) and `tolerance` (CIE76) are for the colour key. Raises
+    ConfigError on invalid values.
     """
 
     how: str = 'as_is'
@@ -41,7 +41,7 @@ class Background:
     tolerance: float = COLOR_TOLERANCE
 
     def __post_init__(self) -> None:
-        """Reject a word that is none of them, and a colour that is no colour."""
+        """Reject unknown methods and invalid colours."""
         if self.how not in BACKGROUNDS:
             raise ConfigError('background: unknown value: expected one of '
                               f'{", ".join(BACKGROUNDS)}, got {self.how!r}')
@@ -50,10 +50,11 @@ class Background:
     def cleared(self, image: NDArray[np.uint8], mask: NDArray[np.bool_] | None = None,
                 reference: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
         """
-        Return an image, (H, W, 3) uint8 RGB, with its background white; `as_is`: as it is.
+        Return an image, (H, W, 3) uint8 RGB, with a white background; unchanged for `as_is`.
 
-        `mask` is (H, W), `reference` an image of the empty scene, (H, W, 3). Raises ViewError
-        where the one that is needed is missing, and as the functions below do.
+        `mask` is (H, W), true on the object; `reference` is an image of the empty scene,
+        (H, W, 3). Raises ViewError where the required one is missing, and as `on_white`,
+        `off_reference` and `off_color` do.
         """
         if self.how == 'as_is':
             return image
@@ -73,17 +74,17 @@ class Background:
 
 def main_part_share(cleared: NDArray[np.uint8]) -> float:
     """
-    Return the share of the largest connected part in what is not white, in (0, 1].
+    Return the fraction of the pixels that are not white in their largest connected part, (0, 1].
 
-    Far below 1 where parts of the object were taken for background: an object of the background's
-    colour falls to pieces.
+    It is far below 1 where parts of the object were taken for background, for example because
+    they have the same colour.
     """
     _, areas = _parts(np.asarray((cleared < 255).any(axis=2)))
     return float(areas.max(initial=0) / max(areas.sum(), 1))
 
 
 def check_color(color: Sequence[int], tolerance: float) -> None:
-    """Raise ConfigError where a colour key, as of `off_color`, cannot be used."""
+    """Raise ConfigError on an invalid colour or tolerance of a colour key, see `off_color`."""
     if len(color) != 3 or not all(0 <= value <= 255 for value in color) or not any(color):
         raise ConfigError('background_color: not a usable color: expected red, green and blue, '
                           f'each from 0 to 255 and one above 0, got {list(color)}')
@@ -94,9 +95,9 @@ def check_color(color: Sequence[int], tolerance: float) -> None:
 
 def on_white(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """
-    Return an image, (H, W, 3) uint8 RGB, white where the mask, (H, W), says background.
+    Return an image, (H, W, 3) uint8 RGB, with white where the mask, (H, W), is false.
 
-    Raises ViewError where the mask is of another size, or has no object at all.
+    Raises ViewError where the mask has another size, or is false everywhere.
     """
     if mask.shape != image.shape[:2]:
         raise ViewError(f"wrong mask size: expected the image's size, {_size(image)}, "
@@ -110,10 +111,10 @@ def on_white(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.ui
 
 def off_reference(image: NDArray[np.uint8], reference: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """
-    Return where an image shows what the reference, the empty scene, does not, (H, W).
+    Return the mask of the object, (H, W): the pixels that differ from the empty scene.
 
-    Both are (H, W, 3) uint8 RGB of one size. Raises ViewError where they are not, where nothing
-    stands out from the reference, and where all but everything does.
+    Image and reference are (H, W, 3) uint8 RGB of the same size. Raises ViewError where they are
+    not, and where nothing or nearly everything differs.
     """
     if image.shape != reference.shape:
         raise ViewError(f"wrong image size: expected the reference's size, {_size(reference)}, "
@@ -127,13 +128,13 @@ def off_reference(image: NDArray[np.uint8], reference: NDArray[np.uint8]) -> NDA
 def off_color(image: NDArray[np.uint8], color: Sequence[int],
               tolerance: float = COLOR_TOLERANCE) -> NDArray[np.bool_]:
     """
-    Return where an image, (H, W, 3) uint8 RGB, is of another colour than its background, (H, W).
+    Return the mask of the object, (H, W): the pixels that differ from the background's colour.
 
-    `color` is the background's red, green and blue, each 0 to 255. Light falls unevenly, so each
-    pixel is compared with that shade of the colour, 0.4 to 1.6 times as bright, which is nearest
-    to it: what is within `tolerance` (CIE76 units of L*a*b*) is background. Raises ConfigError
-    where colour or tolerance cannot be used, ViewError where nothing stands out from the colour
-    and where all but everything does.
+    The image is (H, W, 3) uint8 RGB; `color` is the background's red, green and blue, 0 to 255.
+    Since light is uneven, each pixel is compared with the nearest shade of the colour, 0.4 to 1.6
+    times as bright; it is background if the distance is at most `tolerance` (CIE76 in L*a*b*).
+    Raises ConfigError on an invalid colour or tolerance, ViewError where nothing or nearly
+    everything differs from the colour.
     """
     check_color(color, tolerance)
     pixels = _smoothed(_searched(image))
@@ -159,17 +160,17 @@ def _smoothed(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _apart(a: NDArray[np.uint8], b: NDArray[np.uint8], of_lightness: float = 1.0
            ) -> NDArray[np.float32]:
-    """Return the distance of two images' colours, (H, W), in units of L*a*b*."""
+    """Return the distance between the colours of two images in L*a*b*, CIE76, (H, W)."""
     lab = (cv2.cvtColor(image, cv2.COLOR_RGB2Lab) for image in (a, b))
     lightness, green_red, blue_yellow = (
         plane.astype(np.float32) for plane in cv2.split(cv2.absdiff(*lab)))
-    lightness *= of_lightness * 100 / 255  # of bytes, OpenCV's L* goes to 255
+    lightness *= of_lightness * 100 / 255  # OpenCV scales L* to 255 in 8-bit images
     return np.asarray(cv2.magnitude(cv2.magnitude(green_red, blue_yellow), lightness), np.float32)
 
 
 def _object(apart: NDArray[np.float32], threshold: float, image: NDArray[np.uint8],
             background: str) -> NDArray[np.bool_]:
-    """Return the object's parts, cleaned and in the image's size, of how far pixels stand out."""
+    """Return the object's mask without noise and holes, at the image's size, from distances."""
     around = np.asarray(cv2.dilate(apart, np.ones((3, 3), np.uint8)))
     found = (apart > threshold) & (apart > _EDGE * around)
     labels, areas = _parts(found)
@@ -190,7 +191,7 @@ def _object(apart: NDArray[np.float32], threshold: float, image: NDArray[np.uint
 
 
 def _parts(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return each pixel's part, (H, W), 0 for none, and the area of each, that of none 0."""
+    """Return the label of each pixel's part, (H, W), 0 for none, and the areas by label."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     areas = stats[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0

@@ -1,4 +1,4 @@
-"""Where the camera can go, and what the travel costs."""
+"""Limits of the camera's motion, and the cost of travel."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 END_TOLERANCE = 1e-4
-"""Limits are written with a few digits: so little beyond the range is still within it, radians."""
+"""Azimuths this close to a limit are within it, radians, since limits are written rounded."""
 _ROUNDING = 1e-9
 
 
@@ -24,7 +24,7 @@ class MotionLimits:
     - forbidden_sectors: low, high, low, high, ..., each as a range; the ends are forbidden too
     - reachable_azimuths: the only azimuths allowed; empty allows any
 
-    Raises ConfigError on invalid values, or where they leave no azimuth together.
+    Raises ConfigError on invalid values, and where all of them together allow no azimuth.
     """
 
     azimuth_range: Sequence[float] = (0.0, TURN)
@@ -32,7 +32,7 @@ class MotionLimits:
     reachable_azimuths: Sequence[float] = ()
 
     def __post_init__(self) -> None:
-        """Reject invalid values, and those that leave no azimuth."""
+        """Reject invalid values, and limits that allow no azimuth."""
         if len(self.azimuth_range) != 2 or not _are_sectors(self.azimuth_range):
             raise ConfigError('azimuth_range: not a range: expected low and high, two azimuths '
                               f'that differ, rad, got {list(self.azimuth_range)}')
@@ -61,11 +61,11 @@ class MotionLimits:
 
     def candidates(self, grid: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Return the azimuths among which a goal is sought, (N,) in [0, 2 pi).
+        Return the azimuths from which a goal is chosen, (N,) in [0, 2 pi).
 
-        They are the reachable ones where those are listed, else a grid of azimuths, (M,), and the
-        middle of every stretch that is free and yet too narrow for one of the grid. What else
-        cannot be reached is still among them.
+        They are `reachable_azimuths` where given, else the grid of azimuths (M,) and the middle of
+        every free interval that contains none of them. Azimuths of the grid that cannot be
+        reached are included; see `allows`.
         """
         if self.reachable_azimuths:
             return np.unique([wrap_azimuth(azimuth) for azimuth in self.reachable_azimuths])
@@ -80,7 +80,7 @@ class MotionLimits:
         return list(zip(self.forbidden_sectors[::2], self.forbidden_sectors[1::2], strict=True))
 
     def _stretches(self) -> list[tuple[float, float]]:
-        """Return the begin and the width of what lies between one end of a limit and the next."""
+        """Return the start and the width of each interval between consecutive limits."""
         low, high = self.azimuth_range
         ends = [] if _width(low, high) == TURN else [low, high]
         marks = np.unique([wrap_azimuth(end) for end in (*ends, *self.forbidden_sectors)])
@@ -116,5 +116,5 @@ def _within(azimuths: NDArray[np.float64], low: float, high: float,
 
 
 def _width(low: float, high: float) -> float:
-    """Return how far it is counter-clockwise from low to high, (0, 2 pi]."""
+    """Return the angle counter-clockwise from low to high, (0, 2 pi]."""
     return TURN if high - low >= TURN else (high - low) % TURN or TURN

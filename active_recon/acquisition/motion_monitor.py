@@ -10,7 +10,7 @@ _JUMPS, _JUMPS_S = 3, 1.0
 
 class MotionMonitor:
     """
-    Finds faults in a camera's motion from its poses; stamps are nanoseconds.
+    Detects faults in a camera's motion from its poses; stamps are in nanoseconds.
 
     A camera has stalled if it rests for `stall_timeout` seconds while an open goal is more than
     `goal_tolerance` radians away.
@@ -30,7 +30,7 @@ class MotionMonitor:
         self._away = 0.0
 
     def add(self, camera: Camera, stamp: int, goal: Camera | None) -> None:
-        """Note where the camera is, and its open goal; poses out of order are ignored."""
+        """Add a pose and the open goal, if any; poses out of order are ignored."""
         if stamp < self._last - CLOCK_BACK_S * 1e9:
             self.clear()
         if stamp <= self._last:

@@ -12,9 +12,9 @@ STREAMS = ('images', 'camera_info', 'poses')
 SILENT_S = 0.5
 """A stream is silent after this time without a message, or after three of its periods."""
 LATE_S = 0.15
-"""An image is late if it arrives so long after the camera info or the pose of its stamp."""
+"""An image is late if it arrives this long after the camera info or the pose of its stamp."""
 CLOCK_BACK_S = 1.0
-"""A stamp older than the last by so much means that the clock jumped back."""
+"""A stamp older than the last one by this much means that the clock jumped back."""
 WINDOW_S = 1.0
 """Missing and late messages are counted over this time."""
 _KEPT_S = 3.0
@@ -27,15 +27,15 @@ _QUEUE = 10
 """Images that are queued for a busy node; further ones are lost."""
 
 _NAMES = {'images': 'images', 'camera_info': 'camera infos', 'poses': 'poses'}
-_Moments = dict[int, dict[str, float]]  # by stamp, when each stream's message arrived
+_Moments = dict[int, dict[str, float]]  # arrival time of each stream's message, by stamp
 
 
 class StreamMonitor:
     """
-    Finds faults of a camera's streams from the stamps and arrival times of its messages.
+    Detects faults of a camera's streams from the stamps and arrival times of its messages.
 
-    Stamps are nanoseconds, `now` is a monotonic clock in seconds. Messages that arrive
-    irregularly, for example published by hand, are no stream and never missing.
+    Stamps are in nanoseconds, `now` is a monotonic clock in seconds. Messages that arrive
+    irregularly, for example published by hand, are not a stream and are never missing.
     """
 
     def __init__(self) -> None:
@@ -49,11 +49,11 @@ class StreamMonitor:
             stream: deque(maxlen=_STAMPS) for stream in STREAMS}
         self._periods: dict[str, float] = {}
         self._moments: _Moments = {}
-        self._busy: deque[tuple[float, float]] = deque()  # when, and for how long
+        self._busy: deque[tuple[float, float]] = deque()  # time of a call, time since the last
         self._lost_at: float | None = None
 
     def add(self, stream: str, stamp: int, now: float) -> None:
-        """Note a message of one of STREAMS, whether or not it can be used."""
+        """Add a message of one of STREAMS, whether or not it can be used."""
         self._moments.setdefault(stamp, {}).setdefault(stream, now)
         self._quiet[stream] = 0.0
         stamps = self._stamps[stream]
@@ -63,21 +63,21 @@ class StreamMonitor:
             stamps.append(stamp)
 
     def add_lost(self, now: float) -> None:
-        """Note that images were published, by their sequence numbers, and not received."""
+        """Add a gap in the sequence numbers: images that were published and not received."""
         self._lost_at = now
 
     def faults(self, now: float) -> dict[str, str]:
         """
         Return the faults now: a description of each, by its kind.
 
-        To be called several times a second: silence is measured from one call to the next.
+        Must be called several times a second: silence is measured from one call to the next.
         """
         self._moments = self._since(now - _KEPT_S)
         for stream, stamps in self._stamps.items():
             if len(stamps) == _STAMPS:
                 self._note_period(stream, np.diff(stamps) / 1e9)
         recent = self._since(now - WINDOW_S)
-        # Of the past: a node that was busy receives only afterwards what was queued meanwhile
+        # A busy node receives queued messages afterwards, so past busy times matter
         self._busy.append((now, now - min(self._checked, now)))
         while self._busy[0][0] < now - _KEPT_S:
             self._busy.popleft()
@@ -120,17 +120,17 @@ class StreamMonitor:
                 'camera info and poses as before; is it running and connected?')}
         return {f'silent_{stream}': (
             f'no {_NAMES[stream]} for {time:.1f} s: expected one every '
-            f'{self._periods[stream]:.2g} s as before; is what sends them still running?')
+            f'{self._periods[stream]:.2g} s as before; is their publisher still running?')
             for stream, time in silent.items()}
 
     def _since(self, begin: float) -> _Moments:
-        """Return the stamps of which a message arrived since then."""
+        """Return the stamps with a message that arrived since `begin`."""
         return {stamp: came for stamp, came in self._moments.items()
                 if max(came.values()) >= begin}
 
 
 def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
-    """Yield the streams with missing stamps, and how many, as a description."""
+    """Yield each stream with missing stamps, and a description with their number."""
     stamps = {stream: {stamp for stamp, came in moments.items() if stream in came}
               for stream in STREAMS}
     of_camera = stamps['images'] | stamps['camera_info']
@@ -144,8 +144,8 @@ def _missing(moments: _Moments) -> Iterator[tuple[str, str]]:
         lost = len(due - stamps[stream])
         if lost >= max(_AT_LEAST, _SHARE * len(due)):
             yield stream, (
-                f'{_NAMES[stream]} missing: expected one for each stamp of the rest that the '
-                f'camera sends, {lost} of the last {len(due)} did not arrive')
+                f"{_NAMES[stream]} missing: expected one for each stamp of the camera's other "
+                f'messages, {lost} of the last {len(due)} did not arrive')
 
 
 def _late(moments: _Moments) -> Iterator[tuple[str, str]]:
@@ -154,5 +154,6 @@ def _late(moments: _Moments) -> Iterator[tuple[str, str]]:
     late = [time for time in behind if time > LATE_S]
     if len(late) >= max(_AT_LEAST, _SHARE * len(behind)):
         yield 'late_images', (
-            f'late images: expected them soon after what else has their stamp, {len(late)} of the '
-            f'last {len(behind)} came {median(late):.2f} s later; views are taken that much later')
+            'late images: expected them with the other messages of their stamp, '
+            f'{len(late)} of the last {len(behind)} came {median(late):.2f} s later; views are '
+            'taken that much later')

@@ -8,7 +8,7 @@ from active_recon.geometry.cameras import Camera, view_distance
 
 TAKE_VIEWS = ('auto', 'at_goal', 'by_separation', 'all')
 GOAL_TOLERANCE = 0.14
-"""Largest distance of a view from its goal, radians: 24 rendered views can be 7.5 degrees off."""
+"""Largest distance of a view from its goal, radians: the nearest of 24 can be 7.5 degrees off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +61,8 @@ class ViewGate:
         """
         Return whether the image of this camera, at this stamp in nanoseconds, is to be a view.
 
-        To be called for every image, and `took` for each that became a view. `goals_expected`
-        means for `auto` that goals have a publisher.
+        Call it for every image in order, and `took` for each that becomes a view. With `auto`,
+        `goals_expected` states that goals have a publisher.
         """
         self._stillness.add(camera, stamp)
         if self.take_views == 'all':

@@ -1,4 +1,4 @@
-"""A camera on an arm before a board that lies still: hand-eye calibration."""
+"""Hand-eye calibration: a camera on an arm, and a fixed board."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ from scipy.spatial.transform import Rotation
 FEWEST_IMAGES = 5
 _LEAST_TURN = math.radians(10)
 _SCALE_TOLERANCE = 0.05
-_LIKELY_OFF = np.repeat([math.radians(0.1), 0.0005], 3)  # of an arm's pose, rad and metres
+_POSE_ERROR = np.repeat([math.radians(0.1), 0.0005], 3)  # typical of an arm, rad and metres
 
 
 @dataclass(frozen=True, eq=False)
 class ArmFit:
-    """The camera on its mount and the board before the arm: mount from camera, base from board."""
+    """The poses of the camera on its mount and of the board in the arm's base, (4, 4) each."""
 
     mount_from_camera: NDArray[np.float64]
     base_from_board: NDArray[np.float64]
@@ -36,10 +36,10 @@ class ArmFit:
 
 def fit_arm(seen: Sequence[Detection], lens: Intrinsics, mounts: NDArray[np.float64]) -> ArmFit:
     """
-    Find where on an arm's mount the camera sits.
+    Estimate the pose of a camera on an arm's mount, and of the board in the arm's base frame.
 
-    `mounts`: base from mount of each image, (N, 4, 4). Raises DataError where the images are too
-    few, the poses do not tell it, or contradict the images.
+    `mounts`: base from mount of each image, (N, 4, 4), metres. Raises DataError where there are
+    too few images, the poses do not determine the result, or they contradict the images.
     """
     if len(seen) < FEWEST_IMAGES:
         raise DataError(f'too few images: expected {FEWEST_IMAGES} images from known poses or '
@@ -56,45 +56,45 @@ def fit_arm(seen: Sequence[Detection], lens: Intrinsics, mounts: NDArray[np.floa
         return [np.linalg.inv(mount @ rigid(one[:3], one[3:]) @ camera) @ board
                 for mount, one in zip(mounts, off, strict=True)]
 
-    # An arm is not quite where it says. Left out, its error would be taken for the camera's: a
-    # camera that is turned and moved about the board sees nearly the same.
+    # An arm's poses have errors of their own, which are fitted too. Otherwise they would be
+    # attributed to the camera: rotating it about the board hardly changes the image.
     count = len(seen)
     exact = np.zeros(6 * count)
     own = np.kron(np.eye(count, dtype=bool), np.ones((1, 6), bool))
     depends = np.block([[np.ones((count, 12), bool), own],
                         [np.zeros((6 * count, 12), bool), np.eye(6 * count, dtype=bool)]])
     found = fit(seen, lens, board_poses, np.append(start, exact),
-                lambda parameters: parameters[12:] / np.tile(_LIKELY_OFF, count), depends)[:12]
+                lambda parameters: parameters[12:] / np.tile(_POSE_ERROR, count), depends)[:12]
     return ArmFit(rigid(found[:3], found[3:6]), rigid(found[6:9], found[9:]),
                   fitted_images(seen, lens, board_poses(np.append(found, exact))))
 
 
 def _hand_eye(mounts: NDArray[np.float64], boards: NDArray[np.float64]) -> NDArray[np.float64]:
     """
-    Return mount from camera, after Park and Martin 1994; OpenCV 5 no longer has it.
+    Return mount from camera, (4, 4), after Park and Martin 1994, which OpenCV 5 lacks.
 
-    With `a` the mount's motion and `b` the camera's between two images, a X = X b.
+    It solves a X = X b, with `a` the mount's and `b` the camera's motion between two images.
     """
     first, second = np.triu_indices(len(mounts), 1)
     a = np.linalg.inv(mounts[second]) @ mounts[first]
     b = boards[second] @ np.linalg.inv(boards[first])
     turn_a = Rotation.from_matrix(a[:, :3, :3]).as_rotvec()
     turn_b = Rotation.from_matrix(b[:, :3, :3]).as_rotvec()
-    clear = np.linalg.norm(turn_b, axis=1) < math.radians(170)  # a half turn has two axes
+    clear = np.linalg.norm(turn_b, axis=1) < math.radians(170)  # the axis of a half turn is +-
     if not clear.any() or np.linalg.svd(turn_b[clear])[1][1] < _LEAST_TURN:
-        raise DataError('poses too much alike: expected some that turn the camera about two '
+        raise DataError('poses too much alike: expected some that rotate the camera about two '
                         f'axes, by {math.degrees(_LEAST_TURN):.0f} degrees or more about '
                         'each', 'poses')
     rotation = Rotation.align_vectors(turn_a[clear], turn_b[clear])[0].as_matrix()
-    # (R_a - 1) t_x - scale R_x t_b = -t_a: were the squares of another size, it would show
+    # (R_a - 1) t_x - scale R_x t_b = -t_a: the scale is 1 unless the squares have another size
     left = np.concatenate([a[:, :3, :3] - np.eye(3),
                            -(b[:, :3, 3] @ rotation.T)[..., None]], axis=2)
     solved = np.linalg.lstsq(left.reshape(-1, 4), -a[:, :3, 3].ravel(), rcond=None)[0]
     if abs(solved[3] - 1) > _SCALE_TOLERANCE:
-        raise DataError("wrong scale: expected the arm's poses and the board to have one, but by "
-                        f'the poses the squares are {solved[3]:.3g} times as large as given; '
-                        'measure a square, and see that the poses are those of the mount in the '
-                        "arm's base frame, in metres, their quaternions x y z w", 'scale')
+        raise DataError("wrong scale: expected the arm's poses and the board to have the same, "
+                        f'but by the poses the squares are {solved[3]:.3g} times as large as '
+                        'given; measure a square, and check that the poses are those of the mount '
+                        "in the arm's base frame, in metres, with quaternions x y z w", 'scale')
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation, solved[:3]
     return pose

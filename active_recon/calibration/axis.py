@@ -1,4 +1,4 @@
-"""A turntable's axis and angles, from the board's pose in each image: where the fit starts."""
+"""A turntable's axis and angles from the board's pose in each image: initial values of the fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,8 +21,9 @@ class Axis:
     A turntable's axis in the camera's frame.
 
     - up: unit vector along the axis, away from the plate, (3,)
-    - center: where the axis meets the board's height, metres, (3,)
-    - turned: of each image, counter-clockwise seen from above, from the first, radians, (N,)
+    - center: the point of the axis at the height of the board, metres, (3,)
+    - turned: rotation of the table from the first image to each, counter-clockwise seen from
+      above, radians, (N,)
     """
 
     up: NDArray[np.float64]
@@ -32,7 +33,7 @@ class Axis:
 
 def find_axis(poses: NDArray[np.float64]) -> Axis:
     """
-    Find the axis about which a board turned, from camera from board, (N, 4, 4).
+    Return the axis of rotation of a board, from its poses, camera from board (N, 4, 4).
 
     Raises DataError where the board hardly turned, or does not lie on the plate.
     """
@@ -40,15 +41,15 @@ def find_axis(poses: NDArray[np.float64]) -> Axis:
     first, second = np.triu_indices(len(poses), 1)
     between = (turns[second] * turns[first].inv()).as_rotvec()
     if np.linalg.norm(between, axis=1).max() < _LEAST_TURN:
-        raise DataError('the board hardly turned: expected a table that turns by '
-                        f'{math.degrees(_LEAST_TURN):.0f} degrees or more between the '
-                        'images', 'angles')
+        raise DataError('the board hardly turned: expected a rotation of '
+                        f'{math.degrees(_LEAST_TURN):.0f} degrees or more between two images',
+                        'angles')
     up = np.linalg.eigh(between.T @ between)[1][:, -1]
     facing = -poses[:, :3, 2].mean(0)  # the board's z points into the paper
     up *= np.sign(facing @ up)
     if facing @ up < math.cos(_LARGEST_TILT) * np.linalg.norm(facing):
-        raise DataError('the board is tilted: expected one that lies on the table, but it stands '
-                        f'at {_angle_deg(facing, up):.0f} degrees to it', 'board_tilt')
+        raise DataError('the board is tilted: expected one that lies on the table, got an angle '
+                        f'of {_angle_deg(facing, up):.0f} degrees to it', 'board_tilt')
     x, y, z, w = (turns * turns[0].inv()).as_quat().T
     turned = 2 * np.arctan2(np.stack([x, y, z], axis=1) @ up, w)
     return Axis(up, _center(poses, up, turned), np.asarray(azimuth_difference(turned, 0)))
@@ -56,7 +57,7 @@ def find_axis(poses: NDArray[np.float64]) -> Axis:
 
 def _center(poses: NDArray[np.float64], up: NDArray[np.float64], turned: NDArray[np.float64]
             ) -> NDArray[np.float64]:
-    """Return the point of the axis about which the board's origin went round, at its height."""
+    """Return the centre of the circle that the board's origin moved on, metres, (3,)."""
     about = Rotation.from_rotvec(turned[:, None] * up).as_matrix()
     corner = poses[:, :3, 3]
     left = (np.eye(3) - about).reshape(-1, 3)
@@ -68,11 +69,11 @@ def _center(poses: NDArray[np.float64], up: NDArray[np.float64], turned: NDArray
 @dataclass(frozen=True, eq=False)
 class AngleFit:
     """
-    The fit of a turntable's given angles to those of the images.
+    The fit of a turntable's given angles to those in the images.
 
-    Image angles are `direction` times the given ones plus `offset`, radians, plus the residuals
-    `off`, (N,). `direction` is +1 where the given angle increases counter-clockwise seen from
-    above, else -1.
+    The angles in the images are `direction` times the given ones plus `offset`, radians, plus the
+    residuals `off`, (N,). `direction` is +1 where the given angle increases counter-clockwise seen
+    from above, else -1.
     """
 
     direction: int
@@ -96,13 +97,12 @@ def compare_angles(turned: NDArray[np.float64], angles: NDArray[np.float64],
     if abs(off[worst]) > _ANGLE_TOLERANCE:
         raise DataError(
             f'{names[worst]}: wrong angle: expected the table at '
-            f'{math.degrees(angles[worst]):.1f} degrees, as given, but the board stands '
-            f'{abs(math.degrees(off[worst])):.1f} degrees off '
-            'that; are the angles or the step right, and are the images in the order of their '
-            'names?', 'angles')
+            f'{math.degrees(angles[worst]):.1f} degrees, as given, got one '
+            f'{abs(math.degrees(off[worst])):.1f} degrees off; check the angles or the step, and '
+            'that the names of the images are in the order in which they were taken', 'angles')
     if agreement[direction] - agreement[-direction] < 0.01:
-        raise DataError('direction unknown: expected angles that tell which way the table turns; '
-                        'half turns alone do not', 'direction')
+        raise DataError('direction unknown: expected angles that determine it, got half turns '
+                        'only, which are the same in both directions', 'direction')
     return AngleFit(direction, offset, off)
 
 

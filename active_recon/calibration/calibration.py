@@ -1,4 +1,4 @@
-"""Calibrations from their images to the parameters of the nodes."""
+"""Complete calibrations, from images to the parameters of the nodes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -45,8 +45,8 @@ class BoardImages:
     """
     Images of a board.
 
-    The lens is that of the file `camera_info`; without one it is estimated from the same images
-    and from `lens_paths`, more images of the board in any pose.
+    The lens parameters are read from the file `camera_info`; without it they are estimated from
+    these images and from `lens_paths`, more images of the board in any pose.
     """
 
     board: Board
@@ -56,7 +56,7 @@ class BoardImages:
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
+class _Detections:
     seen: list[Detection]
     lens: Intrinsics
     remarks: list[str]
@@ -65,21 +65,22 @@ class _Look:
 def calibrate_turntable(images: BoardImages, placement: Placement,
                         angles: Mapping[str, float] | None = None) -> Calibration:
     """
-    Find the pose of a fixed camera beside a turntable.
+    Estimate the pose of a fixed camera beside a turntable.
 
-    `angles`: of the table, by the image's name, radians; None where they are not known. Raises
-    DataError where the images do not determine it or contradict the angles.
+    `angles`: the table's angle in each image, by the image's name, radians; None where they are
+    not known. Raises DataError where the images do not determine the pose or contradict the
+    angles.
     """
-    look = _look_at(images, FEWEST_OF_TABLE)
-    given = None if angles is None else np.array([angles[one.name] for one in look.seen])
-    found = fit_turntable(look.seen, look.lens, given)
+    detected = _detect_board(images, FEWEST_OF_TABLE)
+    given = None if angles is None else np.array([angles[one.name] for one in detected.seen])
+    found = fit_turntable(detected.seen, detected.lens, given)
     pose = placement.on_table(found)
     camera = Camera(pose)
     reconstructor: dict[str, Any] = {
         'object_size': placement.object_size, 'pose_source': 'turntable_joint',
         'camera_position': _rounded(pose[:3, 3]),
         'camera_orientation': _rounded(quaternion_of(pose))}
-    remarks = [*look.remarks, *of_elevation(camera), *of_angles(found)]
+    remarks = [*detected.remarks, *of_elevation(camera), *of_angles(found)]
     driver: dict[str, Any] = {'camera_azimuth_at_zero': round(placement.azimuth_at_zero, 6)}
     if found.direction is None:
         remarks.append(DIRECTION_UNKNOWN)
@@ -90,7 +91,7 @@ def calibrate_turntable(images: BoardImages, placement: Placement,
                'distance': round(camera.distance, 5)}
     object_from_board = pose @ found.camera_from_table @ found.table_from_board
     board_from_object = np.asarray(np.linalg.inv(object_from_board), np.float64)
-    return _calibration(found.images, look.lens, board_from_object, placement, remarks,
+    return _calibration(found.images, detected.lens, board_from_object, placement, remarks,
                         {'reconstructor': reconstructor, 'view_planner': planner,
                          'turntable_driver': driver}, {})
 
@@ -98,23 +99,25 @@ def calibrate_turntable(images: BoardImages, placement: Placement,
 def calibrate_arm(images: BoardImages, placement: Placement,
                   mounts: Mapping[str, NDArray[np.float64]], frames: Frames) -> Calibration:
     """
-    Find a camera on an arm, and the object's frame before it.
+    Estimate the pose of a camera on an arm, and of the object frame in the arm's base frame.
 
-    `mounts`: base from mount, (4, 4), by the image's name. Raises DataError as `fit_arm` does.
+    `mounts`: base from mount, (4, 4), metres, by the image's name. Raises DataError as `fit_arm`
+    does.
     """
-    look = _look_at(images, FEWEST_OF_ARM)
-    found = fit_arm(look.seen, look.lens, np.stack([mounts[one.name] for one in look.seen]))
+    detected = _detect_board(images, FEWEST_OF_ARM)
+    found = fit_arm(detected.seen, detected.lens,
+                    np.stack([mounts[one.name] for one in detected.seen]))
     board_from_object = placement.on_board(images.board)
     size: dict[str, Any] = {
         'object_size': placement.object_size, 'object_frame': frames.object}
     return _calibration(
-        found.images, look.lens, board_from_object, placement, look.remarks,
+        found.images, detected.lens, board_from_object, placement, detected.remarks,
         {'reconstructor': {**size, 'pose_source': 'tf'}, 'view_planner': size},
         {(frames.base, frames.object): found.base_from_board @ board_from_object,
          (frames.mount, frames.camera): found.mount_from_camera})
 
 
-def _look_at(images: BoardImages, fewest: int) -> _Look:
+def _detect_board(images: BoardImages, fewest: int) -> _Detections:
     seen, missing = _detect(images.board, images.paths, fewest)
     more = _detect(images.board, images.lens_paths, 1)[0] if images.lens_paths else []
     for other in more[:1]:
@@ -123,11 +126,11 @@ def _look_at(images: BoardImages, fewest: int) -> _Look:
     if images.camera_info is not None:
         lens = read_lens(images.camera_info)
         _same_size(seen[0], (lens.width, lens.height), str(images.camera_info))
-        return _Look(seen, lens, remarks)
+        return _Detections(seen, lens, remarks)
     estimated = estimate_lens([*seen, *more])
     if not estimated.whole:
         remarks.append(LENS_HALF_KNOWN)
-    return _Look(seen, estimated.lens, remarks)
+    return _Detections(seen, estimated.lens, remarks)
 
 
 def _detect(board: Board, paths: Sequence[Path], fewest: int

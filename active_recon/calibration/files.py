@@ -1,4 +1,4 @@
-"""What a calibration reads: images by their names, and the angle or the pose of each."""
+"""Input files of a calibration: images, and tables of their angles or poses."""
 
 import csv
 from pathlib import Path
@@ -15,10 +15,10 @@ SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 
 def image_paths(places: list[Path]) -> list[Path]:
     """
-    Return the image files, those of folders among them, in the order of their names.
+    Return image files and the images in folders, sorted by name.
 
-    A number in a name counts as a number: 2 before 10. Raises DataError where there is none, or
-    two have one name.
+    Numbers in names are sorted as numbers: 2 before 10. Raises DataError where there is no image,
+    or two have the same name.
     """
     paths = [path for place in places
              for path in (place.iterdir() if place.is_dir() else [place])
@@ -28,7 +28,7 @@ def image_paths(places: list[Path]) -> list[Path]:
                         f'({", ".join(SUFFIXES)}), found none')
     names = [path.name for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise DataError(f'images of one name: expected different names, got {twice[0]} twice')
+        raise DataError(f'images of the same name: expected different names, got {twice[0]} twice')
     return sorted(paths, key=_in_order)
 
 
@@ -38,21 +38,31 @@ def _in_order(path: Path) -> list[tuple[int, str]]:
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
-    """Return an image as it lies in the file, (H, W, 3) uint8 BGR; raises DataError."""
-    # As the camera's driver publishes it: a viewer's turn by EXIF is not for the network's eyes
+    """Return an image, (H, W, 3) uint8 BGR; raises DataError where it cannot be read."""
+    # Without rotation by EXIF: a camera's driver publishes images without it
     image = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
-        raise DataError(f'{path}: not readable: expected an image that OpenCV can read')
+        raise DataError(f'{path}: not readable: expected an image file in a format of OpenCV')
     return np.asarray(image, np.uint8)
 
 
 def read_angles(path: Path, names: list[str]) -> dict[str, float]:
-    """Return the table's angle in each image, radians; the file has degrees, see `_rows`."""
+    """
+    Return the table's angle in each image, radians.
+
+    The rows of the CSV file are image, degrees, or only degrees in the order of `names`. Raises
+    DataError on invalid or missing rows.
+    """
     return {name: float(np.radians(row[0])) for name, row in _rows(path, names, 1).items()}
 
 
 def read_poses(path: Path, names: list[str]) -> dict[str, NDArray[np.float64]]:
-    """Return the pose of each image, (4, 4); the file has x, y, z, qx, qy, qz, qw, see `_rows`."""
+    """
+    Return the pose of each image, (4, 4), metres.
+
+    The rows of the CSV file are image, x, y, z, qx, qy, qz, qw, or only the numbers in the order
+    of `names`. Raises DataError on invalid or missing rows.
+    """
     poses = {}
     for name, row in _rows(path, names, 7).items():
         if abs(np.linalg.norm(row[3:]) - 1) > 0.01:
@@ -67,10 +77,10 @@ def read_poses(path: Path, names: list[str]) -> dict[str, NDArray[np.float64]]:
 
 def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
     """
-    Return so many numbers for each image from a CSV file.
+    Return `count` numbers for each image from a CSV file.
 
-    A row begins with the image's name, or the rows have the numbers alone, one for each image in
-    the order of the names. A first row of words is a heading. Raises DataError that names the row.
+    Either each row begins with the image's name, or there is one row of numbers for each image in
+    the order of `names`. A heading is skipped. Raises DataError that names the line.
     """
     try:
         with path.open(newline='') as lines:
@@ -91,12 +101,12 @@ def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
         else:
             unnamed.append(values)
     if unnamed and (named or len(unnamed) != len(names)):
-        raise DataError(f'{path}: rows do not fit the images: expected one for each of the '
+        raise DataError(f'{path}: rows do not match the images: expected one for each of the '
                         f'{len(names)} images, or rows that begin with their names, got '
                         f'{len(unnamed)} without a name')
     found = dict(zip(names, unnamed, strict=True)) if unnamed else named
     if missing := [name for name in names if name not in found]:
-        raise DataError(f'{path}: rows missing: expected one of every image, found none of '
+        raise DataError(f'{path}: rows missing: expected one for every image, found none for '
                         f'{", ".join(missing)}')
     return {name: found[name] for name in names}
 

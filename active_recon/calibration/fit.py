@@ -1,4 +1,4 @@
-"""The last step of every calibration: all corners of all images fitted at once."""
+"""The last step of every calibration: a joint fit to all corners of all images."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 from scipy.spatial.transform import Rotation
 
-_LARGEST_ERROR = 1 / 128  # of the image's width
+_LARGEST_ERROR = 1 / 128  # in image widths
 _OUTLIER = 1.0  # pixels
-_BEHIND = 1e4  # pixels, for what a step too far has put behind the camera
+_BEHIND = 1e4  # pixels: residual of points that a step has put behind the camera
 
 BoardPoses = Callable[[NDArray[np.float64]], Sequence[NDArray[np.float64]]]
-"""From parameters, (P,), to camera from board of each image, (4, 4)."""
+"""Maps parameters (P,) to the board's pose in each image, camera from board (4, 4)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ImageFit:
-    """What was seen in an image, where the fit puts it, (N, 2) pixels, and the board's pose."""
+    """The detection in an image, the fitted corners (N, 2) in pixels, and the board's pose."""
 
     seen: Detection
     fitted: NDArray[np.float64]
@@ -31,17 +31,17 @@ class ImageFit:
 
     @property
     def error(self) -> float:
-        """Root mean square of the distances, pixels."""
+        """Root mean square distance of fitted and detected corners, pixels."""
         return root_mean_square(self.fitted - self.seen.pixels)
 
 
 def root_mean_square(apart: NDArray[np.float64]) -> float:
-    """Return the root mean square length of differences in pixels, (N, 2)."""
+    """Return the root mean square length of differences (N, 2)."""
     return float(np.sqrt(np.mean(np.sum(apart ** 2, axis=1))))
 
 
 def overall_error(images: Sequence[ImageFit]) -> float:
-    """Return the root mean square over all corners of all images, pixels."""
+    """Return the root mean square distance over all corners of all images, pixels."""
     return root_mean_square(np.concatenate([one.fitted - one.seen.pixels for one in images]))
 
 
@@ -50,11 +50,12 @@ def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses,
         expected: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda _: np.zeros(0),
         depends: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
     """
-    Return the parameters, (P,), under which the corners fall where they are seen.
+    Return the parameters (P,) that minimise the reprojection error of the corners.
 
-    `expected` says, in units of what is likely, how far parameters are from what was expected of
-    them. `depends` says of each image, and then of each such expectation, which parameters it
-    depends on, (N + M, P); None: on all. A corner that lies far off counts less than its square.
+    `expected` returns M further residuals, the deviations of parameters from prior values in
+    standard deviations. `depends` (N + M, P) marks the parameters on which each image, and then
+    each further residual, depends; None: all. The loss is soft L1, which limits the influence of
+    outliers.
     """
     def apart(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
         off = [(project(lens, one.points, pose) - one.pixels).ravel()
@@ -74,9 +75,9 @@ def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses,
 def fitted_images(seen: Sequence[Detection], lens: Intrinsics,
                   poses: Sequence[NDArray[np.float64]]) -> list[ImageFit]:
     """
-    Return the images with the board where it was fitted, camera from board (4, 4) of each.
+    Return the fit of each image, from the fitted poses of the board, camera from board (4, 4).
 
-    Raises DataError where that is far from where it is seen.
+    Raises DataError where the overall error is above 1/128 of the image's width.
     """
     images = [ImageFit(one, project(lens, one.points, pose), pose)
               for one, pose in zip(seen, poses, strict=True)]
@@ -84,16 +85,15 @@ def fitted_images(seen: Sequence[Detection], lens: Intrinsics,
     if not (error := overall_error(images)) <= largest:
         worst = max(images, key=lambda one: one.error)
         raise DataError(
-            'images contradict the motion: expected the board to be where the motion says, within '
+            'images contradict the motion: expected a reprojection error of at most '
             f'{largest:.0f} pixels, got {error:.1f} (worst: {worst.error:.1f} in '
-            f'{worst.seen.name}); are the squares, '
-            'the poses and the camera info those of these images, and did neither the camera nor '
-            'the board slip?', 'reprojection')
+            f'{worst.seen.name}); check that the squares, the poses and the camera info are those '
+            'of these images, and that neither the camera nor the board slipped', 'reprojection')
     return images
 
 
 def rigid(turn: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the (4, 4) of a rotation vector, radians (3,), and a translation, metres (3,)."""
+    """Return the pose (4, 4) of a rotation vector (3,), radians, and a shift (3,), metres."""
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
     pose[:3, 3] = shift
@@ -101,5 +101,5 @@ def rigid(turn: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.f
 
 
 def parameters_of(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return rotation vector and translation, (6,), of a rigid (4, 4): `rigid` the other way."""
+    """Return the rotation vector and translation (6,) of a pose (4, 4): the inverse of `rigid`."""
     return np.concatenate([Rotation.from_matrix(pose[:3, :3]).as_rotvec(), pose[:3, 3]])

@@ -1,4 +1,4 @@
-"""A lens: from ROS's calibration YAML and to it, or estimated from images of the board."""
+"""Lens parameters: read and written as ROS's calibration YAML, or estimated from images."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _STRAIGHT = Distortion('plumb_bob', (0.0,) * 5)
 
 
 def board_pose(lens: Intrinsics, seen: Detection) -> NDArray[np.float64]:
-    """Return camera from board, (4, 4), by one image alone."""
+    """Return the board's pose, camera from board (4, 4), from a single image."""
     plane = (seen.pixels - [lens.cx, lens.cy]) / [lens.fx, lens.fy]
     if lens.distortion is not None:
         plane = lens.distortion.undistort(plane)
@@ -37,12 +37,12 @@ def board_pose(lens: Intrinsics, seen: Detection) -> NDArray[np.float64]:
 
 def project(lens: Intrinsics, points: NDArray[np.float64], pose: NDArray[np.float64]
             ) -> NDArray[np.float64]:
-    """Return the pixels, (N, 2), of points (N, 3) under camera from points, (4, 4)."""
+    """Return the pixels (N, 2) of points (N, 3) in a frame; `pose`, (4, 4): camera from frame."""
     return Camera(np.asarray(np.linalg.inv(pose)), lens).project(points)[0]
 
 
 def write_lens(lens: Intrinsics, path: Path) -> None:
-    """Write the lens in the format of ROS's camera_calibration."""
+    """Write the lens parameters in the YAML format of ROS's camera_calibration."""
     matrix = _as_ros_counts(lens)
     distortion = lens.distortion or _STRAIGHT
     path.write_text(yaml.safe_dump({
@@ -56,7 +56,7 @@ def write_lens(lens: Intrinsics, path: Path) -> None:
 
 
 def read_lens(path: Path) -> Intrinsics:
-    """Read ROS's calibration YAML; raises DataError where it is none, or of another model."""
+    """Read ROS's calibration YAML; raises DataError where it is invalid or of another model."""
     try:
         content = yaml.safe_load(path.read_text())
         matrix = np.array(content['camera_matrix']['data'], np.float64).reshape(3, 3)
@@ -65,8 +65,8 @@ def read_lens(path: Path) -> Intrinsics:
         distortion = Distortion(content['distortion_model'], coefficients)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError,
             ValueError) as error:
-        raise DataError(f"{path}: no calibration: expected that of a camera as ROS's "
-                        f'camera_calibration writes it (YAML): {error!r}') from error
+        raise DataError(f"{path}: no calibration: expected a YAML file of ROS's "
+                        f'camera_calibration, got: {error!r}') from error
     except ViewError as error:
         raise DataError(f'{path}: {error}') from error
     if not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1], *size) <= 0:
@@ -78,10 +78,10 @@ def read_lens(path: Path) -> Intrinsics:
 @dataclass(frozen=True)
 class EstimatedLens:
     """
-    A lens, and whether the images determined all of it.
+    Lens parameters, and whether the images determined all of them.
 
-    `whole` is false where the board was always seen at the same tilt: such images tell the focal
-    length alone, and centre and distortion are taken to be those of an ideal camera.
+    `whole` is false where the board always had the same tilt: such images determine only the
+    focal length, and the principal point and distortion are those of an ideal camera.
     """
 
     lens: Intrinsics
@@ -90,10 +90,10 @@ class EstimatedLens:
 
 def estimate_lens(seen: Sequence[Detection]) -> EstimatedLens:
     """
-    Estimate the lens from the board's images.
+    Estimate the lens parameters from images of the board.
 
-    A flat board that turns under a fixed camera stays in one plane, however many images there
-    are, and one plane cannot tell centre and distortion from its tilt.
+    A board that rotates flat under a fixed camera stays in one plane. A single plane, in however
+    many images, does not separate principal point and distortion from its tilt.
     """
     points = [one.points.astype(np.float32) for one in seen]
     pixels = [(one.pixels - 0.5).astype(np.float32) for one in seen]
@@ -114,7 +114,7 @@ def estimate_lens(seen: Sequence[Detection]) -> EstimatedLens:
 
 def _lens(matrix: ArrayLike, distortion: Distortion | None, size: tuple[int, int]
           ) -> Intrinsics:
-    # OpenCV and ROS count from the first pixel's centre, our cameras from its corner
+    # (0, 0) is the first pixel's centre in OpenCV and ROS, its corner in our cameras
     (fx, _, cx), (_, fy, cy), _ = np.asarray(matrix, np.float64).tolist()
     return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, *size, distortion)
 

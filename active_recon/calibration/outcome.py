@@ -1,4 +1,4 @@
-"""What a calibration found, and the files that it leaves."""
+"""The result of a calibration, and its files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,13 +21,14 @@ import yaml
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """
-    What was found.
+    The result of a calibration.
 
-    - lens, images: the lens, and each image as it was fitted
-    - board_from_object: at table angle 0, (4, 4)
-    - parameters: of each node, by its name
-    - remarks: what to know before relying on it, in plain words
-    - transforms: of tf, (parent, child) to a pose (4, 4)
+    - lens: the lens parameters; images: the fit of each image
+    - board_from_object: pose of the object frame on the board, at table angle 0, (4, 4), metres
+    - object_size: side of the object's cube, metres
+    - parameters: parameters for each node, by the node's name
+    - remarks: warnings about the result, one line each
+    - transforms: static tf transforms, (parent, child) to a pose (4, 4)
     """
 
     lens: Intrinsics
@@ -40,11 +41,15 @@ class Calibration:
 
     @property
     def error(self) -> float:
-        """Root mean square over all corners of all images, pixels."""
+        """Root mean square distance over all corners of all images, pixels."""
         return overall_error(self.images)
 
     def save(self, folder: Path, paths: Sequence[Path]) -> None:
-        """Write calibration.yaml, calibration.png and camera_info.yaml; raises DataError."""
+        """
+        Write calibration.yaml, calibration.png and camera_info.yaml to a folder.
+
+        `paths` are the images' files. Raises DataError where the folder cannot be written.
+        """
         by_name = {path.name: path for path in paths}
         picture = picture_of(self.images, self.lens, self.board_from_object, self.object_size,
                              lambda name: read_image(by_name[name]))
@@ -54,7 +59,7 @@ class Calibration:
             write_lens(self.lens, folder / 'camera_info.yaml')
             (folder / 'calibration.png').write_bytes(cv2.imencode('.png', picture)[1].tobytes())
         except OSError as error:
-            raise DataError(f'{folder}: calibration not written: expected a folder to write to: '
+            raise DataError(f'{folder}: calibration not written: expected a writable folder, got: '
                             f'{error}') from error
 
     def as_yaml(self) -> str:
@@ -78,6 +83,6 @@ class Calibration:
 
 
 def quaternion_of(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the unit quaternion x, y, z, w of a (4, 4), (4,), w not below 0."""
+    """Return the unit quaternion x, y, z, w of a pose (4, 4), (4,), with w at least 0."""
     quaternion = Rotation.from_matrix(pose[:3, :3]).as_quat()
     return np.asarray(quaternion * (np.sign(quaternion[3]) or 1.0))

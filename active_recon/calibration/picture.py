@@ -1,4 +1,4 @@
-"""A picture of a calibration: corners as seen and as fitted, the axis, the object's cube."""
+"""A drawing of a calibration: detected and fitted corners, the axis, the object's cube."""
 
 from collections.abc import Callable, Sequence
 import math
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 _TILES = 6
 _COLUMNS = 3
-_WIDTH = 640  # of a tile, pixels
+_WIDTH = 640  # width of a tile, pixels
 _SHIFT = 4  # OpenCV draws in sixteenths of a pixel
 _SEEN, _FITTED, _AXIS, _CUBE = (view_color(number)[::-1] for number in (3, 2, 4, 1))
 
@@ -23,11 +23,11 @@ def picture_of(images: Sequence[ImageFit], lens: Intrinsics,
                board_from_object: NDArray[np.float64], object_size: float,
                read: Callable[[str], NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """
-    Return up to six of the images with what was fitted drawn into them, (H, W, 3) uint8 BGR.
+    Return up to six of the images with the fit drawn into them, (H, W, 3) uint8 BGR.
 
-    Circles are corners as they were seen, crosses where the fit puts them; the thick lines run
-    along the axis, from the plate to the top of the object's cube, and to the middle of its
-    front. `read` gives an image of that name.
+    Circles mark detected corners, crosses fitted ones. The thick lines are the axis, from the
+    plate to the top of the object's cube, and the direction of the cube's front. `read` returns
+    the image of a name.
     """
     chosen = np.unique(np.linspace(0, len(images) - 1, _TILES).round().astype(int))
     tiles = [_tile(images[index], lens, board_from_object, object_size, read)
@@ -73,7 +73,7 @@ def _edges(corners: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDAr
 def _line(tile: NDArray[np.uint8], scale: float, lens: Intrinsics, pose: NDArray[np.float64],
           start: NDArray[np.float64], end: NDArray[np.float64], color: tuple[int, ...],
           thickness: int = 1) -> None:
-    """Draw a line of the object frame as the lens bends it, where it is before the camera."""
+    """Draw a line of the object frame with the lens's distortion, if it is in front of it."""
     points = np.linspace(start, end, 20)
     if (points @ pose[2, :3] + pose[2, 3]).min() <= 0:
         return
@@ -82,6 +82,6 @@ def _line(tile: NDArray[np.uint8], scale: float, lens: Intrinsics, pose: NDArray
 
 
 def _place(pixel: NDArray[np.float64], scale: float) -> tuple[int, int]:
-    """Return OpenCV's fixed-point place of an image's pixel on a tile."""
+    """Return the position on a tile of an image's pixel, in OpenCV's fixed-point numbers."""
     x, y = (pixel * scale - 0.5) * (1 << _SHIFT)
     return round(x), round(y)

@@ -1,4 +1,4 @@
-"""From what was fitted to the object frame: its origin half the object's cube above the plate."""
+"""The object frame on the plate: its origin is half the object's cube above it."""
 
 from dataclasses import dataclass
 
@@ -14,12 +14,15 @@ from scipy.spatial.transform import Rotation
 @dataclass(frozen=True)
 class Placement:
     """
-    Where the object's cube stands.
+    The position of the object's cube relative to the board.
 
-    - object_size: the side of the cube, metres
-    - board_thickness: of the board's face above the plate on which the object will stand, metres
-    - azimuth_at_zero: of the camera at table angle 0, radians; it says where the object frame's
-      x, an object's front, points
+    - object_size: side of the cube, metres
+    - board_thickness: height of the board's face above the plate on which the object will stand,
+      metres
+    - azimuth_at_zero: azimuth of the camera at table angle 0, radians; it fixes the x axis of the
+      object frame, the object's front
+
+    Raises ConfigError unless `object_size` is finite and above 0.
     """
 
     object_size: float
@@ -27,21 +30,21 @@ class Placement:
     azimuth_at_zero: float = 0.0
 
     def __post_init__(self) -> None:
-        """Reject a cube without a size."""
+        """Reject invalid sizes."""
         if not 0 < self.object_size < np.inf:
             raise ConfigError('object_size: out of range: expected metres above 0, got '
                               f'{self.object_size}')
 
     @property
     def above_board(self) -> float:
-        """Metres from the board's face up to the cube's centre."""
+        """Height of the cube's centre above the board's face, metres."""
         return self.object_size / 2 - self.board_thickness
 
     def on_table(self, found: TurntableFit) -> NDArray[np.float64]:
         """
         Return the camera's pose in the object frame at table angle 0, (4, 4).
 
-        Raises DataError where the camera stands below the plate.
+        Raises DataError where the camera is below the plate.
         """
         height = found.board_height + self.above_board
         camera = Camera(_moved(0, 0, -height) @ np.linalg.inv(found.camera_from_table))
@@ -57,9 +60,9 @@ class Placement:
 
     def on_board(self, board: Board) -> NDArray[np.float64]:
         """
-        Return board from object, (4, 4), of a board that lies still.
+        Return board from object, (4, 4), for a fixed board.
 
-        The cube stands on the board's middle, its front towards the ends of the board's rows.
+        The cube is on the board's centre, with its front along the board's rows.
         """
         face_up = np.diag([1.0, -1.0, -1.0, 1.0])
         middle = _moved(board.columns * board.square / 2, board.rows * board.square / 2, 0)

@@ -1,4 +1,4 @@
-"""A board that turns on a table under a fixed camera: the axis, and the camera beside it."""
+"""Calibration of a turntable: its axis in the frame of a fixed camera, from a rotating board."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FEWEST_IMAGES = 3
-_FACE_UP = np.diag([1.0, -1.0, -1.0, 1.0])  # a board on the plate, whose z points down
+_FACE_UP = np.diag([1.0, -1.0, -1.0, 1.0])  # rotation of a board on the plate: its z points down
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +21,10 @@ class TurntableFit:
     """
     A turntable in the frame of a fixed camera.
 
-    - camera_from_table: at table angle 0, (4, 4); the table's frame has z up along the axis
-    - table_from_board: (4, 4)
-    - turned: how far the table stands from angle 0, counter-clockwise seen from above, radians,
-      (N,)
+    - camera_from_table: at table angle 0, (4, 4), metres; the table's frame has z up along the
+      axis
+    - table_from_board: (4, 4), metres
+    - turned: the table's angle in each image, counter-clockwise seen from above, radians, (N,)
     - direction: +1 where the table's own angle increases counter-clockwise, -1 where clockwise,
       None where no angles were given; angle 0 then is that of the first image
     - off: residuals of the given angles, radians, (N,), None where none were given
@@ -39,7 +39,7 @@ class TurntableFit:
 
     @property
     def board_height(self) -> float:
-        """The z of the table's frame at which the axis meets the board, metres."""
+        """Height (z) in the table's frame at which the axis meets the board, metres."""
         corner, normal = self.table_from_board[:3, 3], self.table_from_board[:3, 2]
         return float(corner @ normal / normal[2])
 
@@ -47,12 +47,12 @@ class TurntableFit:
 def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
                   angles: NDArray[np.float64] | None = None) -> TurntableFit:
     """
-    Find a turntable's axis in the camera's frame, and how far the table turned in each image.
+    Estimate a turntable's axis in the camera's frame, and the table's angle in each image.
 
     `angles`: the table's own, radians, (N,), None where they are not known. They determine its
     angle 0 and its direction; backlash does no harm. The order of the images does not matter,
-    except that without angles the first is at 0. Raises DataError where the images are too few or
-    contradict the angles.
+    except that without angles the first is at 0. Raises DataError where there are too few images,
+    or they contradict the angles.
     """
     if len(seen) < FEWEST_IMAGES:
         raise DataError(f'too few images: expected {FEWEST_IMAGES} images of the turning board or '
@@ -66,7 +66,7 @@ def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
 
     def parts(parameters: NDArray[np.float64]
               ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        # The board's corner is at z 0 and its edge along x: the axis itself fixes neither
+        # The board's corner is put at z 0 and its edge along x, which the axis does not determine
         board = rigid(np.append(parameters[6:8], 0), np.append(parameters[8:10], 0)) @ _FACE_UP
         return rigid(parameters[:3], parameters[3:6]), board, np.append(0, parameters[10:])
 
@@ -86,7 +86,7 @@ def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
 
 def _table_frame(up: NDArray[np.float64], center: NDArray[np.float64],
                  board: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return camera from table, whose x runs along the board's edge."""
+    """Return camera from table, (4, 4); the table's x is along the board's edge."""
     edge = board[:3, 0] - up * (up @ board[:3, 0])
     edge /= np.linalg.norm(edge)
     frame = np.eye(4)

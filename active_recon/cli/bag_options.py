@@ -1,4 +1,4 @@
-"""Options for what the bags of other recorders lack."""
+"""Options that supply what bags of other recorders do not contain."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -20,22 +20,25 @@ def _option(*names: str, **keywords: Any) -> Any:
 
 
 _TOPICS: dict[str, tuple[Any, Any]] = {
-    'image': (Annotated[str, _option(metavar='TOPIC', help='Image or CompressedImage.')], ''),
-    'camera_info': (Annotated[str, _option(metavar='TOPIC', help='CameraInfo.')], ''),
+    'image': (Annotated[str, _option(
+        metavar='TOPIC', help='Topic of the images (Image or CompressedImage).')], ''),
+    'camera_info': (Annotated[str, _option(
+        metavar='TOPIC', help='Topic of the camera info (CameraInfo).')], ''),
     'azimuth': (Annotated[str, _option(
         metavar='TOPIC',
-        help="PoseStamped of the camera; or its azimuth, radians, as a turntable's JointState or "
-             'a Float64.')], ''),
+        help='Topic of the camera pose (PoseStamped), or of its azimuth in radians (JointState '
+             'of a turntable, or Float64).')], ''),
     'joint': (Annotated[str, _option(
         metavar='NAME', help='Joint of the JointState, if it has several.')], ''),
     'turned_object': (Annotated[bool, _option(
         '--turned-object',
-        help='The angle is that of a turntable in front of a fixed camera.')], False),
+        help='The azimuth is the angle of a turntable in front of a fixed camera.')], False),
     'object_frame': (Annotated[str, _option(
-        metavar='FRAME', help='Frame of the PoseStamped; default: object.')], 'object'),
+        metavar='FRAME', help='Frame of the camera pose; default: object.')], 'object'),
     'max_pose_gap': (Annotated[float, _option(
         min=0, metavar='SECONDS',
-        help='Longest time from an image to the poses used for it; default: 0.1.')], 0.1),
+        help='Longest time from an image to the poses it is interpolated from; default: '
+             '0.1.')], 0.1),
 }
 _SCENE: dict[str, tuple[Any, Any]] = {
     'object_size': (Annotated[float | None, _option(
@@ -46,11 +49,12 @@ _SCENE: dict[str, tuple[Any, Any]] = {
         help="Azimuth of the object's front; default: as recorded, else 0.")], None),
     'elevation_deg': (Annotated[float | None, _option(
         min=-89.0, max=89.0, metavar='DEGREES',
-        help='Of the camera, if the bag has azimuths only; default: 30.')], None),
+        help='Camera elevation, if the bag has azimuths only; default: 30.')], None),
     'camera_position': (Annotated[str | None, _option(
-        metavar='X,Y,Z', help="Camera position in the object's frame at angle 0, m.")], None),
+        metavar='X,Y,Z', help='Camera position in the object frame at angle 0, metres.')], None),
     'camera_orientation': (Annotated[str | None, _option(
-        metavar='X,Y,Z,W', help='Its orientation; default: it looks at the object.')],
+        metavar='X,Y,Z,W', help='Camera orientation in the object frame at angle 0; default: it '
+                                'looks at the object.')],
         None),
     'background': (Annotated[str, _option(
         metavar='COLOR|IMAGE',

@@ -12,48 +12,56 @@ def calibrate(
     images: Annotated[list[Path] | None, typer.Argument(
         help='Images of the board, or folders of them.', show_default=False)] = None,
     object_size: Annotated[float | None, typer.Option(
-        help="Side of the object's cube, m.", show_default=False)] = None,
+        help="Side of the object's cube, metres.", show_default=False)] = None,
     out: Annotated[Path, typer.Option(
-        help='The folder for calibration.yaml, calibration.png and camera_info.yaml.'
+        help='Output folder for calibration.yaml, calibration.png and camera_info.yaml.'
     )] = Path('calibration'),
     print_board: Annotated[Path | None, typer.Option(
-        help='Write the board as an image (PNG), to be printed at its true size.')] = None,
-    squares: Annotated[str, typer.Option(help='Squares of the board, COLUMNSxROWS.')] = '7x5',
-    square_mm: Annotated[float, typer.Option(help='Side of a square, measured on paper.')] = 30.0,
+        help='Write the board as a PNG file, to be printed at its true size, and exit.')] = None,
+    squares: Annotated[str, typer.Option(
+        help='Number of squares of the board, COLUMNSxROWS.')] = '7x5',
+    square_mm: Annotated[float, typer.Option(
+        help='Side of a square, measured on the printed board.')] = 30.0,
     marker_mm: Annotated[float | None, typer.Option(
         help='Side of a marker; default: 3/4 of a square.')] = None,
-    dictionary: Annotated[str, typer.Option(help='Markers, such as 5x5_100.')] = '4x4_50',
+    dictionary: Annotated[str, typer.Option(
+        help='ArUco dictionary of the markers, e.g. 5x5_100.')] = '4x4_50',
     board_thickness_mm: Annotated[float, typer.Option(
         help='Height of the printed face above the plate.')] = 0.0,
     step_deg: Annotated[float | None, typer.Option(
-        help="The table's rotation from each image to the next, in the order of names; the "
-             'first is at 0.')] = None,
+        help='Rotation of the turntable between consecutive images, sorted by name; the first '
+             'is at 0.')] = None,
     angles_deg: Annotated[Path | None, typer.Option(
-        help="A CSV file of the table's angles: image, degrees.")] = None,
+        help='CSV file of the turntable angles, with the columns image, degrees.')] = None,
     camera_azimuth_deg: Annotated[float, typer.Option(
-        help="Camera azimuth at the table's angle 0; at 0 the object's front faces it.")] = 0.0,
+        help='Azimuth of the camera at turntable angle 0. With 0, the front of the object faces '
+             'the camera there.')] = 0.0,
     poses: Annotated[Path | None, typer.Option(
-        help="For an arm instead of a turntable: a CSV file of the poses of the camera's mount in "
-             'the base frame: image, x, y, z, qx, qy, qz, qw.')] = None,
+        help="For an arm instead of a turntable: CSV file of the poses of the camera's mount in "
+             'the base frame, with the columns image, x, y, z, qx, qy, qz, qw (metres).')] = None,
     camera_info: Annotated[Path | None, typer.Option(
-        help="The lens, as ROS's camera_calibration writes it (YAML); default: estimated.")
+        help="Lens parameters in the YAML format of ROS's camera_calibration; default: "
+             'estimated from the images.')
     ] = None,
     lens_images: Annotated[list[Path] | None, typer.Option(
         help='More images of the board at various tilts, or folders of them, to estimate the '
-             'lens.')] = None,
-    base_frame: Annotated[str, typer.Option(help="The tf frame of an arm's base.")] = 'base_link',
-    mount_frame: Annotated[str, typer.Option(help='The frame of the poses.')] = 'tool0',
+             'lens parameters.')] = None,
+    base_frame: Annotated[str, typer.Option(help="tf frame of the arm's base.")] = 'base_link',
+    mount_frame: Annotated[str, typer.Option(
+        help="tf frame of the camera's mount, whose poses --poses gives.")] = 'tool0',
     camera_frame: Annotated[str, typer.Option(
-        help="The camera's optical frame.")] = 'camera_optical_frame',
+        help="tf name of the camera's optical frame.")] = 'camera_optical_frame',
 ) -> None:
     """
     Calibrate a camera at a turntable, or on an arm, from images of a ChArUco board.
 
-    Lay the board on the table and rotate it in steps in front of the fixed camera; or keep it in
-    place and move the arm. The result is written as parameters of reconstructor and view_planner.
+    Lay the board on the turntable and rotate it in steps in front of the fixed camera; or keep it
+    in place and move the arm. The result is a ROS parameters file for the reconstructor and the
+    view_planner.
 
-    For example: active-recon calibrate --print-board board.png, and then
-    active-recon calibrate images/ --step-deg 15 --object-size 0.25
+    Example: active-recon calibrate --print-board board.png
+
+    Example: active-recon calibrate images/ --step-deg 15 --object-size 0.25
     """
     from active_recon.calibration.board import Board
 
@@ -111,6 +119,6 @@ def calibrate(
 def _squares(words: str) -> tuple[int, int]:
     columns, _, rows = words.lower().partition('x')
     if not (columns.isdecimal() and rows.isdecimal()):
-        raise ConfigError('--squares: invalid size of the board: expected COLUMNSxROWS, such as '
-                          f'7x5, got {words!r}')
+        raise ConfigError('--squares: invalid size of the board: expected COLUMNSxROWS, e.g. 7x5, '
+                          f'got {words!r}')
     return int(columns), int(rows)

@@ -1,4 +1,4 @@
-"""`active-recon demo`: the loop over real ROS 2, live in the terminal."""
+"""`active-recon demo`: the loop of ROS 2 nodes with a simulated camera, live in the terminal."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,16 +13,18 @@ def demo(
     object_name: Annotated[str, typer.Option(
         '--object', help='bed, car, chair, sofa, table, or the path of a mesh file.')] = 'chair',
     views: Annotated[int, typer.Option(min=1, max=24, help='Number of views.')] = 5,
-    policy: Annotated[str, policy_option('How the next view is chosen.')] = DEFAULT_POLICY,
+    policy: Annotated[str, policy_option(
+        'Policy that chooses the next view.')] = DEFAULT_POLICY,
     model: Annotated[str | None, typer.Option(
-        help='A model whose weights ship, or a weights file; attention needs 2d3d-attention.')
+        help='Name of a model that ships, or a weights file; the policy attention needs '
+             '2d3d-attention.')
     ] = None,
     seed: Annotated[int, typer.Option(
         min=0, help='Seed of the first view and of the policy random.')] = 0,
     output_dir: Annotated[Path, typer.Option(
-        help='Folder in which a folder for the run is created.')] = Path('bags'),
+        help='Folder in which the folder of the run is created.')] = Path('bags'),
     view: Annotated[bool, typer.Option(
-        '--view', help='Show the loop in the browser, too; it then runs until Ctrl-C.')] = False,
+        '--view', help='Also show the loop in the browser; it then runs until Ctrl-C.')] = False,
 ) -> None:
     """Reconstruct an object with a simulated camera that chooses its own next view."""
     from rich.console import Console

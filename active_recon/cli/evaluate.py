@@ -21,53 +21,57 @@ if TYPE_CHECKING:
 
 def evaluate(
     data: Annotated[Path, typer.Argument(
-        help="Folder of objects in R2N2's layout, or PASCAL3D+'s, whose photographs are measured "
-             'at a single view.')],
+        help="Folder of test objects in R2N2's layout, or of PASCAL3D+, whose photographs are "
+             'reconstructed from a single view.')],
     model: Annotated[str | None, typer.Option(
-        help='A model that ships, by its name, or a .safetensors file; default: '
+        help='Name of a model that ships, or a .safetensors file; default: '
              '2d3d-attention.')] = None,
     policy: Annotated[str | None, typer.Option(
-        help=f'Policies, separated by commas, out of {", ".join(POLICIES)}, oracle (sees the '
-             'truth; ninety times the work). Default: all but the oracle, attention only where '
+        help=f'Policies, separated by commas: {", ".join(POLICIES)}, oracle (uses the true '
+             'shape; takes ninety times as long). Default: all but oracle; attention only if '
              'the model has it.')] = None,
     against: Annotated[str | None, typer.Option(
-        help='Another model, measured on the same objects and starts: prints the difference with '
-             'its interval.')] = None,
+        help='Second model, measured on the same objects and starts: prints the difference '
+             'to it, with its interval.')] = None,
     paired: Annotated[bool, typer.Option(
-        '--paired', help='The same of the two policies that --policy names.')] = False,
-    views: Annotated[int, typer.Option(min=1, max=24, help='Views of an episode.')] = 5,
+        '--paired', help='Print the difference between the two policies given by --policy, with '
+                         'its interval.')] = False,
+    views: Annotated[int, typer.Option(
+        min=1, max=24, help='Number of views of an episode.')] = 5,
     starts: Annotated[int, typer.Option(
-        min=1, max=24, help='First views of each object; 24 are all.')] = 4,
-    seeds: Annotated[int, typer.Option(min=1, help='How often random is drawn.')] = 5,
-    seed: Annotated[int, typer.Option(help='Draws the starts and the random policy.')] = 0,
+        min=1, max=24, help='Number of first views measured for each object, out of 24.')] = 4,
+    seeds: Annotated[int, typer.Option(
+        min=1, help='Number of runs of the policy random.')] = 5,
+    seed: Annotated[int, typer.Option(help='Seed of the starts and of the policy random.')] = 0,
     split_file: Split = None,
     training: Annotated[list[Path] | None, typer.Option(
-        help="Training folders: adds the category's mean shape and the nearest training image, "
-             'two baselines that use no detail (may be given several times).')] = None,
+        help='Training folder: also measure two baselines, the mean shape of the category and '
+             'the nearest training image (may be given several times).')] = None,
     validation: Annotated[Path | None, typer.Option(
-        help="Validation folder, on which the mean shape's threshold is chosen.")] = None,
+        help='Validation folder, on which the threshold of the mean shape is chosen.')] = None,
     json_file: Annotated[Path | None, typer.Option(
-        '--json', help='File for the figures, with their intervals.')] = None,
+        '--json', help='JSON file for the results, with their intervals.')] = None,
     rows: Annotated[Path | None, typer.Option(
-        help='CSV file with one row for each object, start and view.')] = None,
+        help='CSV file for the results, one row for each object, start and view.')] = None,
     yaw_study: Annotated[bool, typer.Option(
-        '--yaw-study', help="Measure too with a wrong yaw of the object's front.")] = False,
+        '--yaw-study', help="Also measure IoU with wrong yaws of the object's front.")] = False,
     latent_study: Annotated[bool, typer.Option(
-        '--latent-study', help='Latent-swap ablation: measure too what the attention policy '
-                               "loses when it gets another object's latent.")] = False,
+        '--latent-study', help='Latent-swap ablation: also measure the loss of the attention '
+                               "policy when it gets another object's latent.")] = False,
     cache: Annotated[Path | None, typer.Option(
-        help='Folder that caches episodes: an interrupted run continues.')] = None,
+        help='Folder that caches episodes, so that an interrupted run can continue.')] = None,
     bf16: Annotated[bool, typer.Option(
-        help='Half precision where it is safe: half the time, and means that differ by less than '
+        help='Mixed precision, bfloat16: half the time; means differ by less than '
              '0.0001.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
 ) -> None:
     """
-    Measure IoU view by view for each policy, with 95 % intervals over objects, starts and seeds.
+    Measure the IoU of a model after each view, for each policy, with 95 % intervals.
 
-    Also: the area under the IoU curve, both entropies, the rotation travelled and, with the
-    oracle, the fraction of the gap between random and oracle that a policy closes. --against and
-    --paired test whether one is better than another. Objects that cannot be read are listed.
+    The intervals are over objects, starts and seeds. Also measured: the area under the IoU curve,
+    both entropies, the rotation travelled and, with the oracle, the fraction of the gap between
+    random and oracle that a policy closes. --against and --paired compare models or policies
+    episode by episode. Objects that cannot be read are listed.
 
     Example: active-recon evaluate data/test --model runs/new/weights.safetensors
     --against runs/old/weights.safetensors --policy farthest --rows both.csv
@@ -81,11 +85,12 @@ def evaluate(
     import torch
 
     if training and validation is None:
-        raise ConfigError('--training without --validation, on which the threshold of the mean '
-                          'shape is chosen: give both')
+        raise ConfigError('--training: no validation objects: expected --validation too, on which '
+                          'the threshold of the mean shape is chosen, got none')
     named = policy.split(',') if policy else []
     if paired and len(named) != 2:
-        raise ConfigError(f'--paired: {len(named)} policies are named: name two by --policy')
+        raise ConfigError('--paired: wrong number of policies: expected two in --policy, got '
+                          f'{len(named)}')
     torch.set_num_threads(threads)
 
     def measure(weights: Path) -> _Measured:
@@ -94,8 +99,8 @@ def evaluate(
         held_out = read_objects([data], 'objects', bundle.reconstruction.spec, split_file, 'test')
         shown = held_out.azimuths.shape[1]
         if max(views, starts) > shown:
-            typer.echo(f'objects of {shown} views: {min(views, shown)} views from '
-                       f'{min(starts, shown)} starts are measured', err=True)
+            typer.echo(f'views per object: {shown}; measured views: {min(views, shown)}; starts: '
+                       f'{min(starts, shown)}', err=True)
         count = min(views, shown)
         every = contenders(named or contender_names(bool(attentions), oracle=False), attentions,
                            count, seeds, seed, bundle.model)
@@ -111,7 +116,7 @@ def evaluate(
         'model': own.bundle.model, 'weights': weights_hash(own.weights),
         'threshold': trial.threshold, 'objects': len(trial.views), 'episodes': len(trial.objects),
         'unreadable': list(trial.views.unreadable), **compare(trial, own.runs)}
-    _tell_policies(result)
+    _print_policies(result)
     if other is not None:
         require_same_episodes(trial, other.trial)
         result['against'] = {
@@ -119,11 +124,11 @@ def evaluate(
             'above': {name: between(runs, other.runs[name], trial.objects)
                       for name, runs in own.runs.items() if name in other.runs}}
         for name, figures in result['against']['above'].items():
-            typer.echo(f'{name}, above {against}: {_difference(figures)}')
+            typer.echo(f'{name}, difference to {against}: {_difference(figures)}')
     if paired:
         first, second = named
         result['paired'] = between(own.runs[first], own.runs[second], trial.objects)
-        typer.echo(f'{first} above {second}: {_difference(result["paired"])}')
+        typer.echo(f'{first} minus {second}: {_difference(result["paired"])}')
     if rows:
         models = {str(each.weights): (each.trial, each.runs) for each in (own, other) if each}
         write_rows(rows, models)
@@ -148,14 +153,14 @@ class _Measured:
 
 
 def _studies(own: _Measured, result: dict[str, Any], yaw: bool, latent: bool) -> None:
-    """Measure and print the studies that were asked for beside the policies."""
+    """Measure and print the optional studies."""
     from active_recon.evaluation.measure import iou_by_yaw, latent_swap_ablation
     from active_recon.evaluation.metrics import episodes
     from active_recon.policies import learned_policy
     from active_recon.runtimes.torch import TorchPolicyRuntime
 
     trial, attention = own.trial, own.bundle.attention
-    # Few starts are enough for what is no comparison of policies
+    # These studies do not compare policies, so few starts are enough
     starts = len(trial.objects) // len(trial.views)
     objects, first = episodes(trial.views, min(starts, 4), trial.identity['seed'])
     if yaw:
@@ -165,8 +170,8 @@ def _studies(own: _Measured, result: dict[str, Any], yaw: bool, latent: bool) ->
         typer.echo("IoU by the front's yaw: " + ', '.join(
             f'{angle} deg {values["mean"]:.3f}' for angle, values in result['yaw'].items()))
     if latent and (attention is None or len(trial.views) < 2 or trial.count < 2):
-        raise ConfigError('--latent-study: needs a model with an attention policy, two objects '
-                          'and two views')
+        raise ConfigError('--latent-study: cannot swap latents: expected a model with an '
+                          'attention policy, two objects or more and two views or more')
     if latent and attention is not None:
         with progress_bar("other objects' latents", 2 * len(objects)) as advance:
             swap = latent_swap_ablation(
@@ -178,13 +183,13 @@ def _studies(own: _Measured, result: dict[str, Any], yaw: bool, latent: bool) ->
                    f'deg, area under IoU falls by {_spread(swap.auc_loss, 4)}')
 
 
-def _tell_policies(result: dict[str, Any]) -> None:
+def _print_policies(result: dict[str, Any]) -> None:
     for name, figures in result['policies'].items():
         above = figures['auc_above'].get('random')
         share = figures.get('gap_closed')
         typer.echo(_line(name, figures['iou']) + f'   area {figures["auc"]["mean"]:.4f}'
-                   + (f', above random {_spread(above, 4)}' if above else '')
-                   + (f', share of the gap {_spread(share, 2)}' if share else ''))
+                   + (f', minus random {_spread(above, 4)}' if above else '')
+                   + (f', fraction of the gap {_spread(share, 2)}' if share else ''))
     if 'headroom_sentence' in result:
         typer.echo(result['headroom_sentence'])
 

@@ -1,4 +1,4 @@
-"""The command `active-recon`; subcommands import what they need when they run."""
+"""The command `active-recon`; subcommands import their modules when they run."""
 
 from collections.abc import Callable
 import inspect

@@ -1,4 +1,4 @@
-"""`active-recon render` and `active-recon dataset build`: meshes and shapes to datasets."""
+"""`active-recon render` and `active-recon dataset build`: make datasets of meshes or shapes."""
 
 import os
 from pathlib import Path
@@ -14,19 +14,19 @@ if TYPE_CHECKING:
 
 Workers = Annotated[int, typer.Option(min=1, help='Processes; default: one for each core.')]
 Samples = Annotated[int, typer.Option(
-    min=1, max=4, help='Rays in each pixel, N x N: 1 is flat and fast, 2 smooths the edges.')]
+    min=1, max=4, help='N x N rays per pixel: 1 is fastest, 2 smooths the edges.')]
 
 Fine = Annotated[bool, typer.Option(
-    '--fine', help='Voxelise with 64 cells a side too; what is there gets just these.')]
+    '--fine', help='Also voxelise at 64 cells a side; finished objects get only these voxels.')]
 Cameras = Annotated[str, typer.Option(
-    help="'turntable' (24 azimuths, elevation 30 degrees) or 'any': drawn for each object, "
-         'elevation -10 to 85 degrees, any distance and lens, images of 160 pixels.')]
+    help="'turntable' (24 azimuths, elevation 30 degrees) or 'any' (random for each object: "
+         'elevation -10 to 85 degrees, any distance and lens; images of 160 pixels).')]
 Views = Annotated[int, typer.Option(
-    min=1, max=99, help="Views of each object, where its cameras are drawn ('any').")]
+    min=1, max=99, help='Number of views of each object, with --cameras any.')]
 Turned = Annotated[bool, typer.Option(
-    '--turned', help='Every other object stands at any yaw, not with its front at +x.')]
+    '--turned', help='Give half of the objects a random yaw, instead of their front at +x.')]
 
-dataset = typer.Typer(help='Datasets that nothing needs to be downloaded for.',
+dataset = typer.Typer(help='Datasets of parametric shapes, made without any download.',
                       no_args_is_help=True)
 
 _CORES = os.cpu_count() or 1
@@ -37,17 +37,18 @@ _SPLIT_SEEDS = {'train': 0, 'val': _SEEDS, 'test': 2 * _SEEDS, 'unseen': 3 * _SE
 def render(
     meshes: Annotated[Path, typer.Argument(
         help='A mesh file, a folder of <category>/<mesh>, or a manifest (CSV).')],
-    out: Annotated[Path, typer.Argument(help='Where the dataset goes.')],
+    out: Annotated[Path, typer.Argument(help='Folder of the dataset.')],
     up: Annotated[str | None, typer.Option(
-        help='The axis that points up in the files: x, y, z, or with a sign. glTF and GLB are y '
-             'by their standard, others are taken as z.')] = None,
+        help='Axis of the mesh files that points up: x, y, z, with or without a sign. Default: '
+             'y for glTF and GLB, z for others.')] = None,
     front: Annotated[str | None, typer.Option(
-        help="The axis of the objects' front; glTF and GLB: z, others: x.")] = None,
+        help="Axis of the mesh files that points to the object's front. Default: z for glTF and "
+             'GLB, x for others.')] = None,
     split: Annotated[str | None, typer.Option(
-        help='Of a manifest: only the rows of this split.')] = None,
+        help='With a manifest: only the rows of this split.')] = None,
     explicit_licence: Annotated[bool, typer.Option(
-        help='Of a manifest: only rows whose licence is explicit for the models and CC0, CC-BY or '
-             'public domain.')] = False,
+        help='With a manifest: only rows whose licence is explicit for the models and is CC0, '
+             'CC-BY or public domain.')] = False,
     samples: Samples = 2,
     fine: Fine = False,
     cameras: Cameras = 'turntable',
@@ -56,10 +57,10 @@ def render(
     workers: Workers = _CORES,
 ) -> None:
     """
-    Render meshes from their cameras and voxelise them, into R2N2's layout.
+    Render and voxelise meshes, as a dataset in R2N2's layout.
 
-    Any format that trimesh reads will do. A run that was broken off goes on where it stopped: what
-    is there is not made again. What could not be read is listed at the end, with the reason.
+    Reads every format of trimesh. An interrupted run continues where it stopped: finished objects
+    are kept. Meshes that cannot be used are listed at the end, with the reason.
     """
     from active_recon.datasets.drawn_cameras import Viewing
     from active_recon.datasets.making import mesh_jobs
@@ -68,8 +69,8 @@ def render(
     viewing = Viewing(cameras, views, turned)
     if meshes.suffix == '.csv':
         if up or front:
-            raise ConfigError('--up or --front with a manifest: expected neither, since it tells '
-                              'them for each model')
+            raise ConfigError('--up or --front with a manifest: expected neither, since the '
+                              'manifest has the axes of each model')
         rows = [row for row in read_manifest(meshes)
                 if split in (None, row.split)
                 and (row.is_open or not explicit_licence)]
@@ -86,13 +87,13 @@ def render(
 def build(
     out: Annotated[Path, typer.Argument(help='Folder for train/, val/, test/ and unseen/.')],
     train: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Training objects in each category.')] = 400,
+        min=0, max=_SEEDS, help='Training objects per category.')] = 400,
     val: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Validation objects in each category.')] = 50,
+        min=0, max=_SEEDS, help='Validation objects per category.')] = 50,
     test: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Test objects in each category.')] = 100,
+        min=0, max=_SEEDS, help='Test objects per category.')] = 100,
     unseen: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Objects in each category that is never trained on.')] = 100,
+        min=0, max=_SEEDS, help='Objects per held-out category.')] = 100,
     category: Annotated[list[str] | None, typer.Option(
         help='Only these categories (may be given several times).')] = None,
     samples: Samples = 2,
@@ -103,11 +104,11 @@ def build(
     workers: Workers = _CORES,
 ) -> None:
     """
-    Make a dataset of parametric shapes, so that nothing needs a download.
+    Make a dataset of parametric shapes.
 
-    Each object is drawn from a seed of its own, so the same numbers give the same objects; the
-    splits' seeds never meet. The categories that are never trained on stand apart, in unseen/.
-    The hash of the generators' code is written beside. A run that was broken off goes on where it
+    Each object has its own seed, so the same options give the same objects, and no object is in
+    two splits. The held-out categories, which are never trained on, are in unseen/. The hash of
+    the generators' code is written to generators.sha256. An interrupted run continues where it
     stopped.
     """
     from active_recon.datasets.drawn_cameras import Viewing
@@ -122,8 +123,8 @@ def build(
                                   out / split)]
     made_by, code = out / 'generators.sha256', generators_hash()
     if made_by.is_file() and made_by.read_text().strip() != code:
-        raise DataError(f'{out}: shapes of other generators: expected those of the present ones '
-                        f'({code[:12]}), got what others made ({made_by}); choose another folder')
+        raise DataError(f'{out}: shapes of other generators: expected those of the present code '
+                        f'({code[:12]}), got another hash in {made_by}; choose another folder')
     out.mkdir(parents=True, exist_ok=True)
     made_by.write_text(code + '\n')
     _make('making', jobs, samples, workers, fine, Viewing(cameras, views, turned))
@@ -134,16 +135,16 @@ def _make(title: str, jobs: 'list[Job]', samples: int, workers: int, fine: bool,
     from active_recon.datasets.making import make_dataset
 
     if not jobs:
-        raise DataError('no objects to make: expected some, but what was asked for leaves none')
-    refused = []
+        raise DataError('no objects to make: expected at least one, got none with these options')
+    rejected = []
     with progress_bar(title, len(jobs)) as advance:
         for outcome in make_dataset(jobs, samples, workers, fine, viewing):
             if outcome.refusal:
-                refused.append(outcome)
-            advance(1, f'{len(refused)} refused' if refused else '')
-    typer.echo(f'{len(jobs) - len(refused)} objects of {len(jobs)} are there')
-    for outcome in refused:
-        typer.echo(f'refused: {outcome.folder.category}/{outcome.folder.name}: '
+                rejected.append(outcome)
+            advance(1, f'{len(rejected)} rejected' if rejected else '')
+    typer.echo(f'{len(jobs) - len(rejected)} of {len(jobs)} objects made')
+    for outcome in rejected:
+        typer.echo(f'rejected: {outcome.folder.category}/{outcome.folder.name}: '
                    f'{outcome.refusal}', err=True)
-    if refused and len(refused) == len(jobs):
+    if rejected and len(rejected) == len(jobs):
         raise typer.Exit(2)

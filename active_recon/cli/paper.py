@@ -1,4 +1,4 @@
-"""`active-recon paper`: the paper's tables and figures, measured here."""
+"""`active-recon paper`: reproduces the paper's tables and figures."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,54 +15,57 @@ def paper(
         metavar='PART...', help='table1 to table5, fig5 to fig11, policies, document, systems, '
                                 'or all.')],
     data: Annotated[Path, typer.Option(
-        help='Folder with train, val, test and unseen (`active-recon dataset build`); real_val, '
-             'real_cc0 and real_unseen in it, as `active-recon render` makes them, get rows of '
-             'their own.')] = Path('data'),
+        help='Folder with train, val, test and unseen (made by `active-recon dataset build`). If '
+             'it also has real_val, real_cc0 or real_unseen (made by `active-recon render`), '
+             'they get their own rows.')] = Path('data'),
     models: Annotated[Path, typer.Option(
-        help='Where the compared systems are trained, and what was measured of them is kept.',
+        help='Folder of the trainings of the compared systems, and of cached measurements.',
         )] = Path('runs/paper'),
     out: Annotated[Path, typer.Option(
-        help='Where Markdown, JSON and PNG go.')] = Path('docs/results'),
+        help='Folder for the Markdown, JSON and PNG files.')] = Path('docs/results'),
     model: Annotated[str | None, typer.Option(
-        help="Weights (or the name of a model that ships) of the paper's network where nothing is "
-             'compared: tables 4 and 5, figures 9 to 11, policies. Default: those that ship.',
+        help="Weights (or the name of a model that ships) of the paper's network for the parts "
+             'without a comparison: tables 4 and 5, figures 9 to 11, policies. Default: the '
+             'weights that ship.',
         )] = None,
     pascal3d: Annotated[Path | None, typer.Option(
-        help="PASCAL3D+'s folder, for figure 7; without it real models stand in.")] = None,
+        help='Folder of PASCAL3D+, for figure 7; default: real models instead.')] = None,
     training: Annotated[list[str] | None, typer.Option(
-        help='Folder of DATA that all systems learn from (may be given several times); default: '
-             'train.')] = None,
+        help='Folder in DATA that all systems are trained on (may be given several times); '
+             'default: train.')] = None,
     samples: Annotated[int, typer.Option(
-        min=1, help='Views that each system sees in training.')] = 75_000,
+        min=1, help='Number of views that each system is trained on.')] = 75_000,
     starts: Annotated[int, typer.Option(
-        min=1, max=24, help='First views of each object; 24 are all.')] = 4,
+        min=1, max=24, help='Number of first views measured for each object, out of 24.')] = 4,
     policy_starts: Annotated[int, typer.Option(
         min=1, max=24, help='The same, where policies are compared.')] = 24,
     policy_seeds: Annotated[int, typer.Option(
-        min=1, help='Trainings of the view policy, and draws of the random one.')] = 5,
+        min=1, help='Number of trainings of the view policy and of runs of the policy '
+                    'random.')] = 5,
     subset_objects: Annotated[int, typer.Option(
-        min=0, help='Objects of which every sequence of three views is tried, 12,720 passes '
-                    'each; 0 leaves that out.')] = 60,
+        min=0, help='Number of objects on which every sequence of three views is measured, '
+                    '12,720 passes each; 0 skips this.')] = 60,
     seed: Annotated[int, typer.Option(
-        help='Of the trainings, of the starts, and of the random views.')] = 0,
+        help='Seed of the trainings, the starts and the random views.')] = 0,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     device: Annotated[str, typer.Option(
-        help='Where IoU is measured, cpu or cuda. Trainings take a graphics card where there is '
-             'one; table 4 and figure 10 always time a CPU.')] = 'cpu',
+        help='Device on which IoU is measured, cpu or cuda. Trainings use a GPU if there is one; '
+             'the times in table 4 and figure 10 are always of a CPU.')] = 'cpu',
     again: Annotated[bool, typer.Option(
-        help='Make the parts again, though what they are made from has not changed; what was '
-             'measured of a network is taken from MODELS/measured.')] = False,
+        help='Make the parts again even if their inputs have not changed. Cached measurements in '
+             'MODELS/measured are still used.')] = False,
 ) -> None:
     """
-    Measure the paper's tables and figures; write each as Markdown, JSON and PNG.
+    Reproduce the paper's tables and figures; write each as Markdown, JSON and PNG.
 
-    Every system that a part compares is trained first where its weights are missing (`systems`
-    does just that): on the same objects, on as many views. Weights that ship are taken instead of
-    a training if they saw about as many. A run that was cut off goes on where it stopped, and a
-    part whose data, weights and settings have not changed is not made again. `document` puts what
-    is there together in OUT/README.md, with what follows from it; `all` makes everything.
+    Systems that a part compares are trained first if their weights are missing (`systems` does
+    only that), on the same objects and the same number of views. Weights that ship are used
+    instead if they were trained on about as many views. An interrupted run continues where it
+    stopped, and a part whose data, weights and settings have not changed is not made again.
+    `document` combines the existing parts in OUT/README.md, with conclusions; `all` makes
+    everything.
 
-    Example: `active-recon paper table1 --samples 20000 --out /tmp/results`
+    Example: active-recon paper table1 --samples 20000 --out /tmp/results
     """
     from active_recon.paper.document import write_document
     from active_recon.paper.parts import PARTS, run_part
@@ -72,10 +75,10 @@ def paper(
 
     known = (*PARTS, DOCUMENT, SYSTEMS, ALL)
     if unknown := [part for part in parts if part not in known]:
-        raise ConfigError(f'no such parts: {", ".join(unknown)}; expected some of '
-                          f'{", ".join(known)}')
+        raise ConfigError(f'PART: unknown: expected some of {", ".join(known)}, got '
+                          f'{", ".join(unknown)}')
     if device != 'cpu' and not (device == 'cuda' and torch.cuda.is_available()):
-        raise ConfigError('--device: no such device: expected cpu, or cuda where there is a card, '
+        raise ConfigError('--device: no such device: expected cpu, or cuda where there is a GPU, '
                           f'got {device}')
     torch.set_num_threads(threads)
     study = Study(data, models, out, model, pascal3d, tuple(training or ('train',)), samples,

@@ -1,4 +1,4 @@
-"""The option that names a policy: one of the registry."""
+"""The option for a policy, with the names in the registry as allowed values."""
 
 from typing import Any
 
@@ -13,5 +13,5 @@ def _one_of_them(name: str | None) -> str | None:
 
 
 def policy_option(meaning: str) -> Any:
-    """Return the option of a policy's name, whose help says what it means and lists them all."""
+    """Return the option for a policy; its help is `meaning` and the list of allowed names."""
     return typer.Option(callback=_one_of_them, metavar=f'[{"|".join(POLICIES)}]', help=meaning)

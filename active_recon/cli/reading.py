@@ -1,4 +1,4 @@
-"""Reading datasets with a progress bar and a list of what was left out."""
+"""Reading datasets with a progress bar and a list of the objects left out."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,18 +13,20 @@ if TYPE_CHECKING:
     from active_recon.geometry.canonical import NetworkSpec
 
 Split = Annotated[str | None, typer.Option(
-    '--split-file', help="ShapeNet's published split file (JSON), or 'sorted': the sorted ids of "
-                         'each category, the last fifth for the test. Default: whole folders.')]
+    '--split-file', help="ShapeNet's published split file (JSON), or 'sorted': cut the sorted ids "
+                         'of each category, 70 % train, 10 % val, 20 % test. Default: whole '
+                         'folders.')]
 
 
 def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
                  split: str | None = None, part: str = '', at_once: bool = True) -> 'ViewSet':
     """
-    Read the objects of datasets into memory, in the sizes that a network needs.
+    Read the objects of datasets into memory, at the sizes that a network needs.
 
-    Unless `at_once`, images of any cameras are read when they are first used. With a `split`,
-    only the objects of its `part` (train, val or test) are read. A single root may be
-    PASCAL3D+'s folder, whose photographs are objects of one view each.
+    Without `at_once`, images of a network that needs no front are read when they are first used.
+    With a `split`, only the objects of its `part` (train, val or test) are read. A single root
+    may be the folder of PASCAL3D+, whose photographs are objects of one view each. Raises
+    DataError where no object can be read, ConfigError where the network cannot use photographs.
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.splits import list_split
@@ -49,8 +51,8 @@ def _read_photographs(root: Path, title: str, spec: 'NetworkSpec') -> 'ViewSet':
     from active_recon.datasets.photographs import read_photographs
 
     if not spec.needs_front:
-        raise ConfigError(f'{root}: these photographs have no cameras: expected a network without '
-                          'camera input, such as --model 2d3d-attention')
+        raise ConfigError(f'{root}: photographs without camera poses: expected a network without '
+                          'camera input, for example --model 2d3d-attention')
     photographs, left_out = list_photographs(root)
     with progress_bar(f'reading {title}', len(photographs)) as advance:
         views = read_photographs(photographs, left_out, lambda: advance(1, ''),
@@ -61,8 +63,8 @@ def _read_photographs(root: Path, title: str, spec: 'NetworkSpec') -> 'ViewSet':
 
 def _print_left_out(title: str, count: int, missing: Sequence[str],
                    unreadable: Sequence[str]) -> None:
-    for refusal in (*missing, *unreadable):
-        typer.echo(f'left out: {refusal}', err=True)
+    for reason in (*missing, *unreadable):
+        typer.echo(f'left out: {reason}', err=True)
     if missing or unreadable:
         typer.echo(f'{title}: {count} read, {len(missing)} missing, {len(unreadable)} left out',
                    err=True)

@@ -11,19 +11,20 @@ def record_sweep(
         help='bed, car, chair, sofa, table, or the path of a mesh file.')],
     out: Annotated[Path, typer.Option(help='The folder of the bag, which must not exist yet.')],
     object_size: Annotated[float, typer.Option(
-        min=0.001, max=1000.0, help='Side of the voxel grid, m.')] = 1.0,
+        min=0.001, max=1000.0, help='Side of the voxel grid, metres.')] = 1.0,
     background: Annotated[float, typer.Option(
-        min=0.0, max=255.0, help='Grey behind the object.')] = 255.0,
+        min=0.0, max=255.0, help='Grey value of the background.')] = 255.0,
     up: Annotated[str | None, typer.Option(
-        help="The mesh file's axis that is up: x, y, z, or with a sign. Default: its "
-             "format's.")] = None,
+        help='Axis of the mesh file that points up: x, y, z, with or without a sign. Default: '
+             'y for glTF and GLB, z for others.')] = None,
     front: Annotated[str | None, typer.Option(
-        help="The mesh file's axis of the front; likewise.")] = None,
+        help="Axis of the mesh file that points to the object's front. Default: z for glTF and "
+             'GLB, x for others.')] = None,
 ) -> None:
     """
     Record all 24 azimuths of an object on a simulated turntable, without ROS.
 
-    Such a bag can be replayed with any policy: it has every view that one may ask for.
+    Such a bag can be replayed with any policy, because it has every view that a policy can choose.
 
     Example: active-recon record-sweep chair --out bags/chair-sweep
     """

@@ -31,34 +31,35 @@ def replay(
     topics: 'Topics',
     scene: 'Scene',
     model: Annotated[str | None, typer.Option(
-        help='Another model: its name, or a weights file. The views stay as recorded.',
+        help='Replay with another model: its name, or a weights file. The views stay as recorded.',
     )] = None,
     policy: Annotated[str | None, policy_option(
-        'Another policy. It chooses among the views of the bag; an error, if it asks for one '
-        'that was never taken.')] = None,
+        'Replay with another policy. It can only choose views that are in the bag; any other '
+        'is an error.')] = None,
     threshold: Annotated[float | None, typer.Option(
-        help='Another occupancy threshold of occupied cells.')] = None,
+        help='Replay with another occupancy threshold.')] = None,
     out: Annotated[Path | None, typer.Option(
-        help='The folder of the new bag, with one of the three above; default: next to BAG, with '
-             'the overrides in its name.')] = None,
+        help='Folder of the new bag, with --model, --policy or --threshold; default: next to BAG, '
+             'with these options in its name.')] = None,
     weights: Annotated[Path | None, typer.Option(
-        help='The weights file that BAG was recorded with, if it does not ship any more.',
+        help='The weights file that BAG was recorded with, if those weights do not ship.',
     )] = None,
     mesh: Annotated[Path | None, typer.Option(
-        help='Write the shape after the last view as PLY, OBJ or STL, in metres; one file for '
-             'each episode, numbered if there are several.')] = None,
+        help='Write the mesh after the last view to a PLY, OBJ or STL file, in metres; several '
+             'episodes get numbered files.')] = None,
     voxels: Annotated[Path | None, typer.Option(
-        help='The same as voxels: binvox, or npz with probabilities.')] = None,
+        help='Write the voxels after the last view to a binvox file, or to an npz file with '
+             'probabilities; several episodes get numbered files.')] = None,
     threads: Annotated[int | None, typer.Option(
         min=1, help='CPU threads of the network; default: as recorded.')] = None,
 ) -> None:
     """
     Replay a bag and compare it with the recording, or replay it with another model or policy.
 
-    The images go through the network and the policy again, in the order of their stamps, without
-    ROS and without a clock. The same machine and versions give the same bits, another machine the
-    same values within a tolerance; the output says which. Exit code 1: neither. With --model,
-    --policy or --threshold nothing is compared, and a new bag is written next to the old one.
+    Network and policy process the images again in the order of their stamps, without ROS and
+    without a clock. With the same machine and versions the results are bit-identical; on another
+    machine they agree within a tolerance. The output says which; if they differ, the exit code is
+    1. With --model, --policy or --threshold nothing is compared, and a new bag is written.
 
     Example: active-recon replay bags/2026-11-21_14-35-54
 
@@ -74,8 +75,8 @@ def replay(
 
     overrides = Overrides(find_weights(model) if model else None, policy, threshold)
     if out and overrides == Overrides():
-        raise ConfigError('--out without --model, --policy or --threshold: a bag is written '
-                          'with one of them only')
+        raise ConfigError('--out: no bag to write: expected it with --model, --policy or '
+                          '--threshold, got none of them')
     files = ShapeFiles(mesh, voxels)
     began = time.monotonic()
     run = read_run(path, topics, scene, bag_progress(path))

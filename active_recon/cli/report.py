@@ -1,4 +1,4 @@
-"""`active-recon report`: writes recorded runs as one self-contained page."""
+"""`active-recon report`: writes recorded runs to one self-contained HTML page."""
 
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
@@ -24,24 +24,25 @@ def report(
     topics: 'Topics',
     scene: 'Scene',
     out: Annotated[Path | None, typer.Option(
-        help='File of the page; default: report.html in the first bag.')] = None,
+        help='HTML file; default: report.html in the first bag.')] = None,
     truth: Annotated[list[Path] | None, typer.Option(
-        help="The object's true shape for the IoU: a mesh in metres in the object's frame, a "
-             '.binvox, or bed, car, chair, sofa, table; once for all bags, or once for each in '
-             'their order. Not needed for the demo.')] = None,
+        help='True shape of the object, for the IoU: a mesh file in metres in the object frame, '
+             'a .binvox file, or bed, car, chair, sofa, table; one for all bags, or one for each '
+             'bag in the same order. Not needed for bags of the demo.')] = None,
     fit: Annotated[bool, typer.Option(
-        '--fit', help="Centre the true shape, scale its longest side to the cube's and rotate it "
-                      'by the yaw of the run.')] = False,
+        '--fit', help='Centre the true shape, scale its longest side to that of the cube, and '
+                      'rotate it by the object yaw of the run.')] = False,
     up: Annotated[str | None, typer.Option(
-        help="The true mesh's axis that is up: x, y, z, or with a sign. Default: its "
-             "format's.")] = None,
+        help="Axis of the true mesh's file that points up: x, y, z, with or without a sign. "
+             'Default: y for glTF and GLB, z for others.')] = None,
     front: Annotated[str | None, typer.Option(
-        help="The true mesh's axis of +x; likewise.")] = None,
+        help="Axis of the true mesh's file that points to the object's front. Default: z for "
+             'glTF and GLB, x for others.')] = None,
     episode: Annotated[int | None, typer.Option(
         min=1, help='Only this episode of each bag, counted from 1; default: all with '
                     'views.')] = None,
     model: Annotated[str | None, typer.Option(
-        help='The model for bags without reconstructions: its name, or a .safetensors file.',
+        help='Model for bags without reconstructions: its name, or a .safetensors file.',
     )] = None,
 ) -> None:
     """
@@ -80,7 +81,7 @@ def report(
 
 def _subjects(run: 'RecordedRun', scene: 'Scene', truth: 'TruthFile | None', episode: int | None,
               model: str | None, before: int) -> list['Subject']:
-    """Return the episodes of a run that the page shows, their letters after `before` others."""
+    """Return the episodes of a run for the page; their letters follow those of `before` others."""
     from itertools import islice
 
     from active_recon.bags.runs.rebuilt import rebuilt

@@ -17,26 +17,28 @@ VOXEL_FORMATS = ('binvox', 'npz')
 @dataclass(frozen=True)
 class ShapeFiles:
     """
-    Where shapes go; None: nowhere. Several get a number each, before the suffix.
+    The files for shapes; None: no file. Of several shapes, each file name gets a number.
 
-    A binvox has the cells above the threshold; an npz has `occupancy` (X, Y, Z) in [0, 1], the
-    cube's side `size` in metres, and the `threshold`.
+    A binvox file has the cells above the threshold; an npz file has `occupancy` (X, Y, Z) in
+    [0, 1], the cube's side `size` in metres, and the `threshold`. Raises ConfigError on any other
+    suffix.
     """
 
     mesh: Path | None
     voxels: Path | None
 
     def __post_init__(self) -> None:
-        """Refuse suffixes that nothing is written for, before any work is done."""
+        """Reject unknown suffixes, before any work is done."""
         from active_recon.volumes.voxels import MESH_FORMATS
 
         for option, path, formats in (('--mesh', self.mesh, MESH_FORMATS),
                                       ('--voxels', self.voxels, VOXEL_FORMATS)):
             if path is not None and path.suffix.lower().lstrip('.') not in formats:
-                raise ConfigError(f'{option}: {path} has no suffix out of {", ".join(formats)}')
+                raise ConfigError(f'{option}: unknown suffix: expected {", ".join(formats)}, got '
+                                  f'{path}')
 
     def write(self, grids: Sequence['VoxelGrid'], threshold: float) -> None:
-        """Write the shapes, and tell their files; raises DataError where there is no surface."""
+        """Write the shapes and print the paths; raises DataError where there is no surface."""
         from active_recon.volumes.voxels import write_binvox, write_mesh
         import numpy as np
 

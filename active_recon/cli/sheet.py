@@ -1,4 +1,4 @@
-"""`active-recon sheet`: what a category, or a training on it, looks like, on one picture."""
+"""`active-recon sheet`: an image of many objects of a category, or of training images."""
 
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
@@ -14,26 +14,27 @@ _TRAINING_VIEWS = 8
 
 
 def sheet(
-    out: Annotated[Path, typer.Argument(help='Where the picture goes (PNG).')],
+    out: Annotated[Path, typer.Argument(help='PNG file to write.')],
     category: Annotated[list[str] | None, typer.Option(
-        help='A parametric category (may be given several times); default: all.')] = None,
+        help='Parametric category to show (may be given several times); default: all.')] = None,
     meshes: Annotated[Path | None, typer.Option(
-        help='A folder of mesh files to draw instead.')] = None,
+        help='Folder of mesh files to show instead.')] = None,
     training: Annotated[Path | None, typer.Option(
-        help="A dataset of which to draw training images instead, a row for each of a batch's "
-             'sequences of views.')] = None,
+        help='Dataset whose augmented training images are shown instead: one sequence of views '
+             'in each row.')] = None,
     count: Annotated[int, typer.Option(
-        min=1, help='Objects of each category; with --training, rows.')] = 8,
-    azimuth_deg: Annotated[float, typer.Option(help='Seen from; 0 is the front.')] = 35.0,
+        min=1, help='Number of objects of each category; with --training, of rows.')] = 8,
+    azimuth_deg: Annotated[float, typer.Option(
+        help='Azimuth of the camera; 0 is the front.')] = 35.0,
 ) -> None:
-    """Draw many objects on one picture, to look at and to compare with real ones."""
+    """Draw many objects in one image, to inspect them and compare them with real ones."""
     import cv2
 
     picture = _objects(category, meshes, count, azimuth_deg) if training is None else (
         _training(training, count))
     out.parent.mkdir(parents=True, exist_ok=True)
     if not cv2.imwrite(str(out), picture[..., ::-1]):
-        raise DataError(f'{out}: cannot be written')
+        raise DataError(f'{out}: cannot be written: expected the path of a PNG file')
     typer.echo(f'wrote {out}')
 
 
@@ -53,7 +54,8 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
         objects = [load_mesh(path) for path in sorted(meshes.rglob('*'))
                    if path.suffix.lower() in MESH_SUFFIXES]
     if not objects:
-        raise DataError(f'{meshes}: no mesh files there')
+        raise DataError(f'{meshes}: no mesh files: expected some '
+                        f'({", ".join(sorted(MESH_SUFFIXES))}), found none')
     return contact_sheet(objects, azimuth=math.radians(azimuth_deg))
 
 

@@ -1,4 +1,4 @@
-"""`active-recon study`: what networks are worth on posed views, beside each other."""
+"""`active-recon study`: compares networks on the same posed views."""
 
 from collections.abc import Mapping
 import json
@@ -16,64 +16,65 @@ _SHIPPED = ('lifting', 'carving', '2d3d-attention')
 
 def study(
     data: Annotated[list[Path] | None, typer.Argument(
-        help="Folders of objects in R2N2's layout, each measured by itself; such as "
-             '`active-recon render` and `dataset build` make, or R2N2 itself.')] = None,
+        help="Folders of objects in R2N2's layout (for example made by `active-recon render` or "
+             '`dataset build`); each is measured separately.')] = None,
     models: Annotated[str | None, typer.Option(
         help='Networks, separated by commas: models that ship, .safetensors files, or NAME=FILE. '
-             'How far the first is ahead of each other is told, object by object. Default: '
-             f'{",".join(_SHIPPED)}, as far as they ship.')] = None,
+             'The first is compared with each of the others, object by object. Default: '
+             f'{",".join(_SHIPPED)}.')] = None,
     photos: Annotated[Path | None, typer.Option(
-        help="A folder of calibrated photographs in Middlebury's format: *_par.txt with the "
-             'cameras, README.txt with the two corners of the box; masks/ with an image for each '
-             'where the background is not black. They are held against the hull of all '
-             'silhouettes.')] = None,
+        help="Folder of calibrated photographs in Middlebury's format: *_par.txt with the "
+             'cameras, README.txt with the two corners of the bounding box, and masks/ with a '
+             'mask for each image if the background is not black. The reference is the visual '
+             'hull of all masks.')] = None,
     box: Annotated[str | None, typer.Option(
-        help="The photographed object's least and greatest x, y, z, six numbers in quotes, where "
-             'the folder does not tell them.')] = None,
+        help='Bounding box of the photographed object, if the folder has none: minimum x, y, z '
+             'and maximum x, y, z, six numbers in quotes.')] = None,
     up: Annotated[str, typer.Option(
-        help="The axis of the photographs' frame that points up: x, y, z, or with a sign.")] = 'y',
+        help="Axis of the photographs' frame that points up: x, y, z, with or without a "
+             'sign.')] = 'y',
     counts: Annotated[str, typer.Option(
         help='Numbers of views after which the reconstruction is measured.')] = '1,2,3,5,8,12,24',
     surfaces: Annotated[str, typer.Option(
-        help="Those of them after which meshes are compared with the truth's: F-scores, Chamfer "
-             "distance, normals. '' for none.")] = '1,5',
+        help='Numbers of views, out of --counts, after which the mesh is compared with the true '
+             "one: F-scores, Chamfer distance, normals. '' skips this.")] = '1,5',
     validation: Annotated[Path | None, typer.Option(
         help='Folder of other objects, on which thresholds and temperatures are chosen; default: '
-             "the threshold of each model's card, and no temperature.")] = None,
+             "the threshold in each model's card, and no temperature.")] = None,
     training: Annotated[list[Path] | None, typer.Option(
-        help='Training folders: adds the nearest training image, an answer that knows nothing of '
-             'detail (may be given several times).')] = None,
+        help='Training folder: also measure the nearest training image as a baseline (may be '
+             'given several times).')] = None,
     objects: Annotated[int | None, typer.Option(
-        min=2, help='At most so many objects of a folder, drawn; default: all.')] = None,
+        min=2, help='Largest number of objects of a folder, drawn at random; default: '
+                    'all.')] = None,
     category: Annotated[str | None, typer.Option(
-        help="Objects of these categories alone, as a pattern: 'thing_*', or '!thing_*' for all "
-             'others.')] = None,
+        help="Only objects of categories that match this pattern: 'thing_*', or '!thing_*' for "
+             'all others.')] = None,
     disturbed_views: Annotated[int, typer.Option(
-        min=0, help='Views of what is disturbed: frames at 24 yaws, poses off by 2 degrees, a '
-                    'third of the cube outside one image, one band of elevations alone. 0 leaves '
-                    'that out.')] = 5,
+        min=0, help='Number of views in the robustness tests: rotated object frames, poses off '
+                    'by 2 degrees, a third of the cube outside of an image, a single band of '
+                    'elevations. 0 skips them.')] = 5,
     disturbed_objects: Annotated[int, typer.Option(
-        min=1, help='Objects of which views are disturbed, at most.')] = 48,
+        min=1, help='Largest number of objects in the robustness tests.')] = 48,
     out: Annotated[Path, typer.Option(
-        help='Folder where study.json, study.md and a PNG for each set go.')] = Path('study'),
-    seed: Annotated[int, typer.Option(help='Draws objects, views and disturbances.')] = 0,
+        help='Folder for study.json, study.md and a PNG file for each set.')] = Path('study'),
+    seed: Annotated[int, typer.Option(help='Seed of objects, views and disturbances.')] = 0,
     bf16: Annotated[bool, typer.Option(
-        help='Half precision where it is safe: half the time.')] = True,
+        help='Mixed precision, bfloat16: half the time.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
 ) -> None:
     """
-    Measure networks on the same posed views, by number of views, with 95 % intervals.
+    Compare networks on the same posed views, by number of views, with 95 % intervals.
 
-    IoU at 64 and 32 cells after random and evenly spread views; meshes, thin parts, calibration
-    near the surface, and what a threshold for each object gains; what is lost where views are
-    disturbed; and real photographs. Networks without a front (lifting, carving) take any
-    cameras; those of the paper join in on turntables.
+    Measured are: IoU at 64 and 32 cells after random and evenly spread views; mesh quality, thin
+    parts, calibration near the surface, and the gain of a threshold chosen for each object;
+    robustness to disturbed views; and IoU on real photographs. Networks that need no front
+    (lifting, carving) accept any cameras; those of the paper are measured on turntables only.
 
-    For example:
+    Example: active-recon study data/val --models lifting,carving --out build/val
 
-      active-recon study data/val --models lifting,carving --out build/val
-
-      active-recon study --photos photos/dino_sparse_ring --models new=runs/weights.safetensors
+    Example: active-recon study --photos photos/dino_sparse_ring --models
+    new=runs/weights.safetensors
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.evaluation.posed.entrants import load_entrants
@@ -103,7 +104,7 @@ def study(
                               'sets': []}
     for folder in data or []:
         result['sets'].append(study_set(folder, entrants, plan, extent, library, progress_bar))
-        _write(result, out)  # what is done is kept, should a later folder fail
+        _write(result, out)  # keeps the results if a later folder fails
     if photos is not None:
         result['photographs'] = _photographs(photos, box, up, entrants)
     _write(result, out)

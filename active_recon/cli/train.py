@@ -1,4 +1,4 @@
-"""`active-recon train`: the schemes and stages, with a progress bar, checkpoints and a log."""
+"""`active-recon train`: trains networks and policies, with checkpoints and a log."""
 
 from dataclasses import replace
 import math
@@ -19,17 +19,18 @@ def train(
     data: Annotated[list[Path], typer.Argument(
         help="Folders of training objects in R2N2's layout (see `active-recon dataset build`).")],
     validation: Annotated[Path, typer.Option(
-        help='Folder of validation objects: chooses the threshold, and nothing else does.')],
+        help='Folder of validation objects, on which the threshold is chosen.')],
     split_file: Split = None,
     out: Annotated[Path, typer.Option(
         help='Run folder: checkpoints, TensorBoard log, weights.')] = Path('runs/default'),
     model: Annotated[str, typer.Option(
-        help='A network of the registry: 2d3d-attention, 2d3d, 2d3d-posed, r2n2, ptn, '
-             'ptn-combined, ogn, shape-basis, lifting, carving; one that an installed package '
-             'offers; or one of your own, as my_file.py:Net.')] = '2d3d-attention',
+        help='Network: 2d3d-attention, 2d3d, 2d3d-posed, r2n2, ptn, ptn-combined, ogn, '
+             'shape-basis, lifting, carving; the name of one in an installed package; or your own '
+             'class, as my_file.py:Net.')] = '2d3d-attention',
     size: Annotated[str, typer.Option(
-        help="'small' (two CPU cores within an hour), 'published' (its paper's own); of ogn "
-             "also 'small-64' and 'published-64', of lifting 'small-visibility'.")] = 'small',
+        help="Size of the network: 'small' (trains within an hour on two CPU cores) or "
+             "'published' (as in its paper); for ogn also 'small-64' and 'published-64', for "
+             "lifting 'small-visibility'.")] = 'small',
     scheme: Annotated[str, typer.Option(
         help="'two-stage': reconstruction on random views, then the policy with it frozen; "
              "'joint': both together on the policy's views, as in the paper.")] = 'two-stage',
@@ -60,11 +61,14 @@ def train(
     curriculum_fraction: Annotated[float, typer.Option(
         help='Fraction of the steps, at the start, with sequences of at most two views.')] = 0.5,
     volume_loss: Annotated[str | None, typer.Option(
-        help="mse (the paper), bce, dice, mse+dice, bce+dice; default: the network's own."
-        )] = None,
+        help="Volume loss: mse (the paper's), bce, dice, mse+dice, bce+dice; default: depends on "
+             'the network.')] = None,
     volume_weight: Annotated[float | None, typer.Option(
-        help="lambda_V of section 3.2; default: the network's own.")] = None,
-    silhouette_weight: Annotated[float | None, typer.Option(help='lambda_S, the same.')] = None,
+        help="Weight of the volume loss, the paper's lambda_V (section 3.2); default: depends on "
+             'the network.')] = None,
+    silhouette_weight: Annotated[float | None, typer.Option(
+        help="Weight of the silhouette loss, the paper's lambda_S; default: depends on the "
+             'network.')] = None,
     warmup_steps: Annotated[int, typer.Option(
         min=1, help='Steps over which the learning rate rises to its peak.')] = 200,
     checkpoint_every: Annotated[int, typer.Option(
@@ -74,13 +78,14 @@ def train(
     augment: Annotated[bool, typer.Option(
         help='Augment backgrounds, light, shift and scale; --no-augment: plain white, as in the '
              'paper.')] = True,
-    seed: Annotated[int, typer.Option(help='The same seed draws the same batches.')] = 0,
+    seed: Annotated[int, typer.Option(help='Seed of the weights and of the batches.')] = 0,
     bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
-    devices: Annotated[int, typer.Option(min=1, help='Processes, or cards, of a machine.')] = 1,
+    devices: Annotated[int, typer.Option(
+        min=1, help='Number of GPUs of each machine, or of processes without a GPU.')] = 1,
     nodes: Annotated[int, typer.Option(
-        min=1, help="Machines; start the command on each, with Lightning Fabric's MASTER_ADDR, "
-                    'MASTER_PORT and NODE_RANK set.')] = 1,
+        min=1, help='Number of machines. Start the command on each, with the variables '
+                    'MASTER_ADDR, MASTER_PORT and NODE_RANK of Lightning Fabric.')] = 1,
     resume: Annotated[bool, typer.Option(
         help='Continue from the checkpoints in the run folder.')] = False,
 ) -> None:
@@ -103,7 +108,8 @@ def train(
     import torch
 
     if scheme not in ('two-stage', 'joint'):
-        raise ConfigError(f"--scheme: {scheme!r} is neither 'two-stage' nor 'joint'")
+        raise ConfigError("--scheme: unknown scheme: expected 'two-stage' or 'joint', got "
+                          f'{scheme!r}')
     begun_here = [*(out / f'{stage}.safetensors' for stage in ('reconstruction', 'policy', 'joint')
                     if (out / f'{stage}.safetensors').exists()),
                   *(out / 'tensorboard').rglob('events.*')]
@@ -175,5 +181,4 @@ def _warn_of_shared_objects(training: 'ViewSet', held_out: 'ViewSet') -> None:
     shared = sum(folder.images_folder.resolve() in trained for folder in held_out.folders)
     if shared:
         typer.echo(f'warning: {shared} of {len(held_out)} validation objects are trained on too: '
-                   'the threshold and what is measured on them will look better than it is',
-                   err=True)
+                   'the threshold is biased, and their IoU is too high', err=True)

@@ -19,20 +19,20 @@ class LogLevel(StrEnum):
 
 def up(
     params: Annotated[Path, typer.Option(
-        help='A ROS parameters file; its nodes are started.')],
+        help='ROS parameters file; all nodes in it are started.')],
     namespace: Annotated[str, typer.Option(
         help='Namespace of the nodes and their topics.')] = '',
     remap: Annotated[list[str] | None, typer.Option(
         '--remap', '-r', metavar='FROM:=TO', help='Remap a topic; may be repeated.',
     )] = None,
     log_level: Annotated[LogLevel, typer.Option(
-        help='The lowest severity that the nodes log.')] = LogLevel.info,
+        help='Lowest severity that the nodes log.')] = LogLevel.info,
 ) -> None:
     """
     Start the nodes of a parameters file, and stop them on Ctrl-C.
 
-    Replaces the launch files on a machine without ros2 launch. When a node ends by itself, the
-    others are stopped and the command fails.
+    An alternative to the launch files on a machine without ros2 launch. If a node exits by itself,
+    the others are stopped and the command fails.
 
     Example: active-recon up --params config/arm.yaml -r camera/image_raw:=/wrist/image_raw
     """

@@ -21,10 +21,10 @@ def view(
     topics: 'Topics',
     scene: 'Scene',
     bag: Annotated[Path | None, typer.Argument(
-        help='A bag to step through. Default: the loop that runs on this ROS domain.')] = None,
+        help='Bag to step through. Default: the loop that runs on this ROS domain.')] = None,
     port: Annotated[int, typer.Option(
-        min=0, max=HIGHEST_PORT, help='Port of the page, or the next free one, which is '
-                                      'printed; 0 for any.')] = DEFAULT_PORT,
+        min=0, max=HIGHEST_PORT, help='Port of the page; if it is taken, the next free one, which '
+                                      'is printed. 0 chooses any.')] = DEFAULT_PORT,
     remap: Annotated[list[str] | None, typer.Option(
         '--remap', '-r', metavar='FROM:=TO',
         help='Remap a topic of the running loop, or set its namespace with __ns:=/NAME; '
@@ -34,10 +34,13 @@ def view(
     Show the loop in the browser, on a page that only this machine can open.
 
     It shows the reconstruction, the views taken, the next view and the scores of the candidates.
-    The page can be opened late, several times, or closed without any effect on the loop. Ctrl-C
-    ends it. The object's size, its frame and the names of topics are read from the running nodes.
+    The page can be opened late, opened several times, or closed without any effect on the loop.
+    Ctrl-C ends it. The object's size and frame and the topic names are read from the running
+    nodes.
 
-    For example: active-recon view, or active-recon view bags/2026-11-21_10-00-00
+    Example: active-recon view
+
+    Example: active-recon view bags/2026-11-21_10-00-00
     """
     if bag is None:
         # The node replaces this process and receives its Ctrl-C

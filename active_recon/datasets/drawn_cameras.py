@@ -1,4 +1,4 @@
-"""Cameras as robots hold them, and light as rooms have it: drawn for each object, any of them."""
+"""Cameras and light for rendering an object: a turntable's 24 views, or drawn at random."""
 
 from dataclasses import dataclass
 import hashlib
@@ -13,23 +13,25 @@ from numpy.typing import NDArray
 KINDS = ('turntable', 'any')
 LOWEST, HIGHEST = math.radians(-10), math.radians(85)
 _SIDE = 160  # pixels of an image
-_FOCAL = (0.8, 3.0)  # image sides
-_FILLED = (0.55, 1.1)  # of the image's side by the cube
-_OFF_CENTRE = 0.1  # of the image's side
+_FOCAL = (0.8, 3.0)  # focal length, in image sides
+_FILLED = (0.55, 1.1)  # extent of the cube in the image, in image sides
+_OFF_CENTRE = 0.1  # offset of the cube's centre in the image, in image sides
 _ROLL = math.radians(10)
-_NEAREST = 1.05  # sides of the cube: its corners reach 0.87
-_LIGHT_STRAYS = 0.35  # how far light strays from the shoulder
+_NEAREST = 1.05  # distance in sides of the cube, whose corners are at 0.87
+_LIGHT_SPREAD = 0.35  # standard deviation of the light's direction, as a unit vector's parts
 
 
 @dataclass(frozen=True)
 class Viewing:
     """
-    From where an object is seen, and how it stands.
+    The cameras that an object is rendered from, and the object's yaw.
 
-    - cameras: 'turntable' (24 azimuths, elevation 30 degrees), or 'any' (drawn by the object's
-      name: any azimuth, elevation -10 to 85 degrees, roll, distance and lens)
-    - count: how many are drawn
-    - turned: every other object stands at any yaw instead of its front at +x
+    - cameras: 'turntable' (24 azimuths, elevation 30 degrees) or 'any' (random azimuth, elevation
+      from -10 to 85 degrees, roll, distance and focal length, seeded by the object's name)
+    - count: number of cameras of kind 'any', 1 to 99
+    - turned: half of the objects get a random yaw, the others keep their front at +x
+
+    Raises ConfigError on any other kind or count.
     """
 
     cameras: str = 'turntable'
@@ -37,37 +39,41 @@ class Viewing:
     turned: bool = False
 
     def __post_init__(self) -> None:
-        """Reject what nothing is seen from."""
+        """Reject unknown kinds and counts out of range."""
         if self.cameras not in KINDS or not 1 <= self.count <= 99:
             raise ConfigError('cameras: unknown kind or wrong number of views: expected one of '
                               f'{", ".join(KINDS)}, and 1 to 99 views, got {self.cameras!r} and '
                               f'{self.count}')
 
     def yaw(self, name: str) -> float:
-        """Return the yaw at which an object of a name stands, radians."""
+        """Return the yaw of the object with this name, radians in [0, 2 pi)."""
         rng = _generator(name, 'yaw')
         return float(rng.uniform(0, TURN)) if self.turned and rng.random() < 0.5 else 0.0
 
     def of(self, name: str) -> tuple[list[Camera], list[NDArray[np.float64] | None]]:
-        """Return the cameras of an object of a name, and each one's light; see `render`."""
+        """
+        Return the cameras of the object with this name, and for each the direction of the light.
+
+        A direction is a unit vector (3,) in the optical frame, None for the renderer's default.
+        """
         if self.cameras == 'turntable':
             return [orbit_camera(azimuth) for azimuth in AZIMUTHS], [None] * len(AZIMUTHS)
         rng = _generator(name, 'cameras')
         cameras = [draw_camera(rng) for _ in range(self.count)]
-        shoulder = np.array([-0.45, -0.65, -0.61]) + rng.normal(0, _LIGHT_STRAYS, 3)
-        return cameras, [shoulder / np.linalg.norm(shoulder)] * self.count
+        light = np.array([-0.45, -0.65, -0.61]) + rng.normal(0, _LIGHT_SPREAD, 3)
+        return cameras, [light / np.linalg.norm(light)] * self.count
 
 
 TURNTABLE = Viewing()
-"""24 azimuths from a fixed camera."""
+"""The 24 azimuths of a turntable in front of a fixed camera."""
 
 
 def draw_camera(rng: np.random.Generator) -> Camera:
     """
-    Return a camera that sees the unit cube about the origin, or most of it.
+    Return a random camera that sees all or most of the unit cube around the origin.
 
-    It looks a little beside the cube's centre, rolled a little; its distance is what lets the
-    cube fill from half of the image to somewhat more than all of it under the focal length.
+    It looks slightly past the cube's centre, with a small roll. Its distance follows from the
+    focal length, so that the cube's extent is 0.55 to 1.1 sides of the image.
     """
     sine = rng.uniform(math.sin(LOWEST), math.sin(HIGHEST))
     focal = float(np.exp(rng.uniform(*np.log(_FOCAL))))
@@ -84,9 +90,10 @@ def draw_camera(rng: np.random.Generator) -> Camera:
 
 def filling_distance(towards: Camera, focal: float, share: float) -> float:
     """
-    Return how far off the unit cube fills a share of the image, or the least there may be.
+    Return the distance at which the unit cube extends over `share` of the image, at least 1.05.
 
-    `towards` looks at the origin; `focal` counts in sides of the image.
+    `towards` is a camera that looks at the origin; `focal` is in sides of the image, the distance
+    in sides of the cube. Found by bisection.
     """
     corners = cube_corners() @ towards.pose[:3, :3]
     near, far = _NEAREST, 100.0

@@ -1,4 +1,4 @@
-"""Views of any cameras, framed around the object's cube, read when they are first asked for."""
+"""Views from arbitrary cameras, cropped to the object's cube, read from disk on first access."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,9 +15,10 @@ from torch import Tensor
 
 class FramedViews:
     """
-    Images, cameras and voxels of N objects with V views each, as `ViewSet` names them.
+    Images, cameras and voxels of N objects with V views each; for the arrays, see `ViewSet`.
 
-    V is what every object has. Raises DataError on an object whose cameras cannot be read.
+    V is the smallest number of views of any object. Raises DataError where the side of an
+    object's voxel grid cannot be read.
     """
 
     def __init__(self, folders: Sequence[ObjectFolder], shown: Sequence[Sequence[Camera]],
@@ -40,7 +41,7 @@ class FramedViews:
                 self.intrinsics[index, view] = target.intrinsics.matrix
 
     def read_images(self, index: int, views: Sequence[int]) -> None:
-        """Read views of one object that were not read yet."""
+        """Read those views of one object that are not read yet; raises DataError on bad images."""
         for view in views:
             if self._has_image[index, view]:
                 continue
@@ -50,7 +51,7 @@ class FramedViews:
             self._has_image[index, view] = True
 
     def read_voxels(self, index: int) -> None:
-        """Read one object's voxels, if they were not yet."""
+        """Read the voxels of one object, once; raises DataError where they cannot be read."""
         if not self._has_voxels[index]:
             self.voxels[index] = self.folders[index].voxels(
                 self.voxels.shape[-1]).occupied(0.5)
@@ -58,7 +59,7 @@ class FramedViews:
 
 
 class OnDemand:
-    """An array of `FramedViews` that is read where it is looked at: rows of a tensor."""
+    """An array of `FramedViews` that is indexed like a tensor; rows are read when indexed."""
 
     def __init__(self, array: NDArray[np.generic], read: Callable[..., None]) -> None:
         self._array, self._read = array, read
@@ -73,7 +74,7 @@ class OnDemand:
         return len(self._array)
 
     def __getitem__(self, index: Tensor | tuple[Tensor, Tensor]) -> Tensor:
-        """Return rows by objects (...), or by objects (...) and views (...)."""
+        """Return the rows of objects (...), or of objects (...) and views (...)."""
         places = [torch.as_tensor(place) for place in np.broadcast_arrays(
             *(index if isinstance(index, tuple) else (index,)))]
         rows = torch.stack(places, -1).reshape(-1, len(places)).tolist()
@@ -84,8 +85,8 @@ class OnDemand:
 
 def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],
                                                            list[list[Camera]], tuple[str, ...]]:
-    """Return the objects whose cameras can be read, these cameras, and what was said of others."""
-    good, shown, refusals = [], [], []
+    """Return the objects whose cameras can be read, their cameras, and errors of the others."""
+    good, shown, errors = [], [], []
     for folder in folders:
         try:
             cameras = folder.cameras()
@@ -95,12 +96,12 @@ def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],
             good.append(folder)
             shown.append(cameras)
         except DataError as error:
-            refusals.append(str(error))
-    return good, shown, tuple(refusals)
+            errors.append(str(error))
+    return good, shown, tuple(errors)
 
 
 def weighted(rgba: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return the image, (H, W, 4) in [0, 255], its colours multiplied by alpha."""
+    """Return an RGBA image (H, W, 4), premultiplied by alpha, values in [0, 255]."""
     layers = rgba.astype(np.float32)
     layers[..., :3] *= layers[..., 3:] / 255
     return layers

@@ -1,18 +1,18 @@
 """
-R2N2's layout on disk, read and written: one reader for real ShapeNet and for what is made here.
+R2N2's layout on disk, read and written: the same for real ShapeNet and for datasets made here.
 
     <root>/ShapeNetRendering/<category>/<id>/rendering/NN.png  RGBA, 137 x 137
                                                       /rendering_metadata.txt
                                                       /renderings.txt
-                                                      /cameras.json, for other cameras than these
+                                                      /cameras.json (optional)
     <root>/ShapeNetVox32/<category>/<id>/model.binvox
-    <root>/ShapeNetVox64/<category>/<id>/model.binvox, where finer ones were asked for
+    <root>/ShapeNetVox64/<category>/<id>/model.binvox (optional)
 
 A row of the metadata holds azimuth, elevation and in-plane rotation in degrees, distance, and a
-field of view that is not to be used. Its azimuth runs clockwise, so it is negated, and its
-distance counts in units of 1.75 sides of the grid. It knows one lens and no roll: any other
-cameras stand in `cameras.json` instead, each with its pose, 4 x 4 object from optical frame, and
-its lens in pixels; where it is, it is what is read.
+field of view, which is ignored. The azimuth is clockwise, so it is negated, and the distance is in
+units of 1.75 sides of the grid. The metadata assumes R2N2's lens and no roll; any other cameras
+are stored in `cameras.json` instead, which takes precedence: for each camera its pose, 4 x 4
+object from optical frame, and its intrinsics in pixels.
 """
 
 from collections.abc import Sequence
@@ -38,12 +38,12 @@ RENDERING, VOXELS = 'ShapeNetRendering', 'ShapeNetVox'
 _CAMERAS = 'cameras.json'
 _LENS = ('fx', 'fy', 'cx', 'cy', 'width', 'height')
 _DISTANCE_UNIT = 1.75
-_FIELD_OF_VIEW_COLUMN = 25.0  # what R2N2 writes; it is not the lens's
+_FIELD_OF_VIEW_COLUMN = 25.0  # as R2N2 writes it; not the field of view of its lens
 
 
 @dataclass(frozen=True)
 class ObjectFolder:
-    """One object of a dataset: its images, its cameras and its voxels, read when asked for."""
+    """One object of a dataset: its images, cameras and voxels, read from disk at each call."""
 
     root: Path
     category: str
@@ -51,15 +51,19 @@ class ObjectFolder:
 
     @property
     def images_folder(self) -> Path:
-        """Where the images and their metadata lie."""
+        """Folder of the images and their metadata."""
         return self.root / RENDERING / self.category / self.name / 'rendering'
 
     def voxels_path(self, resolution: int = RESOLUTION) -> Path:
-        """Where the voxels of so many cells a side lie."""
+        """Return the path of the voxels with `resolution` cells a side."""
         return self.root / f'{VOXELS}{resolution}' / self.category / self.name / 'model.binvox'
 
     def cameras(self) -> list[Camera]:
-        """Return the camera of every image; positions count in metres, the grid as in the file."""
+        """
+        Return the camera of every image, with poses in the units of the voxel file's grid.
+
+        Raises DataError where they cannot be read.
+        """
         written = self.images_folder / _CAMERAS
         if written.is_file():
             return _read_cameras(written)
@@ -76,7 +80,7 @@ class ObjectFolder:
                             f'{error}') from error
 
     def image(self, index: int) -> NDArray[np.uint8]:
-        """Return one image, (H, W, 4) uint8 RGBA."""
+        """Return one image, (H, W, 4) uint8 RGBA; raises DataError where it cannot be read."""
         path = self.images_folder / f'{index:02d}.png'
         bgra = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         if bgra is None:
@@ -88,7 +92,7 @@ class ObjectFolder:
         return np.asarray(cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA), np.uint8)
 
     def voxels(self, resolution: int = RESOLUTION) -> VoxelGrid:
-        """Return the true voxels; raises DataError where there are none so fine."""
+        """Return the true voxels; raises DataError where there are none of this resolution."""
         path = self._voxels_file(resolution)
         grid = read_binvox(path)
         if grid.occupancy.shape != (resolution,) * 3:
@@ -97,25 +101,29 @@ class ObjectFolder:
         return grid
 
     def grid_side(self, resolution: int = RESOLUTION) -> float:
-        """Return the side of the true voxels' grid, from their file's header alone."""
+        """Return the side of the true voxels' grid, from the header of their file."""
         return binvox_side(self._voxels_file(resolution))
 
     def _voxels_file(self, resolution: int) -> Path:
-        """Return the path of voxels that are there; raises DataError where they are not."""
+        """Return the path of the voxels; raises DataError where finer ones are missing."""
         path = self.voxels_path(resolution)
         if resolution != RESOLUTION and not path.is_file():
-            raise DataError(f'{path}: no such file: the data have no voxels of {resolution} cells '
-                            'a side; make them by `render` or `dataset build` with `--fine`')
+            raise DataError(f'{path}: no such file: expected voxels of {resolution} cells a side; '
+                            'make them by `render` or `dataset build` with `--fine`')
         return path
 
     @property
     def complete(self) -> bool:
-        """Whether the object was written to its end: its voxels come last."""
+        """Whether the object was written completely: its voxels are written last."""
         return self.voxels_path().is_file()
 
 
 def list_objects(root: Path) -> list[ObjectFolder]:
-    """Return the objects of a dataset that have images, sorted by category and name."""
+    """
+    Return the objects of a dataset that have images, sorted by category and name.
+
+    Raises DataError where the folder has no dataset.
+    """
     top = root / RENDERING
     if not top.is_dir():
         raise DataError(f"{root}: no dataset in R2N2's layout: it has no folder "
@@ -126,7 +134,12 @@ def list_objects(root: Path) -> list[ObjectFolder]:
 
 def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
                  cameras: Sequence[Camera], grid: VoxelGrid) -> None:
-    """Write one object, its voxels last and at once, so that a broken-off run can go on."""
+    """
+    Write one object: images (H, W, 4) uint8 RGBA, their cameras, and the true voxels.
+
+    The voxels come last and are renamed into place, so that an interrupted run can continue.
+    Raises DataError where an image cannot be written.
+    """
     folder.images_folder.mkdir(parents=True, exist_ok=True)
     rows, names = [], []
     for index, (image, camera) in enumerate(zip(images, cameras, strict=True)):
@@ -147,7 +160,7 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
 
 
 def _is_r2n2(camera: Camera) -> bool:
-    """Return whether a row of the metadata says all there is to say of a camera."""
+    """Return whether a row of the metadata can represent the camera."""
     if camera.intrinsics != CANONICAL_INTRINSICS or abs(camera.elevation) > math.pi / 2 - 1e-6:
         return False
     upright = orbit_camera(camera.azimuth, camera.elevation, camera.distance)
@@ -172,7 +185,7 @@ def _read_cameras(path: Path) -> list[Camera]:
 
 
 def write_voxels(folder: ObjectFolder, grid: VoxelGrid) -> None:
-    """Write the voxels of one object, at once, where those of their resolution lie."""
+    """Write the voxels of one object to the path of their resolution, atomically."""
     path = folder.voxels_path(len(grid.occupancy))
     unfinished = path.with_suffix('.part')
     write_binvox(grid, unfinished)

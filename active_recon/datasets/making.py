@@ -1,4 +1,4 @@
-"""Meshes to a dataset: every object rendered from its cameras and voxelised, on all cores."""
+"""Make a dataset from meshes: render and voxelise every object, in parallel."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -25,7 +25,11 @@ MESH_SUFFIXES = {'.glb', '.gltf', '.obj', '.ply', '.stl', '.off', '.3mf', '.dae'
 
 @dataclass(frozen=True)
 class Job:
-    """One object to be made: where it goes, and what makes its mesh (called in a worker)."""
+    """
+    An object to render and voxelise.
+
+    Its destination folder, and a function that builds its mesh (called in a worker process).
+    """
 
     folder: ObjectFolder
     make_mesh: Callable[[], trimesh.Trimesh]
@@ -33,28 +37,29 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: done, already there, or refused with a reason."""
+    """Result of a job: made or already present, or rejected with a reason (`refusal`)."""
 
     folder: ObjectFolder
     refusal: str = ''
 
 
 def yawed(mesh: trimesh.Trimesh, yaw: float) -> trimesh.Trimesh:
-    """Return the mesh turned counter-clockwise about +z, radians, and fitted again."""
+    """Return the mesh rotated by `yaw` about +z, radians, and fitted to the grid again."""
     turned = mesh.copy()
     cosine, sine = math.cos(yaw), math.sin(yaw)
     turn = np.eye(4)
     turn[:2, :2] = [[cosine, -sine], [sine, cosine]]
     turned.apply_transform(turn)
-    return fit_to_grid(turned)  # a turn can lengthen the bounding box
+    return fit_to_grid(turned)  # a rotation can enlarge the bounding box
 
 
 def mesh_jobs(meshes: Path, out: Path, up: str | None, front: str | None) -> list[Job]:
     """
-    Return a job for one mesh file, or for each in a folder of `<category>/<mesh>`.
+    Return a job for one mesh file, or for each mesh file in a folder `<category>/<mesh>`.
 
-    A mesh that lies deeper bears the folders between in its name; of meshes of one name each
-    bears its suffix. Raises DataError where there is no mesh, ConfigError on bad axes.
+    The names of folders below the category become part of the object's name; where several files
+    have the same name, their suffixes do too. Raises DataError where there is no mesh,
+    ConfigError on invalid axes.
     """
     if meshes.is_file():
         files, top = [meshes], meshes.parent
@@ -68,7 +73,7 @@ def mesh_jobs(meshes: Path, out: Path, up: str | None, front: str | None) -> lis
         raise DataError(f'{meshes}: no meshes there: expected files '
                         f'({", ".join(sorted(MESH_SUFFIXES))}), found none')
     for path in files:
-        file_rotation(path, up, front)  # a bad option is refused once, before the work
+        file_rotation(path, up, front)  # an invalid option is rejected once, before any work
     folders = [_mesh_folder(out, top, path) for path in files]
     alike = Counter(folders)
     return [Job(folder if alike[folder] == 1 else
@@ -84,7 +89,7 @@ def _mesh_folder(out: Path, top: Path, path: Path) -> ObjectFolder:
 
 
 def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
-    """Return a job for each seed of a parametric category; ConfigError if there is none such."""
+    """Return a job for each seed of a parametric category; raises ConfigError if unknown."""
     check_category(category)
     return [Job(ObjectFolder(out, category, f'{category}-{seed:06d}'),
                 partial(make_shape, category, seed)) for seed in seeds]
@@ -92,7 +97,12 @@ def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
 
 def make_object(job: Job, samples: int, fine: bool = False,
                 viewing: Viewing = TURNTABLE) -> Outcome:
-    """Render and voxelise one object, `fine` also at 64 cells a side; what is there stays."""
+    """
+    Render and voxelise one object at 32 cells a side, with `fine` also at 64.
+
+    Each image pixel averages `samples` x `samples` rays. Existing files are kept. Errors become
+    the outcome's `refusal`.
+    """
     lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
     if job.folder.complete and not lacks_fine:
         return Outcome(job.folder)
@@ -116,8 +126,7 @@ def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int, viewing: 
     images = [renderer.render(camera, samples, light)
               for camera, light in zip(cameras, lights, strict=True)]
     if not np.any(images):
-        raise DataError('no visible surface: expected one that is seen from some azimuth, got '
-                        'none')
+        raise DataError('no visible surface: expected one in at least one image, got none')
     write_object(folder, images, cameras, voxelise(mesh))
 
 
@@ -128,14 +137,15 @@ def _name(folder: ObjectFolder) -> str:
 def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool = False,
                  viewing: Viewing = TURNTABLE) -> Iterator[Outcome]:
     """
-    Make all objects, yielding what became of each as it is done.
+    Make all objects in `workers` processes; yield each one's outcome as it is finished.
 
-    Raises DataError where two jobs would write one object.
+    Raises DataError where two jobs would write the same object.
     """
     for folder, count in Counter(job.folder for job in jobs).most_common(1):
         if count > 1:
-            raise DataError(f'several meshes of one name: expected each object once, but {count} '
-                            f'would become {folder.category}/{folder.name}; rename their files')
+            raise DataError('several meshes of one name: expected each object once, got '
+                            f'{count} meshes for {folder.category}/{folder.name}; rename their '
+                            'files')
     if workers == 1:
         yield from (make_object(job, samples, fine, viewing) for job in jobs)
         return

@@ -1,4 +1,4 @@
-"""A folder of models found in the wild, with a table of what each is and its licence."""
+"""A manifest of downloaded models: a CSV file with the category, source and licence of each."""
 
 import csv
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ _COLUMNS = {'category', 'file', 'split', 'source', 'licence', 'licence_evidence'
             'sha256'}
 _HEX = re.compile('[0-9a-f]+')
 EXPLICIT = 'explicit for the models'
-"""The evidence of a licence that lets a model be trained on."""
+"""Licence evidence that allows training on a model: the licence names the models themselves."""
 _OPEN = re.compile(r'CC0\b|CC-BY(-[0-9]|$)|public[ -]domain', re.IGNORECASE)
-"""Licences that ask for no more than a name; CC-BY-SA asks for more."""
+"""Licences that require at most attribution; CC-BY-SA requires more."""
 
 
 @dataclass(frozen=True)
@@ -38,18 +38,18 @@ class ModelRow:
 
     @property
     def front(self) -> str | None:
-        """The axis of the front in a y-up file: 'z', 'x', or None where it is unknown."""
+        """Front axis of the file, which is y up: 'z' or 'x', None where it is unknown."""
         sign_and_axis = self.front_axis[:2].upper()
         return {'+Z': 'z', '+X': 'x'}.get(sign_and_axis)
 
     @property
     def is_open(self) -> bool:
-        """Whether weights that ship may be trained on it: CC0, CC-BY or public domain, said so."""
+        """Whether shipped weights may be trained on it: explicitly CC0, CC-BY, public domain."""
         return self.licence_evidence == EXPLICIT and bool(_OPEN.match(self.licence))
 
 
 def read_manifest(path: Path) -> list[ModelRow]:
-    """Read the rows of a manifest (CSV); raises DataError where it is none."""
+    """Read the rows of a manifest (CSV); raises DataError where it is unreadable or invalid."""
     try:
         with path.open(newline='') as file:
             rows = list(csv.DictReader(file))
@@ -73,8 +73,8 @@ def manifest_jobs(rows: list[ModelRow], out: Path) -> list[Job]:
     """
     Return a job for each row.
 
-    Where the front is unknown the object stands at a random yaw, drawn from the file's own hash,
-    so that it is the same wherever the model is measured.
+    An object whose front is unknown gets a random yaw, seeded by the file's hash, so that it is
+    the same wherever the model is used.
     """
     return [Job(ObjectFolder(out, row.category, row.file.stem), partial(_load, row))
             for row in rows]

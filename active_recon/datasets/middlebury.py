@@ -1,11 +1,14 @@
 """
-Calibrated photographs in Middlebury's format: images, cameras and a box, in one folder.
+Calibrated photographs in Middlebury's format: images, cameras and a bounding box in one folder.
 
-    *_par.txt    the number of images, then a line each: name, K, R and t, row by row; R and t are
-                 the frame's in the camera, whose pixels count from the first one's centre
-    README.txt   two lines `(x y z)`: the corners of the object's box
-    masks/       optional: an image for each, under its name, bright where the object is; without
-                 them, what is not black is taken for the object
+    *_par.txt    the number of images, then a line for each: name, K, R and t, row-major; R and t
+                 transform world to camera coordinates; pixel (0, 0) is the centre of the first
+    README.txt   two lines `(x y z)`: the corners of the object's bounding box
+    masks/       optional: for each image a mask of the same name, bright where the object is;
+                 without masks, pixels that are not nearly black are taken as the object
+
+The format: Seitz et al., "A comparison and evaluation of multi-view stereo reconstruction
+algorithms", CVPR 2006, https://vision.middlebury.edu/mview/data/.
 """
 
 from collections.abc import Sequence
@@ -20,10 +23,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-MARGIN = 1.09  # the cube's side over the box's longest
+MARGIN = 1.09  # side of the cube relative to the longest side of the box
 _NUMBERS = 21  # K, R, t
-_DARK = 0.19  # what is no brighter is background
-_GROWN, _SHRUNK = 10, 7  # pixels by which a mask is dilated, then eroded: dark spots close
+_DARK = 0.19  # brightness in [0, 1] up to which a pixel is background
+_GROWN, _SHRUNK = 10, 7  # pixels by which a mask is dilated, then eroded, to close dark spots
 _CORNER = re.compile(r'^\s*\(\s*(\S+)\s+(\S+)\s+(\S+)\s*\)\s*$', re.MULTILINE)
 _FRONTS = {'x': 'y', 'y': 'x', 'z': 'x'}
 
@@ -31,9 +34,10 @@ _FRONTS = {'x': 'y', 'y': 'x', 'z': 'x'}
 @dataclass(frozen=True, eq=False)
 class PosedPhotographs:
     """
-    V photographs of one object, whose cube has the side 1 in its frame.
+    V photographs of one object; lengths are in sides of its cube.
 
-    - images: (H, W, 3) uint8 RGB each; masks: (H, W) bool each, where the object is
+    - images: (H, W, 3) uint8 RGB each
+    - masks: (H, W) bool each, true on the object
     """
 
     folder: Path
@@ -52,9 +56,9 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
     """
     Read photographs in Middlebury's format.
 
-    `box` holds the object's least and greatest x, y, z in the cameras' frame, None reads them from
-    README.txt; `up` is that frame's axis that points up. Raises DataError where a file is missing
-    or says something else, ConfigError on a box that is none.
+    `box` holds the minimum and then the maximum x, y, z of the object in the frame of the camera
+    file; None reads them from README.txt. `up` is the axis of that frame that points up. Raises
+    DataError where a file is missing or invalid, ConfigError on an invalid box.
     """
     files = sorted(folder.glob('*_par.txt'))
     if len(files) != 1:
@@ -82,7 +86,7 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
 
 
 def _box(folder: Path, box: Sequence[float] | None) -> NDArray[np.float64]:
-    """Return the least and the greatest corner, (2, 3)."""
+    """Return the minimum and the maximum corner, (2, 3)."""
     if box is None:
         read = [found for path in sorted(folder.glob('README*'))
                 for found in _CORNER.findall(path.read_text(errors='replace'))]
@@ -93,8 +97,8 @@ def _box(folder: Path, box: Sequence[float] | None) -> NDArray[np.float64]:
     corners = np.array(box, np.float64)
     if corners.size != 6 or not np.isfinite(corners).all() or (
             corners[:3] >= corners[3:]).any():
-        raise ConfigError('box: invalid corners: expected the least x, y, z and then the '
-                          f'greatest, six numbers, got {" ".join(map(str, box))}')
+        raise ConfigError('box: invalid corners: expected six numbers, the minimum x, y, z and '
+                          f'then the maximum, got {" ".join(map(str, box))}')
     return corners.reshape(2, 3)
 
 
@@ -120,7 +124,7 @@ def _camera(numbers: NDArray[np.float64], turn: NDArray[np.float64],
     if not np.allclose(left @ right, rotation, atol=1e-3):
         raise ViewError('invalid rotation: expected an orthogonal matrix, got '
                         f'{rotation.tolist()}')
-    rotation = left @ right  # to the last bit, which files round off
+    rotation = left @ right  # the nearest rotation: files round theirs
     pose = np.eye(4)
     pose[:3, :3] = turn @ rotation.T
     pose[:3, 3] = turn @ (-rotation.T @ moved - centre) / side

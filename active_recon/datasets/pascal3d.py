@@ -1,13 +1,16 @@
 """
-PASCAL3D+ as people have it: photographs with a box, a viewpoint and a CAD model for each object.
+PASCAL3D+ as downloaded: photographs with a box, a viewpoint and a CAD model for each object.
 
     <root>/Annotations/<class>_<source>/<id>.mat  record.objects: class, bbox, cad_index, viewpoint
     <root>/Images/<class>_<source>/<id>.jpg       (or .JPEG)
     <root>/CAD/<class>/<NN>.off                   z up, the front at -y
 
-At azimuth 0 the annotations' camera stands before the object, at -y of the CAD model, and with
-rising azimuth it goes towards +x: `active-recon render CAD OUT --up z --front -y` turns the
-models' front to ours, and the azimuth then is ours too, its sign unchanged.
+The annotated azimuth is 0 in front of the object, at -y of the CAD model, and increases towards
++x. `active-recon render CAD OUT --up z --front -y` turns the models' front to +x; the annotated
+azimuth then is that of our object frame, with the same sign.
+
+The dataset: Xiang, Mottaghi and Savarese, "Beyond PASCAL: a benchmark for 3D object detection in
+the wild", WACV 2014.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +26,7 @@ from scipy.io import loadmat
 
 CLASSES = {'aeroplane': 'airplane', 'boat': 'watercraft', 'diningtable': 'table',
            'tvmonitor': 'monitor'}
-"""Classes that have another name here; the others keep theirs."""
+"""Category names of the classes that are named differently here."""
 CAD_UP, CAD_FRONT = 'z', '-y'
 _FLAGS = ('truncated', 'occluded', 'difficult')
 _SUFFIXES = ('.jpg', '.JPEG', '.jpeg', '.png')
@@ -32,11 +35,11 @@ _SUFFIXES = ('.jpg', '.JPEG', '.jpeg', '.png')
 def list_photographs(root: Path, categories: Sequence[str] = ()) -> tuple[
         list[Photograph], list[str]]:
     """
-    Return the photographed objects of some categories (default: all), and what was left out.
+    Return the photographed objects of some categories (default: all), and the reasons of others.
 
-    Objects that are truncated, occluded or difficult are left out, as is usual, and what lacks a
-    viewpoint or cannot be read; each is reported with its reason. Raises DataError if the folder
-    is not PASCAL3D+, or has no such category.
+    Truncated, occluded and difficult objects are left out, as usual, and those without a
+    viewpoint or with unreadable files; for each there is a line with the reason. Raises DataError
+    if the folder is not PASCAL3D+ or lacks one of the categories.
     """
     for name in ('Annotations', 'Images', 'CAD'):
         if not (root / name).is_dir():
@@ -60,10 +63,10 @@ def list_photographs(root: Path, categories: Sequence[str] = ()) -> tuple[
 
 
 def _photographs(root: Path, path: Path, category: str) -> Iterator[Photograph | str]:
-    """Yield the objects of a file that are of its folder's class, or why one is left out."""
+    """Yield the objects of a file that have its folder's class, or the reason against each."""
     kind = path.parent.name.rpartition('_')[0]
     try:
-        # A list of one comes as its element, a structure as an object with attributes
+        # A list of one is read as its element, a structure as an object with attributes
         record = loadmat(path, squeeze_me=True, struct_as_record=False)['record']
         objects = np.atleast_1d(record.objects)
     except Exception as error:  # scipy's reader raises whatever its parser raised
@@ -84,7 +87,7 @@ def _photograph(root: Path, path: Path, folder: ObjectFolder, item: Any) -> Phot
     if flagged:
         raise DataError(f'it is {" and ".join(flagged)}')
     viewpoint = _field(item, 'viewpoint')
-    # Where only the coarse angles were annotated, the distance is 0
+    # A distance of 0 means that only the coarse angles were annotated
     fine = hasattr(viewpoint, 'azimuth') and np.any(getattr(viewpoint, 'distance', 1))
     precision = '' if fine else '_coarse'
     azimuth, elevation = (math.radians(float(_field(viewpoint, angle + precision)))
@@ -102,7 +105,7 @@ def _photograph(root: Path, path: Path, folder: ObjectFolder, item: Any) -> Phot
         raise DataError(f'no image: expected {path.stem}.jpg (or .JPEG) in {images}, found none')
     kind = path.parent.name.rpartition('_')[0]
     cad = root / 'CAD' / kind / f'{int(_field(item, "cad_index")):02d}.off'
-    # MATLAB's pixels count from 1, both ends of the box included
+    # MATLAB's pixel indices start at 1 and the box includes both ends
     return Photograph(folder, image, (left - 1, top - 1, right, bottom), azimuth, elevation, cad,
                       CAD_UP, CAD_FRONT)
 

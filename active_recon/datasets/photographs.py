@@ -1,4 +1,4 @@
-"""Photographs as objects of one view: cut out, laid on white, at the canonical camera's scale."""
+"""Photographs as single-view objects: cropped, on white, at the canonical camera's scale."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,12 +26,12 @@ Box = tuple[float, float, float, float]
 @dataclass(frozen=True)
 class Photograph:
     """
-    One object on one photograph.
+    One object in one photograph.
 
-    - item: what it is called
-    - box: left, top, right, bottom, pixels from the image's corner
-    - azimuth, elevation: radians, of the camera in the object frame
-    - cad: a model of it, and the axes of that file that point up and to the front
+    - item: its category and name; image: the photograph's file
+    - box: left, top, right, bottom, in pixels from the image's corner
+    - azimuth, elevation: of the camera in the object frame, radians
+    - cad: the file of its CAD model; up, front: the axes of that file that point up and forward
     """
 
     item: ObjectFolder
@@ -48,11 +48,11 @@ def read_photographs(photographs: Sequence[Photograph], left_out: Sequence[str] 
                      progress: Callable[[], None] = lambda: None,
                      resolution: int = RESOLUTION) -> ViewSet:
     """
-    Read photographs as objects of one view each, V = 1; the voxels are those of the CAD model.
+    Read photographs as objects of one view each, V = 1, with the voxels of their CAD models.
 
-    Each is cut out along its box and laid on white, as large as the canonical camera would show
-    its CAD model from the annotated direction, and there. What cannot be read is added to
-    `left_out`, as the set's `unreadable`. Raises DataError if none can.
+    Each is cropped to its box, scaled and moved to where the canonical camera would show its CAD
+    model from the annotated direction, on white. `left_out` and the errors of those that cannot
+    be read become the set's `unreadable`. Raises DataError if none can be read.
     """
     models: dict[Path, _Model | str] = {}
     images, voxels, good, unreadable = [], [], [], list(left_out)
@@ -71,7 +71,7 @@ def read_photographs(photographs: Sequence[Photograph], left_out: Sequence[str] 
             unreadable.append(f'{photograph.item.name}: {error}')
         progress()
     if not good:
-        raise DataError('expected photographs, none can be read'
+        raise DataError('no readable photograph: expected at least one, got none'
                         + ''.join(f'\n  {reason}' for reason in unreadable[:5]))
     cameras = Cameras.of([_canonical_camera(photograph) for photograph in good])
     return ViewSet(torch.from_numpy(np.stack(images))[:, None], cameras.poses[:, None],
@@ -87,7 +87,7 @@ class _Model:
 
 
 def _read_model(photograph: Photograph, resolution: int) -> _Model | str:
-    """Return a CAD model, or why it cannot be read: once for all photographs of it."""
+    """Return a CAD model, or the error in reading it, which holds for all its photographs."""
     try:
         mesh = load_mesh(photograph.cad, photograph.up, photograph.front)
     except DataError as error:
@@ -96,7 +96,7 @@ def _read_model(photograph: Photograph, resolution: int) -> _Model | str:
 
 
 def _read_picture(path: Path) -> NDArray[np.uint8]:
-    """Return an image, (H, W, 3) RGB; unlike OpenCV, Pillow tells where it ends too early."""
+    """Return an image, (H, W, 3) RGB; unlike OpenCV, Pillow reports a truncated file."""
     try:
         with Image.open(path) as image:
             return np.asarray(image.convert('RGB'))
@@ -110,7 +110,7 @@ def _canonical_camera(photograph: Photograph) -> Camera:
 
 
 def _shown_at(corners: NDArray[np.float64], photograph: Photograph) -> Box:
-    """Return the box of a model on the canonical camera's image, in the network's pixels."""
+    """Return the box of a model in the canonical camera's image, in the network's pixels."""
     pixels = _canonical_camera(photograph).project(corners)[0]
     (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
     return float(left), float(top), float(right), float(bottom)
@@ -118,9 +118,9 @@ def _shown_at(corners: NDArray[np.float64], photograph: Photograph) -> Box:
 
 def _cut_out(picture: NDArray[np.uint8], box: Box, place: Box) -> NDArray[np.uint8]:
     """
-    Return what is in the box, laid about the middle of its place: (64, 64, 4), premultiplied.
+    Return the contents of `box` centred on `place`, (64, 64, 4) uint8, premultiplied.
 
-    Height and width keep their ratio; the diagonal becomes the place's.
+    The aspect ratio is kept; the diagonal of the box is scaled to that of `place`.
     """
     height, width = picture.shape[:2]
     left, right = (min(max(round(at), 0), width) for at in box[::2])

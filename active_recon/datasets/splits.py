@@ -1,4 +1,4 @@
-"""ShapeNet as people have it: R2N2's download, its categories, and which objects are tested on."""
+"""Splits of ShapeNet as R2N2 publishes it: its categories, and the objects of each part."""
 
 from collections.abc import Iterator
 import json
@@ -13,13 +13,13 @@ SYNSETS = {
     '03001627': 'chair', '03211117': 'monitor', '03636649': 'lamp', '03691459': 'speaker',
     '04090263': 'firearm', '04256520': 'sofa', '04379243': 'table', '04401088': 'cellphone',
     '04530566': 'watercraft'}
-"""R2N2's thirteen folders of ShapeNet, and what the categories are called here."""
+"""R2N2's thirteen folders of ShapeNet, and their category names here."""
 SORTED = 'sorted'
 PORTIONS = {'train': (0.0, 0.7), 'val': (0.7, 0.8), 'test': (0.8, 1.0)}
 """
-Which share of a category's sorted ids is in each part where no file says so.
+The fractions of a category's sorted ids that form each part, where no split file is given.
 
-3D-R2N2's own code trains on the first 80 percent, a part of which is `val` here, and tests on the
+3D-R2N2's own code trains on the first 80 percent, whose last part is `val` here, and tests on the
 last 20.
 """
 
@@ -28,14 +28,13 @@ Listed = tuple[list[ObjectFolder], list[str]]
 
 def list_split(root: Path, split: Path | str, part: str) -> Listed:
     """
-    Return the objects of a part of a dataset, and what the split names but the disk lacks.
+    Return the objects of one part of a dataset, and a line for each object missing on disk.
 
-    `split` is a published split file or 'sorted', which cuts every category's sorted ids by
-    `PORTIONS`; `part` is train, val or test. A file holds, for each category, a record of
-    `taxonomy_id` (the folder's name) and of lists of ids `train`, `val` and `test`: a list of
-    records, or an object of them by their id. Each object that is missing is reported in a line of
-    its own. Raises DataError where the file is none such or none of its objects is there,
-    ConfigError on another part.
+    `split` is a published split file, or 'sorted' to cut every category's sorted ids by
+    `PORTIONS`; `part` is train, val or test. A split file is JSON with a record for each category:
+    `taxonomy_id` (the folder's name) and the lists of ids `train`, `val` and `test`. The records
+    are in a list, or in an object with the ids as keys. Raises DataError where the file is invalid
+    or none of its objects exists, ConfigError on any other part.
     """
     if part not in PORTIONS:
         raise ConfigError(f'part: no such part: expected one of {", ".join(PORTIONS)}, got '
@@ -63,7 +62,7 @@ def _sorted_part(folders: list[ObjectFolder], part: str) -> Iterator[ObjectFolde
 
 
 def _read_split(path: Path, part: str) -> dict[str, list[str]]:
-    """Return the ids of a part by the category's folder."""
+    """Return the ids of a part for each category's folder."""
     try:
         content = json.loads(path.read_bytes())
     except (OSError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""A dataset in memory, at the network's size: what training and measurement draw from."""
+"""A dataset in memory, at a network's image size and resolution, for training and evaluation."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -25,12 +25,12 @@ class ViewSet:
     """
     N objects with V views each.
 
-    - images: (N, V, S, S, 4) uint8, RGB multiplied by alpha, and alpha
-    - poses: (N, V, 4, 4) float64, object from optical frame; lengths count in sides of the grid
+    - images: (N, V, S, S, 4) uint8, RGBA, premultiplied by alpha
+    - poses: (N, V, 4, 4) float64, object from optical frame; lengths in sides of the grid
     - intrinsics: (N, V, 3, 3) float64, K in pixels of these images
     - voxels: (N, R, R, R) bool
-    - folders: where each came from; unreadable: what was left out, and why
-    - seen: (N, V, S, S) bool, which pixels the cameras' own images have; None: all of them
+    - folders: the source of each object; unreadable: errors of the objects left out
+    - seen: (N, V, S, S) bool, the pixels that lie in the cameras' original images; None: all
     """
 
     images: Tensor
@@ -47,7 +47,7 @@ class ViewSet:
 
     @property
     def image_size(self) -> int:
-        """S, pixels a side of the images."""
+        """S, the side of the images in pixels."""
         return self.images.shape[2]
 
     @property
@@ -66,7 +66,7 @@ class ViewSet:
 
     @property
     def categories(self) -> NDArray[np.str_]:
-        """Category of each object, (N,); a synset's id of ShapeNet becomes its name."""
+        """Category of each object, (N,); ShapeNet's synset ids become names."""
         return np.array([SYNSETS.get(folder.category, folder.category)
                          for folder in self.folders])
 
@@ -74,20 +74,24 @@ class ViewSet:
         """
         Return views (B,) of objects (B,) on white, (B, 3, S, S) float32 in [0, 1].
 
-        Where not all pixels were seen, which were is a fourth channel.
+        With `seen`, that mask is the fourth channel: (B, 4, S, S).
         """
         pictures = on_background(self.images[objects, views], torch.ones(len(objects), 3))
         return pictures if self.seen is None else with_seen(pictures, self.seen[objects, views])
 
 
 def on_background(images: Tensor, colors: Tensor) -> Tensor:
-    """Lay premultiplied images (B, S, S, 4) uint8 over colours (B, 3): (B, 3, S, S)."""
+    """
+    Composite premultiplied images (B, S, S, 4) uint8 over colours (B, 3) in [0, 1].
+
+    Returns (B, 3, S, S) float32 in [0, 1].
+    """
     planes = images.permute(0, 3, 1, 2).float() / 255
     return planes[:, :3] + (1 - planes[:, 3:]) * colors[:, :, None, None].to(planes.device)
 
 
 def with_seen(pictures: Tensor, seen: Tensor) -> Tensor:
-    """Return pictures (..., 3, S, S) with which pixels were seen as a fourth channel."""
+    """Return images (..., 4, S, S): `pictures` (..., 3, S, S) masked by `seen`, and `seen`."""
     return torch.cat([pictures * seen[..., None, :, :], seen[..., None, :, :].to(pictures)], -3)
 
 
@@ -95,18 +99,18 @@ def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = l
                resolution: int = RESOLUTION, image_size: int = 64,
                framed: bool = False, at_once: bool = True) -> ViewSet:
     """
-    Read objects, with voxels and images of the sizes that a network asks for.
+    Read objects, with voxels and images of the sizes that a network declares.
 
-    `framed`, the images are what a network gets that needs no front: any camera's, around the
-    object's cube, as many of each object as there are of all; else they are the turntable's 24.
-    What cannot be read is left out and listed. Raises DataError if none can. Framed images that
-    are not read `at_once` are read when a batch first shows them; then those that cannot be read
-    raise DataError.
+    With `framed`, the images are those of a network that needs no front: from arbitrary cameras,
+    cropped to the object's cube, with as many views of each object as every object has. Without
+    it, they are the 24 of the turntable. Objects that cannot be read are left out and listed in
+    `unreadable`. Without `at_once`, framed images are read when they are first indexed, and raise
+    DataError then. Raises DataError if no object can be read.
     """
     if framed:
         return _read_framed(folders, progress, resolution, image_size, at_once)
     count = len(folders)
-    # Filled in place: gathered and then stacked, a large set would take its memory twice
+    # Filled in place: stacking a list of arrays would need twice the memory
     images = np.empty((count, VIEW_COUNT, image_size, image_size, 4), np.uint8)
     poses = np.empty((count, VIEW_COUNT, 4, 4))
     intrinsics = np.empty((count, VIEW_COUNT, 3, 3))
@@ -130,24 +134,24 @@ def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = l
 
 
 def _read_all(read: Callable[[int], str], count: int) -> tuple[slice | list[int], tuple[str, ...]]:
-    """Read so many objects; return which could be, and what was said of the others."""
+    """Read `count` objects; return the indices of those read, and the errors of the others."""
     with ThreadPoolExecutor() as pool:
-        refusals = list(pool.map(read, range(count)))
-    good = [index for index in range(count) if not refusals[index]]
-    unreadable = tuple(filter(None, refusals))
+        errors = list(pool.map(read, range(count)))
+    good = [index for index in range(count) if not errors[index]]
+    unreadable = tuple(filter(None, errors))
     if not good:
-        raise DataError('expected objects in the dataset, none can be read'
-                        + ''.join(f'\n  {refusal}' for refusal in unreadable[:5]))
+        raise DataError('no readable object: expected at least one in the dataset, got none'
+                        + ''.join(f'\n  {error}' for error in unreadable[:5]))
     return slice(None) if len(good) == count else good, unreadable
 
 
 def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], resolution: int,
                  image_size: int, at_once: bool) -> ViewSet:
-    """Read what any cameras saw; see `read_views`."""
+    """Read views from arbitrary cameras; see `read_views`."""
     folders, shown, lacking = read_cameras(folders)
     if not folders:
-        raise DataError('expected objects in the dataset, none can be read'
-                        + ''.join(f'\n  {refusal}' for refusal in lacking[:5]))
+        raise DataError('no readable object: expected at least one in the dataset, got none'
+                        + ''.join(f'\n  {error}' for error in lacking[:5]))
     views = FramedViews(folders, shown, resolution, image_size)
     poses, intrinsics = torch.from_numpy(views.poses), torch.from_numpy(views.intrinsics)
     if not at_once:
@@ -175,7 +179,7 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
 
 def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
                  voxels: NDArray[np.bool_]) -> list[Camera]:
-    """Read one object into (V, S, S, 4) and (R, R, R); return its cameras, the grid's side 1."""
+    """Read one object into (V, S, S, 4), (R, R, R); return its cameras, in sides of the grid."""
     cameras = folder.cameras()
     if len(cameras) != len(images):
         raise DataError(f'{folder.images_folder}: wrong number of views: expected {len(images)}, '
@@ -190,6 +194,6 @@ def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
 
 
 def _premultiplied(rgba: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
-    """Return the image in pixels of a size, (S, S, 4), its colours multiplied by alpha."""
+    """Return the image resampled to a size, (S, S, 4), premultiplied by alpha."""
     small = cv2.resize(weighted(rgba), (size, size), interpolation=cv2.INTER_AREA)
     return np.asarray(np.rint(small), np.uint8)

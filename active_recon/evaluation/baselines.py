@@ -16,7 +16,7 @@ _THUMBNAIL = 16  # pixels a side
 
 @dataclass(frozen=True, eq=False)
 class Baselines:
-    """Both baselines, of a training set; the mean shape's threshold is chosen on validation."""
+    """Both baselines for a training set; `threshold` is that of the mean shape."""
 
     training: ViewSet
     means: dict[str, Tensor]
@@ -31,17 +31,17 @@ class Baselines:
         return cls(training, means, float(threshold))
 
     def mean_shape(self, views: ViewSet) -> NDArray[np.float64]:
-        """Return the IoU of each object with its category's mean shape, (N,)."""
+        """Return the IoU of each object with its category's mean shape, (N,) in [0, 1]."""
         return mean_shape_iou(self.means, views, self.threshold)
 
     def nearest_image(self, views: ViewSet, objects: Tensor,
                       starts: Tensor) -> NDArray[np.float64]:
-        """Return the IoU of each episode (E,) with the training shape of the nearest image."""
+        """Return the IoU of episodes with the training shape of the nearest image, (E,)."""
         return nearest_image_iou(self.training, views, objects, starts)
 
 
 def category_means(training: ViewSet) -> dict[str, Tensor]:
-    """Return the mean occupancy of every training category, and under '' of all, (X, Y, Z)."""
+    """Return the mean occupancy (X, Y, Z) of each training category, and of all under ''."""
     names = training.categories
     means = {str(name): training.voxels[torch.from_numpy(names == name)].float().mean(dim=0)
              for name in np.unique(names)}
@@ -51,9 +51,9 @@ def category_means(training: ViewSet) -> dict[str, Tensor]:
 def mean_shape_iou(means: dict[str, Tensor], views: ViewSet,
                    threshold: float) -> NDArray[np.float64]:
     """
-    Return the IoU of each object with its category's mean shape, (N,).
+    Return the IoU of each object with its category's mean shape above a threshold, (N,).
 
-    It gets the category, which no network does; an unknown category gets the mean of all.
+    Unlike a network, this baseline uses the true category; an unknown one gets the mean of all.
     """
     return np.array([
         float(iou(means.get(str(name), means['']) > threshold, truth))
@@ -61,7 +61,7 @@ def mean_shape_iou(means: dict[str, Tensor], views: ViewSet,
 
 
 def thumbnails(views: ViewSet) -> NDArray[np.float32]:
-    """Return every image, colours and alpha, at 16 x 16, flat, in [0, 1], (N, V, 1024)."""
+    """Return every image, RGBA, resampled to 16 x 16 and flattened, (N, V, 1024) in [0, 1]."""
     objects, count = views.images.shape[:2]
     flat = views.images.numpy().reshape(objects * count, *views.images.shape[2:])
     small = np.stack([cv2.resize(image, (_THUMBNAIL, _THUMBNAIL), interpolation=cv2.INTER_AREA)
@@ -72,10 +72,10 @@ def thumbnails(views: ViewSet) -> NDArray[np.float32]:
 def nearest_image_iou(training: ViewSet, views: ViewSet, objects: Tensor, starts: Tensor,
                       batch: int = 256) -> NDArray[np.float64]:
     """
-    Return the IoU of each episode's object with the training shape whose image is nearest, (E,).
+    Return the IoU of each episode's object with the training shape of the nearest image, (E,).
 
-    The first view's image is compared with all views of all training objects, by Euclidean
-    distance of thumbnails.
+    `objects` and `starts`, (E,), are the object and the first view of each episode. The image of
+    the first view is compared with all training images by Euclidean distance of thumbnails.
     """
     known = thumbnails(training)
     owners = np.repeat(np.arange(len(training)), known.shape[1])

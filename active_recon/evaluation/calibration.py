@@ -1,4 +1,4 @@
-"""Whether occupancies are the probabilities that they look like, where that can be missed."""
+"""Calibration of occupancies as probabilities, measured near the surface."""
 
 from collections.abc import Mapping
 
@@ -18,15 +18,15 @@ def near_surface(truth: Cells, reach: int = REACH) -> Cells:
     """
     Return the cells within `reach` cells of the boundary of a shape, (X, Y, Z).
 
-    Far from it everything is surely full or empty, which would flatter any calibration. What lies
-    beyond the cube is empty.
+    Cells far from it are certainly full or empty, so they would improve any calibration measure.
+    Outside of the grid everything counts as empty.
     """
     return np.asarray(binary_dilation(truth, iterations=reach)
                       & ~binary_erosion(truth, iterations=reach))
 
 
 def brier(occupancy: NDArray[np.floating], truth: Cells) -> float:
-    """Return the mean squared error of occupancies (N,) against the truth (N,), in [0, 1]."""
+    """Return the Brier score, [0, 1]: the mean squared error of occupancies (N,), truth (N,)."""
     return float(np.square(occupancy - truth).mean())
 
 
@@ -35,8 +35,8 @@ def reliability(occupancy: NDArray[np.floating], truth: Cells,
     """
     Return a reliability diagram of occupancies (N,) in [0, 1], (3, bins).
 
-    For each of equally wide bins: how many cells it has, the sum of their occupancies, and how
-    many of them are full. Diagrams of several objects add up.
+    For each bin of equal width: the number of cells, the sum of their occupancies, and the number
+    of full cells. Diagrams of several objects can be added.
     """
     place = np.minimum((occupancy * bins).astype(np.intp), bins - 1)
     return np.stack([np.bincount(place, weights, bins).astype(np.float64)
@@ -44,7 +44,11 @@ def reliability(occupancy: NDArray[np.floating], truth: Cells,
 
 
 def calibration_error(diagram: NDArray[np.float64]) -> float:
-    """Return the expected calibration error of a diagram (3, bins): 0 is perfect, 1 the worst."""
+    """
+    Return the expected calibration error of a reliability diagram (3, bins): 0 (perfect) to 1.
+
+    The ECE of Guo et al., "On calibration of modern neural networks", 2017, equation 3.
+    """
     count, expected, full = diagram
     return float(np.abs(expected - full).sum() / count.sum()) if count.any() else 0.0
 
@@ -52,11 +56,11 @@ def calibration_error(diagram: NDArray[np.float64]) -> float:
 def fit_temperatures(logits_by_count: Mapping[int, NDArray[np.floating]],
                      truth: Cells) -> dict[int, float]:
     """
-    Return for each number of views the temperature that makes logits most likely.
+    Return the temperature with the highest likelihood for each number of views.
 
-    Takes the logits of the same cells (N,) after each number of views, and their truth (N,); what
-    divides the logits is the temperature: above 1 where they are too sure. It minimises the
-    negative log-likelihood, which has one minimum.
+    Takes the logits of the same cells (N,) after each number of views, and their truth (N,).
+    Logits are divided by the temperature, which is above 1 where they are overconfident
+    (temperature scaling, Guo et al. 2017). The negative log-likelihood has one minimum.
     """
     return {count: _temperature(np.asarray(logits, np.float64), truth)
             for count, logits in logits_by_count.items()}

@@ -1,4 +1,4 @@
-"""Everything that is said of a network and its policies on held-out objects, measured."""
+"""Measurement of a network and its policies on held-out objects."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -33,9 +33,10 @@ _BATCH = 128
 @dataclass(frozen=True, eq=False)
 class Episodes:
     """
-    What E episodes brought, after each of T views.
+    The results of E episodes after each of T views.
 
-    IoU, entropy and the paper's entropy in nats, (E, T); azimuths taken, radians, (E, T).
+    IoU in [0, 1], entropy and the paper's entropy in nats, and the azimuths of the views taken in
+    radians, (E, T) each.
     """
 
     iou: NDArray[np.float64]
@@ -45,24 +46,24 @@ class Episodes:
 
     @property
     def auc(self) -> NDArray[np.float64]:
-        """Area under each episode's IoU curve, as its mean over the views, (E,)."""
+        """Area under each episode's IoU curve, i.e. the mean over its views, (E,)."""
         return np.asarray(self.iou.mean(axis=1))
 
     @property
     def rotation(self) -> NDArray[np.float64]:
-        """Radians travelled by each episode, the short way from view to view, (E,)."""
+        """Rotation travelled in each episode, the short way between views, radians, (E,)."""
         steps = azimuth_difference(self.azimuths[:, 1:], self.azimuths[:, :-1])
         return np.asarray(np.abs(steps).sum(axis=1))
 
 
 def joined(parts: Sequence[Episodes]) -> Episodes:
-    """Return the episodes of all parts, one part after the other."""
+    """Return the episodes of all parts, concatenated."""
     return Episodes(*(np.concatenate([getattr(part, name.name) for part in parts])
                       for name in fields(Episodes)))
 
 
 def record(steps: Iterable[Step], truth: Tensor, threshold: float) -> Episodes:
-    """Measure episodes (B,) view by view against their truth, (B, X, Y, Z) bool."""
+    """Return the results of B episodes, from their steps and the truth (B, X, Y, Z) bool."""
     measured: list[tuple[Tensor, ...]] = []
     taken = np.empty((len(truth), 0))
     for step in steps:
@@ -78,7 +79,12 @@ def run_policy(network: ReconstructionNetwork, policy: Policy, views: ViewSet, o
                starts: Tensor, threshold: float, count: int = 5,
                swapped: Tensor | None = None, bfloat16: bool = False,
                progress: Callable[[int], None] = lambda done: None) -> Episodes:
-    """Run all episodes (E,) under a policy; with `swapped` (E,), see `roll_out`."""
+    """
+    Run episodes under a policy and return their results.
+
+    `objects` and `starts`, (E,), are the object and the first view of each; `count` is the number
+    of views. For `swapped` see `roll_out`. `progress` gets the number of episodes just finished.
+    """
     parts = []
     for part in batches(len(objects), _BATCH):
         steps = roll_out(network, policy, views, objects[part], starts[part], count,
@@ -91,7 +97,7 @@ def run_policy(network: ReconstructionNetwork, policy: Policy, views: ViewSet, o
 def run_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Tensor, starts: Tensor,
                threshold: float, count: int = 5, bfloat16: bool = False,
                progress: Callable[[int], None] = lambda done: None) -> Episodes:
-    """Run all episodes (E,) under the greedy oracle, which sees the truth."""
+    """Run episodes as `run_policy` does, but under the greedy oracle, which uses the truth."""
     parts = []
     for part in batches(len(objects), oracle_batch(views)):
         own = objects[part]
@@ -103,9 +109,9 @@ def run_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Tensor, 
 
 def summary(runs: Sequence[Episodes], views: ViewSet, objects: Tensor) -> dict[str, Any]:
     """
-    Return means with 95 % intervals, and per category, ready for JSON.
+    Return means with 95 % intervals, overall and per category, ready for JSON.
 
-    `runs` are the same episodes under each seed of a policy.
+    `runs` has the same episodes for each seed of a policy.
     """
     def stacked(name: str) -> NDArray[np.float64]:
         """Return (T, objects, starts, seeds), or without T."""
@@ -128,7 +134,7 @@ def summary(runs: Sequence[Episodes], views: ViewSet, objects: Tensor) -> dict[s
 
 
 def interval(values: NDArray[np.float64], objects: Tensor) -> dict[str, float]:
-    """Return mean, low and high (95 %, over objects and starts) of values of episodes (E,)."""
+    """Return the mean of values of episodes (E,) and both ends of its 95 % interval."""
     return asdict(mean_interval(by_object(values, objects.numpy())))
 
 
@@ -138,10 +144,10 @@ def iou_by_yaw(
     threshold: float, progress: Callable[[int], None] = lambda done: None,
 ) -> dict[str, dict[str, float]]:
     """
-    Return the single-view IoU where the front stands turned by each of YAWS_DEG.
+    Return the single-view IoU with the object's front off by each of YAWS_DEG.
 
-    Every other episode's is turned to the right. The images stay as they are; the truth turns,
-    and so does the azimuth that the network is given, if it uses it.
+    The sign of the yaw alternates between episodes. The images are unchanged; the truth is
+    rotated, and so are the cameras that the network gets.
     """
     found: dict[int, list[float]] = {yaw: [] for yaw in YAWS_DEG}
     observer = Observer(network, views)
@@ -167,11 +173,11 @@ def _turned_truth(views: ViewSet, item: int, yaw: float) -> Tensor:
 @dataclass(frozen=True)
 class LatentSwap:
     """
-    A policy that gets the latent of another object, compared with one that gets the true latent.
+    Result of the latent-swap ablation: a policy with the latent of another object or its own.
 
-    Means with their 95 % intervals: `goal_change_deg`, how far the first goal moves from the same
-    start; `auc` and `auc_swapped`, the area under the IoU curve with either latent; `auc_loss`,
-    their difference, paired by episode.
+    Means with their 95 % intervals: `goal_change_deg`, the change of the first goal from the same
+    start, degrees; `auc` and `auc_swapped`, the area under the IoU curve with the true and the
+    swapped latents; `auc_loss`, their difference, paired by episode.
     """
 
     goal_change_deg: dict[str, float]
@@ -187,9 +193,9 @@ def latent_swap_ablation(
     progress: Callable[[int], None] = lambda done: None,
 ) -> LatentSwap:
     """
-    Swap every latent for another object's, seen from the same azimuths; measure what changes.
+    Measure a policy when every latent is that of another object from the same azimuths.
 
-    Raises DataError on a set of a single object.
+    Raises DataError on a set with a single object.
     """
     observer = Observer(network, views)
     swapped = swapped_objects(objects, len(views))

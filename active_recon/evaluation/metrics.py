@@ -1,4 +1,4 @@
-"""Episodes to measure, and the IoU over their views at several thresholds."""
+"""The episodes to measure, and the IoU after each view at several thresholds."""
 
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import DataError
@@ -16,9 +16,9 @@ THRESHOLDS: NDArray[np.float64] = np.arange(0.10, 0.66, 0.05).round(2)
 
 def episodes(views: ViewSet, starts: int, seed: int = 0) -> tuple[Tensor, Tensor]:
     """
-    Return objects and first views of the episodes to measure, (N x starts,) each.
+    Return the objects and the first views of the episodes to measure, (N x starts,) each.
 
-    Each object starts from `starts` different views; 24 starts are all of them.
+    Each object has episodes from `starts` different views, drawn by the seed.
     """
     order = np.random.default_rng(seed).random(views.azimuths.shape).argsort(axis=1)
     objects = np.repeat(np.arange(len(views)), starts)
@@ -29,7 +29,7 @@ def iou_per_view(
     network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
     starts: Tensor, thresholds: NDArray[np.float64], count: int = 5, batch: int = 128,
 ) -> NDArray[np.float64]:
-    """Return the IoU of every episode after every view at every threshold, (E, count, K)."""
+    """Return the IoU of E episodes after each view at each of K thresholds, (E, count, K)."""
     result = np.empty((len(objects), count, len(thresholds)))
     for low in range(0, len(objects), batch):
         part = slice(low, low + batch)
@@ -43,9 +43,9 @@ def iou_per_view(
 
 def swapped_objects(objects: Tensor, count: int) -> Tensor:
     """
-    Return another object for each of objects (E,) of a set of `count`: the one half a set away.
+    Return another object for each of objects (E,) of a set of `count`: the index half a set away.
 
-    In a set sorted by category it mostly is of another category. Raises DataError on a set of
+    In a set sorted by category it usually has another category. Raises DataError on a set of
     fewer than two objects.
     """
     if count < 2:

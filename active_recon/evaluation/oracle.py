@@ -1,4 +1,4 @@
-"""What a policy could gain: views chosen with knowledge of the truth."""
+"""The greedy oracle, which chooses views with the true shape: an upper reference for policies."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import torch
 from torch import Tensor
 
-_ROWS = 240  # candidates that go through the network at once
+_ROWS = 240  # candidates in a batch of the network
 
 
 def rows_of(state: State, rows: Tensor) -> State:
@@ -23,7 +23,7 @@ def rows_of(state: State, rows: Tensor) -> State:
 
 @dataclass(frozen=True, eq=False)
 class _Candidates:
-    """What the network would know after each of B x K candidate views; rows of B x K."""
+    """The network's state, logits and IoU after each of B x K candidate views, in B x K rows."""
 
     views: Tensor
     state: State
@@ -32,14 +32,14 @@ class _Candidates:
 
     @property
     def best(self) -> Tensor:
-        """The candidates of the highest IoU, (B,), out of K; the first of those alike."""
+        """Index of the candidate with the highest IoU, (B,) in [0, K); of equals the first."""
         return self.iou.argmax(dim=1)
 
 
 @torch.inference_mode()
-def _look_at(observer: Observer, truth: Tensor, objects: Tensor, candidates: Tensor, state: State,
-             threshold: float) -> _Candidates:
-    """Look at candidates (B, K) of objects (B,) of this truth, after a state of B rows."""
+def _evaluated(observer: Observer, truth: Tensor, objects: Tensor, candidates: Tensor,
+               state: State, threshold: float) -> _Candidates:
+    """Evaluate candidate views (B, K) of objects (B,) with this truth, from a state of B rows."""
     batch, count = candidates.shape
     rows = torch.arange(batch).repeat_interleave(count)
     after = observer.update(objects[rows], candidates.flatten(), rows_of(state, rows))
@@ -49,8 +49,8 @@ def _look_at(observer: Observer, truth: Tensor, objects: Tensor, candidates: Ten
     return _Candidates(candidates, after, logits, iou(occupied, truth).cpu())
 
 
-class _LookedAhead(RenderedObjects):
-    """Objects whose candidate views are all tried before one of them is taken."""
+class _LookaheadObjects(RenderedObjects):
+    """Objects whose candidate views are all evaluated before one of them is taken."""
 
     def __init__(self, observer: Observer, objects: Tensor, starts: Tensor,
                  threshold: float) -> None:
@@ -60,19 +60,19 @@ class _LookedAhead(RenderedObjects):
         self.logits = torch.empty(0)
 
     def reset(self) -> None:
-        """Begin an episode of each with its start as the only candidate."""
+        """Begin an episode of each, with its first view as the only candidate."""
         super().reset()
         self.look_ahead(self._starts[:, None])
 
     def look_ahead(self, candidates: Tensor) -> Tensor:
-        """Try candidate views (B, K); return the best of each object, (B,)."""
-        self._ahead = _look_at(self._observer, self._observer.views.voxels[self.objects],
-                               self.objects, candidates, self.seen.state, self._threshold)
+        """Evaluate candidate views (B, K); return the best view of each object, (B,)."""
+        self._ahead = _evaluated(self._observer, self._observer.views.voxels[self.objects],
+                                 self.objects, candidates, self.seen.state, self._threshold)
         best: Tensor = candidates.gather(1, self._ahead.best[:, None])[:, 0]
         return best
 
     def step(self, view: Tensor) -> Seen:
-        """Take one of the candidates (B,) that were tried."""
+        """Take one of the evaluated candidates of each object, (B,)."""
         batch, count = self._ahead.views.shape
         column = (self._ahead.views == view[:, None]).int().argmax(dim=1)
         rows = column + torch.arange(batch) * count
@@ -87,12 +87,12 @@ def roll_out_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Ten
                     starts: Tensor, count: int, threshold: float,
                     bfloat16: bool = False) -> Iterator[Step]:
     """
-    Run episodes (B,) as `roll_out` does, under the greedy oracle.
+    Run B episodes as `roll_out` does, under the greedy oracle.
 
-    It sees the truth: of the views not yet taken it goes to the one after which the IoU is
-    highest, one step ahead.
+    It knows the truth: of the views not yet taken it chooses the one with the highest IoU after
+    it.
     """
-    own = _LookedAhead(Observer(network, views, bfloat16), objects, starts, threshold)
+    own = _LookaheadObjects(Observer(network, views, bfloat16), objects, starts, threshold)
     every = torch.arange(views.images.shape[1]).expand(len(objects), -1)
 
     def choose(step: TimeStep[Tensor, Seen]) -> Tensor | None:
@@ -106,7 +106,7 @@ def roll_out_oracle(network: ReconstructionNetwork, views: ViewSet, objects: Ten
 
 
 def oracle_batch(views: ViewSet) -> int:
-    """Return how many episodes of the greedy oracle make a batch of candidates."""
+    """Return the number of episodes whose candidates form one batch of the network."""
     return max(1, _ROWS // views.images.shape[1])
 
 
@@ -114,21 +114,21 @@ def oracle_batch(views: ViewSet) -> int:
 def sequence_iou(network: ReconstructionNetwork, views: ViewSet, item: int, threshold: float,
                  length: int = 3, bfloat16: bool = False) -> NDArray[np.float32]:
     """
-    Return the IoU of one object after every ordered sequence of so many views, (V, ..., V).
+    Return the IoU of one object after every ordered sequence of `length` views, (V, ..., V).
 
-    Entry [i, j, k] is that of view i, then j, then k: a network may care for the order. NaN where
-    a view comes twice. Sequences share the states before: 3 of 24 views are 12,720
-    passes.
+    Entry [i, j, k] is for view i, then j, then k, because a network may depend on the order. It is
+    NaN where a view repeats. Sequences share the states of their prefixes: three of 24 views take
+    12,720 passes.
     """
     count, observer = views.images.shape[1], Observer(network, views, bfloat16)
     table = np.full((count,) * length, np.nan, np.float32)
 
     def explore(sequences: Tensor, state: State) -> None:
-        """Look at all that may follow sequences (P, t), after which the network's state is."""
+        """Evaluate all views that can follow sequences (P, t), whose states are given."""
         taken = torch.zeros(len(sequences), count, dtype=torch.bool).scatter(1, sequences, True)
         fresh = torch.nonzero(~taken)[:, 1].reshape(len(sequences), -1)
         objects = torch.full((len(sequences),), item)
-        seen = _look_at(observer, views.voxels[objects], objects, fresh, state, threshold)
+        seen = _evaluated(observer, views.voxels[objects], objects, fresh, state, threshold)
         longer = torch.cat([sequences.repeat_interleave(fresh.shape[1], dim=0),
                             fresh.reshape(-1, 1)], dim=1)
         if longer.shape[1] == length:

@@ -1,4 +1,4 @@
-"""Two weights files or two policies on the same episodes: each alone, and what is between them."""
+"""Paired comparison of two models or two policies on the same episodes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 import csv
@@ -18,20 +18,20 @@ COLUMNS = ('model', 'policy', 'seed', 'category', 'object', 'start', 'view', 'az
 
 
 def require_same_episodes(one: Trial, other: Trial) -> None:
-    """Raise DataError where two networks were not shown the same objects from the same starts."""
+    """Raise DataError unless two trials have the same objects, starts and numbers of views."""
     own, theirs = (_named(trial) for trial in (one, other))
     if own != theirs or one.count != other.count:
-        raise DataError('the two cannot be paired: they read other objects of the dataset, '
-                        f'{len(own)} and {len(theirs)} episodes')
+        raise DataError('episodes cannot be paired: expected the same objects, starts and numbers '
+                        f'of views for both models, got {len(own)} and {len(theirs)} episodes')
 
 
 def paired(runs: Sequence[Episodes], others: Sequence[Episodes],
            objects: Tensor) -> dict[str, Any]:
     """
-    Return by how much the first are above the others, with 95 % intervals, ready for JSON.
+    Return the paired difference of runs minus others, with 95 % intervals, ready for JSON.
 
-    `iou` after each view, `auc` the area under its curve; both are the same episodes (E,) of
-    `objects`, under one seed or several.
+    `iou` is that after each view, `auc` that of the area under the curve. Both are the same
+    episodes, of `objects` (E,), one run for each seed.
     """
     def of(runs: Sequence[Episodes], view: int | None) -> Any:
         return np.stack([by_object(run.auc if view is None else run.iou[:, view], objects.numpy())
@@ -45,9 +45,10 @@ def paired(runs: Sequence[Episodes], others: Sequence[Episodes],
 def write_rows(path: Path, trials: Mapping[str, tuple[Trial, Mapping[str, Sequence[Episodes]]]]
                ) -> None:
     """
-    Write one row of CSV for each object, start, view, policy and seed of each model by its name.
+    Write a CSV file with one row for each model, policy, seed, object, start and view.
 
-    `start` is the number of the first view in the dataset; `view` counts from 1.
+    `trials` has the trial and the runs of each model by its name. The column `start` is the index
+    of the first view in the dataset; `view` counts from 1.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open('w', newline='') as file:

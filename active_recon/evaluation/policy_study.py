@@ -1,4 +1,4 @@
-"""What each view policy is worth on one frozen network, beside chance and beside an oracle."""
+"""Comparison of view policies on one frozen network, including random and the greedy oracle."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -41,16 +41,16 @@ from torch import nn
 _TIMED_EPISODES = 8
 
 Runs = Mapping[str, Sequence[Episodes]]
-"""The same episodes under each seed of each policy."""
+"""The runs of each policy by its name: the same episodes for each seed."""
 
 
 def heuristic_names() -> list[str]:
-    """Return the policies that no network brings."""
+    """Return the names of the policies that are not learned."""
     return [name for name, entry in POLICIES.items() if not entry.is_learned]
 
 
 def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
-    """Return all policies, the learned ones after the others, and the oracle, which is none."""
+    """Return the names of all policies, learned ones last, and 'oracle', which is not a policy."""
     own = [name for name, entry in POLICIES.items() if entry.is_learned and learned]
     return [*heuristic_names(), *own, *(['oracle'] if oracle else [])]
 
@@ -58,14 +58,14 @@ def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
 def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count: int = 5,
                seeds: int = 5, seed: int = 0, model: str = PAPER_MODEL) -> list[Contender]:
     """
-    Return the policies named, under all of their seeds.
+    Return the policies of these names, each with all of its seeds.
 
-    - attentions: the learned policy's models, one for each seed it was trained under
-    - model: the network's name, beside which they were trained
-    - count: views of an episode, which uniform divides the turn by
-    - seeds: how often random is drawn, from `seed` on
+    - attentions: the learned policy's modules, one for each training seed
+    - model: name of the network that they were trained with
+    - count: number of views of an episode, used by uniform
+    - seeds: number of runs of random, with seeds from `seed` on
 
-    Raises ConfigError on other names, WeightsError where attention has no model.
+    Raises ConfigError on an unknown name, WeightsError where attention has no module.
     """
     made: list[Contender] = []
     for name in names:
@@ -76,42 +76,42 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
             made.append(Contender(name, name, None))
         elif POLICIES[name].is_learned:
             if not attentions:
-                raise WeightsError(f'{name}: no view policy: expected weights with one in them, '
-                                   'as `active-recon train --model 2d3d-attention` makes; there '
-                                   'is none')
+                raise WeightsError(f'{name}: no view policy: expected weights that contain one, '
+                                   'for example of `active-recon train --model 2d3d-attention`, '
+                                   'got none')
             made += [Contender(name, f'{name}-{_model_hash(each)}', partial(_learned, model, each))
                      for each in attentions]
         elif POLICIES[name].draws:
-            made += [Contender(name, f'{name}-{each}', partial(_blind, name, count))
+            made += [Contender(name, f'{name}-{each}', partial(_heuristic, name, count))
                      for each in range(seed, seed + seeds)]
         else:
-            made.append(Contender(name, name, partial(_blind, name, count)))
+            made.append(Contender(name, name, partial(_heuristic, name, count)))
     return made
 
 
 def load_attentions(files: Sequence[Path], network: ReconstructionNetwork) -> list[nn.Module]:
     """
-    Return the attentive models of weights files, trained on this very network.
+    Return the attention modules of weights files that were trained with this network.
 
-    Raises WeightsError where one has none, or was trained on another network: what it has learned
-    to read are that one's latents.
+    Raises WeightsError where a file has none, or one trained with another network, whose latents
+    differ.
     """
     models = []
     for file in files:
         bundle = load_weights(file)
         if bundle.attention is None:
-            raise WeightsError(f'{file}: no view policy: expected weights with one in them, got '
+            raise WeightsError(f'{file}: no view policy: expected weights that contain one, got '
                                'none')
         if state_hash(bundle.reconstruction) != state_hash(network):
-            raise WeightsError(f'{file}: view policy of another network: expected one trained on '
-                               'the network that is measured, got one trained on another; train '
-                               'it with `active-recon train --freeze-from` that network')
+            raise WeightsError(f'{file}: view policy of another network: expected one trained '
+                               'with the network that is measured, got one of another; train it '
+                               'with `active-recon train --freeze-from` and that network')
         models.append(bundle.attention)
     return models
 
 
 def run_all(trial: Trial, every: Sequence[Contender], reporting: Reporting = silent) -> Runs:
-    """Run the episodes of all contenders; gathered by policy."""
+    """Run the episodes of all contenders; return the runs by policy."""
     runs: dict[str, list[Episodes]] = {}
     for contender in every:
         with reporting(contender.key, len(trial.objects)) as advance:
@@ -122,12 +122,12 @@ def run_all(trial: Trial, every: Sequence[Contender], reporting: Reporting = sil
 
 def compare(trial: Trial, runs: Runs) -> dict[str, Any]:
     """
-    Return the figures of every policy and of what is between them, ready for JSON.
+    Return the results of every policy and their differences, ready for JSON.
 
-    - policies: see `measure.summary`; `auc_above` what the area under the IoU curve is above those
-      of random, uniform and farthest, paired; `gap_closed` the share of the gap between random
-      and the oracle, None where there is none
-    - headroom: of the areas, the oracle's above random's; headroom_sentence says it
+    - policies: see `measure.summary`; `auc_above` is the paired difference of the area under the
+      IoU curve to those of random, uniform and farthest; `gap_closed` is the fraction of the gap
+      between random and the oracle, None where there is no gap
+    - headroom: the oracle's area minus random's; headroom_sentence states it in words
 
     All intervals are of 95 %, over objects, starts and seeds.
     """
@@ -147,7 +147,7 @@ def compare(trial: Trial, runs: Runs) -> dict[str, Any]:
 
 
 def decision_ms(trial: Trial, contender: Contender) -> float | None:
-    """Return the median time of a decision of a single episode, milliseconds; None: the oracle."""
+    """Return the median time of one decision in one episode, milliseconds; None for the oracle."""
     if contender.make is None:
         return None
     watch = _Stopwatch(contender.make(np.random.default_rng(0)))
@@ -161,12 +161,12 @@ def decision_ms(trial: Trial, contender: Contender) -> float | None:
 def policy_study(trial: Trial, attentions: Sequence[nn.Module] = (), seeds: int = 5,
                  subset_objects: int = 60, reporting: Reporting = silent) -> dict[str, Any]:
     """
-    Compare all policies, ready for JSON: `compare`, and `identity`, `decision_ms`, `best_subset`.
+    Compare all policies; return `compare` with `identity`, `decision_ms` and `best_subset`.
 
-    - attentions: one for each seed that the policy was trained under, on this very network
-    - seeds: how often random is drawn
-    - subset_objects: objects, drawn over the categories, of which every sequence of three views
-      is tried; 0 leaves it out
+    - attentions: one for each training seed of the policy, trained with this network
+    - seeds: number of runs of random
+    - subset_objects: number of objects, spread over the categories, on which every sequence of
+      three views is measured; 0 skips this
     """
     every = contenders(contender_names(bool(attentions)), attentions, trial.count, seeds)
     runs = run_all(trial, every, reporting)
@@ -183,7 +183,7 @@ def policy_study(trial: Trial, attentions: Sequence[nn.Module] = (), seeds: int 
     return found
 
 
-def _blind(name: str, count: int, rng: np.random.Generator) -> Policy:
+def _heuristic(name: str, count: int, rng: np.random.Generator) -> Policy:
     return load_policy(name, PolicyOptions(rng, count))
 
 
@@ -192,7 +192,7 @@ def _learned(model: str, module: nn.Module, rng: np.random.Generator) -> Policy:
 
 
 def _model_hash(module: nn.Module) -> str:
-    """Return what tells a learned policy apart: its weights, and what it says of itself."""
+    """Return a hash that identifies a learned policy: of its weights and its metadata."""
     facts = sorted(TorchPolicyRuntime(module).facts.items())
     return hashlib.sha256(f'{state_hash(module)} {facts}'.encode()).hexdigest()[:16]
 
@@ -214,15 +214,15 @@ class _Stopwatch:
 
     @property
     def wants_volume(self) -> bool:
-        """Whether the policy looks at the occupancy."""
+        """Whether the policy uses the occupancy."""
         return self._policy.wants_volume
 
     def initial_state(self, batch: int) -> State:
-        """Return the policy's."""
+        """Return the policy's initial state."""
         return self._policy.initial_state(batch)
 
     def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
-        """Let the policy choose."""
+        """Return the policy's choice, and record its time."""
         begun = time.perf_counter()
         chosen = self._policy.choose(seen, state)
         self.milliseconds.append(1e3 * (time.perf_counter() - begun))

@@ -1,4 +1,4 @@
-"""Episodes in batches: a frozen network, a view policy, and what was known after every view."""
+"""Batches of episodes with a frozen network and a view policy."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,7 +18,12 @@ from torch import Tensor
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """B episodes after one more view: occupancy (B, R, R, R), the latent, and azimuths taken."""
+    """
+    B episodes after one more view.
+
+    - occupancy: (B, R, R, R) in [0, 1]; latent: (B, C, h, w) float32
+    - taken: azimuths of all views so far, radians, (B, t)
+    """
 
     occupancy: Tensor
     latent: Tensor
@@ -27,14 +32,14 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """B episodes after t views: the network's state, and the views' indices, (B, t)."""
+    """B episodes after t views: the network's state, and the indices of the views, (B, t)."""
 
     state: State
     chosen: Tensor
 
 
 class Shows(Protocol):
-    """Shows a network views of a set, by their indices."""
+    """Feeds views of a set to a network, by the indices of objects (B,) and views (B,)."""
 
     views: ViewSet
 
@@ -44,7 +49,7 @@ class Shows(Protocol):
 
 
 class RenderedObjects:
-    """The environment of B objects of a set, whose rendered views are named by their indices."""
+    """The environment of B objects of a set; an action is the index of a rendered view."""
 
     def __init__(self, shows: Shows, objects: Tensor) -> None:
         self._shows, self.objects = shows, objects
@@ -55,7 +60,7 @@ class RenderedObjects:
         self.seen = Seen(self._shows.initial_state(count), torch.empty(count, 0, dtype=torch.long))
 
     def step(self, view: Tensor) -> Seen:
-        """Take a view (B,) of each object."""
+        """Take a view of each object, (B,)."""
         state = self._shows.update(self.objects, view, self.seen.state)
         self.seen = Seen(state, torch.column_stack([self.seen.chosen, view]))
         return self.seen
@@ -66,7 +71,12 @@ class RenderedObjects:
 
     def observation(self, latent: Tensor, seen: Seen,
                     occupancy: Tensor | None = None) -> Observation:
-        """Return what a policy sees: all views of an object are its candidates."""
+        """
+        Return the policy's observation, with all views of an object as candidates.
+
+        `latent` is (B, C, h, w); `occupancy`, (B, R, R, R), is None for policies that do not use
+        it.
+        """
         poses = self._shows.views.poses
         published = None if occupancy is None else torch.where(
             occupancy > PUBLISHED_FLOOR, occupancy, 0).float().cpu().numpy()
@@ -75,7 +85,7 @@ class RenderedObjects:
             poses[self.objects].numpy(), published)
 
     def goal_azimuths(self, choice: Choice) -> NDArray[np.float64]:
-        """Return the azimuths (B,) that a policy's choice goes to, radians."""
+        """Return the azimuths of the goals that a policy chose, radians, (B,)."""
         own = pose_azimuths(self._shows.views.poses[self.objects].numpy())
         best = np.take_along_axis(own, choice.scores.argmax(axis=1)[:, None], axis=1)[:, 0]
         if choice.azimuth is None:
@@ -83,7 +93,7 @@ class RenderedObjects:
         return np.where(np.isnan(choice.azimuth), best, choice.azimuth)
 
     def view_of(self, choice: Choice) -> Tensor:
-        """Return the views (B,) that show a policy's choice: the nearest, or the best."""
+        """Return the views (B,) of a policy's choice: nearest to its azimuth, else best score."""
         best = torch.from_numpy(choice.scores.argmax(axis=1))
         if choice.azimuth is None:
             return best
@@ -97,11 +107,11 @@ def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, obj
              starts: Tensor, count: int, swapped: Tensor | None = None,
              bfloat16: bool = False) -> Iterator[Step]:
     """
-    Run one episode for each object (B,) from the view it starts at (B,), yielding every view.
+    Run an episode of `count` views for each object (B,) from a first view (B,); yield every step.
 
-    An azimuth between the views is shown by the nearest rendered view, as on the turntable.
-    With `swapped`, (B,), the policy gets the latents of these objects, seen from the same
-    azimuths, instead of the true ones.
+    For an azimuth between views, the nearest rendered view is taken, as on the turntable. With
+    `swapped`, (B,), the policy gets the latents of those objects from the same azimuths instead
+    of the true ones.
     """
     observer = Observer(network, views, bfloat16)
     own = RenderedObjects(observer, objects)
@@ -126,14 +136,14 @@ def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, obj
 
 
 class Observer:
-    """A frozen network that is shown views of a set, on white; it encodes each of them once."""
+    """Feeds views of a set, on white, to a frozen network; each view is encoded once."""
 
     def __init__(self, network: ReconstructionNetwork, views: ViewSet,
                  bfloat16: bool = False) -> None:
         self.views = views
         self._network, self._bfloat16 = network, bfloat16
         self._device = network.device
-        self._rows: dict[tuple[int, int], int] = {}  # of `_encoded`, by object and view
+        self._rows: dict[tuple[int, int], int] = {}  # rows of `_encoded`, by object and view
         self._encoded: Tensor | None = None
 
     def initial_state(self, batch: int) -> State:
@@ -143,10 +153,10 @@ class Observer:
     def update(self, objects: Tensor, chosen: Tensor, state: State,
                yaws: Tensor | None = None) -> State:
         """
-        Update the state by views (B,) of objects (B,).
+        Return the state after views (B,) of objects (B,).
 
-        `yaws` (B,), radians, turn the cameras that the network gets about +z: its error about
-        the front.
+        The network's cameras are rotated about +z by `yaws` (B,), radians: an error of the
+        object's front.
         """
         cameras = self.views.cameras(objects, chosen)
         if yaws is not None:
@@ -156,8 +166,8 @@ class Observer:
                 self._encode(objects, chosen), cameras.to(self._device), state)
 
     def decode(self, state: State) -> Tensor:
-        """Return the occupancy's logits of a state, (B, R, R, R) float32."""
-        # 3D convolutions take two thirds of the time if channels are last
+        """Return the logits of occupancy of a state, (B, R, R, R) float32."""
+        # 3D convolutions take two thirds of the time with channels last
         placed = {name: part.contiguous(memory_format=torch.channels_last_3d)
                   if part.ndim == 5 else part for name, part in state.items()}
         with self._precision():
@@ -192,6 +202,6 @@ def batches(count: int, size: int) -> Iterator[Tensor]:
 
 
 def nearest_views(azimuths: NDArray[np.float32], wanted: NDArray[np.float64]) -> Tensor:
-    """Return the index of the view nearest to each azimuth wanted, (B, V) and (B,) to (B,)."""
+    """Return the index (B,) of the view nearest to an azimuth, of azimuths (B, V), wanted (B,)."""
     away = np.abs(azimuth_difference(azimuths, wanted[:, None]))
     return torch.from_numpy(away.argmin(axis=1))

@@ -1,4 +1,4 @@
-"""The best three views of an object, out of every sequence of three."""
+"""The best sequence of three views of an object, by exhaustive search."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -16,9 +16,9 @@ _LENGTH = 3
 
 def drawn_over_categories(categories: NDArray[np.str_], count: int,
                           seed: int = 0) -> NDArray[np.int64]:
-    """Return so many objects (fewer where there are no more), as evenly of each as they go."""
+    """Return the indices of `count` objects (or all, if fewer), evenly spread over categories."""
     order = np.random.default_rng(seed).permutation(len(categories))
-    rank = np.empty(len(categories), np.int64)  # of each object among those of its category
+    rank = np.empty(len(categories), np.int64)  # position of each object within its category
     for name in np.unique(categories):
         alike = order[categories[order] == name]
         rank[alike] = np.arange(len(alike))
@@ -28,17 +28,16 @@ def drawn_over_categories(categories: NDArray[np.str_], count: int,
 def best_subsets(trial: Trial, runs: Mapping[str, Sequence[Episodes]], count: int,
                  progress: Callable[[], None] = lambda: None) -> dict[str, Any]:
     """
-    Try every ordered sequence of three views of `count` objects; return what is ready for JSON.
+    Measure every ordered sequence of three views of `count` objects; return results for JSON.
 
-    IoU after the third view, on these objects alone:
+    IoU after the third view, on these objects only:
 
-    - best: of the best sequence; the order counts, since a network may care for it
-    - best_from_start: of the best one that begins with the first view of the trial's episodes
-    - expected_at_random: the mean of all that begin with it
-    - policies: what the policies reached; oracle_lacks: by how much the greedy oracle falls short
-      of best_from_start, paired
+    - best: of the best sequence (a network may depend on the order)
+    - best_from_start: of the best sequence that begins with the first view of an episode
+    - expected_at_random: the mean over all sequences that begin with it
+    - policies: of the policies; oracle_lacks: best_from_start minus the greedy oracle, paired
 
-    Every object is 12,720 passes at 24 views; what was tried before is read from the cache.
+    An object of 24 views takes 12,720 passes; earlier results are read from the trial's cache.
     """
     items = drawn_over_categories(trial.views.categories, count)
     starts = by_object(trial.starts.numpy(), trial.objects.numpy())[items]

@@ -1,8 +1,8 @@
 """
-How near a reconstructed surface is to the true one: what IoU does not tell of thin parts.
+Distance of a reconstructed surface from the true one; unlike IoU, it measures thin parts well.
 
-Distances count in sides of the object's cube. Surfaces are compared by points drawn evenly over
-their area, the same points each time.
+Distances are in sides of the object's cube. Surfaces are compared by points drawn uniformly over
+their area, with a fixed seed.
 """
 
 from dataclasses import dataclass
@@ -17,25 +17,26 @@ from scipy.spatial import cKDTree
 import trimesh
 
 SAMPLES = 50_000
-"""Points of a surface: two drawings of one surface have an F-score of 0.99 at 1 % and more."""
+"""Points drawn on a surface: two drawings of the same have an F-score of 0.99 or more at 1 %."""
 ASKED = 10_000
-"""How many of them look for the nearest of the other's: means change by less than 0.01."""
+"""Number of them for which the nearest point is searched: changes means by less than 0.01."""
 NEAR = (0.01, 0.02)
-"""Distances, in sides of the cube, within which a point counts as found."""
+"""Distances, in sides of the cube, within which a point counts as matched."""
 _THICK = np.ones((3, 3, 3), np.bool_)
 
 
 @dataclass(frozen=True)
 class SurfaceScores:
     """
-    A surface against the true one.
+    Comparison of a surface with the true one.
 
-    - f_score_1, f_score_2: harmonic mean of the shares of either's points that are within 1 % and
-      2 % of the cube's side of the other, [0, 1]
+    - f_score_1, f_score_2: harmonic mean of precision and recall at a distance of 1 % and 2 % of
+      the cube's side, [0, 1] (Tatarchenko et al. 2019)
     - chamfer: mean of the two mean distances to the nearest point of the other, sides of the cube
-    - normal_consistency: mean |cosine| between the normals there, both ways, [0, 1]
+    - normal_consistency: mean |cosine| between the normals of nearest points, both ways, [0, 1]
+      (Mescheder et al. 2019)
 
-    Where there is no surface they are 0, 0, the cube's diagonal, and 0.
+    Without a surface they are 0, 0, the cube's diagonal, and 0.
     """
 
     f_score_1: float
@@ -49,9 +50,9 @@ NO_SURFACE = SurfaceScores(0.0, 0.0, math.sqrt(3), 0.0)
 
 class SampledSurface:
     """
-    Points (N, 3) drawn evenly from a mesh's surface, its normals there, and a tree over them.
+    Points (N, 3) drawn uniformly from a mesh's surface, their normals (N, 3), and a k-d tree.
 
-    Which points they are depends on the mesh and the seed alone.
+    The points depend only on the mesh and the seed.
     """
 
     def __init__(self, mesh: trimesh.Trimesh, count: int = SAMPLES, seed: int = 0) -> None:
@@ -62,7 +63,7 @@ class SampledSurface:
 
 
 def compare_surfaces(found: SampledSurface, truth: SampledSurface) -> SurfaceScores:
-    """Return the scores of a surface against the true one."""
+    """Return the scores of a surface compared with the true one."""
     away, precise = _nearest(found, truth)
     missed, complete = _nearest(truth, found)
     alike = (precise + complete) / 2
@@ -71,8 +72,8 @@ def compare_surfaces(found: SampledSurface, truth: SampledSurface) -> SurfaceSco
 
 
 def _nearest(asking: SampledSurface, asked: SampledSurface) -> tuple[NDArray[np.float64], float]:
-    """Return distances to a surface's nearest points, and the mean |cosine| of the normals."""
-    some = slice(ASKED)  # points are drawn one by one: any of them are a drawing
+    """Return the distances to the nearest points of `asked`, and the mean |cosine| of normals."""
+    some = slice(ASKED)  # points are drawn independently, so the first ones are a sample too
     away, nearest = asked.tree.query(asking.points[some])
     cosines = (asking.normals[some] * asked.normals[nearest]).sum(axis=1)
     return away, float(np.abs(cosines).mean())
@@ -83,7 +84,7 @@ def voxel_surface(occupancy: NDArray[Any], threshold: float, count: int = SAMPLE
     """
     Return the surface of occupancies (X, Y, Z) at a threshold, in a cube of side 1.
 
-    None where no cell is above it.
+    None where no cell is above the threshold.
     """
     grid = VoxelGrid(np.asarray(occupancy, np.float32))
     if not grid.occupied(threshold).any():
@@ -93,21 +94,21 @@ def voxel_surface(occupancy: NDArray[Any], threshold: float, count: int = SAMPLE
 
 
 def surface_scores(found: SampledSurface | None, truth: SampledSurface) -> SurfaceScores:
-    """Return the scores of a surface that may not be there."""
+    """Return the scores of a surface, NO_SURFACE for None."""
     return NO_SURFACE if found is None else compare_surfaces(found, truth)
 
 
 def thin_cells(truth: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
-    Return the cells of a shape (X, Y, Z) that one opening by 3 x 3 x 3 cells removes.
+    Return the cells of a shape (X, Y, Z) that a morphological opening by 3 x 3 x 3 cells removes.
 
-    Those are its parts of less than three cells across: legs, handles, sheets; edges stay.
+    These are parts of less than three cells across: legs, handles, sheets; edges stay.
     """
     return np.asarray(truth & ~binary_opening(truth, _THICK))
 
 
 def recall(found: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> float:
-    """Return the share of the cells wanted that were found; NaN where none is."""
+    """Return the fraction of the cells `wanted` that are in `found`; NaN where none is wanted."""
     return float(found[wanted].mean()) if wanted.any() else math.nan
 
 

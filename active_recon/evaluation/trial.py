@@ -1,4 +1,4 @@
-"""One frozen network on the same episodes for every policy; what was run once is kept."""
+"""A frozen network on the same episodes for every policy, with cached results."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -20,16 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-_BLOCK = 2400  # episodes that are kept at once: a run that was cut off loses no more
+_BLOCK = 2400  # episodes per cached file: the most that an interrupted run loses
 
 
 @dataclass(frozen=True, eq=False)
 class Contender:
     """
-    A policy under one seed.
+    A policy with one seed.
 
-    `make` builds it, given a generator; None is the greedy oracle, which is no policy, since it is
-    given the truth. `key` identifies its results on disk.
+    `make` builds it from a random generator; None stands for the greedy oracle, which is not a
+    policy, since it uses the truth. `key` identifies its results on disk.
     """
 
     policy: str
@@ -39,14 +39,14 @@ class Contender:
 
 class Trial:
     """
-    A frozen network, its threshold, and the objects of a set, each from several first views.
+    A frozen network, its threshold, and the objects of a set, each with several first views.
 
-    - starts: first views of each object; 24 are all
-    - count: views of an episode
-    - seed: draws the first views
-    - bfloat16: the network runs in half precision where that is safe
-    - cache: a folder in which episodes are kept, or None; whatever they depend on (the network's
-      weights, the data, the numbers above) is part of their folder's name
+    - starts: number of first views of each object, of 24
+    - count: number of views of an episode
+    - seed: of the first views
+    - bfloat16: the network runs in mixed precision
+    - cache: folder that caches episodes, or None; the subfolder's name is a hash of everything
+      that they depend on (the network's weights, the data, the numbers above)
     """
 
     def __init__(self, network: ReconstructionNetwork, threshold: float, views: ViewSet,
@@ -62,7 +62,7 @@ class Trial:
 
     def run(self, contender: Contender,
             progress: Callable[[int], None] = lambda done: None) -> Episodes:
-        """Run a contender's episodes, or read those that were kept."""
+        """Run a contender's episodes, or read them from the cache; raises DataError if damaged."""
         parts = []
         for block, part in enumerate(batches(len(self.objects), _BLOCK)):
             path = self.folder and self.folder / f'{contender.key}-{block:03d}.npz'
@@ -82,14 +82,14 @@ class Trial:
         if contender.make is None:
             return run_oracle(self.network, self.views, objects, starts, self.threshold,
                               self.count, self.bfloat16, progress)
-        # Each block draws by itself, so that a run that goes on draws what one in one go does
+        # A generator for each block makes interrupted and uninterrupted runs equal
         policy = contender.make(np.random.default_rng([*contender.key.encode(), block]))
         return run_policy(self.network, policy, self.views, objects, starts, self.threshold,
                           self.count, None, self.bfloat16, progress)
 
 
 def data_hash(views: ViewSet) -> str:
-    """Return the SHA-256 of what a set shows and of its truth."""
+    """Return the SHA-256 of a set's images, cameras and voxels."""
     digest = hashlib.sha256()
     for part in (views.images, views.poses, views.intrinsics, views.voxels):
         digest.update(str(tuple(part.shape)).encode())
@@ -98,18 +98,18 @@ def data_hash(views: ViewSet) -> str:
 
 
 def read_arrays(path: Path, names: set[str]) -> dict[str, NDArray[np.float64]]:
-    """Read arrays that were kept; raises DataError where they are not whole."""
+    """Read cached arrays; raises DataError where the file is damaged or lacks one of them."""
     try:
         with np.load(path) as stored:
             return {name: stored[name] for name in names}
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise DataError(f'{path}: no readable result of an earlier run: expected the arrays '
-                        f'{", ".join(sorted(names))}, got: {error}; delete it to have it made '
-                        'anew') from error
+                        f'{", ".join(sorted(names))}, got: {error}; delete it to measure '
+                        'again') from error
 
 
 def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
-    """Keep arrays, in one move."""
+    """Write arrays to a cache file, atomically."""
     unfinished = path.with_suffix('.part')
     with unfinished.open('wb') as file:
         np.savez(file, allow_pickle=False, **arrays)

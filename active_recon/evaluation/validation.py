@@ -1,4 +1,4 @@
-"""What a training looks at while it runs: the validation objects, never the test's."""
+"""Measurements on validation objects, for monitoring trainings and choosing thresholds."""
 
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.metrics import episodes, iou_per_view, THRESHOLDS
@@ -11,7 +11,7 @@ _MONITOR_THRESHOLD = np.array([0.4])
 
 
 def reconstruction_iou(network: ReconstructionNetwork, views: ViewSet) -> dict[str, float]:
-    """Return the IoU after 1 and 5 random views at a threshold of 0.4, one start an object."""
+    """Return the IoU after 1 and 5 random views at a threshold of 0.4, one start per object."""
     objects, starts = episodes(views, 1)
     policy = RandomPolicy(np.random.default_rng(0))
     values = iou_per_view(network, policy, views, objects, starts, _MONITOR_THRESHOLD)
@@ -19,7 +19,7 @@ def reconstruction_iou(network: ReconstructionNetwork, views: ViewSet) -> dict[s
 
 
 def best_threshold(network: ReconstructionNetwork, views: ViewSet) -> float:
-    """Return the threshold of the highest mean IoU over 1 to 5 random views, two starts each."""
+    """Return the threshold with the highest mean IoU over 1 to 5 random views, two starts each."""
     network.eval()
     objects, starts = episodes(views, 2)
     policy = RandomPolicy(np.random.default_rng(0))
@@ -29,7 +29,7 @@ def best_threshold(network: ReconstructionNetwork, views: ViewSet) -> float:
 
 def policy_auc(network: ReconstructionNetwork, learned: Policy, views: ViewSet,
                threshold: float) -> dict[str, float]:
-    """Return the mean IoU over views 1 to 5 under a learned policy and at random."""
+    """Return the mean IoU over views 1 to 5 of a learned policy and of random views."""
     objects, starts = episodes(views, 2)
     at = np.array([threshold])
     policies: dict[str, Policy] = {'validation_auc': learned,

@@ -1,1 +1,1 @@
-"""Cameras, their lenses, and what of an image a network gets."""
+"""Cameras and lenses, and the cropping and warping of images for a network."""

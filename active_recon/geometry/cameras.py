@@ -22,7 +22,7 @@ AZIMUTHS: NDArray[np.float64] = np.arange(VIEW_COUNT) * TURN / VIEW_COUNT
 """Azimuths of the rendered views, radians, (24,)."""
 CANONICAL_ELEVATION = math.radians(30)
 ELEVATION_TOLERANCE = math.radians(5)
-"""A camera further off the canonical elevation is warned of: the network never saw it."""
+"""Deviation from the canonical elevation beyond which there is a warning: not trained on."""
 CANONICAL_DISTANCE = 2.1
 """Distance of the canonical camera in sides of the voxel grid: the grid's sphere just fits."""
 
@@ -40,16 +40,17 @@ def azimuth_difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
 
 
 def nearest_view(azimuth: float, azimuths: ArrayLike = AZIMUTHS) -> int:
-    """Return the index of the azimuth nearest to the one asked for, the short way round."""
+    """Return the index of the azimuth with the smallest wrapped difference, radians."""
     return int(np.argmin(np.abs(azimuth_difference(azimuths, azimuth))))
 
 
 @dataclass(frozen=True)
 class Intrinsics:
     """
-    A lens: focal lengths and principal point in pixels, image size in pixels, and how it bends.
+    Camera intrinsics: focal lengths, principal point and image size in pixels, and distortion.
 
-    `distortion` is None where it bends nothing: a pinhole.
+    Pixel coordinates are (0.5, 0.5) at the centre of the first pixel. `distortion` is None for a
+    pinhole camera.
     """
 
     fx: float
@@ -62,11 +63,11 @@ class Intrinsics:
 
     @property
     def matrix(self) -> NDArray[np.float64]:
-        """K of the paper's section 3.2, (3, 3)."""
+        """The camera matrix K, (3, 3), of the paper's section 3.2; without distortion."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
 
     def resized(self, width: int, height: int) -> 'Intrinsics':
-        """Return the same lens seen on an image of another size."""
+        """Return the intrinsics of the same lens for an image resized to this size, in pixels."""
         across, down = width / self.width, height / self.height
         return Intrinsics(self.fx * across, self.fy * down, self.cx * across, self.cy * down,
                           width, height, self.distortion)
@@ -78,19 +79,23 @@ CANONICAL_INTRINSICS = Intrinsics(_FOCAL, _FOCAL, 68.5, 68.5, 137, 137)
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pose in the object frame, (4, 4) object from optical frame, and a lens."""
+    """
+    A pose in the object frame, (4, 4) object from optical frame in metres, and the intrinsics.
+
+    Raises ViewError unless the pose is finite and its rotation a rotation.
+    """
 
     pose: NDArray[np.float64]
     intrinsics: Intrinsics = CANONICAL_INTRINSICS
 
     def __post_init__(self) -> None:
-        """Reject what is no rigid pose."""
+        """Reject a pose that is not rigid."""
         if self.pose.shape != (4, 4) or not np.isfinite(self.pose).all():
             raise ViewError('invalid camera pose: expected a finite 4 x 4 matrix, '
                             f'got\n{self.pose}', 'pose')
         rotation = self.pose[:3, :3]
         if (not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
-                or np.linalg.det(rotation) < 0):  # a mirror is no rotation
+                or np.linalg.det(rotation) < 0):  # a reflection
             raise ViewError('invalid camera pose: expected a rotation in it, '
                             f'got\n{rotation}', 'pose')
 
@@ -101,7 +106,7 @@ class Camera:
 
     @property
     def distance(self) -> float:
-        """Metres from the object frame's origin."""
+        """Distance from the object frame's origin, metres."""
         return float(np.linalg.norm(self.position))
 
     @property
@@ -111,7 +116,7 @@ class Camera:
 
     @property
     def elevation(self) -> float:
-        """Radians up from the horizon."""
+        """Angle above the horizon, radians in [-pi/2, pi/2]."""
         across = math.hypot(self.position[0], self.position[1])
         return math.atan2(self.position[2], across)
 
@@ -121,7 +126,7 @@ class Camera:
         return self.position / self.distance
 
     def turned(self, yaw: float) -> 'Camera':
-        """Return the camera turned counter-clockwise about +z, radians; by 0 it stays as it is."""
+        """Return the camera rotated by `yaw` counter-clockwise about +z, radians."""
         if yaw == 0:
             return self
         turn = np.eye(4)
@@ -151,8 +156,8 @@ class Camera:
         Project points of the object frame, P^s ~ T P^w (section 3.2).
 
         Takes (N, 3) metres; returns pixels (N, 2), where the centre of the first pixel is
-        (0.5, 0.5), and depths along the optical axis (N,). What lies behind the camera (a depth
-        of 0 or less) has no pixel, and numbers without a meaning stand in its place.
+        (0.5, 0.5), and depths along the optical axis (N,) in metres. The pixels of points behind
+        the camera (a depth of 0 or less) are meaningless.
         """
         transform = self.object_to_camera
         optical = np.asarray(points, np.float64) @ transform[:3, :3].T + transform[:3, 3]
@@ -167,10 +172,10 @@ class Camera:
 
     def ray_directions(self, samples: int = 1) -> NDArray[np.float64]:
         """
-        Return rays through the pixels in the object frame, (height, width, 3), depth 1 each.
+        Return rays through the pixels in the object frame, (height, width, 3), of depth 1.
 
-        `samples` asks for a grid of samples x samples rays in each pixel; height and width grow
-        by that factor.
+        With `samples` there are samples x samples rays in each pixel: (samples x height, samples
+        x width, 3).
         """
         lens = self.intrinsics.resized(
             self.intrinsics.width * samples, self.intrinsics.height * samples)
@@ -188,9 +193,9 @@ class Camera:
 
 class OrbitCamera(Camera):
     """
-    A camera made from azimuth, elevation and distance, which it has to the last bit.
+    A camera that keeps the exact azimuth, elevation and distance it was made from.
 
-    What is None is that of the pose, as where a field was replaced.
+    Those that are None, as after `dataclasses.replace`, are computed from the pose.
     """
 
     def __init__(self, pose: NDArray[np.float64], intrinsics: Intrinsics = CANONICAL_INTRINSICS,
@@ -211,12 +216,12 @@ class OrbitCamera(Camera):
 
     @property
     def elevation(self) -> float:
-        """Radians up from the horizon."""
+        """Angle above the horizon, radians in (-pi/2, pi/2)."""
         return self._made_from[1]
 
     @property
     def distance(self) -> float:
-        """Metres from the object frame's origin."""
+        """Distance from the object frame's origin, metres."""
         return self._made_from[2]
 
 
@@ -227,9 +232,10 @@ def orbit_camera(
     intrinsics: Intrinsics = CANONICAL_INTRINSICS,
 ) -> OrbitCamera:
     """
-    Return the camera that looks at the origin from an azimuth, upright.
+    Return the upright camera at an azimuth that looks at the origin.
 
-    Angles in radians, distance in metres. An elevation of exactly +-pi/2 has no upright.
+    Angles in radians, distance in metres. Raises ViewError where a number is not finite, the
+    distance not above 0, or the elevation not within +-pi/2, where upright is undefined.
     """
     if not all(map(math.isfinite, (azimuth, elevation, distance))) or distance <= 0:
         raise ViewError('invalid camera position: expected finite angles and a distance above 0, '
@@ -251,10 +257,9 @@ def orbit_camera(
 
 def view_distance(a: Camera, b: Camera) -> float:
     """
-    Return how far apart two views of the object are, radians in [0, pi].
+    Return the angle at the object's centre between two cameras, radians in [0, pi].
 
-    The angle at the object's centre between the two cameras: how far each is away and how it is
-    rolled makes no other view. This is the one distance of goals, gates and policies.
+    Distance and roll make no difference. Goals, the view gate and policies all use this measure.
     """
     return float(direction_distance(a.direction, b.direction))
 
@@ -267,17 +272,17 @@ def direction_distance(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
 
 
 def nearest_camera(camera: Camera, cameras: Sequence[Camera]) -> int:
-    """Return the index of the camera of the nearest view; the first of those alike."""
+    """Return the index of the camera with the smallest `view_distance`; of equals the first."""
     directions = np.array([each.direction for each in cameras])
     return int(direction_distance(directions, camera.direction).argmin())
 
 
 def pose_directions(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the unit vectors from the object to cameras, poses (..., 4, 4) to (..., 3)."""
+    """Return unit vectors from the origin to cameras, (..., 3), of poses (..., 4, 4)."""
     positions = poses[..., :3, 3]
     return np.asarray(positions / np.linalg.norm(positions, axis=-1, keepdims=True))
 
 
 def pose_azimuths(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the azimuths of poses, (..., 4, 4) to (...), radians in [0, 2 pi)."""
+    """Return the azimuths (...) of poses (..., 4, 4), radians in [0, 2 pi)."""
     return np.asarray(np.arctan2(poses[..., 1, 3], poses[..., 0, 3]) % TURN)

@@ -1,4 +1,4 @@
-"""Any camera's image, brought to what a network was trained with: image and camera together."""
+"""Warp or crop a camera's image to what a network was trained on, and return its new camera."""
 
 from dataclasses import dataclass
 import math
@@ -17,22 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 _FINEST = 2
-"""An image this many times as fine as asked for, or finer, is shrunk first."""
+"""An image at least this many times as fine as needed is downsampled first."""
 _MOST_SAMPLES = 3
-_SAMPLE_EVERY = 1.5  # pixels: no finer stripe is lost between two of them
-_MARGIN = 1.05  # of the cube's extent in a framed image
-_MOST_MISSING = 0.9  # of the cube's silhouette, from an image that still shows something
+_SAMPLE_EVERY = 1.5  # pixels: close enough that stripes of a pixel are not skipped
+_MARGIN = 1.05  # side of a framed image relative to the cube's extent
+_MOST_MISSING = 0.9  # fraction of the cube's silhouette that may be outside of a framed image
 
 
 @dataclass(frozen=True)
 class NetworkSpec:
     """
-    What a network asks of its images, and what it gives.
+    The input and output of a network.
 
-    - image_size: pixels a side
-    - resolution: R, cells a side of the occupancy
-    - needs_front: whether it predicts in the object's own frame, front at +x, and was trained on
-      the canonical camera's images alone; any other network takes any camera
+    - image_size: S, side of its images in pixels
+    - resolution: R, side of its occupancy in cells
+    - needs_front: whether it predicts with the object's front at +x and accepts only images of
+      the canonical camera; other networks accept any camera
     """
 
     image_size: int
@@ -43,12 +43,12 @@ class NetworkSpec:
 def network_image(image: NDArray[np.uint8], camera: Camera, spec: NetworkSpec,
                   object_size: float = 1.0) -> tuple[NDArray[np.uint8], Camera]:
     """
-    Return the image that a network asks for, and its camera: `canonical_image` or `framed_image`.
+    Return a network's image and its camera, from `canonical_image` or `framed_image`.
 
     `object_size` is the side of the object's cube, metres. Raises ViewError as they do.
     """
-    bring = canonical_image if spec.needs_front else framed_image
-    return bring(image, camera, object_size, spec.image_size)
+    converted = canonical_image if spec.needs_front else framed_image
+    return converted(image, camera, object_size, spec.image_size)
 
 
 def canonical_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 1.0,
@@ -56,10 +56,10 @@ def canonical_image(image: NDArray[np.uint8], camera: Camera, object_size: float
     """
     Return the view as the canonical camera would see it, (S, S, 3) uint8 RGB, and that camera.
 
-    The virtual camera stands in the real one's direction, upright, at the canonical distance. The
-    image is carried over as if all that it shows were on the plane through the object's centre
-    that faces it: exact for the turn of the camera and the distortion of its lens and, for its
-    distance, on that plane. Raises ViewError where the image is not (H, W, 3) uint8 of the
+    The virtual camera is upright, in the direction of the real one and at the canonical distance.
+    The image is warped as if everything in it were on the plane through the object's centre that
+    faces the camera. This is exact for rotation and lens distortion; a change of distance is
+    exact on that plane only. Raises ViewError where the image is not (H, W, 3) uint8 of the
     camera's size, or the cube of `object_size` metres is not in it.
     """
     _require_size(image, camera)
@@ -74,11 +74,12 @@ def framed_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 
     """
     Return the part of the image around the object, (S, S, 3) uint8 RGB, and its pinhole camera.
 
-    The virtual camera stands where the real one does, upright, looks at the object's centre, and
-    its focal length lets the cube of `object_size` metres just fill the image: nothing but a
-    rotation, a zoom and the lens's distortion, so that it is exact at every depth. Where the
-    image ends within the frame, a fourth channel tells what was seen, 255, and what was not, 0.
-    Raises ViewError as `canonical_image` does, but takes a cube that is partly in the image.
+    The virtual camera is upright at the position of the real one, looks at the object's centre,
+    and its focal length makes the cube of `object_size` metres just fill the image. Only
+    rotation, zoom and distortion differ, so the result is exact at every depth. If part of it
+    lies outside of the original image, the result is (S, S, 4), and its fourth channel is 255 on
+    the pixels that were in the image and 0 elsewhere. Raises ViewError as `canonical_image` does,
+    but up to 90 % of the cube's silhouette may be outside of the image.
     """
     _require_size(image, camera)
     require_in_image(camera, object_size, _MOST_MISSING)
@@ -94,15 +95,15 @@ def framed_layers(
     layers: NDArray[np.uint8], camera: Camera, object_size: float = 1.0, image_size: int = 64,
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_], Camera]:
     """
-    Return layers (H, W, C) uint8 as `framed_image` would frame them, and which pixels there are.
+    Return channels (H, W, C) uint8 framed as in `framed_image`, the mask of pixels, the camera.
 
-    The cube may be partly outside the image: what was not seen is 0, and False in the second
-    array, (S, S). The third is the camera.
+    The mask, (S, S) bool, is true on the pixels that were in the original image; others are 0.
+    The cube may be wholly or partly outside of the image.
     """
     target = framing_camera(camera, object_size, image_size)
     lens, size = camera.intrinsics, (image_size, image_size)
     if lens.distortion is None and lens.fx < _SAMPLE_EVERY * target.intrinsics.fx:
-        half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # OpenCV counts from centres
+        half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # OpenCV: (0, 0) is a centre
         to_source = np.linalg.inv(half) @ _turn(camera, target) @ half
         whole = np.full(layers.shape[:2], 255, np.uint8)
         carried, there = (cv2.warpPerspective(each, to_source, size,
@@ -114,12 +115,12 @@ def framed_layers(
 
 
 def framing_camera(camera: Camera, object_size: float = 1.0, image_size: int = 64) -> Camera:
-    """Return the pinhole camera of `framed_image`."""
+    """Return the pinhole camera of `framed_image`, of `image_size` pixels; lengths in metres."""
     pose = np.eye(4)
     pose[:3, 3] = camera.position
     forward = -camera.direction
     right = np.array([forward[1], -forward[0], 0.0])
-    if np.linalg.norm(right) < 1e-6:  # from straight above nothing is upright but the camera's own
+    if np.linalg.norm(right) < 1e-6:  # straight above, upright is undefined: keep the camera's yaw
         right = camera.pose[:3, 0] - forward * (camera.pose[:3, 0] @ forward)
     pose[:3, 2] = forward
     pose[:3, 0] = right / np.linalg.norm(right)
@@ -140,7 +141,7 @@ def _require_size(image: NDArray[np.uint8], camera: Camera) -> None:
 
 def _seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
              beyond: int = cv2.BORDER_REPLICATE) -> NDArray[np.uint8]:
-    """Return a camera's image as the target would see it, (S, S, C), all on the facing plane."""
+    """Return a camera's image warped to the target, (S, S, C), via the plane that faces it."""
     size = target.intrinsics.width
     seen = _seen(camera, target, size)
     if _is_whole_image(seen, camera, size):
@@ -150,7 +151,7 @@ def _seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
     window = _shrunk(image[top:bottom, left:right], width, height)
     scale = np.array([width / (right - left), height / (bottom - top)])
     fine = size * _samples(seen * scale)
-    # OpenCV counts from the first pixel's centre, our cameras from its corner
+    # OpenCV's (0, 0) is the centre of the first pixel, ours its corner
     where = (_seen(camera, target, fine) - [left, top]) * scale - 0.5
     where = np.clip(where, -1, [width, height]).astype(np.float32)
     sampled = cv2.remap(window, where[..., 0], where[..., 1], cv2.INTER_LINEAR,
@@ -159,7 +160,7 @@ def _seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
 
 
 def _seen(camera: Camera, target: Camera, size: int) -> NDArray[np.float64]:
-    """Return where the camera sees the target's pixels, size x size of them, (size, size, 2)."""
+    """Return the camera's pixel coordinates of size x size target pixels, (size, size, 2)."""
     if camera.intrinsics.distortion is None and np.array_equal(camera.position, target.position):
         fine = Camera(target.pose, target.intrinsics.resized(size, size))  # fifty times as fast
         across = np.arange(size) + 0.5
@@ -174,19 +175,19 @@ def _seen(camera: Camera, target: Camera, size: int) -> NDArray[np.float64]:
 
 
 def _turn(camera: Camera, target: Camera) -> NDArray[np.float64]:
-    """Return the homography from a pinhole's pixels to another's in the same place, (3, 3)."""
+    """Return the homography, (3, 3), from the target's pixels to those of a camera beside it."""
     return np.asarray(camera.intrinsics.matrix @ camera.pose[:3, :3].T @ target.pose[:3, :3]
                       @ np.linalg.inv(target.intrinsics.matrix))
 
 
 def _within(camera: Camera, target: Camera, size: int) -> NDArray[np.bool_]:
-    """Return which of the target's pixels the camera's image holds, (size, size)."""
+    """Return which of the target's pixels lie in the camera's image, (size, size)."""
     where, lens = _seen(camera, target, size), camera.intrinsics
     return np.asarray(np.all((where >= 0) & (where <= [lens.width, lens.height]), axis=-1))
 
 
 def _is_whole_image(seen: NDArray[np.float64], camera: Camera, size: int) -> bool:
-    """Return whether the target sees just what the camera does."""
+    """Return whether the target's image is the camera's, resized."""
     column, row = np.meshgrid(*[np.arange(size) + 0.5] * 2)
     lens = camera.intrinsics
     whole = np.stack([column * lens.width, row * lens.height], axis=-1) / size
@@ -194,7 +195,7 @@ def _is_whole_image(seen: NDArray[np.float64], camera: Camera, size: int) -> boo
 
 
 def _window(seen: NDArray[np.float64], camera: Camera, size: int) -> tuple[int, int, int, int]:
-    """Return left, top, right, bottom of the pixels that are needed of the camera's image."""
+    """Return left, top, right, bottom of the required part of the camera's image, in pixels."""
     whole = np.array([camera.intrinsics.width, camera.intrinsics.height])
     first, last = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
     first, last = np.clip(first, 0, whole), np.clip(last, 0, whole)
@@ -209,7 +210,7 @@ def _few_pixels(count: int, size: int) -> int:
 
 
 def _samples(seen: NDArray[np.float64]) -> int:
-    """Return of how many samples a side, each as wide as two pixels, the target's pixels are."""
+    """Return the number of samples along each side of a target pixel that avoids aliasing."""
     steps = np.concatenate([np.diff(seen, axis=0).reshape(-1, 2),
                             np.diff(seen, axis=1).reshape(-1, 2)])
     apart = float(np.median(np.linalg.norm(steps, axis=1)))

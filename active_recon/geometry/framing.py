@@ -1,4 +1,4 @@
-"""Whether a camera has the object in its image: the object's cube, seen through its lens."""
+"""Checks that the object's cube is in a camera's image, with the lens's distortion."""
 
 from active_recon.errors import ViewError
 from active_recon.geometry.cameras import Camera
@@ -7,27 +7,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 TOLERATED_OUTSIDE = 0.02
-"""Share of the cube's silhouette that may be outside: a pose is never exact."""
-_ALONG = np.linspace(-0.5, 0.5, 9)  # of an edge: a lens bends it
+"""Fraction of the cube's silhouette that may be outside of the image, since poses are inexact."""
+_ALONG = np.linspace(-0.5, 0.5, 9)  # points along an edge, which a lens distorts
 
 
 def require_in_image(camera: Camera, object_size: float,
                      tolerated: float = TOLERATED_OUTSIDE) -> None:
     """
-    Raise ViewError where more of the object than is tolerated is out of the camera's image.
+    Raise ViewError where the object is not in front of the camera or not in its image.
 
-    `object_size` is the side of the object's cube, metres; `tolerated` a share of its silhouette.
+    `object_size` is the side of the object's cube, metres; `tolerated` is the fraction of the
+    cube's silhouette, [0, 1], that may be outside.
     """
     _, depth = camera.project(_EDGES * object_size)
     if depth.max() <= 0:
         raise ViewError('camera looks away from the object: expected one that looks at it; check '
-                        'the pose, which is that of the optical frame (z forward, y down)',
+                        'that the pose is that of the optical frame (z forward, y down)',
                         'out_of_image')
     if depth.min() <= 1e-3 * object_size:
         raise ViewError(
-            "camera in the object's cube or beside it: expected one outside of the cube of "
-            f'{object_size:g} m and in front of it, got one at {camera.distance:.3g} m; move it '
-            'back or set object_size', 'out_of_image')
+            "camera in the object's cube or beside it: expected a distance at which the whole "
+            f'cube of {object_size:g} m is in front of the camera, got {camera.distance:.3g} m; '
+            'move it back or set object_size', 'out_of_image')
     outside = share_outside(camera, object_size)
     if outside > tolerated:
         raise ViewError(
@@ -37,9 +38,13 @@ def require_in_image(camera: Camera, object_size: float,
 
 
 def share_outside(camera: Camera, object_size: float) -> float:
-    """Return the share of the cube's silhouette, [0, 1], that is not in the image."""
+    """
+    Return the fraction of the cube's silhouette, [0, 1], that is outside of the image.
+
+    `object_size` is the side of the cube, metres, which has to be in front of the camera.
+    """
     seen, _ = camera.project(_EDGES * object_size)
-    # In units of the image, whose size so does not matter to 32 bits
+    # In units of the image's sides, because float32 is too coarse for large images in pixels
     silhouette = cv2.convexHull(
         (seen / [camera.intrinsics.width, camera.intrinsics.height]).astype(np.float32))
     image = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
@@ -48,13 +53,13 @@ def share_outside(camera: Camera, object_size: float) -> float:
 
 
 def cube_corners() -> NDArray[np.float64]:
-    """Return the corners of a cube of side 1 about the origin, (8, 3)."""
+    """Return the corners of the unit cube around the origin, (8, 3)."""
     ends = (-0.5, 0.5)
     return np.array([[x, y, z] for x in ends for y in ends for z in ends])
 
 
 def _edges() -> NDArray[np.float64]:
-    """Return points on the twelve edges of a cube of side 1 about the origin, (108, 3)."""
+    """Return points on the twelve edges of the unit cube around the origin, (108, 3)."""
     points = [np.insert([first, second], axis, along)
               for axis in range(3) for first in (-0.5, 0.5) for second in (-0.5, 0.5)
               for along in _ALONG]

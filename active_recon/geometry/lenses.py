@@ -1,4 +1,9 @@
-"""Lens distortion: ROS's distortion models, which are OpenCV's."""
+"""
+Lens distortion: the models of sensor_msgs/CameraInfo, which are OpenCV's.
+
+The formulas are those of OpenCV's modules calib3d (plumb_bob, rational_polynomial) and fisheye
+(equidistant).
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,10 +15,10 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 MODELS = {'plumb_bob': (4, 5), 'rational_polynomial': (8, 12), 'equidistant': (4,)}
-"""Each model's numbers of coefficients, in OpenCV's order: k1, k2, p1, p2, k3, k4, ..."""
-_LARGEST = 1e6  # no lens has it, and its sixth power can still be computed
+"""The allowed numbers of coefficients of each model, in OpenCV's order: k1, k2, p1, p2, k3, ..."""
+_LARGEST = 1e6  # larger than in any lens, and its sixth power does not overflow
 _STEP = 1e-6
-_WITHIN = 0.9999  # at the largest radius itself a model may divide by 0
+_WITHIN = 0.9999  # at the maximum radius itself a model may divide by 0
 
 
 @dataclass(frozen=True)
@@ -21,15 +26,15 @@ class Distortion:
     """
     A distortion model of `MODELS` and its coefficients.
 
-    It maps points of the image plane at depth 1, (N, 2), x right and y down. Raises ViewError on
-    an unknown model, a wrong number of coefficients, and coefficients that are not finite.
+    It maps normalised image points, (N, 2), x right and y down at depth 1. Raises ViewError on an
+    unknown model, a wrong number of coefficients, and coefficients that are not finite.
     """
 
     model: str
     coefficients: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Reject what no lens has."""
+        """Reject unknown models and invalid coefficients."""
         if self.model not in MODELS:
             raise ViewError(f'unknown distortion model: expected one of {", ".join(MODELS)}, got '
                             f'{self.model!r}; publish rectified images instead', 'camera_info')
@@ -44,10 +49,10 @@ class Distortion:
 
     def distort(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Return the distorted points of points of the pinhole's plane, (N, 2).
+        Return normalised points (N, 2) after distortion, (N, 2).
 
-        Beyond `max_radius`, where the model's curve turns back to the centre, the distortion is
-        continued outwards, so that what the lens cannot see never appears inside its image.
+        Beyond `max_radius`, where the model would fold back towards the centre, the displacement
+        is held constant, so that points outside of the field of view stay outside of the image.
         """
         radius = np.linalg.norm(points, axis=1, keepdims=True)
         beyond = np.maximum(radius - self.max_radius, 0.0)
@@ -56,9 +61,13 @@ class Distortion:
         return np.asarray(distorted + beyond * outwards)
 
     def undistort(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the points of the pinhole's plane of distorted points, (N, 2): the inverse."""
+        """
+        Return distorted points (N, 2) without the distortion, (N, 2): the inverse of `distort`.
+
+        Found by Newton's method, to 1e-6.
+        """
         found, open_ones = points.copy(), np.arange(len(points))
-        for _ in range(20):  # Newton's steps; a handful is enough wherever a lens sees well
+        for _ in range(20):  # Newton's steps; a handful is enough but at the edge of the field
             near = found[open_ones]
             wrong = self.distort(near) - points[open_ones]
             across, down = ((self.distort(near + step) - self.distort(near - step)) / (2 * _STEP)
@@ -74,18 +83,18 @@ class Distortion:
 
     @cached_property
     def max_radius(self) -> float:
-        """The radius in the pinhole's plane up to which the model is monotonic."""
+        """The undistorted radius, at depth 1, up to which the model is monotonic."""
         k = self.coefficients
         if self.model == 'equidistant':
             angle = math.sqrt(_first_root(Polynomial([1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]])))
             return _WITHIN * (math.tan(angle) if angle < math.pi / 2 - 1e-3 else 1e3)
-        # r N(s) / D(s), s the square of the radius r, turns back where its derivative is 0
+        # r N(s) / D(s), with s the square of the radius r, folds where its derivative is 0
         s, n, d = Polynomial([0, 1]), Polynomial([1, *k[:2], *k[4:5]]), Polynomial([1, *k[5:8]])
         turns = (n + 2 * s * n.deriv()) * d - 2 * s * n * d.deriv()
         return _WITHIN * math.sqrt(min(_first_root(turns), _first_root(d)))
 
     def _modelled(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Evaluate OpenCV's model; its own function takes a hundred times as long."""
+        """Return OpenCV's model at points (N, 2); its own function is a hundred times slower."""
         if self.model == 'equidistant':
             radius = np.linalg.norm(points, axis=1, keepdims=True)
             angle = np.arctan(radius)
@@ -101,7 +110,7 @@ class Distortion:
 
 
 def _first_root(polynomial: Polynomial) -> float:
-    """Return the smallest root above 0; a million where there is none."""
+    """Return the smallest positive root; a million where there is none."""
     roots = polynomial.trim().roots()
     real = roots[np.abs(roots.imag) < 1e-9].real
     return float(min(real[real > 1e-9], default=1e6))

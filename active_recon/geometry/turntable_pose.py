@@ -1,4 +1,4 @@
-"""Where a fixed camera stands in the frame of an object that a turntable turns before it."""
+"""The pose of a fixed camera in the frame of an object on a turntable."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,24 +11,25 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 DIRECTIONS = (-1, 1)
-"""Seen from above, where the joint's angle grows: clockwise, counter-clockwise."""
+"""The rotation, seen from above, in which the joint's angle increases: clockwise or not."""
 
 
 @dataclass(frozen=True, eq=False)
 class FixedCamera:
     """
-    A camera that stands still while the object turns about the z axis of its frame.
+    A fixed camera in front of an object that rotates about the z axis of the object frame.
 
-    `pose_at_zero` is the camera's pose in the object frame while the turntable's joint stands at
-    0, (4, 4) object from optical frame, metres; `direction` is 1 where the joint's angle grows as
-    the object turns counter-clockwise, seen from above, -1 where it grows clockwise.
+    `pose_at_zero` is the camera's pose in the object frame at joint angle 0, (4, 4) object from
+    optical frame, metres. `direction` is 1 where the joint's angle increases as the object turns
+    counter-clockwise, seen from above, and -1 where it increases clockwise. Raises ViewError on
+    an invalid pose, ConfigError on any other direction.
     """
 
     pose_at_zero: NDArray[np.float64]
     direction: int = 1
 
     def __post_init__(self) -> None:
-        """Reject what is no pose, and no direction."""
+        """Reject an invalid pose or direction."""
         Camera(self.pose_at_zero)
         if self.direction not in DIRECTIONS:
             raise ConfigError('turntable_direction: invalid direction: expected 1 or -1, got '
@@ -38,18 +39,19 @@ class FixedCamera:
     def from_parameters(cls, position: Sequence[float], orientation: Sequence[float],
                         direction: int = 1) -> 'FixedCamera':
         """
-        Return the camera at x, y, z in metres, turned by the unit quaternion x, y, z, w.
+        Return the camera at `position` x, y, z (metres) with the unit quaternion x, y, z, w.
 
-        Raises ConfigError that names `camera_position` or `camera_orientation`.
+        Both are in the object frame at joint angle 0. Raises ConfigError that names the parameter
+        `camera_position` or `camera_orientation`.
         """
         if len(position) != 3 or not np.isfinite(position).all() or not np.any(position):
             raise ConfigError('camera_position: invalid position: expected x, y, z of the camera '
-                              'in the object frame, metres, away from its origin, got '
-                              f'{list(position)}; active-recon calibrate finds them')
+                              'in the object frame, metres, other than 0, 0, 0, got '
+                              f'{list(position)}; active-recon calibrate measures it')
         if len(orientation) != 4 or not abs(np.linalg.norm(orientation) - 1) < 0.01:
             raise ConfigError('camera_orientation: invalid orientation: expected x, y, z, w of '
                               f"the optical frame's unit quaternion, got {list(orientation)}; "
-                              'active-recon calibrate finds them')
+                              'active-recon calibrate measures it')
         pose = np.eye(4)
         pose[:3, :3] = Rotation.from_quat(orientation).as_matrix()
         pose[:3, 3] = position
@@ -57,9 +59,9 @@ class FixedCamera:
 
     def pose_at(self, angle: float) -> NDArray[np.float64]:
         """
-        Return the camera's pose in the object frame, (4, 4), at an angle of the joint in radians.
+        Return the camera's pose in the object frame, (4, 4), at a joint angle in radians.
 
-        Its azimuth is that at 0 minus what the object has turned counter-clockwise. Raises
+        Its azimuth is that at angle 0 minus the object's counter-clockwise rotation. Raises
         ViewError where the angle is not finite.
         """
         if not math.isfinite(angle):

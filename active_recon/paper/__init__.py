@@ -1,1 +1,1 @@
-"""The paper's tables and figures, measured here; the paper's own figures stand beside ours."""
+"""Reproduction of the paper's tables and figures, with the published values beside ours."""

@@ -1,4 +1,4 @@
-"""Whether a claim holds: decided by the intervals of paired differences, never by hand."""
+"""Verdicts on claims, decided by the 95 % intervals of paired differences."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,8 +12,8 @@ def larger(claim: str, difference: Interval, what: str, least: float = 0.0) -> C
     """
     Decide a claim that a difference is above `least`.
 
-    It holds where the whole 95 % interval lies above, does not where none of it does, and is left
-    open between. `what` names the difference.
+    It holds if the whole 95 % interval is above, fails if none of it is, and is open otherwise.
+    `what` names the difference.
     """
     beyond = '0' if least == 0 else f'{least:g}'
     because = f'{_capital(what)}: {format_interval(difference, 4)}'
@@ -38,8 +38,8 @@ def all_larger(claim: str, differences: Mapping[str, Interval], what: str) -> Cl
     """
     Decide a claim that every difference is above 0, naming those that are not.
 
-    It holds where all intervals lie above 0, does not where one lies below, and is left open
-    where one has 0 inside and none lies below.
+    It holds if all intervals are above 0, fails if one is below, and is open if one contains 0
+    and none is below.
     """
     behind = {name: value for name, value in differences.items() if value.high <= 0}
     unclear = {name: value for name, value in differences.items()
@@ -55,7 +55,7 @@ def all_larger(claim: str, differences: Mapping[str, Interval], what: str) -> Cl
 
 
 def reaches(claim: str, value: Interval, aim: float) -> Claim:
-    """Decide whether a figure reaches an aim: by its mean, with its interval."""
+    """Decide by its mean whether a value reaches a target `aim`."""
     reached = value.mean >= aim
     lack = '' if reached else f', missed by {aim - value.mean:.3f}'
     return Claim(claim, HOLDS if reached else FAILS,
@@ -63,7 +63,7 @@ def reaches(claim: str, value: Interval, aim: float) -> Claim:
 
 
 def headroom(difference: Interval) -> Claim:
-    """Say what a policy can gain at most: the greedy oracle minus random."""
+    """Decide whether view policies have headroom: the greedy oracle minus random."""
     matters = difference.mean >= SMALL_HEADROOM
     verdict = HOLDS if matters and difference.low > 0 else OPEN if matters else FAILS
     return Claim('Choosing views can gain something', verdict, headroom_sentence(difference))

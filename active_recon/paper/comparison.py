@@ -1,4 +1,4 @@
-"""All compared systems on the same objects and views: what table 3 and figure 6 are drawn from."""
+"""Measurements of all compared systems on the same objects and views, for table 3 and figure 6."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -36,9 +36,9 @@ SHIPPED = 'the weights that ship'
 @dataclass(frozen=True)
 class Compared:
     """
-    A system to be measured: its label, its weights, and cells a side of what it predicts.
+    A system to measure: its label, its weights, and its resolution in cells a side.
 
-    The paper's network is compared with a `rival`, pair by pair.
+    The paper's network is compared with each `rival`.
     """
 
     label: str
@@ -49,10 +49,10 @@ class Compared:
 
 def compared(study: Study) -> list[Compared]:
     """
-    Return all systems, trained where they were not, and the study's own model as a last row.
+    Return all systems, training missing ones, and the study's own model as the last row.
 
-    That model may have seen more than the others, so it is named apart and takes no part in what
-    is said of the comparison.
+    That model may have been trained on more views than the others, so it has a separate label and
+    is not part of the claims.
     """
     trained = have_systems(study, systems(study))
     rows = [Compared(system.label, weights, system.resolution,
@@ -65,7 +65,7 @@ def compared(study: Study) -> list[Compared]:
 
 
 def same_training(cards: Mapping[str, Mapping[str, Any]]) -> Claim:
-    """Say by their cards whether all systems learned from the same objects and as many views."""
+    """Decide by their cards whether all systems had the same training objects and view counts."""
     seen = {label: views for label, card in cards.items() if (views := views_seen(card))}
     sources = {label: card.get('data') for label, card in cards.items()}
     same = len({json.dumps(source, sort_keys=True) for source in sources.values()}) == 1
@@ -88,7 +88,7 @@ def weights_of(rows: list[Compared]) -> dict[str, Path]:
 
 
 def seen_at_random(study: Study, row: Compared, name: str, category: str = '') -> Measured:
-    """Measure a system on a folder of the data, at random views, the same for all systems."""
+    """Measure a system on a folder of the data, with the same random views for all systems."""
     return measure(study, row.weights, 'random', study.objects(name, category, row.resolution))
 
 
@@ -114,7 +114,7 @@ def baselines(study: Study, names: list[str]) -> dict[str, dict[str, Values]]:
 
 
 def yaw_table(study: Study, rows: list[Compared]) -> Table:
-    """Return the single-view IoU of every system where the front stands turned, on test."""
+    """Return a table of every system's single-view IoU with wrong yaws of the front, on test."""
     found: dict[str, dict[str, Interval]] = {}
     for row in rows:
         bundle = load_weights(row.weights, study.device)
@@ -131,7 +131,7 @@ def yaw_table(study: Study, rows: list[Compared]) -> Table:
 
 
 def cost_table(study: Study, rows: list[Compared]) -> Table:
-    """Return how large every system is, what a view costs, and what it was trained on."""
+    """Return a table of every system's size, cost per view, and number of training views."""
     costs: dict[str, list[Any]] = {}
     for row in rows:
         bundle, card = load_weights(row.weights), read_card(row.weights)
@@ -147,7 +147,7 @@ def cost_table(study: Study, rows: list[Compared]) -> Table:
 
 
 def _million_operations(study: Study, row: Compared) -> float | None:
-    """Return the multiply-adds of one view, in millions; None where there is a fit instead."""
+    """Return the multiply-adds of one view, in millions; None for systems that fit at run time."""
     bundle = load_weights(row.weights)
     if network_entry(bundle.model).fit is not None:
         return None
@@ -159,7 +159,7 @@ def _million_operations(study: Study, row: Compared) -> float | None:
 
 
 def octree_table(study: Study, rows: list[Compared]) -> Table | None:
-    """Return cells and memory of the finest octree decoder beside a dense one; None without."""
+    """Return cells and memory of the finest octree decoder and a dense one; None without OGN."""
     trees = [row for row in rows if isinstance(load_weights(row.weights).reconstruction, Ogn)]
     if not trees:
         return None

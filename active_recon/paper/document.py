@@ -21,7 +21,11 @@ each part's JSON."""
 
 
 def write_document(study: Study) -> bool:
-    """Write README.md beside the results; return whether that changed it."""
+    """
+    Write README.md with all results there are; return whether it changed.
+
+    Raises DataError where there is no result.
+    """
     there = {}
     for name in PARTS:
         try:
@@ -29,7 +33,7 @@ def write_document(study: Study) -> bool:
         except DataError:
             continue
     if not there:
-        raise DataError(f'{study.out}: no results: expected some to put together, found none; '
+        raise DataError(f'{study.out}: no results: expected at least one part, found none; '
                         '`active-recon paper all` makes them')
     blocks = [_INTRODUCTION, '## What holds, and what does not']
     claims = {name: claims_of(found) for name, found in there.items()}
@@ -50,7 +54,7 @@ def write_document(study: Study) -> bool:
 
 
 def _verdict(verdict: str, claims: dict[str, list[Claim]]) -> list[str]:
-    """Return a heading and the claims of one verdict, each with the part that it stands in."""
+    """Return a heading and the claims with one verdict, each with a link to its part."""
     verdicts: Sequence[Claim] = [
         Claim(f'{claim.claim} ([{name}]({name}.md))', claim.verdict, claim.because)
         for name, own in claims.items() for claim in own if claim.verdict == verdict]

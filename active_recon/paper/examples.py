@@ -1,4 +1,4 @@
-"""Figures 7, 8 and 11: examples, drawn as voxels."""
+"""Figures 7, 8 and 11: example reconstructions, drawn as voxels."""
 
 from collections.abc import Sequence
 import hashlib
@@ -35,7 +35,7 @@ _EXAMPLES = 6
 
 
 def inputs7(study: Study) -> dict[str, Any]:
-    """Return what figure 7 is drawn from."""
+    """Return the inputs of figure 7, see `provenance`."""
     found = have_systems(study, (TWO_STAGE, SHAPE_BASIS))
     sets = {} if study.pascal3d else {'examples': study.objects(_stand_in(study))}
     return provenance(study, sets, {system.label: path for system, path in found.items()},
@@ -51,7 +51,7 @@ def _annotations(root: Path) -> dict[str, Any]:
 
 
 def make7(study: Study) -> Result:
-    """Draw single-view examples beside the shape basis."""
+    """Draw single-view examples of our network and the shape basis."""
     bundles = {system.label: load_weights(path) for system, path in have_systems(
         study, (TWO_STAGE, SHAPE_BASIS)).items()}
     views, where = _photographs(study) if study.pascal3d else _renderings(study)
@@ -98,7 +98,7 @@ def _renderings(study: Study) -> tuple[ViewSet, str]:
 
 @torch.inference_mode()
 def _single_view(bundle: Bundle, views: ViewSet) -> tuple[list[NDArray[np.bool_]], Values]:
-    """Return what is predicted from each object's first image, and its IoU, (N,)."""
+    """Return the prediction from each object's first image, (R, R, R), and its IoU, (N,)."""
     predicted: list[NDArray[np.bool_]] = []
     for low in range(0, len(views), _BATCH):
         items = torch.arange(low, min(low + _BATCH, len(views)))
@@ -111,14 +111,14 @@ def _single_view(bundle: Bundle, views: ViewSet) -> tuple[list[NDArray[np.bool_]
 
 
 def inputs8(study: Study) -> dict[str, Any]:
-    """Return what figure 8 is drawn from."""
+    """Return the inputs of figure 8, see `provenance`."""
     found = have_systems(study, (TWO_STAGE, R2N2))
     return provenance(study, {'test': study.objects('test')},
                       {system.label: path for system, path in found.items()})
 
 
 def make8(study: Study) -> Result:
-    """Draw what five views come to, chosen by attention, beside 3D-R2N2 at random views."""
+    """Draw reconstructions from views chosen by attention, and of 3D-R2N2 from random views."""
     found = have_systems(study, (TWO_STAGE, R2N2))
     views = study.read(study.objects('test'))
     chosen = _first_of_each(views, MULTI_VIEW)
@@ -143,7 +143,7 @@ def make8(study: Study) -> Result:
 
 
 def inputs11(study: Study) -> dict[str, Any]:
-    """Return what figure 11 is drawn from."""
+    """Return the inputs of figure 11, see `provenance`."""
     return provenance(study, {name: study.objects(name) for name in unseen_sets(study)},
                       {'measured': study.weights})
 
@@ -172,7 +172,7 @@ def make11(study: Study) -> Result:
 
 
 def _first_of_each(views: ViewSet, categories: Sequence[str] | None = None) -> list[int]:
-    """Return the index of the first object of each category; by default of all there are."""
+    """Return the index of the first object of each category, by default of all categories."""
     there = [str(name) for name in views.categories]
     wanted = [name for name in categories or dict.fromkeys(there) if name in there]
     if not wanted:
@@ -183,7 +183,7 @@ def _first_of_each(views: ViewSet, categories: Sequence[str] | None = None) -> l
 
 def _steps(study: Study, weights: Path, policy: str, views: ViewSet,
            items: Sequence[int]) -> list[Step]:
-    """Return an episode of each object, from the start that the tables begin with."""
+    """Return the steps of an episode of each object, from the first of the tables' starts."""
     every, starts = episodes(views, study.starts, study.seed)
     first = starts[[int((every == item).nonzero()[0]) for item in items]]
     options = PolicyOptions(np.random.default_rng(study.seed), study.views, weights)
@@ -207,7 +207,7 @@ def _nearest_image(views: ViewSet, item: int, azimuth: float) -> Picture:
 
 
 def _voxel_tiles(truth: NDArray[np.bool_], grids: Sequence[NDArray[np.bool_]]) -> list[Picture]:
-    """Return grids as boxes, coloured between the heights of the truth."""
+    """Return renderings of grids as boxes, with the colour scale of the truth's heights."""
     camera = Camera(orbit_camera(math.radians(35), math.radians(25), 1.9).pose,
                     CANONICAL_INTRINSICS.resized(_TILE, _TILE))
     heights = height_range(VoxelGrid(truth.astype(np.float32)))

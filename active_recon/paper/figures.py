@@ -1,4 +1,4 @@
-"""Figures 5, 6, 9 and 10: curves and boxes of what was measured."""
+"""Figures 5, 6, 9 and 10: curves and box plots."""
 
 from collections.abc import Mapping
 import hashlib
@@ -22,14 +22,14 @@ _POLICIES = ('attention', 'random')
 
 
 def inputs5(study: Study) -> dict[str, Any]:
-    """Return what figure 5 is drawn from: what table 1 measured."""
+    """Return the inputs of figure 5, those of table 1; see `provenance`."""
     found = (study.out / 'table1.json').read_bytes()
     inputs: dict[str, Any] = read_result(study, 'table1')['inputs']
     return inputs | {'table1': hashlib.sha256(found).hexdigest()}
 
 
 def make5(study: Study) -> Result:
-    """Draw loss and IoU over the views."""
+    """Draw loss and IoU over the number of views."""
     figures = read_result(study, 'table1')['figures']
     with canvas(9, 3.4, columns=2) as (figure, axes):
         for place, key, label in ((axes[0][0], 'loss', 'loss'), (axes[0][1], 'iou', 'IoU')):
@@ -43,7 +43,7 @@ def make5(study: Study) -> Result:
 
 
 def inputs6(study: Study) -> dict[str, Any]:
-    """Return what figure 6 is drawn from."""
+    """Return the inputs of figure 6, see `provenance`."""
     return provenance(study, {'test': study.objects('test')}, weights_of(compared(study)))
 
 
@@ -71,13 +71,13 @@ def quartiles(values: Mapping[str, Values]) -> Table:
 
 
 def inputs9(study: Study) -> dict[str, Any]:
-    """Return what figure 9 is drawn from."""
+    """Return the inputs of figure 9, see `provenance`."""
     return provenance(study, {'test': study.objects('test', ENTROPY_CATEGORY)},
                       {'measured': study.weights})
 
 
 def make9(study: Study) -> Result:
-    """Draw both entropies and IoU over the views, under attention and at random."""
+    """Draw both entropies and IoU over the number of views, for attention and random."""
     objects = study.objects('test', ENTROPY_CATEGORY)
     found = {policy: measure(study, study.weights, policy, objects) for policy in _POLICIES}
     kinds = {"the paper's entropy, nats": 'paper_entropy', 'entropy, nats': 'entropy',
@@ -94,14 +94,14 @@ def make9(study: Study) -> Result:
         for label, lines in rows.items()]
     return Result(
         f'Figure 9: entropy and IoU over the views, {ENTROPY_CATEGORY}',
-        "The paper's entropy, -sum p log p, leaves out the second term, "
-        '(1 - p) log(1 - p); the full one stands beside it. Both policies start from the same '
+        "The paper's entropy, -sum p log p, omits the second term, "
+        '(1 - p) log(1 - p); the full entropy is shown too. Both policies start from the same '
         'views, on one frozen network. Bands are 95 % intervals over objects and starts.',
         tables, claims9(found), picture)
 
 
 def claims9(found: Mapping[str, Measured]) -> list[Claim]:
-    """Return whether entropy falls and IoU rises faster under attention than at random."""
+    """Return the claims that entropy falls and IoU rises more with attention than at random."""
     chosen, random = (found[policy] for policy in _POLICIES)
     results = [larger(
         f'{label} falls more under attention than at random',
@@ -114,13 +114,13 @@ def claims9(found: Mapping[str, Measured]) -> list[Claim]:
 
 
 def inputs10(study: Study) -> dict[str, Any]:
-    """Return what figure 10 is drawn from."""
+    """Return the inputs of figure 10, see `provenance`."""
     return provenance(study, {'test': study.objects('test')}, {'measured': study.weights},
                       threads=study.threads)
 
 
 def make10(study: Study) -> Result:
-    """Time the prediction from 1 to 5 images."""
+    """Draw the time of prediction over the number of images."""
     runs = np.cumsum([run['predictions'] for run in timed_runs(study)], axis=1)  # (runs, T)
     lines = [over_runs(list(values)) for values in runs.T]
     with canvas(5.5, 3.2) as (figure, axes):
@@ -139,7 +139,7 @@ def make10(study: Study) -> Result:
 
 
 def claims10(runs: Values) -> list[Claim]:
-    """Return whether time grows with the images, and slightly: seconds so far, (runs, T)."""
+    """Return the claims on the growth of time, from cumulative seconds (runs, T)."""
     share = (runs[:, -1] - runs[:, 0]) / runs[:, 0] / max(runs.shape[1] - 1, 1)
     return [
         larger('The time of prediction rises with the number of images',

@@ -1,4 +1,4 @@
-"""What a network and a policy do on a set of objects; what was run before is kept on disk."""
+"""Measurements of a network and a policy on a set of objects, cached on disk."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,7 +42,7 @@ class Measured:
 
 
 def measure(study: Study, weights: Path, policy: str, objects: Objects) -> Measured:
-    """Run a policy on every object from the study's starts."""
+    """Run a policy on every object from the study's starts, or read the cached episodes."""
     trial, _, run = _run(study, weights, policy, objects)
     shape = len(trial.views), study.starts, study.views
     return Measured(run.iou.reshape(shape), run.entropy.reshape(shape),
@@ -51,7 +51,11 @@ def measure(study: Study, weights: Path, policy: str, objects: Objects) -> Measu
 
 def measure_loss(study: Study, weights: Path, policy: str, objects: Objects,
                  loss: LossConfig) -> Values:
-    """Return lambda_V L(V) + lambda_S L(S), over 24 silhouettes, after every view, (N, S, T)."""
+    """
+    Return the loss of section 3.2, lambda_V L(V) + lambda_S L(S), after every view, (N, S, T).
+
+    L(S) is the mean over 24 silhouettes.
+    """
     trial, key, run = _run(study, weights, policy, objects)
     assert trial.folder is not None
     path = trial.folder / f'loss-{loss.volume_weight}-{loss.silhouette_weight}-{key}.npz'
@@ -84,13 +88,13 @@ def _run(study: Study, weights: Path, policy: str,
 
 
 class Retaken(HeuristicPolicy):
-    """A policy that takes known azimuths (B, T) again."""
+    """A policy that repeats known azimuths, radians, (B, T)."""
 
     def __init__(self, azimuths: Values) -> None:
         self._azimuths = azimuths
 
     def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
-        """Go where the known episode went next; see Policy."""
+        """Return the next known azimuth of each episode; see Policy."""
         goals = self._azimuths[:, seen.taken.shape[1]]
         return Choice(np.zeros(seen.candidates.shape[:2], np.float32), goals), state
 
@@ -98,7 +102,7 @@ class Retaken(HeuristicPolicy):
 @torch.inference_mode()
 def _losses(network: ReconstructionNetwork, views: ViewSet, items: Tensor, starts: Tensor,
             azimuths: Values, loss: LossConfig) -> Values:
-    """Return the loss after every view of known episodes, (B, T)."""
+    """Return the loss after every view of episodes with known azimuths, (B, T)."""
     frusta = frustum([orbit_camera(azimuth) for azimuth in AZIMUTHS])
     truth = views.voxels[items].float()
     outlines = project_all(truth, frusta)

@@ -1,5 +1,5 @@
 """
-One reconstruction in a process of its own, its steps timed; JSON on standard output.
+One timed reconstruction in a fresh process, with JSON on standard output.
 
 `python -m active_recon.paper.one_reconstruction DATASET CATEGORY NAME WEIGHTS THREADS VIEWS OUT`
 """
@@ -17,8 +17,8 @@ def main(root: str, category: str, name: str, weights: str, threads: str, views:
     """
     Reconstruct an object from its first views, and write the seconds of each step.
 
-    Loading counts the import of what runs the network. `predictions` are the seconds of each
-    view's prediction; the step `making prediction` is the first.
+    Loading includes the import of the runtime. `predictions` are the seconds of each view's
+    prediction; the step `making prediction` is the first.
     """
     seconds: dict[str, float] = {}
 

@@ -1,4 +1,4 @@
-"""All parts in reading order; each is made where its inputs have changed."""
+"""All parts of the document in reading order; a part is made if its inputs have changed."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from active_recon.paper.writing import Inputs, is_current, write_result
 
 @dataclass(frozen=True)
 class Part:
-    """What a part is made from, how it is made, and which parts it builds upon."""
+    """The functions for a part's inputs and its result, and the parts that it depends on."""
 
     inputs: Callable[[Study], Inputs]
     make: Callable[[Study], Result]
@@ -38,10 +38,10 @@ PARTS: Mapping[str, Part] = {
 
 def run_part(study: Study, name: str, again: bool = False) -> bool:
     """
-    Make a part and write it, unless it is there from the same inputs; return whether it was made.
+    Make a part and write it, unless it is current; return whether it was made.
 
-    Systems that it needs are trained first, where they are missing. Raises ConfigError on an
-    unknown part.
+    Missing systems are trained first. A part is current if its files exist and were made from
+    the same inputs; `again` makes it anyway. Raises ConfigError on an unknown part.
     """
     if name not in PARTS:
         raise ConfigError(f'no such part: expected one of {", ".join(PARTS)}, got {name!r}')

@@ -1,4 +1,4 @@
-"""Curves, bars, boxes and rows of tiles, as RGB pictures; matplotlib is imported when it draws."""
+"""Curves, bars, box plots and rows of tiles as RGB images; matplotlib is imported when used."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,7 +20,7 @@ _COLORS = ('#2563a8', '#d95f02', '#1b8869', '#be2b6e', '#6d50ac', '#8c6414', '#4
 @contextmanager
 def canvas(width: float, height: float, columns: int = 1,
            rows: int = 1) -> Iterator[tuple['Figure', Any]]:
-    """Yield a figure of so many inches and its axes, (rows, columns)."""
+    """Yield a figure, its size in inches, and its axes, (rows, columns)."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -28,12 +28,12 @@ def canvas(width: float, height: float, columns: int = 1,
     with rc_context({'axes.spines.top': False, 'axes.spines.right': False, 'font.size': 9,
                      'legend.frameon': False}):
         figure = Figure(figsize=(width, height), dpi=130, layout='constrained')
-        FigureCanvasAgg(figure)  # without a display, and without pyplot's state
+        FigureCanvasAgg(figure)  # needs no display and no pyplot state
         yield figure, figure.subplots(rows, columns, squeeze=False)
 
 
 def drawn(figure: 'Figure') -> Picture:
-    """Return what the figure shows, (H, W, 3) uint8 RGB."""
+    """Return the rendered figure, (H, W, 3) uint8 RGB."""
     figure.canvas.draw()
     rgba = np.asarray(figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
     return rgba[..., :3].copy()
@@ -83,7 +83,7 @@ def boxes(axes: 'Axes', groups: Mapping[str, NDArray[np.float64]], y_label: str)
 
 def tiles(rows: Sequence[Sequence[Picture | None]], headings: Sequence[str],
           names: Sequence[str], notes: Sequence[Sequence[str]] | None = None) -> Picture:
-    """Draw rows of pictures under headings, each row with its name; None leaves a gap."""
+    """Return rows of images with headings, row names and notes below; None leaves a gap."""
     with canvas(1.25 * len(headings) + 0.6, 1.4 * len(rows) + 0.4, len(headings),
                 len(rows)) as (figure, grid):
         for row, pictures in enumerate(rows):

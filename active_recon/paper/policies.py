@@ -1,4 +1,4 @@
-"""The view policies on one frozen network: what each is worth, beside chance and an oracle."""
+"""The study of view policies on one frozen network, with random and the greedy oracle."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -31,9 +31,9 @@ _OWN = 'attention'
 
 def weights(study: Study) -> list[Path]:
     """
-    Return policies of several seeds on one frozen reconstruction, the first its own.
+    Return weights files of policies with several seeds on the study's frozen reconstruction.
 
-    Those that are missing are trained, as the first was.
+    The first is the study's own. Missing ones are trained with the settings of the first.
     """
     first = study.weights
     folder = study.models / 'policies' / weights_hash(first)[:12]
@@ -55,7 +55,7 @@ def _plan(study: Study, first: Path) -> Plan:
 
 
 def inputs(study: Study) -> dict[str, Any]:
-    """Return what the study is made from."""
+    """Return the inputs of the study, see `provenance`."""
     return provenance(
         study, {'test': study.objects('test')},
         {f'seed {seed}': path for seed, path in enumerate(weights(study))},
@@ -64,7 +64,7 @@ def inputs(study: Study) -> dict[str, Any]:
 
 
 def make(study: Study) -> Result:
-    """Run all policies from the same starts."""
+    """Measure all policies from the same starts."""
     bundle = load_weights(study.weights, study.device)
     trial = Trial(bundle.reconstruction, bundle.threshold, study.read(study.objects('test')),
                   study.policy_starts, study.views, study.seed, bfloat16=True,
@@ -77,9 +77,9 @@ def make(study: Study) -> Result:
         f'All policies on one frozen network, in bfloat16, from {study.policy_starts} first views '
         f'of each of {found["objects"]} parametric test objects. Attention was trained under '
         f'{len(attentions)} seeds{learned_from(paths)}, random drawn under '
-        f'{study.policy_seeds}. The greedy oracle sees the truth and takes, one step ahead, the '
-        'view after which the IoU is highest: no policy can be built so, it shows what there is '
-        'to be gained. `area` is the mean IoU over the views; differences are paired by object, '
+        f'{study.policy_seeds}. The greedy oracle knows the truth and takes the view with the '
+        'highest IoU after it; it is not a usable policy, but shows the possible '
+        'gain. `area` is the mean IoU over the views; differences are paired by object, '
         'start and, where both have as many, seed. Brackets are 95 % intervals over objects, '
         f'starts and seeds. {found["headroom_sentence"]}')
     return Result('View policies on one frozen network', text, _tables(found), claims(found),
@@ -87,14 +87,14 @@ def make(study: Study) -> Result:
 
 
 def learned_from(paths: Sequence[Path]) -> str:
-    """Say what the policies learned from, where that is not the same for all."""
+    """Return the training data of the policies in words, '' if it is the same for all."""
     first, *others = (' and '.join(read_card(path).get('data') or ()) for path in paths)
     unlike = sorted(set(others) - {first})
     return f' (the first on {first}, others on {", ".join(unlike)})' if unlike else ''
 
 
 def claims(found: Mapping[str, Any]) -> list[Claim]:
-    """Return what follows from the study's figures."""
+    """Return the claims on the study's figures."""
     verdicts = [headroom(Interval(**found['headroom']))]
     if _OWN in found['policies']:
         above = {name: Interval(**value)
@@ -142,7 +142,7 @@ def _tables(found: Mapping[str, Any]) -> list[Table]:
 
 
 def subset_table(subset: Mapping[str, Any]) -> Table:
-    """Return the IoU that the best of all sequences of three views reach, beside the policies'."""
+    """Return a table of the IoU after the best sequence of three views, and of the policies."""
     rows = {'the best sequence of three': subset['best'],
             'the best from the same start': subset['best_from_start'],
             **subset.get('policies', {}),

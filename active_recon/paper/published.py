@@ -1,4 +1,4 @@
-"""The paper's own tables, as printed: of ShapeNet and PASCAL3D+, and not of our objects."""
+"""The values of the paper's tables as printed, measured on ShapeNet and PASCAL3D+."""
 
 from collections.abc import Mapping
 
@@ -41,7 +41,7 @@ TABLE3: Mapping[str, tuple[float, float, float, float]] = {
     'cellphone': (0.661, 0.702, 0.728, 0.758),
     'watercraft': (0.513, 0.632, 0.536, 0.532),
 }
-"""IoU of a single view by category, of the systems in their order."""
+"""IoU of a single view by category, of TABLE3_SYSTEMS in their order."""
 
 TABLE4: Mapping[str, tuple[float, float]] = {
     'pre-processing data': (0.455, 11.34),

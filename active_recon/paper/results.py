@@ -1,4 +1,4 @@
-"""What a part of the paper comes to: tables, what follows from them, and a picture."""
+"""The result of a part of the paper: tables, claims and an image."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -18,8 +18,8 @@ class Column:
     """
     A column of a table; None is a cell that was not measured.
 
-    `published` marks the paper's own figures. Its heading then says so, and what is measured here
-    cannot stand under it.
+    `published` marks the paper's own values, which its heading states. Raises ConfigError where
+    published and measured values are mixed.
     """
 
     heading: str
@@ -27,7 +27,7 @@ class Column:
     published: bool = False
 
     def __post_init__(self) -> None:
-        """Reject figures of ours under the heading of the published, and the other way round."""
+        """Reject measured values under a published heading, and the reverse."""
         intervals = any(isinstance(cell, Interval) for cell in self.cells)
         if self.heading.startswith(PUBLISHED) or (self.published and intervals):
             raise ConfigError(f'{self.heading}: published and measured figures in one column: '
@@ -35,14 +35,19 @@ class Column:
 
     @property
     def title(self) -> str:
-        """What stands above the column."""
+        """The column's heading in the table."""
         return ': '.join(filter(None, (PUBLISHED, self.heading))) if self.published else (
             self.heading)
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table; its first column, headed `key`, names the rows. Figures get so many digits."""
+    """
+    A table, whose first column has the heading `key` and the rows' names.
+
+    Numbers are printed with `digits` decimals. Raises ConfigError where a column has the wrong
+    length.
+    """
 
     title: str
     key: str
@@ -62,17 +67,17 @@ class Table:
         """Return the table in Markdown."""
         lines = [[self.key, *(column.title for column in self.columns)],
                  ['---'] + ['---:'] * len(self.columns)]
-        lines += [[name, *(self._told(column.cells[row]) for column in self.columns)]
+        lines += [[name, *(self._formatted(column.cells[row]) for column in self.columns)]
                   for row, name in enumerate(self.rows)]
         return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold."""
+        """Return the table for JSON."""
         return {'title': self.title, 'rows': list(self.rows), 'columns': [
             {'heading': column.title, 'published': column.published,
              'cells': [plain(cell) for cell in column.cells]} for column in self.columns]}
 
-    def _told(self, cell: Cell) -> str:
+    def _formatted(self, cell: Cell) -> str:
         match cell:
             case None:
                 return '–'
@@ -87,7 +92,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Claim:
-    """Something said by the paper or wanted of us: whether it holds here, and by which figures."""
+    """A claim of the paper or a target, the verdict on it, and the values that decide it."""
 
     claim: str
     verdict: str
@@ -101,10 +106,10 @@ class Claim:
 @dataclass(frozen=True, eq=False)
 class Result:
     """
-    What a part found.
+    The result of a part.
 
-    `text` says what was measured and how; `figures` is what other parts build upon, ready for
-    JSON; `picture` is (H, W, 3) uint8 RGB.
+    `text` describes the measurement; `figures` are values that other parts use, ready for JSON;
+    `picture` is (H, W, 3) uint8 RGB.
     """
 
     title: str
@@ -116,7 +121,7 @@ class Result:
 
 
 def format_interval(spread: Interval, digits: int = 3) -> str:
-    """Return a mean with its interval, for people to read."""
+    """Return a mean with its interval as text: mean [low, high]."""
     return f'{spread.mean:.{digits}f} [{spread.low:.{digits}f}, {spread.high:.{digits}f}]'
 
 
@@ -126,5 +131,5 @@ def counted(views: int) -> str:
 
 
 def plain(cell: Cell) -> Any:
-    """Return a cell as JSON holds it."""
+    """Return a cell for JSON."""
     return asdict(cell) if isinstance(cell, Interval) else cell

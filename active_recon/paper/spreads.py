@@ -6,16 +6,17 @@ from numpy.typing import NDArray
 
 
 def per_view(values: Values) -> list[Interval]:
-    """Return the mean after each view, of values (N, S, T): N objects from S starts."""
+    """Return mean and interval after each of T views, of values (N, S, T): N objects, S starts."""
     return [mean_interval(values[..., view]) for view in range(values.shape[-1])]
 
 
 def unweighted(values: Values, categories: NDArray[np.str_], rounds: int = 2000,
                seed: int = 0) -> Interval:
     """
-    Return the mean over categories of their means, with its interval, of values (N, S).
+    Return the mean over categories of their means, with its 95 % interval, of values (N, S).
 
-    Every category weighs alike, however many objects it has; objects are drawn anew within each.
+    Every category has the same weight. The interval is from a bootstrap over the objects within
+    each category.
     """
     rng = np.random.default_rng(seed)
     rows = values.reshape(len(values), -1).mean(axis=1)

@@ -1,4 +1,4 @@
-"""What is measured, on what, and how: the settings that all parts share."""
+"""The settings that all parts share: data, models, and parameters of the measurements."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -17,19 +17,19 @@ from active_recon.volumes.voxels import RESOLUTION
 SAMPLES = 75_000
 REAL = {'real_val': 'real models, `val`', 'real_cc0': 'real models that ship (CC0)',
         'real_unseen': 'real models of unseen categories'}
-"""Folders of real models, rendered, which are measured where they are present."""
+"""Folders of rendered real models, which are measured if they exist, and their titles."""
 
 
 @dataclass(frozen=True)
 class Objects:
-    """Objects of a dataset on disk, of one category or of all, with so fine a truth."""
+    """Objects of a dataset on disk, of one category or of all (''), and a voxel resolution."""
 
     root: Path
     category: str = ''
     resolution: int = RESOLUTION
 
     def folders(self) -> list[ObjectFolder]:
-        """Return where they lie; raises DataError where there is none."""
+        """Return the objects' folders; raises DataError where there is none."""
         folders = [folder for folder in list_objects(self.root)
                    if self.category in ('', SYNSETS.get(folder.category, folder.category))]
         if not folders:
@@ -40,7 +40,7 @@ class Objects:
 
     @property
     def present(self) -> bool:
-        """Whether there are any, with a truth as fine as it is asked for."""
+        """Whether there is any object with voxels of this resolution."""
         return any(folder.voxels_path(self.resolution).is_file()
                    for folder in (list_objects(self.root) if self.root.is_dir() else ()))
 
@@ -57,19 +57,21 @@ class Objects:
 @dataclass(frozen=True)
 class Study:
     """
-    Where data, weights and results lie, and the settings of all measurements.
+    The folders of data, weights and results, and the settings of all measurements.
 
     - data: a folder with train, val, test and unseen, as `active-recon dataset build` makes it,
-      and folders of rendered real models (REAL) where there are any
-    - models: where the compared systems are trained, and what was measured is kept
-    - model: weights of the paper's network for what is not a comparison; None: those that ship
-    - training: the folders of `data` that all systems learn from
-    - samples: views that each system sees in training
-    - starts: first views of each object, out of 24; policy_starts: the same where policies are
-      compared; seed: draws them, and the random policy
-    - device: where IoU is measured; table 4 and figure 10 always time a CPU
-    - policy_seeds: trainings of the view policy, and draws of the random one
-    - subset_objects: objects of which every sequence of three views is tried
+      and optionally folders of rendered real models (REAL)
+    - models: folder of the trainings of the compared systems, and of cached measurements
+    - out: folder of the results
+    - model: weights of the paper's network for parts without a comparison; None: those that ship
+    - pascal3d: folder of PASCAL3D+, for figure 7
+    - training: the folders in `data` that all systems are trained on
+    - samples: number of views that each system is trained on
+    - starts: number of first views of each object, of 24; policy_starts: the same where policies
+      are compared; seed: of the starts, the trainings and the random policy
+    - device: device on which IoU is measured; table 4 and figure 10 always time a CPU
+    - policy_seeds: number of trainings of the view policy, and of runs of random
+    - subset_objects: number of objects on which every sequence of three views is measured
     """
 
     data: Path = Path('data')
@@ -94,20 +96,20 @@ class Study:
         return Objects(self.data / name, category, resolution)
 
     def real(self) -> list[str]:
-        """Return the folders of real models that are there."""
+        """Return the names of the folders of real models that exist."""
         return [name for name in REAL if self.objects(name).present]
 
     @property
     def weights(self) -> Path:
-        """Where the weights of the paper's network lie; raises WeightsError if there are none."""
+        """Path of the weights of the paper's network; raises WeightsError if there are none."""
         path = find_weights(self.model or PAPER_MODEL)
         if not path.is_file():
             raise WeightsError(f"{path}: no such file: expected weights of the paper's network; "
-                               'name some by --model, or train them with `active-recon train`')
+                               'give them by --model, or train them with `active-recon train`')
         return path
 
     def command(self, part: str) -> str:
-        """Return the command that makes a part under these settings."""
+        """Return the command line that makes a part with these settings."""
         words = ['active-recon', 'paper', part]
         usual = Study()
         for option in ('data', 'models', 'out', 'model', 'pascal3d', 'samples', 'starts', 'seed',
@@ -119,15 +121,15 @@ class Study:
         return ' '.join(words)
 
     def training_sets(self, category: str = '', resolution: int = RESOLUTION) -> list[Objects]:
-        """Return what the systems learn from."""
+        """Return the objects that the systems are trained on."""
         return [self.objects(name, category, resolution) for name in self.training]
 
     def read(self, *sets: Objects) -> ViewSet:
-        """Read sets of objects as one; the two that were asked for last are kept in memory."""
+        """Read sets of objects as one; the last two results are cached in memory."""
         return _read(sets, self)
 
     def generators(self) -> str | None:
-        """Return the hash of the generators that made the data, where it is known."""
+        """Return the hash of the generators that made the data, None where it is unknown."""
         path = self.data / 'generators.sha256'
         return path.read_text().strip() if path.is_file() else None
 

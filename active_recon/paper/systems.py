@@ -1,4 +1,4 @@
-"""The systems that are compared, each trained on the same objects with as many views."""
+"""The compared systems, all trained on the same objects and the same number of views."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,16 +21,16 @@ from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
 BATCH, POLICY_BATCH = 32, 48
 LEARNING_RATE, POLICY_LEARNING_RATE = 6e-4, 5e-4
 MAX_VIEWS = 5
-POLICY_SHARE = 0.4  # views that a policy sees, of those that its reconstruction saw before
+POLICY_SHARE = 0.4  # training views of a policy, relative to those of its reconstruction
 MODEL = '2d3d-attention'
 
 
 @dataclass(frozen=True)
 class System:
     """
-    A system to compare: its name on disk, its label in tables, and how it is trained.
+    A system to compare: its name on disk, its label in tables, and the settings of its training.
 
-    `model` and `size` are the registry's; `loss` None is the network's own.
+    `model` and `size` are those of the registry; `loss` None is the network's default.
     """
 
     name: str
@@ -43,7 +43,7 @@ class System:
 
     @property
     def resolution(self) -> int:
-        """Cells a side of what it predicts."""
+        """Resolution of its prediction, cells a side."""
         return FINE_RESOLUTION if self.size.endswith('64') else RESOLUTION
 
 
@@ -60,7 +60,7 @@ SYSTEMS = (
 
 
 def systems(study: Study) -> list[System]:
-    """Return the systems whose truth is there: those of 64 cells need data made with --fine."""
+    """Return the systems whose true voxels exist: those at 64 cells need data made with --fine."""
     return [system for system in SYSTEMS if system.model in NETWORKS
             and all(objects.present for objects in (
                 *study.training_sets(resolution=system.resolution),
@@ -70,10 +70,10 @@ def systems(study: Study) -> list[System]:
 
 def find_system(study: Study, system: System) -> Path | None:
     """
-    Return a system's weights: those in the study's folder, else those that ship.
+    Return a system's weights: those in the study's folder, else those that ship, else None.
 
-    Those that ship are taken only where they saw about as many views as the study gives, or
-    where the system sees none, being fitted in one go.
+    Weights that ship are used only if they were trained on about as many views as the study's, or
+    if the system is not trained by steps.
     """
     own = study.models / system.name / 'weights.safetensors'
     if own.is_file():
@@ -89,7 +89,7 @@ def find_system(study: Study, system: System) -> Path | None:
 
 
 def have_systems(study: Study, wanted: Sequence[System]) -> dict[System, Path]:
-    """Return the weights of systems, training those that are missing."""
+    """Return the weights of systems; train those that are missing."""
     return {system: find_system(study, system) or train_system(
         system, study.training_sets(resolution=system.resolution),
         study.objects('val', resolution=system.resolution), study.models / system.name,
@@ -98,14 +98,14 @@ def have_systems(study: Study, wanted: Sequence[System]) -> dict[System, Path]:
 
 def train_system(system: System, training: Sequence[Objects], validation: Objects, out: Path,
                  samples: int, study: Study) -> Path:
-    """Train a system on so many views, unless it is there; return its weights."""
+    """Train a system on `samples` views unless its weights exist; return their path."""
     return run_plan(training_plan(system, samples), training, validation, out, study, study.seed)
 
 
 def run_plan(plan: Plan, training: Sequence[Objects], validation: Objects, out: Path,
              study: Study, seed: int) -> Path:
     """
-    Train as planned, unless the weights are there; return their path.
+    Train according to a plan unless the weights exist; return their path.
 
     An interrupted training continues from its checkpoints in `out`.
     """
@@ -134,8 +134,8 @@ def run_plan(plan: Plan, training: Sequence[Objects], validation: Objects, out: 
 
 
 def training_plan(system: System, samples: int) -> Plan:
-    """Return the plan under which a system sees about so many views."""
-    # The joint scheme's sequences are all the longest
+    """Return the plan for training a system on about `samples` views."""
+    # In the joint scheme all sequences have the maximum length
     steps = (max(1, round(samples / (BATCH * MAX_VIEWS))) if system.joint
              else steps_for(samples, BATCH, MAX_VIEWS))
     first = TrainingConfig(steps, BATCH, LEARNING_RATE, MAX_VIEWS,
@@ -146,14 +146,14 @@ def training_plan(system: System, samples: int) -> Plan:
 
 
 def policy_training(samples: int) -> TrainingConfig:
-    """Return how a view policy is trained beside a reconstruction that saw so many views."""
+    """Return the training settings of a view policy whose reconstruction had `samples` views."""
     steps = max(1, round(POLICY_SHARE * samples / (POLICY_BATCH * MAX_VIEWS)))
     return TrainingConfig(steps, POLICY_BATCH, POLICY_LEARNING_RATE, MAX_VIEWS, augment=False,
                           warmup_steps=min(20, steps), checkpoint_every=50, validate_every=250)
 
 
 def views_seen(card: Mapping[str, Any]) -> int | None:
-    """Return how many views a reconstruction saw in training, by its card; None if unknown."""
+    """Return the number of training views of a reconstruction by its card; None if unknown."""
     if 'model' in card and network_entry(card['model']).fit:
         return None
     training = card.get('reconstruction') or {}

@@ -1,4 +1,4 @@
-"""Table 1: loss and IoU at 1 to 5 views of sofas; what training gains, and what choice gains."""
+"""Table 1: loss and IoU at 1 to 5 views of sofas; the gains of the training and of the policy."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,7 +26,7 @@ ROWS = {'two-stage, random views': ('two-stage', 'random'),
 
 
 def weights(study: Study) -> dict[str, Path]:
-    """Return both schemes' weights, trained on sofas alone."""
+    """Return the weights of both schemes, trained on sofas only."""
     return {name: _train(study, system) for name, system in _SCHEMES.items()}
 
 
@@ -37,12 +37,12 @@ def _train(study: Study, system: System) -> Path:
 
 
 def inputs(study: Study) -> dict[str, Any]:
-    """Return what the table is made from."""
+    """Return the inputs of the table, see `provenance`."""
     return provenance(study, {'test': study.objects('test', CATEGORY)}, weights(study))
 
 
 def make(study: Study) -> Result:
-    """Measure both schemes under both ways to choose views."""
+    """Measure both schemes with random views and with their own policies."""
     trained = weights(study)
     objects = study.objects('test', CATEGORY)
     found = {row: measure(study, trained[scheme], policy, objects)
@@ -55,8 +55,8 @@ def make(study: Study) -> Result:
         f'on. Both schemes learn from {CATEGORY} alone, from the same objects and from as many '
         "views. The two-stage scheme trains the reconstruction on random views and then the "
         "policy on it, frozen; the joint scheme, the paper's, trains both together on the views "
-        "that the policy chooses. Each is measured on random views and on its own policy's, so "
-        'that what training gains and what choice gains are told apart: at a single view nothing '
+        "that the policy chooses. Each is measured on random views and on its own policy's, to "
+        'separate the gain of the training from that of the choice: at a single view nothing '
         'has been chosen yet. The loss is 0.4 and 0.6 of the mean squared errors of volume and of '
         '24 silhouettes. Brackets are 95 % intervals over objects and starts.')
     tables = [_table('IoU', 'iou', ious), _table('Loss', 'loss', losses)]
@@ -66,7 +66,7 @@ def make(study: Study) -> Result:
 
 
 def claims(found: Mapping[str, Measured]) -> list[Claim]:
-    """Return what follows from the four rows, from differences paired by object and start."""
+    """Return the claims on the four rows, from differences paired by object and start."""
     random, chosen, joint_random, joint_chosen = (found[row].iou for row in ROWS)
     return [
         larger('IoU rises with the views (2D-3D)', mean_interval(random[..., -1] - random[..., 0]),

@@ -1,4 +1,4 @@
-"""Table 2: seven pairs of lambda, motorbikes, training and test; its weights do not ship."""
+"""Table 2: IoU on motorbikes for seven pairs of loss weights; the trained weights do not ship."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,14 +22,14 @@ import numpy as np
 CATEGORY = 'motorbike'
 COUNTS = {'train': 200, 'val': 30, 'test': 60}
 SHARE = 0.2
-"""Views that each of the seven sees, of those that a compared system sees."""
-_SEEDS = {'train': 7_000_000, 'val': 8_000_000, 'test': 9_000_000}  # of no other dataset
+"""Training views of each of the seven, relative to those of a compared system."""
+_SEEDS = {'train': 7_000_000, 'val': 8_000_000, 'test': 9_000_000}  # used by no other dataset
 _PAPERS_PAIR = (0.4, 0.6)
 
 
 def objects(study: Study) -> dict[str, Objects]:
-    """Return the sets of motorbikes, making those that are missing."""
-    # Of other generators they are other objects, so the folder bears their hash
+    """Return the sets of motorbikes; make those that are missing."""
+    # Other generators make other objects, so the folder's name contains their hash
     root = study.models / 'table2' / f'{CATEGORY}-{generators_hash()[:12]}'
     jobs = [job for part, count in COUNTS.items()
             for job in shape_jobs(CATEGORY, range(_SEEDS[part], _SEEDS[part] + count),
@@ -38,14 +38,14 @@ def objects(study: Study) -> dict[str, Objects]:
         with study.progress(f'making {CATEGORY}', len(jobs)) as advance:
             for outcome in make_dataset(jobs, workers=study.threads):
                 if outcome.refusal:
-                    raise DataError(f'{outcome.folder.name}: cannot be rendered: '
+                    raise DataError(f'{outcome.folder.name}: cannot be made: '
                                     f'{outcome.refusal}')
                 advance(1, '')
     return {part: Objects(root / part) for part in COUNTS}
 
 
 def weights(study: Study) -> dict[tuple[float, float], Path]:
-    """Return the weights of every pair, trained on the same motorbikes for as long."""
+    """Return the weights of every pair, trained on the same motorbikes for the same time."""
     sets = objects(study)
     return {pair: train_system(
         System(_name(pair), _name(pair), MODEL, loss=LossConfig(*pair)), [sets['train']],
@@ -54,13 +54,13 @@ def weights(study: Study) -> dict[tuple[float, float], Path]:
 
 
 def inputs(study: Study) -> dict[str, Any]:
-    """Return what the table is made from."""
+    """Return the inputs of the table, see `provenance`."""
     return provenance(study, objects(study), {
         _name(pair): path for pair, path in weights(study).items()})
 
 
 def make(study: Study) -> Result:
-    """Measure all pairs on what they were trained on, and on what they were not."""
+    """Measure all pairs on training and test objects."""
     sets, trained = objects(study), weights(study)
     values = {part: {pair: measure(study, path, 'random', sets[part]).iou.mean(axis=2)
                      for pair, path in trained.items()} for part in ('train', 'test')}
@@ -79,7 +79,7 @@ def make(study: Study) -> Result:
 
 
 def claims(test: Mapping[tuple[float, float], Values]) -> list[Claim]:
-    """Return what follows from the mean IoU (N, S) of each pair on the test objects."""
+    """Return the claims on the mean IoU (N, S) of each pair on the test objects."""
     gaps = {_name(pair): mean_interval(test[_PAPERS_PAIR] - one) for pair, one in test.items()
             if pair != _PAPERS_PAIR}
     silhouettes = np.mean([one for (volume, outline), one in test.items() if outline > volume],

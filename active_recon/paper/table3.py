@@ -1,4 +1,4 @@
-"""Table 3: single-view IoU by category of all systems; and 1 to 5 views, yaw, and cost."""
+"""Table 3: single-view IoU of all systems by category; also 1 to 5 views, yaw and cost."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -35,18 +35,18 @@ _OWN = TWO_STAGE.label
 
 
 def inputs(study: Study) -> dict[str, Any]:
-    """Return what the table is made from."""
+    """Return the inputs of the table, see `provenance`."""
     sets = {name: study.objects(name) for name in (*study.training, 'val', *measured_on(study))}
     return provenance(study, sets, weights_of(compared(study)))
 
 
 def measured_on(study: Study) -> list[str]:
-    """Return the folders that all systems are measured on: of the categories trained on."""
+    """Return the folders on which all systems are measured: those of training categories."""
     return ['test', *(name for name in study.real() if name != 'real_unseen')]
 
 
 def make(study: Study) -> Result:
-    """Measure every system on every folder, and the two answers that know no detail."""
+    """Measure every system and both baselines on every folder."""
     rows, names = compared(study), measured_on(study)
     found = {name: {row.label: seen_at_random(study, row, name) for row in rows
                     if study.objects(name, resolution=row.resolution).present}
@@ -66,11 +66,11 @@ def make(study: Study) -> Result:
                *claims(rows, found)]
     text = (
         'IoU of a single view on objects that were not trained on, by category. All systems are '
-        'asked about the same views; what each learned from stands in the last tables. The mean '
-        'over categories weighs every category alike, the mean over objects every object. Beside '
-        "the systems stand two answers that know nothing of an image's detail: the mean shape of "
-        "the object's category, which is told the category, and the training shape whose image "
-        'is nearest. A system of 64 cells a side is measured against a truth of 64, where there '
+        'measured on the same views; the last tables have their training data. The mean over '
+        'categories gives every category the same weight, the mean over objects every object. Two '
+        "baselines use no detail of an image: the mean shape of the object's category, which is "
+        'given, and the training shape with the nearest image. '
+        'A system of 64 cells a side is measured against a truth of 64, where there '
         f'is one, and not compared. {_last_row(rows)}Where the published columns have a mean, it '
         'is ours, of the thirteen printed figures. Brackets are 95 % intervals over '
         'objects and starts. Over several views, all systems see the same random ones.')
@@ -88,7 +88,7 @@ def _last_row(rows: Sequence[Compared]) -> str:
 
 
 def claims(rows: Sequence[Compared], found: Mapping[str, Mapping[str, Measured]]) -> list[Claim]:
-    """Return what follows from the paired differences to every rival."""
+    """Return the claims on the paired differences to every rival."""
     results: list[Claim] = []
     rivals = [row.label for row in rows if row.rival]
     for name, own in found.items():
@@ -127,7 +127,7 @@ def best_categories(single: Mapping[str, Values], categories: NDArray[np.str_]) 
 
 
 def category_table(single: Mapping[str, Values], categories: NDArray[np.str_]) -> Table:
-    """Return the table of IoU (N, S) by category, with both means, beside the published."""
+    """Return a table of IoU (N, S) by category, with both means and the published values."""
     names = [name for name in CATEGORIES if name in set(categories)]
     names += sorted(set(map(str, categories)) - set(names))
     own = [Column(label, [*(mean_interval(values[categories == name]) for name in names),
@@ -148,7 +148,7 @@ def category_table(single: Mapping[str, Values], categories: NDArray[np.str_]) -
 def real_table(found: Mapping[str, Mapping[str, Measured]],
                plain_answers: Mapping[str, Mapping[str, Values]],
                names: Sequence[str]) -> Table:
-    """Return the IoU of one view on folders of real models, empty where a truth is too coarse."""
+    """Return a table of single-view IoU on real models; empty where the truth is too coarse."""
     columns = []
     labels = dict.fromkeys(label for name in names for label in found[name])
     for label in (*labels, *plain_answers[names[0]]):
@@ -156,7 +156,7 @@ def real_table(found: Mapping[str, Mapping[str, Measured]],
         for name in names:
             values = (found[name][label].iou[..., 0] if label in found[name]
                       else plain_answers[name].get(label))
-            if values is None:  # no truth as fine as what the system predicts
+            if values is None:  # no true voxels at the resolution of the system
                 cells += [None, None]
                 continue
             categories = next(iter(found[name].values())).categories
@@ -168,7 +168,7 @@ def real_table(found: Mapping[str, Mapping[str, Measured]],
 
 
 def views_table(found: Mapping[str, Measured], name: str) -> Table:
-    """Return the IoU of every system after each view."""
+    """Return a table of the IoU of every system after each view."""
     rows = {label: per_view(one.iou) for label, one in found.items()}
     count = len(next(iter(rows.values())))
     return Table(f'IoU at 1 to {count} random views, {REAL.get(name, "parametric test")}',

@@ -17,13 +17,13 @@ STEPS = tuple(published.TABLE4)
 
 
 def inputs(study: Study) -> dict[str, Any]:
-    """Return what the table is made from."""
+    """Return the inputs of the table, see `provenance`."""
     return provenance(study, {'test': study.objects('test')}, {'measured': study.weights},
                       threads=study.threads)
 
 
 def make(study: Study) -> Result:
-    """Time fresh processes."""
+    """Time the steps in fresh processes."""
     runs = timed_runs(study)
     steps = {step: over_runs([run['steps'][step] for run in runs]) for step in STEPS}
     total = over_runs([sum(run['steps'].values()) for run in runs])
@@ -39,7 +39,7 @@ def make(study: Study) -> Result:
 
 
 def table(steps: Mapping[str, Interval], total: Interval) -> Table:
-    """Return seconds and percentages beside the published ones."""
+    """Return a table of seconds and percentages, with the published ones."""
     printed = published.TABLE4
     return Table('Time of each step', 'step', [*steps, 'total'], [
         Column('seconds', [*steps.values(), total]),
@@ -52,7 +52,7 @@ def table(steps: Mapping[str, Interval], total: Interval) -> Table:
 
 
 def claim(steps: Mapping[str, Interval]) -> Claim:
-    """Decide the paper's order of the steps by their means."""
+    """Decide whether the steps have the paper's order, by their mean times."""
     order = sorted(steps, key=lambda step: -steps[step].mean)
     papers: Sequence[str] = sorted(STEPS, key=lambda step: -published.TABLE4[step][0])
     return Claim(f'The longest steps are, in this order, {", ".join(papers)}',

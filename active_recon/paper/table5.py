@@ -1,4 +1,4 @@
-"""Table 5: categories that no system was trained on, at 1, 3 and 5 views."""
+"""Table 5: IoU on categories that were never trained on, at 1, 3 and 5 views."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,18 +21,18 @@ _NAMES = {'unseen': 'parametric, unseen categories', **REAL}
 
 
 def sets(study: Study) -> list[str]:
-    """Return the folders of unseen categories that are there."""
+    """Return the names of the existing folders of unseen categories."""
     return ['unseen', *(name for name in study.real() if name == 'real_unseen')]
 
 
 def inputs(study: Study) -> dict[str, Any]:
-    """Return what the table is made from."""
+    """Return the inputs of the table, see `provenance`."""
     return provenance(study, {name: study.objects(name) for name in sets(study)},
                       {'measured': study.weights})
 
 
 def make(study: Study) -> Result:
-    """Measure unseen categories under the learned policy and at random."""
+    """Measure unseen categories with the learned policy and random views."""
     found = {name: {policy: measure(study, study.weights, policy, study.objects(name))
                     for policy in POLICIES} for name in sets(study)}
     views = [view for view in published.TABLE5_VIEWS if view <= study.views]
@@ -46,7 +46,7 @@ def make(study: Study) -> Result:
 
 
 def claims(name: str, found: Mapping[str, Measured]) -> list[Claim]:
-    """Return what follows for one folder of objects."""
+    """Return the claims on one folder of objects."""
     where, chosen = _NAMES[name], found['attention']
     last = chosen.iou[..., -1]
     results = [

@@ -1,4 +1,4 @@
-"""Reconstructions in fresh processes, timed: what table 4 and figure 10 are drawn from."""
+"""Timing of reconstructions in fresh processes, for table 4 and figure 10."""
 
 import json
 import os
@@ -18,9 +18,9 @@ _BUDGET_S = 120
 
 def timed_runs(study: Study) -> list[dict[str, Any]]:
     """
-    Time a reconstruction of another test object in each of RUNS fresh processes.
+    Time a reconstruction in each of RUNS fresh processes, each of another test object.
 
-    A first process, which fills the disk's cache, is not counted.
+    A first run, which fills the disk cache, is not counted. Raises DataError where one fails.
     """
     folders = study.objects('test').folders()
     found = []
@@ -35,13 +35,13 @@ def timed_runs(study: Study) -> list[dict[str, Any]]:
                 capture_output=True, text=True, timeout=_BUDGET_S, check=False,
                 env=os.environ | {'PYTHONPATH': os.pathsep.join(filter(None, sys.path))})
             if ended.returncode:
-                raise DataError(f'{study.weights}: no reconstruction of {folder.name}: '
-                                f'{ended.stderr.strip()[-400:]}')
+                raise DataError(f'{study.weights}: reconstruction failed: expected one of '
+                                f'{folder.name}, got: {ended.stderr.strip()[-400:]}')
             found.append(json.loads(ended.stdout))
             advance(1, '')
     return found[1:]
 
 
 def over_runs(values: list[float]) -> Interval:
-    """Return the mean over runs and its 95 % interval, runs drawn anew."""
+    """Return the mean over runs and its 95 % interval, by bootstrap over runs."""
     return mean_interval(np.array(values))

@@ -1,4 +1,4 @@
-"""A part's result on disk: Markdown, JSON and PNG, each with where it came from."""
+"""A part's result on disk: Markdown, JSON and PNG, with their provenance."""
 
 from collections.abc import Mapping
 import json
@@ -20,7 +20,11 @@ _SUFFIXES = ('.json', '.md', '.png')
 
 def provenance(study: Study, sets: Mapping[str, Objects], weights: Mapping[str, Path],
                **more: Any) -> dict[str, Any]:
-    """Return what a result is made from: it is made again when any of this changes."""
+    """
+    Return the inputs of a result: hashes of data and weights, and settings.
+
+    A part is made again when they change.
+    """
     return {
         'data': {name: objects.identity() for name, objects in sets.items()},
         'generators': study.generators(), 'seed': study.seed, 'starts': study.starts,
@@ -35,7 +39,7 @@ def _origin(weights: Path) -> dict[str, Any]:
 
 
 def read_result(study: Study, name: str) -> dict[str, Any]:
-    """Return what a part wrote as JSON; raises DataError where it is not there."""
+    """Return a part's JSON; raises DataError where it cannot be read."""
     path = study.out / f'{name}.json'
     try:
         found: dict[str, Any] = json.loads(path.read_bytes())
@@ -46,7 +50,7 @@ def read_result(study: Study, name: str) -> dict[str, Any]:
 
 
 def is_current(study: Study, name: str, inputs: Inputs) -> bool:
-    """Return whether a part's three files are there, made from the same inputs."""
+    """Return whether a part's three files exist and were made from the same inputs."""
     if not all((study.out / f'{name}{suffix}').is_file() for suffix in _SUFFIXES):
         return False
     try:
@@ -56,7 +60,7 @@ def is_current(study: Study, name: str, inputs: Inputs) -> bool:
 
 
 def write_result(study: Study, name: str, inputs: Inputs, result: Result) -> None:
-    """Write a part's three files, JSON last: a part that was cut off is made again."""
+    """Write a part's three files, JSON last, so that an interrupted part is made again."""
     study.out.mkdir(parents=True, exist_ok=True)
     command = study.command(name)
     Image.fromarray(result.picture).save(study.out / f'{name}.png', optimize=True)
@@ -70,12 +74,12 @@ def write_result(study: Study, name: str, inputs: Inputs, result: Result) -> Non
 
 
 def body(study: Study, name: str) -> str:
-    """Return a part's Markdown without how it came about."""
+    """Return a part's Markdown without its provenance."""
     return (study.out / f'{name}.md').read_text().partition(f'\n\n{_MADE_BY}\n')[0]
 
 
 def claims_of(found: Mapping[str, Any]) -> list[Claim]:
-    """Return the claims of a result that was read."""
+    """Return the claims in a part's JSON."""
     return [Claim(**claim) for claim in found['claims']]
 
 
@@ -84,14 +88,14 @@ def _markdown(name: str, command: str, inputs: Inputs, result: Result) -> str:
     for table in result.tables:
         blocks += [f'**{table.title}**', table.markdown()]
     if result.claims:
-        blocks += ['What the paper says, or what was aimed at, and what is measured here:',
+        blocks += ['Claims of the paper and targets, with the verdict of these measurements:',
                    sentences(result.claims)]
     blocks.append(_provenance(command, inputs))
     return '\n\n'.join(blocks) + '\n'
 
 
 def _provenance(command: str, inputs: Inputs) -> str:
-    """Return how the figures come about again: command, data, seed and weights."""
+    """Return the provenance in Markdown: command, data, seed and weights."""
     lines = [f'- command: `{command}`']
     for key, value in inputs.items():
         if isinstance(value, Mapping):
@@ -102,7 +106,7 @@ def _provenance(command: str, inputs: Inputs) -> str:
 
 
 def _short(value: Any) -> str:
-    """Return a value for people: hashes by their first digits; the JSON has them whole."""
+    """Return a value as text; hashes are shortened, since the JSON has them in full."""
     if isinstance(value, Mapping):
         return ', '.join(f'{key} {_short(entry)}' for key, entry in value.items())
     text = str(value)

@@ -1,1 +1,1 @@
-"""A turntable with a camera, its faults, and the objects that it shows."""
+"""A simulated turntable with a camera: its motion, its faults, and its objects."""

@@ -1,4 +1,4 @@
-"""What goes wrong with a camera on a turntable, on purpose: what is sent when, and what is not."""
+"""Fault injection for the simulated camera: lost, late, repeated and corrupt messages."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -13,26 +13,27 @@ from numpy.typing import NDArray
 _SHARE = 1.0
 FAULTS: Mapping[str, tuple[float, str]] = {
     'drop_images': (_SHARE, 'share of the images that are not sent'),
-    'delay_images': (10.0, 's by which images come after their pose'),
+    'delay_images': (10.0, 'delay of the images after their pose, s'),
     'duplicate_images': (_SHARE, 'share of the images that are sent twice'),
     'reorder_images': (_SHARE, 'share of the images that are sent after the next one'),
-    'corrupt_images': (_SHARE, 'share of the images that are cut short'),
-    'wrong_camera_info': (_SHARE, 'share of the camera infos that are of another image size'),
+    'corrupt_images': (_SHARE, 'share of the images that are truncated'),
+    'wrong_camera_info': (_SHARE, 'share of the camera infos with a wrong image size'),
     'drop_camera_info': (_SHARE, 'share of the camera infos that are not sent'),
     'pose_noise': (math.pi, 'standard deviation of the azimuth in the poses, rad'),
     'drop_poses': (_SHARE, 'share of the poses that are not sent'),
-    'stall_motor': (_SHARE, 'share of the seconds in which the motor stands'),
-    'restart': (_SHARE, 'share of the seconds in which the camera is gone, to come back at its '
-                        'start without a goal'),
+    'stall_motor': (_SHARE, 'share of the seconds in which the motor stands still'),
+    'restart': (_SHARE, 'share of the seconds in which the camera is off; it restarts at its '
+                        'first azimuth, without a goal'),
 }
-"""Each fault with the largest amount of it, the least being 0, and what the amount is."""
+"""The largest amount of each fault (the smallest is 0), and the meaning of the amount."""
 
 
 def read_faults(entries: Iterable[str]) -> dict[str, float]:
     """
-    Return the amount of each fault, of entries such as 'drop_images:0.3'; '' is no entry.
+    Return the amount of each fault, from entries like 'drop_images:0.3'; '' is ignored.
 
-    Raises ConfigError of kind 'faults' that names the entry and what was expected.
+    Raises ConfigError of the kind 'faults' on an unknown fault, one given twice, or an amount out
+    of range.
     """
     amounts: dict[str, float] = {}
     for entry in filter(None, entries):
@@ -67,9 +68,9 @@ class Shot:
 @dataclass(frozen=True, eq=False)
 class Sent:
     """
-    What is to be sent now: 'image', 'camera_info' or 'pose' of a shot.
+    A message to send now: the 'image', 'camera_info' or 'pose' of a shot.
 
-    Of an image's bytes only the first `kept`, a share in [0, 1], are sent.
+    `kept` is the fraction of an image's bytes, [0, 1], that is sent.
     """
 
     part: str
@@ -79,9 +80,10 @@ class Sent:
 
 class CameraFaults:
     """
-    Spoils the stream of a camera; times are seconds of one clock.
+    Injects faults into a camera's stream; times are in seconds of any one clock.
 
-    The same seed, faults, shots and times give the same stream.
+    The same seed, faults, shots and times give the same stream. `amounts` is as `read_faults`
+    returns it.
     """
 
     def __init__(self, amounts: Mapping[str, float], seed: int = 0) -> None:
@@ -94,11 +96,11 @@ class CameraFaults:
         self.change(amounts)
 
     def change(self, amounts: Mapping[str, float]) -> None:
-        """Have other faults from now on; what is under way still comes."""
+        """Replace the faults; messages that are already delayed are still sent."""
         self._amounts = dict(amounts)
 
     def is_there(self, now: float) -> bool:
-        """Return whether the camera is there; what a camera that is gone had to send is lost."""
+        """Return whether the camera is on; when it is off, delayed messages are lost."""
         if not self._this_second('restart', now):
             return True
         self._held = None
@@ -106,14 +108,14 @@ class CameraFaults:
         return False
 
     def motor_time(self, now: float) -> float:
-        """Return the time that the motor knows: it stands still while the motor does."""
+        """Return the time of the motor, seconds, which stops while the motor is stalled."""
         if self._this_second('stall_motor', now) and self._last > -math.inf:
             self._stood += max(now - self._last, 0.0)
         self._last = now
         return now - self._stood
 
     def sent(self, shot: Shot, now: float) -> list[Sent]:
-        """Return what is to be sent when this shot has been taken, the images last."""
+        """Return the messages to send after this shot, images last."""
         parts = []
         if not self._happens('drop_poses'):
             parts.append(Sent('pose', self._with_noise(shot)))
@@ -126,7 +128,7 @@ class CameraFaults:
         return parts
 
     def _images(self, shot: Shot) -> list[Sent]:
-        """Return the images that leave the camera with this shot."""
+        """Return the images to send or delay with this shot."""
         if self._happens('drop_images'):
             return []
         image = Sent('image', shot)
@@ -161,7 +163,7 @@ class CameraFaults:
         return bool(self._rng.random() < self._amounts.get(name, 0.0))
 
     def _this_second(self, name: str, now: float) -> bool:
-        """Draw once a second, and anew when the share is another."""
+        """Return whether a fault is on in this second; drawn anew where its amount changes."""
         drawn_for = math.floor(now), self._amounts.get(name, 0.0)
         if name not in self._drawn or self._drawn[name][0] != drawn_for:
             self._drawn[name] = drawn_for, self._happens(name)

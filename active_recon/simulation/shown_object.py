@@ -1,4 +1,4 @@
-"""An object as a simulated camera shows it: images around it, and the cameras that took them."""
+"""An object in front of the simulated camera: images around it and their cameras."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class ShownObject:
-    """Images, each (H, W, 3) uint8 RGB, and the camera of each in the object frame, metres."""
+    """Images, (H, W, 3) uint8 RGB each, and their cameras in the object frame, metres."""
 
     name: str
     images: list[NDArray[np.uint8]]
     cameras: list[Camera]
 
     def seen_from(self, azimuth: float) -> tuple[NDArray[np.uint8], Camera]:
-        """Return the image nearest to an azimuth, and the camera that really took it."""
+        """Return the image nearest to an azimuth (radians), and its own camera."""
         index = nearest_view(azimuth, [camera.azimuth for camera in self.cameras])
         return self.images[index], self.cameras[index]
 
@@ -29,9 +29,9 @@ class ShownObject:
 def rendered_object(path: Path, object_size: float = 1.0, background: float = 255.0,
                     up: str | None = None, front: str | None = None) -> ShownObject:
     """
-    Return a mesh rendered from 24 azimuths, its longest side `object_size` metres.
+    Return renderings of a mesh from 24 azimuths, its longest side `object_size` metres.
 
-    `background` is grey in [0, 255]. Raises MeshError as `load_mesh` does.
+    `background` is a grey in [0, 255]. For `up`, `front` and errors, see `read_mesh`.
     """
     renderer = Renderer(load_mesh(path, up, front))
     cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
@@ -41,7 +41,11 @@ def rendered_object(path: Path, object_size: float = 1.0, background: float = 25
 
 def stored_object(folder: ObjectFolder, object_size: float = 1.0,
                   background: float = 255.0) -> ShownObject:
-    """Return an object of a dataset in R2N2's layout; raises DataError where it is not whole."""
+    """
+    Return an object of a dataset in R2N2's layout, with a grid of `object_size` metres a side.
+
+    `background` is a grey in [0, 255]. Raises DataError where the object cannot be read.
+    """
     cameras = folder.cameras()
     if not cameras:
         raise DataError(f'{folder.images_folder}: no views: expected one or more, got none')

@@ -1,4 +1,4 @@
-"""A simulated turntable: the camera's azimuth over time, at a finite speed, the shortest way."""
+"""A simulated turntable: the camera's azimuth over time, at constant speed, the shortest way."""
 
 import math
 
@@ -8,10 +8,11 @@ from active_recon.geometry.cameras import azimuth_difference, wrap_azimuth
 
 class Turntable:
     """
-    Where the camera stands around the object; times are seconds of any one clock.
+    The camera's azimuth around the object; times are in seconds of any one clock.
 
-    It turns at `speed` radians a second, `time_scale` times as fast as the clock runs, and stands
-    at `azimuth` until it is given a goal.
+    It moves at `speed` radians per second, `time_scale` times as fast as the clock, and stays at
+    `azimuth` until it gets a goal. Raises ConfigError where the azimuth is not finite, or speed or
+    time scale are not finite and above 0.
     """
 
     def __init__(self, azimuth: float = 0.0, speed: float = 1.0, time_scale: float = 1.0) -> None:
@@ -23,7 +24,7 @@ class Turntable:
         self.set_speed(speed, time_scale, 0.0)
 
     def set_speed(self, speed: float, time_scale: float, now: float) -> None:
-        """Go on at another speed from where the camera is now."""
+        """Continue at another speed from the azimuth at `now`; raises ConfigError if invalid."""
         if not (0 < speed < math.inf and 0 < time_scale < math.inf):
             raise ConfigError('turntable: speed or time scale out of range: expected both finite '
                               f'and above 0, got {speed} and {time_scale}')
@@ -34,14 +35,14 @@ class Turntable:
         self._rate = speed * time_scale
 
     def turn_to(self, azimuth: float, now: float) -> None:
-        """Leave for an azimuth from where the camera is now; raises ViewError if not finite."""
+        """Set a goal azimuth, radians, at the time `now`; raises ViewError if not finite."""
         if not math.isfinite(azimuth):
-            raise ViewError(f'azimuth goal not finite: got {azimuth}', 'goal')
+            raise ViewError(f'azimuth goal not finite: expected radians, got {azimuth}', 'goal')
         self._start = self.azimuth_at(now)
         self._way = float(azimuth_difference(azimuth, self._start))
         self._left_at = now
 
     def azimuth_at(self, now: float) -> float:
-        """Return the camera's azimuth, [0, 2 pi)."""
+        """Return the camera's azimuth at a time, radians in [0, 2 pi)."""
         turned = min(max(now - self._left_at, 0.0) * self._rate, abs(self._way))
         return wrap_azimuth(self._start + math.copysign(turned, self._way))

@@ -1,1 +1,1 @@
-"""Voxel grids and meshes: measured, converted, rendered, written to disk."""
+"""Voxel grids and meshes: measures, conversion, rendering and files."""

@@ -1,4 +1,4 @@
-"""Voxels as boxes that a renderer can show."""
+"""Voxels as boxes, for the renderer."""
 
 from active_recon.geometry.cameras import Camera
 from active_recon.volumes.rendering import composite, Renderer
@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 import trimesh
 
-_GAP = 0.93  # of a cell: the seams let the single voxels be told apart
+_GAP = 0.93  # side of a box in cells: the gaps make single voxels visible
 
 
 def height_range(grid: VoxelGrid) -> tuple[int, int]:
-    """Return the lowest and the highest layer of cells above 0; the whole grid's where none is."""
+    """Return the lowest and highest layer (z index) with cells above 0; of an empty grid, all."""
     layers = np.flatnonzero(grid.occupied(0).any(axis=(0, 1)))
     return (layers[0], layers[-1]) if len(layers) else (0, grid.occupancy.shape[2] - 1)
 
 
 def voxel_boxes(grid: VoxelGrid, heights: tuple[int, int]) -> trimesh.Trimesh | None:
     """
-    Return a box for each cell above 0, coloured by its height; None where there is none.
+    Return a mesh with a box for each cell above 0, coloured by height; None for an empty grid.
 
-    `heights` are the layers between which the colours go. The grid's own size is scaled to 1, as
-    the renderer's cameras expect it.
+    `heights` are the layers (z indices) at both ends of the colour map. The grid is scaled to
+    side 1.
     """
     index = np.argwhere(grid.occupied(0))
     if len(index) == 0:
@@ -43,7 +43,11 @@ def voxel_boxes(grid: VoxelGrid, heights: tuple[int, int]) -> trimesh.Trimesh | 
 
 def voxel_picture(grid: VoxelGrid, heights: tuple[int, int], camera: Camera,
                   background: tuple[int, int, int]) -> NDArray[np.uint8]:
-    """Return what a camera sees of the cells above 0, (H, W, 3) RGB; see `voxel_boxes`."""
+    """
+    Return a rendering of the cells above 0, (H, W, 3) uint8 RGB; see `voxel_boxes`.
+
+    `camera` is in sides of the grid; `background` is RGB in [0, 255].
+    """
     ground = np.full((camera.intrinsics.height, camera.intrinsics.width, 3), background, np.uint8)
     boxes = voxel_boxes(grid, heights)
     return ground if boxes is None else composite(Renderer(boxes).render(camera, 3), ground)

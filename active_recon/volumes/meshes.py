@@ -1,4 +1,4 @@
-"""Meshes from files, brought into the object frame: z up, front +x; as they are, or fitted."""
+"""Mesh files read into the object frame, z up and front +x, optionally fitted to the grid."""
 
 from pathlib import Path
 
@@ -13,25 +13,30 @@ _AXES = {sign + name: (-1 if sign == '-' else 1) * np.eye(3)[i]
 
 
 def upright(up: str, front: str) -> NDArray[np.float64]:
-    """Return the rotation, (3, 3), that turns axis `up` to +z and axis `front` to +x."""
+    """
+    Return the rotation, (3, 3), that turns axis `up` to +z and axis `front` to +x.
+
+    Raises ConfigError where one is not an axis (x, y, z, with or without a sign) or both are the
+    same.
+    """
     for option, axis in (('up', up), ('front', front)):
         if axis not in _AXES:
-            raise ConfigError(f'{option}: {axis!r} is no axis: expected x, y or z, with or '
-                              'without a sign')
+            raise ConfigError(f'{option}: not an axis: expected x, y or z, with or without a '
+                              f'sign, got {axis!r}')
     z, x = _AXES[up], _AXES[front]
     if z @ x:
-        raise ConfigError(f'up and front are one axis, {up} and {front}: name both')
+        raise ConfigError(f'up and front: on the same axis: expected two, got {up} and {front}')
     return np.array([x, np.cross(z, x), z])
 
 
 def file_rotation(path: Path, up: str | None, front: str | None) -> NDArray[np.float64]:
-    """Return the rotation, (3, 3), of a file's axes, by its format where they are not named."""
+    """Return `upright` of a file's axes, (3, 3); None stands for the default of its format."""
     gltf = path.suffix.lower() in GLTF
     return upright(up or ('y' if gltf else 'z'), front or ('z' if gltf else 'x'))
 
 
 def fit_to_grid(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return a copy centred on the origin by its bounding box, its longest side 1."""
+    """Return a copy with its bounding box centred on the origin and its longest side 1."""
     fitted = mesh.copy()
     fitted.apply_translation(-fitted.bounds.mean(axis=0))
     fitted.apply_transform(np.diag([*[1 / fitted.extents.max()] * 3, 1.0]))
@@ -39,17 +44,18 @@ def fit_to_grid(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def load_mesh(path: Path, up: str | None = None, front: str | None = None) -> trimesh.Trimesh:
-    """Read a mesh as `read_mesh` does, and fit it to the grid."""
+    """Return `read_mesh` fitted to the grid; raises as it does."""
     return fit_to_grid(read_mesh(path, up, front))
 
 
 def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> trimesh.Trimesh:
     """
-    Read any mesh that trimesh reads, z up and front +x, as large and where it is in its file.
+    Read a mesh in any format of trimesh, rotated to z up and front +x; size and position stay.
 
-    `up` and `front` name the file's axes (for example 'y' and '-z'); glTF and GLB are y up with
-    the front at +z by their standard, other formats are taken as z up with the front at +x.
-    Raises MeshError where the file is missing, is no mesh, or holds no face with an area.
+    `up` and `front` are the file's axes (for example 'y' and '-z'). By default glTF and GLB are y
+    up with the front at +z, as their standard says, other formats z up with the front at +x.
+    Raises MeshError where the file is missing, is not a mesh or has no face with an area,
+    ConfigError on invalid axes.
     """
     rotation = file_rotation(path, up, front)
     if not path.is_file():

@@ -1,9 +1,9 @@
 """
-The threshold that suits one object: the set of cells whose expected IoU is highest.
+The threshold for one object that maximises the expected IoU.
 
-Where occupancies are calibrated and cells err independently, the expected IoU J of a set S of
-cells is about sum_S p / (|S| + sum_not-S p). Adding a cell raises it if and only if p is above
-J / (1 + J): the best set is what lies above a threshold, at which J and the threshold agree.
+If occupancies p are calibrated and cells are independent, the expected IoU J of a set S of cells
+is about sum_S p / (|S| + sum_not-S p). Adding a cell raises it if and only if p > J / (1 + J), so
+the best set is that of all cells above the threshold J / (1 + J) of its own J.
 """
 
 import numpy as np
@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 def expected_iou(occupancy: ArrayLike, kept: ArrayLike) -> float:
     """
-    Return about the IoU that the cells kept will have with the truth, in [0, 1].
+    Return the approximate expected IoU of the cells `kept` with the truth, in [0, 1].
 
-    Takes occupancies in [0, 1] and which cells are kept, of one shape. Two empty shapes are alike:
-    1.
+    Takes occupancies in [0, 1] and booleans, of the same shape. The IoU of two empty shapes is 1.
     """
     values, inside = np.asarray(occupancy, np.float64), np.asarray(kept, np.bool_)
     union = np.count_nonzero(inside) + values[~inside].sum()
@@ -24,13 +23,13 @@ def expected_iou(occupancy: ArrayLike, kept: ArrayLike) -> float:
 
 def best_threshold(occupancy: NDArray[np.floating]) -> tuple[float, float]:
     """
-    Return the threshold above which cells have the highest expected IoU, and that IoU.
+    Return the threshold that maximises the expected IoU of the cells above it, and that IoU.
 
-    Takes occupancies in [0, 1] of any shape, in any order; the threshold is at most a half.
+    Takes occupancies in [0, 1] of any shape; the threshold is at most 0.5.
     """
     falling = np.sort(occupancy.ravel())[::-1].astype(np.float64)
     shared = falling.cumsum()
-    # Adding cells that are surely empty changes no expectation, so the first maximum is taken
+    # Cells of occupancy 0 do not change the expectation, so the first maximum is taken
     expected = shared / (np.arange(1, len(falling) + 1) + (shared[-1] - shared).clip(min=0))
     if shared[-1] <= 0:
         return 0.5, 1.0

@@ -1,4 +1,4 @@
-"""Meshes to images: ray casting with embree, flat shading, straight alpha."""
+"""Rendering of meshes: ray casting with Embree, flat shading, straight alpha."""
 
 from typing import Any
 
@@ -10,23 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 import trimesh
 
-# The light comes from over the camera's left shoulder, so that no view of a turntable is dark.
+# The light comes from above and left of the camera, so that no view of a turntable is dark.
 _LIGHT = np.array([-0.45, -0.65, -0.61])  # towards the light, in the optical frame
 _AMBIENT, _DIFFUSE = 0.38, 0.66
 
 
 class Renderer:
     """
-    A mesh, ready to be seen from any camera.
+    Renders a mesh, given in the object frame, from any camera.
 
-    The mesh stands in the object frame; its faces' colours (or, where it has vertex colours or a
-    texture, their means) are shaded flat, and both sides of a face are lit alike, because the
-    winding of models found in the wild cannot be trusted.
+    Every face has one colour, with vertex colours or a texture the mean of its corners. Both sides
+    of a face are lit alike, because the winding of downloaded models is unreliable.
     """
 
     def __init__(self, mesh: trimesh.Trimesh) -> None:
         self._scene = EmbreeScene()
-        # embree's wrapper drops the mesh when Python does, so it is kept
+        # Embree's wrapper frees the mesh with its Python object, so keep a reference
         self._geometry = TriangleMesh(self._scene, mesh.triangles.astype(np.float32))
         self._vertices = np.asarray(mesh.vertices)
         self._normals = np.asarray(mesh.face_normals, np.float32)
@@ -35,10 +34,11 @@ class Renderer:
     def render(self, camera: Camera, samples: int = 2,
                light: NDArray[np.float64] | None = None) -> NDArray[np.uint8]:
         """
-        Return what the camera sees, (height, width, 4) uint8 RGBA, transparent where empty.
+        Return the image of a camera, (height, width, 4) uint8 RGBA, transparent where empty.
 
         `samples` x `samples` rays are cast in each pixel: 1 is fastest, 2 smooths the edges.
-        `light`, (3,), points towards the light in the optical frame; None: over the shoulder.
+        `light` is the unit vector (3,) towards the light in the optical frame; None puts it above
+        and left of the camera.
         """
         lens = camera.intrinsics
         left, top, right, bottom = self._bounds(camera)
@@ -50,7 +50,7 @@ class Renderer:
         height, width = rays.shape[:2]
         origins = np.broadcast_to(camera.position.astype(np.float32), (height * width, 3))
         hit = self._scene.run(np.ascontiguousarray(origins), rays.reshape(-1, 3))
-        # The last row of the table is what a ray that hits nothing (-1) sees.
+        # The last row of the table is for rays that hit nothing (-1).
         shaded = self._shaded(camera, _LIGHT if light is None else light)
         seen = np.take(shaded, hit, axis=0, mode='wrap').reshape(height, width, 4)
         if samples > 1:
@@ -62,7 +62,7 @@ class Renderer:
         """Return left, top, right, bottom of the pixels that the mesh can touch."""
         lens = camera.intrinsics
         pixels, depth = camera.project(self._vertices)
-        # Where the camera stands inside, or its lens bends, nothing can be left out
+        # A camera inside the mesh, or a distorting lens, needs the whole image
         if depth.min() <= 1e-3 or lens.distortion is not None:
             return 0, 0, lens.width, lens.height
         left, top = np.maximum(np.floor(pixels.min(axis=0)).astype(int), 0)
@@ -70,7 +70,7 @@ class Renderer:
         return left, top, min(right, lens.width), min(bottom, lens.height)
 
     def _shaded(self, camera: Camera, light: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """Return each face's RGBA under a light, (faces + 1, 4), the last empty."""
+        """Return the lit RGBA of each face, (faces + 1, 4), the last row transparent."""
         towards = (camera.pose[:3, :3] @ light).astype(np.float32)
         brightness = _AMBIENT + _DIFFUSE * np.abs(self._normals @ towards)
         shaded = np.zeros((len(brightness) + 1, 4), np.uint8)
@@ -80,14 +80,14 @@ class Renderer:
 
 
 def _face_colors(mesh: trimesh.Trimesh) -> NDArray[np.float32]:
-    """Return one RGB for each face, (faces, 3) in [0, 255]; plain grey where none is given."""
+    """Return one RGB for each face, (faces, 3) in [0, 255]; grey for a mesh without colours."""
     visual: Any = mesh.visual
     if visual is None or visual.kind is None:
         return np.full((len(mesh.faces), 3), 178, np.float32)
     if visual.kind != 'texture':
         return np.asarray(visual.face_colors[:, :3], np.float32)
     corners = visual.material.to_color(visual.uv)
-    if np.ndim(corners) != 2:  # a material without a picture
+    if np.ndim(corners) != 2:  # a material without a texture image
         corners = np.tile(visual.material.main_color, (len(mesh.vertices), 1))
     colors: NDArray[np.float32] = corners[mesh.faces, :3].mean(axis=1, dtype=np.float32)
     return colors
@@ -103,7 +103,11 @@ def _averaged(rgba: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint
 
 
 def composite(rgba: NDArray[np.uint8], background: float | NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Lay an RGBA image over a background (grey in [0, 255] or an RGB image): (H, W, 3) uint8."""
+    """
+    Return an RGBA image (H, W, 4) composited over a background, (H, W, 3) uint8 RGB.
+
+    The background is a grey in [0, 255] or an RGB image (H, W, 3).
+    """
     alpha = rgba[..., 3:].astype(np.float32) / 255
     mixed = rgba[..., :3] * alpha + np.asarray(background, np.float32) * (1 - alpha)
     composed: NDArray[np.uint8] = np.rint(mixed).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Contact sheets: many objects or training images on one picture, for people to look at."""
+"""Contact sheets: many objects or training images in one image, for inspection."""
 
 from collections.abc import Sequence
 import math
@@ -13,7 +13,11 @@ import trimesh
 
 def contact_sheet(meshes: Sequence[trimesh.Trimesh], columns: int = 8, azimuth: float = 0.6,
                   tile: int = 160, background: int = 255) -> NDArray[np.uint8]:
-    """Return the meshes seen from one azimuth (radians), row by row, (rows x tile, ..., 3) RGB."""
+    """
+    Return renderings of meshes from one azimuth (radians) in rows of `columns`.
+
+    Tiles have `tile` pixels a side: (rows x tile, columns x tile, 3) uint8 RGB.
+    """
     camera = orbit_camera(azimuth, intrinsics=CANONICAL_INTRINSICS.resized(tile, tile))
     rows = math.ceil(len(meshes) / columns)
     sheet = np.full((rows * tile, columns * tile, 3), background, np.uint8)
@@ -25,7 +29,7 @@ def contact_sheet(meshes: Sequence[trimesh.Trimesh], columns: int = 8, azimuth: 
 
 
 def sequence_sheet(images: Tensor) -> NDArray[np.uint8]:
-    """Return sequences of views (T, B, 3, S, S) in [0, 1], a row each, (B x S, T x S, 3) RGB."""
+    """Return sequences of views (T, B, 3, S, S) in [0, 1] as rows, (B x S, T x S, 3) uint8 RGB."""
     length, count, _, side, _ = images.shape
     rows = images.permute(1, 3, 0, 4, 2).reshape(count * side, length * side, 3)
     return np.asarray((rows * 255).round().byte())

@@ -1,9 +1,9 @@
 """
-The perspective transformer of section 3.2: a voxel grid seen from a camera, differentiably.
+The perspective transformer of section 3.2: differentiable silhouettes of voxel grids.
 
-The paper follows Yan et al. 2016 (Perspective Transformer Nets): a grid of samples fills the
-camera's frustum, the voxels are interpolated there trilinearly (the paper's V_i, which is
-`grid_sample`), and the maximum along each ray is the silhouette S.
+The paper follows Yan et al. 2016 (Perspective Transformer Nets): the voxels are interpolated
+trilinearly (the paper's V_i; here `grid_sample`) at a grid of samples in the camera's frustum,
+and the maximum along each ray is the silhouette S.
 """
 
 from collections.abc import Sequence
@@ -19,11 +19,11 @@ from torch.nn import functional
 def frustum(cameras: Sequence[Camera], image_size: int = 32, depth_samples: int = 32,
             grid_side: float = 1.0) -> Tensor:
     """
-    Return where cameras sample the grid, (cameras, D, S, S, 3), ready for `grid_sample`.
+    Return the sample positions of cameras in the grid, (cameras, D, S, S, 3), for `grid_sample`.
 
     Sample (d, v, u) of a camera lies on the ray through the centre of pixel (u, v) of an image of
     S x S pixels, at the d-th of D depths, evenly spaced over the grid's bounding sphere. The last
-    axis is ordered z, y, x, each in [-1, 1] from border to border of a grid of `grid_side` metres.
+    axis is ordered z, y, x, and [-1, 1] spans the grid of `grid_side` metres.
     """
     samples = []
     for camera in cameras:
@@ -39,10 +39,10 @@ def frustum(cameras: Sequence[Camera], image_size: int = 32, depth_samples: int 
 
 def project(occupancy: Tensor, samples: Tensor) -> Tensor:
     """
-    Return the silhouettes of voxel grids, each seen from its own frustum, (B, S, S).
+    Return the silhouettes of voxel grids, each from its own frustum, (B, S, S) in [0, 1].
 
-    Takes occupancies (B, X, Y, Z) in [0, 1] and samples (B, D, S, S, 3) from `frustum`. Outside
-    the grid there is nothing.
+    Takes occupancies (B, X, Y, Z) in [0, 1] and samples (B, D, S, S, 3) from `frustum`. The
+    occupancy outside of the grid is 0.
     """
     samples = samples.to(occupancy.dtype)
     volume = occupancy[:, None]
@@ -57,6 +57,6 @@ def project(occupancy: Tensor, samples: Tensor) -> Tensor:
 
 
 def project_all(occupancy: Tensor, samples: Tensor) -> Tensor:
-    """Return the silhouettes of grids (B, X, Y, Z) from every frustum (V, ...), (B, V, S, S)."""
+    """Return silhouettes (B, V, S, S) of grids (B, X, Y, Z) from frustums (V, D, S, S, 3)."""
     views = [project(occupancy, one.expand(len(occupancy), *one.shape)) for one in samples]
     return torch.stack(views, dim=1)

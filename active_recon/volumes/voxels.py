@@ -17,12 +17,12 @@ FINE_RESOLUTION = 64
 _MOST_CELLS = 256  # a side
 # Centres of cells of different powers of two never coincide: where one fits, no other does
 _RESOLUTIONS = sorted(range(1, _MOST_CELLS + 1), key=lambda side: (side & (side - 1) > 0, side))
-_FEW = 300  # points that are tried before all of them are
-_TELLING = 8  # so many cells of an object are not all a multiple of 3 apart by chance
-_OFF_CENTRE = 1e-3  # of a cell: above float32's rounding, below what centres of grids differ by
+_FEW = 300  # points tested before all of them
+_TELLING = 8  # this many cells of an object are never all a multiple of 3 apart by chance
+_OFF_CENTRE = 1e-3  # in cells: above float32's rounding, below the differences between grids
 MESH_FORMATS = ('ply', 'obj', 'stl')
 PUBLISHED_FLOOR = 0.02
-"""Cells of no more occupancy are left out of the cloud of probabilities, and of its entropy."""
+"""Cells up to this occupancy are left out of the published probabilities and their entropy."""
 
 
 def iou(predicted: Any, truth: Any, axes: tuple[int, ...] = (-3, -2, -1)) -> Any:
@@ -30,7 +30,7 @@ def iou(predicted: Any, truth: Any, axes: tuple[int, ...] = (-3, -2, -1)) -> Any
     Return intersection over union of two boolean arrays or tensors of one shape, in [0, 1].
 
     The measure of the paper's section 3.3, over the last three axes (voxels) or those given
-    (silhouettes: the last two); the other axes stay. Two empty shapes are alike: 1.
+    (silhouettes: the last two); the other axes stay. The IoU of two empty shapes is 1.
     """
     intersection, union = _count(predicted & truth, axes), _count(predicted | truth, axes)
     empty = union == 0
@@ -47,7 +47,7 @@ def entropy(occupancy: Any) -> Any:
 
 
 def paper_entropy(occupancy: Any) -> Any:
-    """Return -sum(p log p) in nats, as section 4.6 writes it, without `entropy`'s second term."""
+    """Return -sum(p log p) in nats, the paper's section 4.6: `entropy` without its second term."""
     if isinstance(occupancy, np.ndarray):
         return -xlogy(occupancy, occupancy).sum((-3, -2, -1))
     return -occupancy.xlogy(occupancy).sum((-3, -2, -1))
@@ -65,14 +65,14 @@ class VoxelGrid:
     A cube of voxels in the object frame, centred at its origin.
 
     `occupancy` is (X, Y, Z) float32 in [0, 1], indexed [x, y, z]; `size` is the cube's side in
-    metres.
+    metres. Raises DataError where the shape is not a cube or the size not finite and above 0.
     """
 
     occupancy: NDArray[np.float32]
     size: float = 1.0
 
     def __post_init__(self) -> None:
-        """Reject what is no cube."""
+        """Reject other shapes and sizes."""
         shape = self.occupancy.shape
         if len(shape) != 3 or len(set(shape)) != 1:
             raise DataError('not a cube: expected as many voxels along every axis, got the shape '
@@ -92,12 +92,12 @@ class VoxelGrid:
         return above
 
     def above(self, threshold: float) -> 'VoxelGrid':
-        """Return the grid with 0 where it is not above the threshold: what a point cloud holds."""
+        """Return the grid with all cells up to the threshold set to 0, as in its point cloud."""
         occupancy = np.where(self.occupied(threshold), self.occupancy, np.float32(0))
         return VoxelGrid(np.ascontiguousarray(occupancy), self.size)
 
     def as_fine_as(self, other: 'VoxelGrid') -> 'VoxelGrid':
-        """Return an empty grid at the other's resolution; a grid with cells stays as it is."""
+        """Return this grid; if it has no cell above 0, an empty one at the other's resolution."""
         return self if self.occupancy.any() else VoxelGrid(
             np.zeros_like(other.occupancy), self.size)
 
@@ -105,20 +105,21 @@ class VoxelGrid:
         """
         Return the entropy in nats, -sum(p log p + (1 - p) log(1 - p)), of the published cells.
 
-        Those are the cells above PUBLISHED_FLOOR: a grid and its cloud have the same, to the bit.
+        Those are the cells above PUBLISHED_FLOOR, so a grid and its point cloud have exactly the
+        same entropy.
         """
         cells = self.occupancy[self.occupied(PUBLISHED_FLOOR)].astype(np.float64)
         return float(entropy(cells[None, None]))
 
     def points(self, threshold: float) -> NDArray[np.float32]:
-        """Return x, y, z (metres, object frame) and occupancy of the cells above, (N, 4)."""
+        """Return x, y, z (metres) and occupancy of the cells above the threshold, (N, 4)."""
         index = np.argwhere(self.occupied(threshold))
         centers = (index + 0.5) * self.cell_size - self.size / 2
         return np.column_stack([centers, self.occupancy[tuple(index.T)]]).astype(np.float32)
 
     def mesh(self, threshold: float) -> 'trimesh.Trimesh':
         """
-        Return the surface at the threshold by marching cubes, in metres, closed at the border.
+        Return the isosurface at the threshold by marching cubes, in metres, closed at the border.
 
         Raises DataError where no cell is above the threshold.
         """
@@ -142,17 +143,16 @@ class VoxelGrid:
 def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
                      resolution: int = RESOLUTION) -> VoxelGrid:
     """
-    Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `points`.
+    Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `VoxelGrid.points`.
 
-    It has the fewest cells a side with which every point is the centre of one, powers of two
-    before others; `resolution` is that of a grid without points, which do not tell it. Raises
-    DataError of the kind 'cloud' where points are outside the cube of `size` metres, are not
-    centres of one grid's cells or only of every third, fifth ... of them, share a cell, or have
-    an occupancy that is none.
+    Its resolution is the smallest with every point at the centre of a cell, powers of two first;
+    `resolution` is used where there are no points. Raises DataError of the kind 'cloud' where
+    points are outside of the cube of `size` metres, are not at the centres of one grid's cells,
+    only at every third, fifth ... of them, share a cell, or have an occupancy outside of [0, 1].
     """
     if not len(points):
         return VoxelGrid(np.zeros((resolution,) * 3, np.float32), size)
-    with np.errstate(invalid='ignore', over='ignore'):  # what is not finite is refused below
+    with np.errstate(invalid='ignore', over='ignore'):  # values that are not finite: see below
         shares = points[:, :3] / size + np.float32(0.5)
     if not ((shares >= 0) & (shares < 1)).all():  # also where a coordinate is NaN
         raise DataError(f'point out of the cube: expected all inside a cube of {size} m about the '
@@ -181,7 +181,7 @@ def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
 
 
 def _cells_a_side(shares: NDArray[np.floating]) -> int | None:
-    """Return in how many cells a side points, (N, 3) in [0, 1), are centres, None if in none."""
+    """Return the resolution whose cell centres points (N, 3) in [0, 1) are, None if none is."""
     def fit(shares: NDArray[np.floating], side: int) -> bool:
         places = shares * side
         return bool((np.abs(places - np.floor(places) - 0.5) <= _OFF_CENTRE).all())
@@ -192,9 +192,9 @@ def _cells_a_side(shares: NDArray[np.floating]) -> int | None:
 
 def _spacing(index: NDArray[np.intp]) -> int:
     """
-    Return by how many cells points, (N, 3), are apart where it tells of another grid, else 1.
+    Return the spacing of points (N, 3) in cells where it is that of a coarser grid, else 1.
 
-    Grids about one centre share centres of cells only where one is an odd number of times finer.
+    Grids with the same centre share cell centres only if one is an odd number of times finer.
     """
     if len(index) < _TELLING:
         return 1
@@ -206,7 +206,7 @@ def _spacing(index: NDArray[np.intp]) -> int:
 
 
 def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
-    """Write a mesh as PLY, OBJ or STL, by the file's suffix."""
+    """Write a mesh as PLY, OBJ or STL, by the file's suffix; raises ConfigError on others."""
     suffix = path.suffix.lower().lstrip('.')
     if suffix not in MESH_FORMATS:
         raise ConfigError(f'{path}: no mesh has that suffix: expected {", ".join(MESH_FORMATS)}')
@@ -280,9 +280,9 @@ def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
 
 def turned(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:
     """
-    Return occupancies (X, Y, Z) turned counter-clockwise about +z by a yaw in radians.
+    Return occupancies (X, Y, Z) rotated counter-clockwise about +z by a yaw in radians.
 
-    Cells are interpolated linearly; what turns out of the cube is lost. A yaw of 0 is exact.
+    Cells are interpolated linearly; cells rotated out of the cube are lost. A yaw of 0 is exact.
     """
     if yaw == 0:
         return occupancy

@@ -187,6 +187,6 @@ def test_a_goal_that_is_not_finite_is_said_once_counted_and_survived(
     bench.until(lambda: bench.counts('turntable_camera').get('refused/goal') == 1,
                 'the goal to be refused')
     line, = turntable.log('WARN|ERROR|Traceback')
-    assert f'azimuth goal not finite: got {azimuth}' in line
+    assert f'azimuth goal not finite: expected radians, got {azimuth}' in line
     ask(math.pi)
     bench.until(lambda: poses and poses[-1].pose.position.x < -1, 'the camera on the other side')

@@ -1,1 +1,1 @@
-"""What networks are worth that take posed views: on sets of objects, disturbed, on photographs."""
+"""Comparison of networks on posed views: datasets, robustness tests and photographs."""

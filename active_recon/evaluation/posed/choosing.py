@@ -1,4 +1,4 @@
-"""Thresholds and temperatures, chosen on validation objects and never on those measured."""
+"""Choice of thresholds and temperatures on validation objects."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 from scipy.special import logit
 
 _BATCH = 4
-_CELLS = 2000  # of each object, near its surface and anywhere
+_CELLS = 2000  # cells sampled from each object, near its surface and anywhere
 
 
 @dataclass(eq=False)
 class _Cells:
-    """Some cells of every object: logits by number of views, and the truth."""
+    """Sampled cells of every object: logits by number of views, and the truth."""
 
     logits: dict[int, list[NDArray[np.float32]]]
     truth: list[NDArray[np.bool_]]
 
     def temperatures(self) -> dict[int, float]:
-        """Return the temperatures that make these cells most likely."""
+        """Return the maximum-likelihood temperatures, by number of views."""
         if not all(self.logits.values()):
             return {}
         return fit_temperatures({count: np.concatenate(parts)
@@ -36,9 +36,9 @@ class _Cells:
 
 @dataclass(eq=False)
 class _Totals:
-    """Sums over validation objects of an entrant: IoU at thresholds, and some cells."""
+    """Results of an entrant over validation objects: sums of IoU, and sampled cells."""
 
-    iou: dict[int, NDArray[np.float64]]  # by cells a side, a sum over objects and counts
+    iou: dict[int, NDArray[np.float64]]  # by cells a side: at each threshold, over all counts
     near: _Cells
     anywhere: _Cells
 
@@ -46,11 +46,11 @@ class _Totals:
 def choose(scene: Scene, entrants: Sequence[Entrant], plan: Plan, source: str,
            advance: Callable[[int], None] = lambda done: None) -> list[Entrant]:
     """
-    Return the entrants with the thresholds and temperatures that are best on validation objects.
+    Return the entrants with thresholds and temperatures chosen on validation objects.
 
-    Thresholds have the highest mean IoU over all counts of random views; temperatures make the
-    cells near the surface, or anywhere, most likely. An entrant that the objects cannot be shown
-    to stays as it is. `source` names the validation objects.
+    Thresholds maximise the mean IoU over all counts of random views; temperatures maximise the
+    likelihood of cells near the surface, and of cells anywhere. Entrants that cannot use the
+    views are returned unchanged. `source` names the validation objects.
     """
     return [_chosen(scene, entrant, plan, source, advance)
             if scene.shown_to(entrant.network) is not None else entrant for entrant in entrants]
@@ -94,7 +94,7 @@ def _add_scores(totals: _Totals, count: int, logits: NDArray[np.float32], truth:
 
 
 def _some_cells(truth: Target, seed: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return some cells near a shape's surface and some anywhere, by places in the flat grid."""
+    """Return random cells near a shape's surface and anywhere, as indices of the flat grid."""
     rng, near = np.random.default_rng(seed), np.flatnonzero(truth.near)
     if len(near) > _CELLS:
         near = rng.choice(near, _CELLS, replace=False)

@@ -1,4 +1,4 @@
-"""The networks that are measured beside each other, each with what was chosen for it."""
+"""The networks to compare, with their thresholds and temperatures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from active_recon.models.weights_files import find_weights, weights_hash
 from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
 
 SIDES = (FINE_RESOLUTION, RESOLUTION)
-"""Cells a side at which networks are measured, as far as they have them."""
+"""Resolutions (cells a side) at which networks are measured, up to their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,12 +20,12 @@ class Entrant:
     A network to measure.
 
     - thresholds: by cells a side, 64 and 32
-    - temperatures: by number of views; what divides its logits, fitted to cells near surfaces.
-      None were fitted where empty
-    - grid_temperatures: the same, fitted to cells anywhere, as the expected IoU asks for: near
-      surfaces cells are so doubtful that, divided alike, all of empty space becomes so too
-    - chosen_on: what they were chosen on: the weights' card, or a validation folder
-    - weights: SHA-256 of its file
+    - temperatures: divisors of the logits, by number of views, fitted to cells near surfaces;
+      empty where none were fitted
+    - grid_temperatures: the same, fitted to cells anywhere, for the expected IoU. Temperatures
+      fitted near surfaces, where cells are uncertain, would make all of empty space uncertain
+    - chosen_on: the source of thresholds and temperatures: 'card' or a validation folder
+    - weights: SHA-256 of the weights file
     """
 
     name: str
@@ -38,16 +38,17 @@ class Entrant:
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """Cells a side at which it can be measured: its own, and by halves fewer."""
+        """Resolutions at which it can be measured: its own, and that halved once or twice."""
         own = self.network.resolution
         return tuple(side for side in SIDES if own in (side, 2 * side, 4 * side))
 
 
 def load_entrants(models: str) -> list[Entrant]:
     """
-    Load networks named as `MODEL,MODEL,...`: each a shipped model, a file, or `NAME=FILE`.
+    Load networks named `MODEL,MODEL,...`: each a model that ships, a file, or `NAME=FILE`.
 
-    Raises ConfigError where two have one name, WeightsError where weights are missing.
+    Raises ConfigError on an empty list or where two have the same name, WeightsError where
+    weights are missing.
     """
     entrants: list[Entrant] = []
     for asked in filter(None, (part.strip() for part in models.split(','))):
@@ -56,7 +57,7 @@ def load_entrants(models: str) -> list[Entrant]:
         bundle = load_weights(path)
         name = name if named else Path(path).stem
         if any(other.name == name for other in entrants):
-            raise ConfigError('models: ambiguous name: expected a name of its own for each, got '
+            raise ConfigError('models: ambiguous name: expected a different name for each, got '
                               f'{name!r} twice; name one as NAME=FILE')
         entrants.append(Entrant(name, bundle.reconstruction, dict.fromkeys(
             SIDES, bundle.threshold), weights=weights_hash(path)))

@@ -1,8 +1,9 @@
 """
-Real photographs: what networks make of some of them, against the hull of all their silhouettes.
+Measurement on real photographs: IoU with the visual hull of all silhouettes.
 
-There is no truth; the hull of all views at 32 cells a side stands for it. Its cells are those
-whose centre is in every silhouette, so that probabilities of 64 cells are averaged, not pooled.
+The true shape is unknown; the hull of all views at 32 cells a side is the reference. A cell
+belongs to it if its centre is in every silhouette, so probabilities at 64 cells are averaged to
+32, instead of taking the largest.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +29,7 @@ _TILES = (16, 12)
 
 def hull(photographs: PosedPhotographs, chosen: Sequence[int],
          side: int = RESOLUTION) -> NDArray[np.bool_]:
-    """Return the cells that no silhouette of these views rules out, (side, side, side)."""
+    """Return the visual hull of the silhouettes of some views, (side, side, side) bool."""
     centers = cell_centers(side).numpy()
     inside = np.ones(len(centers), np.bool_)
     for view in chosen:
@@ -42,13 +43,13 @@ def hull(photographs: PosedPhotographs, chosen: Sequence[int],
 
 
 def even_views(count: int, start: int = 0, views: int = EVEN) -> list[int]:
-    """Return `views` of `count` photographs on a ring that are evenly apart, from `start` on."""
+    """Return the indices of `views` even steps, from `start`, on a ring of `count` photographs."""
     return [(start + step * count // views) % count for step in range(views)]
 
 
 def with_background(photographs: PosedPhotographs, view: int,
                     background: str) -> NDArray[np.uint8]:
-    """Return a photograph before a background of BACKGROUNDS, (H, W, 3) uint8 RGB."""
+    """Return a photograph with one of BACKGROUNDS, (H, W, 3) uint8 RGB."""
     image, mask = photographs.images[view], photographs.masks[view][..., None]
     if background == 'as it is':
         return image
@@ -65,11 +66,11 @@ def photograph_figures(photographs: PosedPhotographs, entrants: Sequence[Entrant
                        views: int = EVEN,
                        advance: Callable[[int], None] = lambda done: None) -> dict[str, Any]:
     """
-    Return IoU at 32 cells after 1 to `views` even views, ready for JSON.
+    Return the IoU at 32 cells after 1 to `views` even views, ready for JSON.
 
-    By entrant and background: `iou` of the sequence that begins with the first photograph, and the
-    mean, least and greatest over sequences that begin with each. `hull` is what carving by the
-    same silhouettes has.
+    For each entrant and background: `iou` for the sequence that begins with the first photograph,
+    and the mean, least and greatest over sequences that begin with any of them. `hull` is the IoU
+    of the visual hull of the same views.
     """
     count = len(photographs)
     views = min(views, count)
@@ -100,7 +101,7 @@ def photograph_figures(photographs: PosedPhotographs, entrants: Sequence[Entrant
 
 def _shown(photographs: PosedPhotographs, background: str,
            size: int) -> tuple[list[Tensor], Cameras]:
-    """Return what a network gets of the photographs, (4, S, S) each, and the cameras (V,)."""
+    """Return the network's images of the photographs, (4, S, S) each, and their cameras (V,)."""
     pictures, cameras = [], []
     for view, camera in enumerate(photographs.cameras):
         layers, seen, framed = framed_layers(with_background(photographs, view, background),
@@ -113,7 +114,7 @@ def _shown(photographs: PosedPhotographs, background: str,
 
 def _iou_after(entrant: Entrant, encoded: Sequence[Tensor], cameras: Cameras,
                order: Sequence[int], truth: NDArray[np.bool_]) -> list[float]:
-    """Return the IoU after each of some views."""
+    """Return the IoU after each view of an order."""
     network, found = entrant.network, []
     state = network.initial_state(1)
     for view in order:
@@ -125,7 +126,7 @@ def _iou_after(entrant: Entrant, encoded: Sequence[Tensor], cameras: Cameras,
 
 
 def _threshold(entrant: Entrant) -> float:
-    """Return the threshold of the entrant's own cells: means are no larger than these."""
+    """Return the threshold at the entrant's own resolution; means have the same scale."""
     return entrant.thresholds[max(entrant.sides)]
 
 
@@ -136,7 +137,7 @@ def averaged(values: NDArray[np.floating], side: int) -> NDArray[np.floating]:
 
 
 def _spread(rows: list[list[float]]) -> dict[str, list[float]]:
-    """Return the first row, and the mean, least and greatest of all, (S, T)."""
+    """Return the first of rows (S, T), and the mean, least and greatest over all rows."""
     values = np.array(rows)
     return {'iou': values[0].tolist(), 'mean': values.mean(axis=0).tolist(),
             'least': values.min(axis=0).tolist(), 'greatest': values.max(axis=0).tolist()}

@@ -1,4 +1,4 @@
-"""The nearest training image of posed views: an answer that knows nothing of an image's detail."""
+"""A retrieval baseline for posed views: the training shape with the nearest image."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,10 +18,12 @@ _AT_ONCE = 64  # objects in memory
 @dataclass(frozen=True, eq=False)
 class Library:
     """
-    What there is to answer with.
+    The training images to retrieve from.
 
+    - folders: the objects
     - images: thumbnails of all views of all objects, (M, 1024)
-    - azimuths: of their cameras, radians, (M,); owners: whose they are, (M,)
+    - azimuths: of their cameras, radians, (M,)
+    - owners: index of the object in `folders`, (M,)
     """
 
     folders: Sequence[ObjectFolder]
@@ -30,14 +32,14 @@ class Library:
     owners: NDArray[np.int64]
 
     def nearest(self, asked: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Return the rows of the images that are nearest to thumbnails (E, 1024), (E,)."""
+        """Return the rows (E,) of the images nearest to thumbnails (E, 1024)."""
         norms = np.square(self.images).sum(axis=1)
         return np.asarray((norms - 2 * asked @ self.images.T).argmin(axis=1))
 
 
 def read_library(folders: Sequence[ObjectFolder],
                  advance: Callable[[int], None] = lambda done: None) -> Library:
-    """Read objects, framed as networks get them, and keep their thumbnails alone."""
+    """Read the framed images of objects as thumbnails; raises DataError as `read_views` does."""
     kept: list[ObjectFolder] = []
     images, azimuths, owners = [], [], []
     for low in range(0, len(folders), _AT_ONCE):
@@ -54,10 +56,10 @@ def read_library(folders: Sequence[ObjectFolder],
 def nearest_image_scores(library: Library, scene: Scene,
                          chosen: NDArray[np.int64]) -> list[Scores]:
     """
-    Return the IoU of each object with the shape whose image is nearest to one of its views (N,).
+    Return the IoU of each object with the training shape nearest to its view `chosen` (N,).
 
-    Frames have any yaw, so that the shape is turned until its camera stands where the object's
-    does; how high the camera stands is not made up for.
+    Objects may have any yaw, so the shape is rotated until both cameras have the same azimuth; a
+    difference in elevation is not corrected.
     """
     rows = np.arange(len(scene))
     nearest = library.nearest(thumbnails(scene.views)[rows, chosen])

@@ -1,4 +1,4 @@
-"""What is lost where views are not as they should be: each figure beside that of clean views."""
+"""Robustness tests: the IoU with disturbed views, compared with that of clean views."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ _BATCH = 4
 
 
 class Found(NamedTuple):
-    """IoU of one object under one disturbance, and without it, by cells a side."""
+    """Scores of one object (its index `row`) with one disturbance, and without it."""
 
     name: str
     row: int
@@ -40,7 +40,7 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A few objects: as their set shows them, their truths, and the views (B, c) they get."""
+    """A batch of B objects: their views, their truths, and the views used, (B, c)."""
 
     views: ViewSet
     targets: Sequence[Target]
@@ -50,14 +50,16 @@ class Block:
 def disturbances(scene: Scene, entrant: Entrant, plan: Plan, count: int, most: int,
                  advance: Callable[[int], None] = lambda done: None) -> Iterator[Found]:
     """
-    Yield what becomes of an entrant's IoU after `count` random views, on at most so many objects.
+    Yield an entrant's IoU after `count` random views of up to `most` objects, with disturbances.
 
-    - `yaw NNN`: the frame turned by as many degrees, the images as they are; the reconstruction
-      is turned back to the truth, since interpolating the truth's cells would lose four times as
-      much as interpolating probabilities. What turned out of the cube is not counted
-    - `poses off by 2 degrees`: each about the object's centre, about an axis of its own
-    - `a third of the cube cut`: of the first view's image, at one of its sides
-    - `elevation A to B`: one view, or three, from there, beside as many from anywhere
+    - `yaw NNN`: the object frame rotated by that many degrees, with the same images. The
+      reconstruction is rotated back, since interpolating the truth's cells would lose four times
+      as much as interpolating probabilities. Cells rotated out of the cube are not counted
+    - `poses off by 2 degrees`: each rotated about the object's centre, about a random axis
+    - `a third of the cube cut`: missing at one side of the first view's image
+    - `elevation A to B`: one or three views in that band, compared with as many of any elevation
+
+    Yields nothing where the network cannot use the views.
     """
     shown = scene.shown_to(entrant.network)
     if shown is None:
@@ -93,10 +95,10 @@ def _cut(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
 
 
 def _bands(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
-    """Compare what views from one band of elevations show with what any views do."""
+    """Compare views from one band of elevations with views from any."""
     elevations = np.degrees(np.arcsin(pose_directions(block.views.poses.numpy())[..., 2]))
     if np.ptp(elevations) < BANDS_DEG[0][1]:
-        return  # all from one
+        return  # all views are in the same band
     observer = Observer(entrant.network, block.views, plan.bfloat16)
     rng = np.random.default_rng(plan.seed)
     count = elevations.shape[1]
@@ -111,7 +113,7 @@ def _bands(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
             rows = [row for row, order in enumerate(own) if len(order) == views]
             if not rows:
                 continue
-            # All objects are shown something, so that the batch stays as it is
+            # Other objects get any views, so that the batch keeps its size
             order = np.stack([mine if len(mine) == views else any_order[row, :views]
                               for row, mine in enumerate(own)])
             scores = list(_iou(block, entrant, observer, order))
@@ -121,7 +123,7 @@ def _bands(block: Block, entrant: Entrant, plan: Plan) -> Iterator[Found]:
 
 
 def poses_off(views: ViewSet, angle: float, seed: int = 0) -> torch.Tensor:
-    """Return the poses of a set, each turned by an angle about the centre, (N, V, 4, 4)."""
+    """Return poses (N, V, 4, 4), each rotated about the object's centre by an angle, radians."""
     shape = views.poses.shape[:2]
     axes = np.random.default_rng([seed, 1]).normal(size=(*shape, 3))
     axes *= angle / np.linalg.norm(axes, axis=-1, keepdims=True)
@@ -133,9 +135,10 @@ def poses_off(views: ViewSet, angle: float, seed: int = 0) -> torch.Tensor:
 
 def cut_views(views: ViewSet, chosen: NDArray[np.int64], share: float, seed: int = 0) -> ViewSet:
     """
-    Return a set in which one view of each object (N,) lacks a share of the object's cube.
+    Return a set in which the view `chosen` (N,) of each object lacks a share of the cube.
 
-    The image ends at one of its four sides, drawn: as many of the cube's cells project beyond.
+    The image is cut at one of its four sides, drawn by the seed, so that this share of the cube's
+    cells projects outside of it.
     """
     images = views.images.clone()
     seen = torch.ones(images.shape[:4], dtype=torch.bool) if views.seen is None else (
@@ -156,9 +159,9 @@ def cut_views(views: ViewSet, chosen: NDArray[np.int64], share: float, seed: int
 
 def turned_back(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:
     """
-    Return occupancies (R, R, R) of a frame that was turned by a yaw, in the frame before.
+    Return occupancies (R, R, R) of a frame that was rotated by a yaw, in the original frame.
 
-    Cells are interpolated linearly, but for quarter turns. What the turned cube did not hold is
+    Cells are interpolated linearly, except at quarter turns. Cells outside of the rotated cube are
     NaN.
     """
     quarters = yaw / (TURN / 4)
@@ -182,13 +185,13 @@ def _beside_clean(name: str, block: Block, views: ViewSet, entrant: Entrant,
 
 def _iou(block: Block, entrant: Entrant, observer: Observer, order: NDArray[np.int64],
          yaw: float = 0.0) -> Iterator[Scores]:
-    """Yield the IoU of every object after its order's views (B, c), the frame turned by a yaw."""
+    """Yield the IoU of each object after the views of its order (B, c), with a rotated frame."""
     objects = torch.arange(len(order))
     yaws = torch.full((len(order),), yaw) if yaw else None
     logits = next(walk(observer, objects, [order], yaws)).cpu().numpy()
     for one, truth in zip(logits, block.targets, strict=True):
         occupancy = turned_back(expit(one), yaw)
-        # A coarse cell that is partly unknown is NaN too: the larger of NaN and a number
+        # The maximum with NaN is NaN, so a coarse cell that is partly unknown is unknown
         unknown = {side: np.isnan(pooled(occupancy, side)) for side in entrant.sides}
         known = replace(truth, cells={side: cells & ~unknown.get(side, np.False_)
                                       for side, cells in truth.cells.items()})

@@ -1,4 +1,4 @@
-"""A set of objects to measure on: posed views, the truth in cells of two sizes, and the front."""
+"""A set of objects to measure on: posed views, true voxels, views for the paper's networks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ class Scene:
     """
     N objects with V posed views each.
 
-    - views: the framed images, as networks get them that need no front
-    - truths: (N, R, R, R) bool by R, cells a side
-    - turntable: the same views as the paper's networks get them, by their images' size; none where
-      the objects do not stand as these expect it
+    - views: framed images, for networks that need no front
+    - truths: true voxels (N, R, R, R) bool, by R, cells a side
+    - turntable: the same views for the paper's networks, by image size; empty unless the views
+      are those of a turntable
     """
 
     views: ViewSet
@@ -43,7 +43,7 @@ class Scene:
         return self.views.images.shape[1]
 
     def shown_to(self, network: ReconstructionNetwork) -> ViewSet | None:
-        """Return the views as a network gets them; None where it has no use for them."""
+        """Return the views for a network; None where it cannot use them."""
         if network.needs_front:
             return self.turntable.get(network.image_size)
         return self.views if network.image_size == self.views.image_size else None
@@ -52,9 +52,9 @@ class Scene:
 def chosen_folders(folders: Sequence[ObjectFolder], category: str | None = None,
                    most: int | None = None, seed: int = 0) -> list[ObjectFolder]:
     """
-    Return the objects of a category, a pattern such as `thing_*` (all but those: `!thing_*`).
+    Return the objects whose category matches a pattern, e.g. `thing_*` (`!thing_*`: all others).
 
-    At most so many, drawn by the seed. Raises ConfigError where none is left.
+    At most `most` of them, drawn by the seed. Raises ConfigError where no category matches.
     """
     wanted = category or '*'
     but = wanted.startswith('!')
@@ -63,7 +63,7 @@ def chosen_folders(folders: Sequence[ObjectFolder], category: str | None = None,
     if not kept:
         found = ', '.join(sorted({folder.category for folder in folders})[:8])
         raise ConfigError('category: no such objects: expected a pattern that some objects match, '
-                          f'such as thing_*, got {wanted!r}; there are {found}')
+                          f'e.g. thing_*, got {wanted!r}; there are {found}')
     if most is not None and most < len(kept):
         rows = np.random.default_rng(seed).choice(len(kept), most, replace=False)
         kept = [kept[row] for row in sorted(rows)]
@@ -73,9 +73,9 @@ def chosen_folders(folders: Sequence[ObjectFolder], category: str | None = None,
 def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[ReconstructionNetwork],
                title: str = 'objects', reporting: Reporting = silent) -> Scene:
     """
-    Read objects as the networks ask for them.
+    Read objects with the images and voxels that the networks need.
 
-    Where no object has voxels of 64 cells a side, only 32 are measured. Raises DataError where no
+    If no object has voxels at 64 cells a side, only 32 are measured. Raises DataError where no
     object can be read.
     """
     fine = any(folder.voxels_path(FINE_RESOLUTION).is_file() for folder in folders)
@@ -93,7 +93,7 @@ def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[Reconstructio
             with reporting(f'reading {title} for the front', len(views)) as advance:
                 shown = read_views(views.folders, lambda: advance(1, ''), RESOLUTION, size)
             if shown.folders != views.folders:
-                raise DataError(f'objects missing at {size} pixels: expected the same as before, '
-                                f'but some cannot be read: {"; ".join(shown.unreadable[:3])}')
+                raise DataError(f'objects missing at {size} pixels: expected those of the other '
+                                f'sizes, got errors: {"; ".join(shown.unreadable[:3])}')
             turntable[size] = shown
     return Scene(views, truths, turntable)

@@ -1,4 +1,4 @@
-"""One occupancy against one object's truth: all that is said of it, by names."""
+"""All scores of one occupancy grid against one object's truth, by name."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -26,9 +26,9 @@ class Target:
     """
     One object's truth.
 
-    - cells: (R, R, R) bool by R, cells a side
-    - near: the cells of the finest near its surface; thin: those of its thin parts
-    - surface: of the finest, or None where surfaces are not measured
+    - cells: true voxels (R, R, R) bool, by R, cells a side
+    - near: cells near the surface, at the finest resolution; thin: those of thin parts
+    - surface: that of the finest voxels; None where surfaces are not measured
     """
 
     cells: Mapping[int, NDArray[np.bool_]]
@@ -43,7 +43,7 @@ class Target:
 
 
 def target(cells: Mapping[int, NDArray[np.bool_]], surface: bool = True) -> Target:
-    """Return an object's truth, ready to be compared with."""
+    """Return an object's truth of its voxels by resolution, with its surface if `surface`."""
     finest = cells[max(cells)]
     return Target(cells, near_surface(finest), thin_cells(finest),
                   voxel_surface(finest, 0.5) if surface else None)
@@ -51,9 +51,9 @@ def target(cells: Mapping[int, NDArray[np.bool_]], surface: bool = True) -> Targ
 
 def pooled(values: NDArray[np.floating], side: int) -> NDArray[np.floating]:
     """
-    Return values (R, R, R) in fewer cells, halved and halved again: the largest of 2 x 2 x 2.
+    Return values (R, R, R) max-pooled by 2 x 2 x 2 until there are `side` cells a side.
 
-    A coarse cell is occupied where any of its cells is, as the truth's voxels are.
+    A coarse cell is occupied if any of its fine cells is, as in the true voxels.
     """
     while len(values) > side:
         for axis in range(3):
@@ -64,7 +64,7 @@ def pooled(values: NDArray[np.floating], side: int) -> NDArray[np.floating]:
 
 def iou_scores(values: NDArray[np.floating], truth: Target, sides: tuple[int, ...],
                thresholds: Mapping[int, float], name: str = 'iou') -> Scores:
-    """Return the IoU of values (R, R, R) above thresholds, by `<name>_<cells a side>`."""
+    """Return the IoU of values (R, R, R) above thresholds, named `<name>_<cells a side>`."""
     return {f'{name}_{side}': float(iou(pooled(values, side) > thresholds[side],
                                         truth.cells[side]))
             for side in sides if side in truth.cells}
@@ -73,15 +73,15 @@ def iou_scores(values: NDArray[np.floating], truth: Target, sides: tuple[int, ..
 def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: int,
            surfaces: bool) -> tuple[Scores, dict[str, NDArray[np.float64]]]:
     """
-    Return what is said of logits (R, R, R) after `count` views, and reliability diagrams.
+    Return the scores of logits (R, R, R) after `count` views, and reliability diagrams.
 
-    - `iou_*`: at the entrant's threshold; `own_iou_*`: at the object's own, and `expected_iou`:
-      what it expects there
-    - `brier` and the diagram `calibration_error`, near the surface, and `thin_recall`: where the
-      truth is as fine as the logits
-    - with `tempered_` before the name: of logits under the entrant's temperatures, if it has any;
-      thresholds of objects under those fitted to cells anywhere
-    - those of `SurfaceScores`, where `surfaces` are asked for
+    - `iou_*`: at the entrant's threshold; `own_iou_*`: at the threshold chosen for the object;
+      `expected_iou`: the expected IoU there
+    - `brier` and the diagram `calibration_error`, near the surface, and `thin_recall`: if the
+      truth has the resolution of the logits
+    - with the prefix `tempered_`: of logits divided by the entrant's temperatures, if it has any;
+      for the object's threshold, by those fitted to cells anywhere
+    - those of `SurfaceScores`, with `surfaces`
     """
     whole = expit(logits)
     scores = _own_scores(whole, truth, entrant, '')
@@ -109,7 +109,7 @@ def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: 
 
 def _own_scores(occupancy: NDArray[np.float32], truth: Target, entrant: Entrant,
                 prefix: str) -> Scores:
-    """Return what is said of probabilities (R, R, R) at the threshold that they ask for."""
+    """Return the scores of probabilities (R, R, R) at their own best threshold."""
     own, expected = best_threshold(occupancy)
     return {f'{prefix}expected_iou': expected, **iou_scores(
         occupancy, truth, entrant.sides, dict.fromkeys(entrant.sides, own), f'{prefix}own_iou')}

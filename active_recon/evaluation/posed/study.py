@@ -1,4 +1,4 @@
-"""All figures of a set: entrants beside each other, baselines, and views that are disturbed."""
+"""All results on a set: entrants, their differences, baselines and robustness tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,11 +30,12 @@ _OTHER_SIZE = 'it takes images of another size than all others'
 @dataclass(frozen=True)
 class Extent:
     """
-    How much of a set is measured.
+    The part of a set that is measured.
 
-    - category: a pattern of categories, `!` before it for all others; most: objects at most
-    - disturbed_views: views at which disturbances are compared, 0 for none; disturbed_objects: on
-      so many objects at most
+    - category: pattern of categories, with `!` before it for all others
+    - most: largest number of objects
+    - disturbed_views: number of views in the robustness tests, 0 to skip them
+    - disturbed_objects: largest number of objects in the robustness tests
     """
 
     category: str | None = None
@@ -45,7 +46,7 @@ class Extent:
 
 def read_set(data: Path, entrants: Sequence[Entrant], extent: Extent, seed: int = 0,
              reporting: Reporting = silent) -> Scene:
-    """Read what is measured of a folder; raises DataError and ConfigError as its parts do."""
+    """Read the objects to measure; raises as `chosen_folders` and `read_scene` do."""
     folders = chosen_folders(list_objects(data), extent.category, extent.most, seed)
     return read_scene(folders, [entrant.network for entrant in entrants], data.name, reporting)
 
@@ -62,17 +63,17 @@ def choose_on(data: Path, entrants: Sequence[Entrant], plan: Plan, extent: Exten
 def study_set(data: Path, entrants: Sequence[Entrant], plan: Plan, extent: Extent,
               library: Library | None = None, reporting: Reporting = silent) -> dict[str, Any]:
     """
-    Return all figures of a folder of objects, ready for JSON.
+    Return all results on a folder of objects, ready for JSON.
 
-    What cannot be shown its views is left out and said so. Raises ConfigError where that is all.
+    Entrants that cannot use its views are left out and listed in `left_out`. Raises ConfigError
+    where none can.
     """
     scene = read_set(data, entrants, extent, plan.seed, reporting)
     taking = [each for each in entrants if scene.shown_to(each.network) is not None]
     left_out = {each.name: _NO_TURNTABLE if each.network.needs_front else _OTHER_SIZE
                 for each in entrants if each not in taking}
     if not taking:
-        raise ConfigError(f'{data}: no model for these views: expected one that can be '
-                          'shown them, but '
+        raise ConfigError(f'{data}: no model for these views: expected one that can use them, got '
                           + '; '.join(f'{name}: {why}' for name, why in left_out.items()))
     with reporting(f'measuring {data.name}', len(taking) * len(scene)) as advance:
         measured = measure(scene, taking, plan, lambda done: advance(done, ''))

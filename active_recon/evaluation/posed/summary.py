@@ -1,4 +1,4 @@
-"""Means with their intervals of what was measured, ready for JSON, and tables in Markdown."""
+"""Means and intervals of the measured values, ready for JSON, and tables in Markdown."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 Values = NDArray[np.float64]
 Figure = dict[str, float] | None
-"""Mean, low, high (95 % over objects) and how many objects; None where nothing was measured."""
+"""Mean, low, high (95 % over objects), number of objects; None where nothing was measured."""
 
 
 def figure(values: Values, others: Values | None = None) -> Figure:
-    """Return the interval of values (N,), or of how far they are ahead of others; NaN is none."""
+    """Return mean and interval of values (N,), or of values minus others, paired; NaN: missing."""
     there = np.isfinite(values) if others is None else np.isfinite(values) & np.isfinite(others)
     if not there.any():
         return None
@@ -29,7 +29,7 @@ def figure(values: Values, others: Values | None = None) -> Figure:
 
 
 def entrant_figures(entrant: Entrant, measured: Measured) -> dict[str, Any]:
-    """Return all figures of an entrant: by kind of views and name, one after each count."""
+    """Return all figures of an entrant: by kind of views and name, one for each count."""
     return {
         'weights': entrant.weights, 'chosen_on': entrant.chosen_on,
         'thresholds': {str(side): entrant.thresholds[side] for side in entrant.sides},
@@ -45,14 +45,14 @@ def entrant_figures(entrant: Entrant, measured: Measured) -> dict[str, Any]:
 
 
 def _own_ahead(values: Mapping[str, Values]) -> dict[str, list[Figure]]:
-    """Return by how much each object's own threshold is ahead of the fixed one, by name."""
+    """Return the gain of a threshold for each object over the fixed one, by name."""
     return {name: [figure(*pair) for pair in zip(own.T, values[f'iou_{name.rpartition("_")[2]}'].T,
                                                strict=True)]
             for name, own in values.items() if 'own_iou_' in name}
 
 
 def ahead_figures(first: Measured, other: Measured) -> dict[str, Any]:
-    """Return by how much the first entrant is ahead of another, paired, where both have it."""
+    """Return the paired differences of the first entrant minus another, where both have values."""
     return {kind: {name: [figure(*pair) for pair in zip(values.T, other.values[kind][name].T,
                                                       strict=True)]
                    for name, values in of_kind.items() if name in other.values[kind]}
@@ -60,17 +60,17 @@ def ahead_figures(first: Measured, other: Measured) -> dict[str, Any]:
 
 
 def baseline_figures(rows: Sequence[Scores]) -> dict[str, Figure]:
-    """Return the means of scores of objects, by name."""
+    """Return the figures of scores of objects, by name."""
     return {name: figure(np.array([row.get(name, np.nan) for row in rows]))
             for name in sorted({name for row in rows for name in row})}
 
 
 def robustness_figures(found: Iterable[Found]) -> dict[str, Any]:
     """
-    Return by disturbance and name what it is, what it would be on clean views, and the change.
+    Return for each disturbance and score the disturbed and clean figures and their difference.
 
-    Beside them `yaw`: for each name the IoU at every yaw, and their spread, greatest minus least;
-    `quarters` is the same of quarter turns alone, at which no cell is interpolated.
+    `yaw` has for each score the means at all yaws and their spread, greatest minus least;
+    `quarters` is the spread of quarter turns only, which need no interpolation.
     """
     by_name: dict[str, list[Found]] = {}
     for each in found:
@@ -98,7 +98,7 @@ def _beside(found: Sequence[Found]) -> dict[str, Any]:
 
 
 def markdown(result: Mapping[str, Any]) -> str:
-    """Return all tables of a study's result."""
+    """Return a Markdown document with all tables of a study's result."""
     parts = ['# Measured on posed views', f'`{result["command"]}`',
              'Means with 95 % intervals over objects.']
     for figures in result.get('sets', []):
@@ -109,7 +109,7 @@ def markdown(result: Mapping[str, Any]) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table in Markdown, numbers to the right."""
+    """Return a table in Markdown, with right-aligned columns but the first."""
     lines = [header, [':--', *['--:'] * (len(header) - 1)], *rows]
     return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
 

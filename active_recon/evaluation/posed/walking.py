@@ -1,4 +1,4 @@
-"""Views of objects in an order: which come when, and what is known after some of them."""
+"""Orders of views, and the network's logits after each."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -20,20 +20,20 @@ from torch import Tensor
 _EVEN = 1e-3  # radians
 
 Order = NDArray[np.int64]
-"""Views (N, c) of N objects, in the order in which they are shown."""
+"""Indices of c views of N objects, in order, (N, c)."""
 
 
 def random_orders(objects: int, views: int, seed: int = 0) -> Order:
-    """Return all views of every object, each object's in an order of its own, (N, V)."""
+    """Return a random order of all V views for each of N objects, (N, V)."""
     return np.stack([np.random.default_rng([seed, item]).permutation(views)
                      for item in range(objects)])
 
 
 def on_turntable(views: ViewSet) -> bool:
     """
-    Return whether all objects are seen as the paper's networks expect it.
+    Return whether the views are those of the paper's networks: 24 of each object at 30 degrees.
 
-    That is from 24 azimuths, from about 30 degrees up.
+    The elevation may differ by ELEVATION_TOLERANCE.
     """
     directions = pose_directions(views.poses.numpy())
     apart = np.abs(np.arcsin(directions[..., 2].clip(-1, 1)) - CANONICAL_ELEVATION)
@@ -43,11 +43,10 @@ def on_turntable(views: ViewSet) -> bool:
 
 def even_orders(directions: NDArray[np.float64], count: int, first: NDArray[np.int64]) -> Order:
     """
-    Return `count` views of each object that are spread evenly, beginning with `first` (N,).
+    Return `count` evenly spread views of each object, beginning with `first` (N,): (N, count).
 
-    Takes the directions to the cameras, (N, V, 3). Where they are V even steps around the object,
-    views are as many steps apart as they can be; elsewhere each next view is the one farthest from
-    all before it.
+    Takes unit vectors to the cameras, (N, V, 3). If the azimuths are V even steps, the views are
+    equidistant on the circle; else each next view is the one farthest from all before it.
     """
     objects, views = directions.shape[:2]
     azimuths = np.arctan2(directions[..., 1], directions[..., 0])
@@ -72,8 +71,8 @@ def walk(observer: Observer, objects: Tensor, orders: Sequence[Order],
     """
     Yield the logits (B, R, R, R) of objects (B,) after the views (B, c) of each order.
 
-    An order that begins with the one before goes on from where that ended. By `yaws` (B,) the
-    cameras are turned.
+    If an order begins with the one before, the state is continued. The cameras are rotated by
+    `yaws` (B,), radians.
     """
     done: Order = np.empty((len(objects), 0), np.int64)
     state = observer.initial_state(len(objects))
