@@ -22,14 +22,17 @@ if TYPE_CHECKING:
     from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
     from active_recon.planner import Planner
     from active_recon.reconstructor import load, Reconstructor
+    from active_recon.volumes.refinement import refined_mesh
     from active_recon.volumes.voxels import VoxelGrid
 
 __version__ = '0.1.0'
-__all__ = ['Camera', 'Intrinsics', 'Planner', 'Reconstructor', 'VoxelGrid', 'load', 'orbit_camera']
+__all__ = ['Camera', 'Intrinsics', 'Planner', 'Reconstructor', 'VoxelGrid', 'load', 'orbit_camera',
+           'refined_mesh']
 _MODULES = {
     'Camera': 'geometry.cameras', 'Intrinsics': 'geometry.cameras',
     'orbit_camera': 'geometry.cameras', 'Planner': 'planner', 'Reconstructor': 'reconstructor',
-    'load': 'reconstructor', 'VoxelGrid': 'volumes.voxels'}
+    'load': 'reconstructor', 'VoxelGrid': 'volumes.voxels',
+    'refined_mesh': 'volumes.refinement'}
 
 
 def __getattr__(name: str) -> Any:

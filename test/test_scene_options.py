@@ -9,6 +9,8 @@ from active_recon.bags.runs.topics import Topics
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import CANONICAL_DISTANCE, CANONICAL_INTRINSICS
+from active_recon.volumes.refinement import refined_mesh
+from active_recon.volumes.voxels import VoxelGrid
 import cv2
 from foreign_recordings import AZIMUTHS, cameras, images, joints, TIMES
 from loop_bags import header, write_bag
@@ -136,9 +138,12 @@ def test_a_mesh_and_voxels_come_out_of_a_bag_without_any_record(tmp_path):
     assert f'wrote {mesh}' in said
     with np.load(voxels) as stored:
         occupancy, size = stored['occupancy'], float(stored['size'])
+        expected = refined_mesh(VoxelGrid(occupancy, size), float(stored['threshold']))
     assert size == 0.16
     assert occupancy.max() <= 1
     surface = trimesh.load(mesh)
+    assert len(surface.faces) == len(expected.faces)
+    np.testing.assert_allclose(surface.bounds, expected.bounds, atol=1e-6)
     assert 0 < surface.extents.max() <= 0.17
     with pytest.raises(ConfigError, match='--mesh: .* has no suffix out of ply'):
         told('replay', folder, '--mesh', tmp_path / 'mug.png')

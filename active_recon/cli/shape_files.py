@@ -39,6 +39,7 @@ class ShapeFiles:
 
     def write(self, grids: Sequence['VoxelGrid'], threshold: float) -> None:
         """Write the shapes and print the paths; raises DataError where there is no surface."""
+        from active_recon.volumes.refinement import refined_mesh
         from active_recon.volumes.voxels import write_binvox, write_mesh
         import numpy as np
 
@@ -46,7 +47,7 @@ class ShapeFiles:
             of_several = number if len(grids) > 1 else None
             if self.mesh is not None:
                 path = _numbered(self.mesh, of_several)
-                write_mesh(grid.mesh(threshold), path)
+                write_mesh(refined_mesh(grid, threshold), path)
                 typer.echo(f'wrote {path}')
             if self.voxels is not None:
                 path = _numbered(self.voxels, of_several)

@@ -27,6 +27,7 @@ from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
 from active_recon.reconstructor import Reconstruction, Reconstructor
+from active_recon.volumes.refinement import refined_mesh
 from active_recon.volumes.voxels import write_mesh
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import pixels_from_msg
@@ -276,7 +277,8 @@ class ReconstructorNode(ManagedNode):
         name = f'{self._episode.id}-{self._reconstructor.view_count}.{params.mesh_format}'
         path = output_path(Path(params.output_dir), name)
         try:
-            write_mesh(self._reconstruction.grid.mesh(self._reconstructor.threshold), path)
+            write_mesh(refined_mesh(self._reconstruction.grid, self._reconstructor.threshold),
+                       path)
         except (DataError, OSError) as error:
             response.message = f'{path} was not written: {one_line(error)}'
         else:
