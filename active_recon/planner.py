@@ -5,19 +5,11 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from active_recon.acquisition.motion import MotionLimits, utility
+from active_recon.acquisition.goals import best_goal, Goal, Ring, Wanted
+from active_recon.acquisition.motion import MotionLimits
 from active_recon.errors import ConfigError, ViewError
-from active_recon.geometry.cameras import (
-    azimuth_difference,
-    AZIMUTHS,
-    Camera,
-    CANONICAL_DISTANCE,
-    nearest_camera,
-    orbit_camera,
-    OrbitCamera,
-    TURN,
-    view_distance,
-)
+from active_recon.geometry.cameras import AZIMUTHS, Camera, CANONICAL_DISTANCE, OrbitCamera, TURN
+from active_recon.geometry.view_distance import view_distance
 from active_recon.policies import (
     Choice,
     DEFAULT_POLICY,
@@ -29,22 +21,6 @@ from active_recon.policies import (
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
-
-_STEEPEST = math.radians(89)  # of goals at the camera's own elevation: above, nothing is upright
-
-
-@dataclass(frozen=True, eq=False)
-class Goal:
-    """
-    The camera of the next view, and the utility of every reachable candidate.
-
-    - camera: its pose in the object frame; it may lie between the candidates
-    - candidates: N cameras; scores: (N,), more is better
-    """
-
-    camera: Camera
-    candidates: Sequence[Camera]
-    scores: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -74,14 +50,6 @@ class PlannerView:
     camera: Camera
     entropy: float
     volume: VoxelGrid | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Wanted:
-    """Of a choice: the camera between the candidates, if any, and the candidates' scores (N,)."""
-
-    camera: Camera | None
-    scores: NDArray[np.float32]
 
 
 class Planner:
@@ -117,9 +85,8 @@ class Planner:
         self._yaw = object_yaw
         self._limits = limits or MotionLimits()
         self._motion_weight = motion_weight
-        self._elevation = elevation
-        self._distance = distance
-        self._azimuths = self._limits.candidates((AZIMUTHS + object_yaw) % TURN)
+        self._ring = Ring(self._limits.candidates((AZIMUTHS + object_yaw) % TURN), elevation,
+                          distance)
         self.reset()
 
     @classmethod
@@ -144,8 +111,8 @@ class Planner:
         self._views: list[PlannerView] = []
         self._state = self._policy.initial_state(1)
         self._choice: Choice | None = None
-        self._wanted: _Wanted | None = None
-        self._ring: list[OrbitCamera] = []
+        self._wanted: Wanted | None = None
+        self._candidates: list[OrbitCamera] = []
         self._failed: list[Camera] = []
         self._stopped = False
         self._goal: Goal | None = None
@@ -188,13 +155,13 @@ class Planner:
         if not (math.isfinite(entropy) and np.isfinite(latent).all()):
             raise ViewError('latent or entropy not finite: expected finite numbers, got entropy '
                             f'{entropy}', 'latent')
-        before = self._ring
+        before = self._candidates
         self._look_from(camera)
         views = [*self._views, PlannerView(latent, camera, entropy, volume)]
         try:
             self._choose(views)
         except ViewError:
-            self._ring = before
+            self._candidates = before
             raise
         self._views = views
         self._aim(camera)
@@ -242,21 +209,13 @@ class Planner:
 
     def _look_from(self, camera: Camera) -> None:
         """Place the candidates, where their elevation is the camera's."""
-        if not self._ring or self._ring[0].elevation != self._height(camera):
-            self._ring = [self._place(float(azimuth), camera) for azimuth in self._azimuths]
-
-    def _height(self, camera: Camera) -> float:
-        """Return the elevation of goals while the camera's last view is that one."""
-        if self._elevation is not None:
-            return self._elevation
-        return min(max(camera.elevation, -_STEEPEST), _STEEPEST)
-
-    def _place(self, azimuth: float, camera: Camera) -> OrbitCamera:
-        return orbit_camera(azimuth, self._height(camera), self._distance)
+        elevation = self._ring.elevation_for(camera)
+        if not self._candidates or self._candidates[0].elevation != elevation:
+            self._candidates = self._ring.candidates(camera)
 
     def _is_ring_of(self, other: 'Planner') -> bool:
-        return (self._elevation == other._elevation and self._yaw == other._yaw
-                and np.array_equal(self._azimuths, other._azimuths))
+        return (self._ring.elevation == other._ring.elevation and self._yaw == other._yaw
+                and np.array_equal(self._ring.azimuths, other._ring.azimuths))
 
     def _choose(self, views: Sequence[PlannerView]) -> None:
         """Let the policy choose after the last of some views."""
@@ -266,7 +225,7 @@ class Planner:
                             'looks at them, got none', 'volume')
         taken, candidates = (
             np.stack([each.turned(-self._yaw).pose for each in cameras])[None]
-            for cameras in ([view.camera for view in views], self._ring))
+            for cameras in ([view.camera for view in views], self._candidates))
         volume = None if last.volume is None else turned(
             last.volume.occupancy, -self._yaw)[None]
         seen = Observation(last.latent[None], taken, candidates, volume)
@@ -275,41 +234,25 @@ class Planner:
     def _aim_first(self, camera: Camera) -> None:
         """Make the best of a camera that no policy chose."""
         self._look_from(camera)
-        away = [view_distance(each, camera) for each in self._ring]
-        self._wanted = _Wanted(self._place(camera.azimuth, camera), -np.array(away, np.float32))
+        away = [view_distance(each, camera) for each in self._candidates]
+        self._wanted = Wanted(self._ring.goal(camera.azimuth, camera), -np.array(away, np.float32))
         self._goal = self._best(camera)
 
     def _aim(self, camera: Camera) -> None:
         """Make the best of the policy's choice for a camera."""
         assert self._choice is not None
         proposed = np.nan if self._choice.azimuth is None else float(self._choice.azimuth[0])
-        self._wanted = _Wanted(
-            None if math.isnan(proposed) else self._place(proposed + self._yaw, camera),
+        self._wanted = Wanted(
+            None if math.isnan(proposed) else self._ring.goal(proposed + self._yaw, camera),
             self._choice.scores[0])
         self._goal = self._best(camera)
 
     def _best(self, camera: Camera) -> Goal | None:
         """Return the best goal for a camera that is somewhere; None where none is left."""
         assert self._wanted is not None
-        scores, options = self._wanted.scores, list[Camera](self._ring)
-        nearest = np.arange(len(self._ring))
-        if self._wanted.camera is not None:  # first: it is as good as the best of the candidates
-            options.insert(0, self._wanted.camera)
-            nearest = np.insert(nearest, 0, nearest_camera(self._wanted.camera, self._ring))
-            scores = np.append(scores.max(), scores)
-        azimuths = np.array([option.azimuth for option in options])
-        failed, taken = ([nearest_camera(each, self._ring) for each in cameras]
-                         for cameras in (self._failed, [view.camera for view in self._views]))
-        is_open = self._limits.allows(azimuths) & ~np.isin(nearest, failed)
-        if not is_open.any():
-            return None
-        fresh = is_open & ~np.isin(nearest, taken)
-        travel = np.abs(azimuth_difference(azimuths, camera.azimuth))
-        value = utility(scores, travel, self._motion_weight if self._views else 0.0)
-        best = int(np.where(fresh if fresh.any() else is_open, value, -np.inf).argmax())
-        own = slice(len(options) - len(self._ring), None)
-        return Goal(options[best], [each for each, free in zip(
-            self._ring, is_open[own], strict=True) if free], value[own][is_open[own]])
+        return best_goal(
+            self._wanted, self._candidates, camera, [view.camera for view in self._views],
+            self._failed, self._limits, self._motion_weight if self._views else 0.0)
 
     def _settled(self) -> bool:
         """Whether the last two views each changed the entropy by no more than the tolerance."""

@@ -1,7 +1,8 @@
 """Voxel grids to and from PointCloud2: one point for each cell above a threshold."""
 
 from active_recon.errors import DataError, MessageError
-from active_recon.volumes.voxels import grid_from_points, RESOLUTION, VoxelGrid
+from active_recon.volumes.point_grids import grid_from_points
+from active_recon.volumes.voxels import RESOLUTION, VoxelGrid
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header

@@ -50,7 +50,7 @@ def announced(folder, max_bytes=None):
 
 def doctor(path):
     program = Path(sys.executable).with_name('pymcap-cli')
-    return subprocess.run([program, 'doctor', path], capture_output=True, text=True, timeout=60)
+    return subprocess.run([program, 'doctor', path], capture_output=True, text=True, timeout=600)
 
 
 def errors_in(path):

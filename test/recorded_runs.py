@@ -10,7 +10,7 @@ from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import RandomPolicy
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes.torch import TorchPolicyRuntime, TorchRuntime
-from active_recon.volumes.voxels import grid_from_points
+from active_recon.volumes.point_grids import grid_from_points
 import numpy as np
 
 THRESHOLD, FLOOR = 0.15, 0.02

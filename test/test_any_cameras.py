@@ -9,8 +9,9 @@ from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.geometry.canonical import framed_image, framed_layers, framing_camera
 from active_recon.geometry.framing import share_outside
 from active_recon.shapes import make_shape
+from active_recon.volumes.binvox import binvox_side
 from active_recon.volumes.rendering import composite, Renderer
-from active_recon.volumes.voxels import binvox_side, VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
 import pytest

@@ -114,6 +114,15 @@ def test_an_object_partly_of_the_background_s_color_is_in_pieces():
     assert main_part_share(Background('color', GREEN).cleared(pillar)) == pytest.approx(0.5, 0.02)
 
 
+@pytest.mark.parametrize('side', [SIDE, 3000])
+def test_the_share_of_the_largest_part_does_not_depend_on_the_image_s_size(side):
+    cleared = np.full((SIDE, SIDE, 3), 255, np.uint8)
+    cleared[40:120, 100:200] = 254
+    cleared[200:240, 100:200] = 30
+    cleared = cv2.resize(cleared, (side, side), interpolation=cv2.INTER_NEAREST)
+    assert main_part_share(cleared) == pytest.approx(2 / 3, abs=0.01)
+
+
 def test_a_speck_of_noise_is_no_part_of_the_object():
     image = np.full((SIDE, SIDE, 3), 128, np.uint8)
     reference = image.copy()

@@ -5,8 +5,8 @@ import tracemalloc
 
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.storage import compression
-from active_recon.cli.main import main
 from active_recon.errors import DataError
+from command_line import command
 from foreign_recordings import images, joints
 from loop_bags import BEGIN, LoopRun, type_name, write_bag
 from mcap.opcode import Opcode
@@ -237,8 +237,5 @@ def test_a_damaged_database_is_refused(bag, tmp_path):
 
 def test_the_command_ends_with_one_line_and_exit_code_2(tmp_path, monkeypatch, capsys):
     (tmp_path / 'bag.mcap').write_bytes(b'hello')
-    monkeypatch.setattr('sys.argv', ['active-recon', 'bag', 'info', str(tmp_path / 'bag.mcap')])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
+    assert command(monkeypatch, 'bag', 'info', tmp_path / 'bag.mcap') == 2
     assert capsys.readouterr().err.count('\n') == 1

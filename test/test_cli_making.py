@@ -153,7 +153,7 @@ def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp
 def command(*arguments):
     return subprocess.run(
         [sys.executable, '-m', 'active_recon.cli.main', *map(str, arguments)],
-        capture_output=True, text=True, timeout=120, check=False)
+        capture_output=True, text=True, timeout=600, check=False)
 
 
 def test_two_processes_make_what_one_makes(meshes, tmp_path):

@@ -2,9 +2,9 @@
 
 import json
 
-from active_recon.cli.main import main
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.making import make_dataset, shape_jobs
+from command_line import command, refusal
 import cv2
 import pytest
 import torch
@@ -25,25 +25,9 @@ def made(tmp_path_factory):
     return out
 
 
-def command(monkeypatch, *arguments):
-    """Run `active-recon study`; return its exit code."""
-    monkeypatch.setattr('sys.argv', ['active-recon', 'study', *map(str, arguments)])
-    with pytest.raises(SystemExit) as end:
-        main()
-    return end.value.code or 0
-
-
-def refusal(monkeypatch, capsys, *arguments):
-    capsys.readouterr()
-    assert command(monkeypatch, *arguments) == 2
-    line = capsys.readouterr().err
-    assert line.startswith('active-recon: ') and line.count('\n') == 1
-    return line
-
-
 def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, monkeypatch):
-    assert command(monkeypatch, made, dataset, '--models', 'carving,2d3d-attention', '--counts',
-                   '1,3', '--surfaces', '', '--disturbed-views', 0, '--training', made,
+    assert command(monkeypatch, 'study', made, dataset, '--models', 'carving,2d3d-attention',
+                   '--counts', '1,3', '--surfaces', '', '--disturbed-views', 0, '--training', made,
                    '--threads', 1, '--out', tmp_path) == 0
     result = json.loads((tmp_path / 'study.json').read_text())
     assert "--surfaces ''" in result['command']
@@ -59,7 +43,7 @@ def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, m
 
 def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypatch, capsys):
     def refused(*arguments):
-        return refusal(monkeypatch, capsys, *arguments, '--out', tmp_path)
+        return refusal(monkeypatch, capsys, 'study', *arguments, '--out', tmp_path)
 
     assert 'got neither' in refused()
     assert 'whole numbers' in refused(made, '--counts', '1,two')

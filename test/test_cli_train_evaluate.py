@@ -3,9 +3,9 @@
 import json
 import math
 
-from active_recon.cli.main import main
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import weights_hash
+from command_line import command, refusal
 import pytest
 from safetensors.torch import load_file
 import torch
@@ -17,23 +17,6 @@ def as_many_threads_as_before():
     before = torch.get_num_threads()
     yield
     torch.set_num_threads(before)
-
-
-def command(monkeypatch, *arguments):
-    """Run a command; return its exit code."""
-    monkeypatch.setattr('sys.argv', ['active-recon', *map(str, arguments)])
-    with pytest.raises(SystemExit) as end:
-        main()
-    return end.value.code or 0
-
-
-def refusal(monkeypatch, capsys, *arguments):
-    """Run a command that is refused with exit code 2; return its one line."""
-    capsys.readouterr()
-    assert command(monkeypatch, *arguments) == 2
-    *_, line = capsys.readouterr().err.splitlines()  # warnings may come before
-    assert line.startswith('active-recon: ')
-    return line
 
 
 def training(dataset, out, *more):

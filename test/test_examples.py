@@ -4,7 +4,7 @@ from pathlib import Path
 import re
 
 from active_recon import orbit_camera, Planner
-from active_recon.geometry.cameras import view_distance
+from active_recon.geometry.view_distance import view_distance
 import numpy as np
 import pytest
 

@@ -28,21 +28,22 @@ RECORDINGS = (
 
 
 class HangError(BaseException):
-    """What no one catches on the way: a bag took too long."""
+    """What no one catches on the way: a bag took too much of a core."""
 
 
 @contextmanager
 def at_most(seconds):
+    """Raise HangError once the block has had so much of a core, however busy the machine is."""
     def stop(*_):
         raise HangError
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def damaged(content, rng):

@@ -5,7 +5,8 @@ import math
 from active_recon.datasets.layout import list_objects, ObjectFolder, write_object, write_voxels
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
-from active_recon.volumes.voxels import VoxelGrid, write_binvox
+from active_recon.volumes.binvox import write_binvox
+from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
 import pytest

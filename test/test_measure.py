@@ -4,16 +4,8 @@ import json
 import math
 
 from active_recon.errors import DataError
-from active_recon.evaluation.measure import (
-    Episodes,
-    interval,
-    iou_by_yaw,
-    joined,
-    latent_swap_ablation,
-    run_policy,
-    summary,
-    YAWS_DEG,
-)
+from active_recon.evaluation.ablations import iou_by_yaw, latent_swap_ablation, YAWS_DEG
+from active_recon.evaluation.measure import Episodes, interval, joined, run_policy, summary
 from active_recon.evaluation.metrics import episodes, iou_per_view
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies.attention import AttentionPolicy

@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from active_recon.cli.main import main
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models import registry
 from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
 from active_recon.models.weights import load_weights
 from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLICIES_GROUP
 from active_recon.policies.registry import _installed, PolicyOptions
+from command_line import command
 import pytest
 
 EXAMPLE = Path(__file__).parents[1] / 'examples' / 'my_network.py'
@@ -17,13 +17,6 @@ EXAMPLE = Path(__file__).parents[1] / 'examples' / 'my_network.py'
 @pytest.fixture(autouse=True)
 def none_known(monkeypatch):
     monkeypatch.setattr(registry, '_OWN', {})
-
-
-def command(monkeypatch, *arguments):
-    monkeypatch.setattr('sys.argv', ['active-recon', *map(str, arguments)])
-    with pytest.raises(SystemExit) as end:
-        main()
-    return end.value.code or 0
 
 
 def test_the_example_is_trained_for_ten_steps_and_its_weights_load_where_it_is_named(

@@ -3,12 +3,12 @@
 from dataclasses import replace
 import json
 
-from active_recon.cli.main import main
 from active_recon.errors import ConfigError
 from active_recon.paper import examples, timing
 from active_recon.paper.document import write_document
 from active_recon.paper.parts import PARTS, run_part
 from active_recon.paper.results import PUBLISHED
+from command_line import command
 from paper_study import make_study, small_objects
 from PIL import Image
 import pytest
@@ -143,31 +143,28 @@ def test_an_unknown_part_is_refused(study):
         run_part(study, 'table6')
 
 
-def command(monkeypatch, study, *arguments):
+def paper(monkeypatch, study, *arguments):
     """Run `active-recon paper` with the study's settings; return its exit code."""
     before = torch.get_num_threads()
-    monkeypatch.setattr('sys.argv', [
-        'active-recon', 'paper', *arguments, '--data', str(study.data), '--models',
-        str(study.models), '--out', str(study.out), '--model', study.model, '--samples', '96',
-        '--starts', '2', '--threads', '1'])
-    with pytest.raises(SystemExit) as end:
-        main()
+    code = command(monkeypatch, 'paper', *arguments, '--data', study.data, '--models',
+                   study.models, '--out', study.out, '--model', study.model, '--samples', 96,
+                   '--starts', 2, '--threads', 1)
     torch.set_num_threads(before)
-    return end.value.code or 0
+    return code
 
 
 def test_the_command_makes_parts_systems_and_the_document(study, monkeypatch, capsys):
     write_document(study)
-    assert command(monkeypatch, study, 'systems', 'document') == 0
+    assert paper(monkeypatch, study, 'systems', 'document') == 0
     told = capsys.readouterr().out
     assert f'3D-R2N2: {study.models / "r2n2" / "weights.safetensors"}' in told
     assert 'README.md: unchanged' in told
 
 
 def test_the_command_refuses_parts_that_there_are_not(study, monkeypatch, capsys):
-    assert command(monkeypatch, study, 'table6') == 2
+    assert paper(monkeypatch, study, 'table6') == 2
     assert 'expected some of table1,' in capsys.readouterr().err
-    assert command(monkeypatch, study, 'table1', '--device', 'tpu') == 2
+    assert paper(monkeypatch, study, 'table1', '--device', 'tpu') == 2
     assert '--device: no such device: expected cpu, or cuda' in capsys.readouterr().err
 
 

@@ -251,15 +251,12 @@ def test_every_photograph_is_told_to_the_progress_once(root):
 
 
 def test_photographs_are_evaluated_at_their_single_view(root, tmp_path, monkeypatch, capsys):
-    from active_recon.cli.main import main
+    from command_line import command
     annotate(root, 'car_imagenet/two', annotated(truncated=1))
     monkeypatch.setattr('torch.set_num_threads', lambda threads: None)
     out = tmp_path / 'found.json'
-    asked = ['active-recon', 'evaluate', str(root), '--json', str(out), '--threads', '1']
-    monkeypatch.setattr('sys.argv', [*asked, '--model', PAPER_MODEL])
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert not end.value.code
+    asked = ['evaluate', root, '--json', out, '--threads', 1]
+    assert command(monkeypatch, *asked, '--model', PAPER_MODEL) == 0
     found = json.loads(out.read_text())
     assert found['objects'] == found['episodes'] == 1
     assert [len(figures['iou']) for figures in found['policies'].values()] == [1] * 4
@@ -267,7 +264,5 @@ def test_photographs_are_evaluated_at_their_single_view(root, tmp_path, monkeypa
     told = capsys.readouterr().err
     assert 'views per object: 1; measured views: 1; starts: 1' in told
     assert 'objects: 1 read, 0 missing, 1 left out' in told
-    monkeypatch.setattr('sys.argv', asked)
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert end.value.code == 2 and 'photographs without camera poses' in capsys.readouterr().err
+    assert command(monkeypatch, *asked) == 2
+    assert 'photographs without camera poses' in capsys.readouterr().err

@@ -12,15 +12,13 @@ from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.training import policy_gradient
 from active_recon.training.loop import make_fabric, Run, TrainingConfig, TrainingDivergedError
-from active_recon.training.policy_gradient import (
+from active_recon.training.policy_gradient import draw_episodes, run_episodes, train_policy
+from active_recon.training.policy_losses import (
     azimuth_entropy,
     distance_reward,
-    draw_episodes,
     Episode,
     policy_losses,
     returns_to_go,
-    run_episodes,
-    train_policy,
 )
 from active_recon.volumes.voxels import iou
 import numpy as np

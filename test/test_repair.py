@@ -189,7 +189,7 @@ def test_a_disk_too_full_for_the_repair_leaves_all_as_it_was(tmp_path):
 def test_the_command_says_what_it_did_and_refuses_in_one_line(cut_off, tmp_path):
     def run(path):
         return subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'bag', 'repair',
-                               str(path)], capture_output=True, text=True, timeout=60)
+                               str(path)], capture_output=True, text=True, timeout=600)
 
     done = run(cut_off)
     assert done.returncode == 0, done.stderr

@@ -2,11 +2,11 @@
 
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.sweep import record_sweep
-from active_recon.cli.main import main
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
 from active_recon.models.weights_files import PAPER_MODEL
 from active_recon.policies import POLICIES
 from active_recon.simulation.shown_object import ShownObject
+from command_line import command
 import numpy as np
 import pytest
 from recorded_runs import image_at
@@ -23,11 +23,9 @@ def sweep(tmp_path_factory):
 
 def replayed(monkeypatch, capsys, *arguments):
     """Replay with the command; return its exit code and what it said."""
-    monkeypatch.setattr('sys.argv', ['active-recon', 'replay', *map(str, arguments)])
-    with pytest.raises(SystemExit) as end:
-        main()
+    code = command(monkeypatch, 'replay', *arguments)
     said = capsys.readouterr()
-    return end.value.code or 0, said.out + said.err
+    return code, said.out + said.err
 
 
 def test_a_sweep_has_nothing_to_compare_and_says_so(sweep, monkeypatch, capsys):

@@ -11,7 +11,8 @@ from active_recon.objects import find_object
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.subject import Subject
 from active_recon.report.truth import known_truth, TruthFile
-from active_recon.volumes.voxels import VoxelGrid, write_binvox
+from active_recon.volumes.binvox import write_binvox
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 from report_runs import changed, recorded_run

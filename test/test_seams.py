@@ -5,7 +5,8 @@ import math
 
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.views import read_views
-from active_recon.evaluation.policy_study import compare, contenders, run_all
+from active_recon.evaluation.contenders import contenders
+from active_recon.evaluation.policy_study import compare, run_all
 from active_recon.evaluation.trial import Trial
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network import Cameras

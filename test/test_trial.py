@@ -5,7 +5,7 @@ import json
 
 from active_recon.errors import DataError
 from active_recon.evaluation import trial as trial_module
-from active_recon.evaluation.policy_study import contenders
+from active_recon.evaluation.contenders import contenders
 from active_recon.evaluation.trial import Contender, data_hash, Trial
 from active_recon.models.weights import state_hash
 import numpy as np

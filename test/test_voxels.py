@@ -3,17 +3,16 @@
 import math
 
 from active_recon.errors import ConfigError, DataError
+from active_recon.volumes.binvox import read_binvox, write_binvox
+from active_recon.volumes.point_grids import grid_from_points
 from active_recon.volumes.voxels import (
     entropy,
-    grid_from_points,
     iou,
     MESH_FORMATS,
     paper_entropy,
     PUBLISHED_FLOOR,
-    read_binvox,
     turned,
     VoxelGrid,
-    write_binvox,
     write_mesh,
 )
 import numpy as np

@@ -9,7 +9,7 @@ from importlib import import_module
 import sys
 
 from active_recon.config import Config, LossConfig
-from active_recon.geometry.cameras import pose_directions
+from active_recon.geometry.view_distance import pose_directions
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import NetworkEntry, NETWORKS
 from active_recon.policies import Choice, POLICIES, PolicyEntry

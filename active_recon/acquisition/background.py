@@ -13,6 +13,7 @@ BACKGROUNDS = ('as_is', 'mask', 'reference', 'color')
 COLOR_TOLERANCE = 10.0
 """Largest distance of a background pixel from the background's colour, CIE76 in L*a*b*."""
 GREEN_SCREEN = (0, 177, 64)
+_WHITE = (255, 255, 255)
 """Red, green and blue of a common green screen."""
 
 _SEARCHED_SIDE = 1024  # pixels: larger images are downsampled to find the object
@@ -79,7 +80,8 @@ def main_part_share(cleared: NDArray[np.uint8]) -> float:
     It is far below 1 where parts of the object were taken for background, for example because
     they have the same colour.
     """
-    _, areas = _parts(np.asarray((cleared < 255).any(axis=2)))
+    white = np.asarray(cv2.inRange(cleared, _WHITE, _WHITE), np.uint8)
+    _, areas = _parts(_searched(white) < 255)
     return float(areas.max(initial=0) / max(areas.sum(), 1))
 
 

@@ -2,7 +2,8 @@
 
 from active_recon.acquisition.stillness import Stillness
 from active_recon.acquisition.stream_monitor import CLOCK_BACK_S
-from active_recon.geometry.cameras import Camera, view_distance
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.view_distance import view_distance
 import numpy as np
 
 _JUMPS, _JUMPS_S = 3, 1.0

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from active_recon.acquisition.stillness import STILL_TIME, Stillness
 from active_recon.errors import ConfigError
-from active_recon.geometry.cameras import Camera, view_distance
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.view_distance import view_distance
 
 TAKE_VIEWS = ('auto', 'at_goal', 'by_separation', 'all')
 GOAL_TOLERANCE = 0.14

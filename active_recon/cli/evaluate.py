@@ -1,12 +1,13 @@
 """`active-recon evaluate`: the IoU of a model under view policies, on held-out objects."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 import json
 from pathlib import Path
 import sys
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.evaluate_studies import print_baselines, print_latent_swap, print_yaw
+from active_recon.cli.intervals import difference, line, spread
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import read_objects, Split
 from active_recon.errors import ConfigError
@@ -76,9 +77,10 @@ def evaluate(
     Example: active-recon evaluate data/test --model runs/new/weights.safetensors
     --against runs/old/weights.safetensors --policy farthest --rows both.csv
     """
+    from active_recon.evaluation.contenders import contender_names, contenders
     from active_recon.evaluation.paired import paired as between
     from active_recon.evaluation.paired import require_same_episodes, write_rows
-    from active_recon.evaluation.policy_study import compare, contender_names, contenders, run_all
+    from active_recon.evaluation.policy_study import compare, run_all
     from active_recon.evaluation.trial import Trial
     from active_recon.models.weights import load_weights
     from active_recon.models.weights_files import find_weights, weights_hash
@@ -124,18 +126,21 @@ def evaluate(
             'above': {name: between(runs, other.runs[name], trial.objects)
                       for name, runs in own.runs.items() if name in other.runs}}
         for name, figures in result['against']['above'].items():
-            typer.echo(f'{name}, difference to {against}: {_difference(figures)}')
+            typer.echo(f'{name}, difference to {against}: {difference(figures)}')
     if paired:
         first, second = named
         result['paired'] = between(own.runs[first], own.runs[second], trial.objects)
-        typer.echo(f'{first} minus {second}: {_difference(result["paired"])}')
+        typer.echo(f'{first} minus {second}: {difference(result["paired"])}')
     if rows:
         models = {str(each.weights): (each.trial, each.runs) for each in (own, other) if each}
         write_rows(rows, models)
         typer.echo(f'wrote {rows}')
-    _studies(own, result, yaw_study, latent_study)
+    if yaw_study:
+        result['yaw'] = print_yaw(trial)
+    if latent_study:
+        result['latent_swap'] = print_latent_swap(trial, own.bundle)
     if training and validation is not None:
-        result['baselines'] = _baselines(training, validation, trial)
+        result['baselines'] = print_baselines(training, validation, trial)
     if json_file:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps(result, indent=1) + '\n')
@@ -152,74 +157,12 @@ class _Measured:
     runs: 'Runs'
 
 
-def _studies(own: _Measured, result: dict[str, Any], yaw: bool, latent: bool) -> None:
-    """Measure and print the optional studies."""
-    from active_recon.evaluation.measure import iou_by_yaw, latent_swap_ablation
-    from active_recon.evaluation.metrics import episodes
-    from active_recon.policies import learned_policy
-    from active_recon.runtimes.torch import TorchPolicyRuntime
-
-    trial, attention = own.trial, own.bundle.attention
-    # These studies do not compare policies, so few starts are enough
-    starts = len(trial.objects) // len(trial.views)
-    objects, first = episodes(trial.views, min(starts, 4), trial.identity['seed'])
-    if yaw:
-        with progress_bar("the front's yaw", len(objects)) as advance:
-            result['yaw'] = iou_by_yaw(trial.network, trial.views, objects, first,
-                                       trial.threshold, lambda done: advance(done, ''))
-        typer.echo("IoU by the front's yaw: " + ', '.join(
-            f'{angle} deg {values["mean"]:.3f}' for angle, values in result['yaw'].items()))
-    if latent and (attention is None or len(trial.views) < 2 or trial.count < 2):
-        raise ConfigError('--latent-study: cannot swap latents: expected a model with an '
-                          'attention policy, two objects or more and two views or more')
-    if latent and attention is not None:
-        with progress_bar("other objects' latents", 2 * len(objects)) as advance:
-            swap = latent_swap_ablation(
-                trial.network, learned_policy(own.bundle.model, TorchPolicyRuntime(attention)),
-                trial.views, objects, first, trial.threshold, trial.count,
-                lambda done: advance(done, ''))
-        result['latent_swap'] = asdict(swap)
-        typer.echo(f"another object's latent: goals move by {swap.goal_change_deg['mean']:.1f} "
-                   f'deg, area under IoU falls by {_spread(swap.auc_loss, 4)}')
-
-
 def _print_policies(result: dict[str, Any]) -> None:
     for name, figures in result['policies'].items():
         above = figures['auc_above'].get('random')
         share = figures.get('gap_closed')
-        typer.echo(_line(name, figures['iou']) + f'   area {figures["auc"]["mean"]:.4f}'
-                   + (f', minus random {_spread(above, 4)}' if above else '')
-                   + (f', fraction of the gap {_spread(share, 2)}' if share else ''))
+        typer.echo(line(name, figures['iou']) + f'   area {figures["auc"]["mean"]:.4f}'
+                   + (f', minus random {spread(above, 4)}' if above else '')
+                   + (f', fraction of the gap {spread(share, 2)}' if share else ''))
     if 'headroom_sentence' in result:
         typer.echo(result['headroom_sentence'])
-
-
-def _baselines(training: list[Path], validation: Path, trial: 'Trial') -> dict[str, Any]:
-    from active_recon.evaluation.baselines import Baselines
-    from active_recon.evaluation.measure import interval
-    import torch
-
-    held_out = trial.views
-    asked = trial.network.spec
-    found = Baselines.of(read_objects(training, 'training data', asked),
-                         read_objects([validation], 'validation data', asked))
-    result = {
-        'mean_shape': interval(found.mean_shape(held_out), torch.arange(len(held_out))),
-        'nearest_image': interval(
-            found.nearest_image(held_out, trial.objects, trial.starts), trial.objects)}
-    for name, values in result.items():
-        typer.echo(f'{name:>14}: {_spread(values)}')
-    return result | {'mean_shape_threshold': found.threshold}
-
-
-def _difference(figures: dict[str, Any]) -> str:
-    after = '  '.join(_spread(values) for values in figures['iou'])
-    return f'{after}   area {_spread(figures["auc"], 4)}'
-
-
-def _spread(values: dict[str, float], digits: int = 3) -> str:
-    return f'{values["mean"]:.{digits}f} [{values["low"]:.{digits}f}, {values["high"]:.{digits}f}]'
-
-
-def _line(name: str, values: Sequence[dict[str, float]]) -> str:
-    return f'{name:>14}: ' + '  '.join(_spread(value) for value in values)

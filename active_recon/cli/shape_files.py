@@ -39,8 +39,9 @@ class ShapeFiles:
 
     def write(self, grids: Sequence['VoxelGrid'], threshold: float) -> None:
         """Write the shapes and print the paths; raises DataError where there is no surface."""
+        from active_recon.volumes.binvox import write_binvox
         from active_recon.volumes.refinement import refined_mesh
-        from active_recon.volumes.voxels import write_binvox, write_mesh
+        from active_recon.volumes.voxels import write_mesh
         import numpy as np
 
         for number, grid in enumerate(grids, 1):

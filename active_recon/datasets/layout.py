@@ -23,13 +23,8 @@ from pathlib import Path
 
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
-from active_recon.volumes.voxels import (
-    binvox_side,
-    read_binvox,
-    RESOLUTION,
-    VoxelGrid,
-    write_binvox,
-)
+from active_recon.volumes.binvox import binvox_side, read_binvox, write_binvox
+from active_recon.volumes.voxels import RESOLUTION, VoxelGrid
 import cv2
 import numpy as np
 from numpy.typing import NDArray

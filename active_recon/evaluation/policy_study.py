@@ -3,12 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
-import hashlib
-from pathlib import Path
 import time
 from typing import Any
 
-from active_recon.errors import ConfigError, WeightsError
+from active_recon.evaluation.contenders import contender_names, contenders, heuristic_names
 from active_recon.evaluation.measure import Episodes, summary
 from active_recon.evaluation.rollouts import batches, roll_out
 from active_recon.evaluation.statistics import (
@@ -20,21 +18,9 @@ from active_recon.evaluation.statistics import (
 )
 from active_recon.evaluation.subsets import best_subsets
 from active_recon.evaluation.trial import Contender, Trial
-from active_recon.models.network import ReconstructionNetwork
-from active_recon.models.weights import load_weights, state_hash
-from active_recon.models.weights_files import PAPER_MODEL
-from active_recon.policies import (
-    Choice,
-    learned_policy,
-    load_policy,
-    Observation,
-    POLICIES,
-    Policy,
-    PolicyOptions,
-)
+from active_recon.policies import Choice, Observation, Policy
 from active_recon.reporting import Advance, Reporting, silent
 from active_recon.runtimes import State
-from active_recon.runtimes.torch import TorchPolicyRuntime
 import numpy as np
 from torch import nn
 
@@ -42,72 +28,6 @@ _TIMED_EPISODES = 8
 
 Runs = Mapping[str, Sequence[Episodes]]
 """The runs of each policy by its name: the same episodes for each seed."""
-
-
-def heuristic_names() -> list[str]:
-    """Return the names of the policies that are not learned."""
-    return [name for name, entry in POLICIES.items() if not entry.is_learned]
-
-
-def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
-    """Return the names of all policies, learned ones last, and 'oracle', which is not a policy."""
-    own = [name for name, entry in POLICIES.items() if entry.is_learned and learned]
-    return [*heuristic_names(), *own, *(['oracle'] if oracle else [])]
-
-
-def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count: int = 5,
-               seeds: int = 5, seed: int = 0, model: str = PAPER_MODEL) -> list[Contender]:
-    """
-    Return the policies of these names, each with all of its seeds.
-
-    - attentions: the learned policy's modules, one for each training seed
-    - model: name of the network that they were trained with
-    - count: number of views of an episode, used by uniform
-    - seeds: number of runs of random, with seeds from `seed` on
-
-    Raises ConfigError on an unknown name, WeightsError where attention has no module.
-    """
-    made: list[Contender] = []
-    for name in names:
-        if name not in contender_names():
-            raise ConfigError('policy: no such policy: expected some of '
-                              f'{", ".join(contender_names())}, got {name!r}')
-        if name not in POLICIES:
-            made.append(Contender(name, name, None))
-        elif POLICIES[name].is_learned:
-            if not attentions:
-                raise WeightsError(f'{name}: no view policy: expected weights that contain one, '
-                                   'for example of `active-recon train --model 2d3d-attention`, '
-                                   'got none')
-            made += [Contender(name, f'{name}-{_model_hash(each)}', partial(_learned, model, each))
-                     for each in attentions]
-        elif POLICIES[name].draws:
-            made += [Contender(name, f'{name}-{each}', partial(_heuristic, name, count))
-                     for each in range(seed, seed + seeds)]
-        else:
-            made.append(Contender(name, name, partial(_heuristic, name, count)))
-    return made
-
-
-def load_attentions(files: Sequence[Path], network: ReconstructionNetwork) -> list[nn.Module]:
-    """
-    Return the attention modules of weights files that were trained with this network.
-
-    Raises WeightsError where a file has none, or one trained with another network, whose latents
-    differ.
-    """
-    models = []
-    for file in files:
-        bundle = load_weights(file)
-        if bundle.attention is None:
-            raise WeightsError(f'{file}: no view policy: expected weights that contain one, got '
-                               'none')
-        if state_hash(bundle.reconstruction) != state_hash(network):
-            raise WeightsError(f'{file}: view policy of another network: expected one trained '
-                               'with the network that is measured, got one of another; train it '
-                               'with `active-recon train --freeze-from` and that network')
-        models.append(bundle.attention)
-    return models
 
 
 def run_all(trial: Trial, every: Sequence[Contender], reporting: Reporting = silent) -> Runs:
@@ -181,20 +101,6 @@ def policy_study(trial: Trial, attentions: Sequence[nn.Module] = (), seeds: int 
             found['best_subset'] = best_subsets(
                 trial, runs, subset_objects, lambda: advance(1, ''))
     return found
-
-
-def _heuristic(name: str, count: int, rng: np.random.Generator) -> Policy:
-    return load_policy(name, PolicyOptions(rng, count))
-
-
-def _learned(model: str, module: nn.Module, rng: np.random.Generator) -> Policy:
-    return learned_policy(model, TorchPolicyRuntime(module))
-
-
-def _model_hash(module: nn.Module) -> str:
-    """Return a hash that identifies a learned policy: of its weights and its metadata."""
-    facts = sorted(TorchPolicyRuntime(module).facts.items())
-    return hashlib.sha256(f'{state_hash(module)} {facts}'.encode()).hexdigest()[:16]
 
 
 def _advance(advance: Advance, done: int) -> None:

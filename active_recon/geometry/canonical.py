@@ -1,7 +1,6 @@
 """Warp or crop a camera's image to what a network was trained on, and return its new camera."""
 
 from dataclasses import dataclass
-import math
 
 from active_recon.errors import ViewError
 from active_recon.geometry.cameras import (
@@ -12,14 +11,11 @@ from active_recon.geometry.cameras import (
     orbit_camera,
 )
 from active_recon.geometry.framing import cube_corners, require_in_image
+from active_recon.geometry.resampling import pixels_within, SAMPLE_EVERY, seen_by, turn_between
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_FINEST = 2
-"""An image at least this many times as fine as needed is downsampled first."""
-_MOST_SAMPLES = 3
-_SAMPLE_EVERY = 1.5  # pixels: close enough that stripes of a pixel are not skipped
 _MARGIN = 1.05  # side of a framed image relative to the cube's extent
 _MOST_MISSING = 0.9  # fraction of the cube's silhouette that may be outside of a framed image
 
@@ -66,7 +62,7 @@ def canonical_image(image: NDArray[np.uint8], camera: Camera, object_size: float
     require_in_image(camera, object_size)
     target = orbit_camera(camera.azimuth, camera.elevation, CANONICAL_DISTANCE * object_size,
                           CANONICAL_INTRINSICS.resized(image_size, image_size))
-    return _seen_by(target, image, camera), target
+    return seen_by(target, image, camera), target
 
 
 def framed_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 1.0,
@@ -84,7 +80,7 @@ def framed_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 
     _require_size(image, camera)
     require_in_image(camera, object_size, _MOST_MISSING)
     target = framing_camera(camera, object_size, image_size)
-    framed, seen = _seen_by(target, image, camera), _within(camera, target, image_size)
+    framed, seen = seen_by(target, image, camera), pixels_within(camera, target, image_size)
     if seen.all():
         return framed, target
     framed[~seen] = 0
@@ -102,16 +98,16 @@ def framed_layers(
     """
     target = framing_camera(camera, object_size, image_size)
     lens, size = camera.intrinsics, (image_size, image_size)
-    if lens.distortion is None and lens.fx < _SAMPLE_EVERY * target.intrinsics.fx:
-        half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # OpenCV: (0, 0) is a centre
-        to_source = np.linalg.inv(half) @ _turn(camera, target) @ half
+    if lens.distortion is None and lens.fx < SAMPLE_EVERY * target.intrinsics.fx:
+        half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # OpenCV counts from centres
+        to_source = np.linalg.inv(half) @ turn_between(camera, target) @ half
         whole = np.full(layers.shape[:2], 255, np.uint8)
         carried, there = (cv2.warpPerspective(each, to_source, size,
                                               flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
                           for each in (layers, whole))
         return np.asarray(carried, np.uint8), np.asarray(there > 127), target
-    return (_seen_by(target, layers, camera, cv2.BORDER_CONSTANT),
-            _within(camera, target, image_size), target)
+    return (seen_by(target, layers, camera, cv2.BORDER_CONSTANT),
+            pixels_within(camera, target, image_size), target)
 
 
 def framing_camera(camera: Camera, object_size: float = 1.0, image_size: int = 64) -> Camera:
@@ -137,86 +133,3 @@ def _require_size(image: NDArray[np.uint8], camera: Camera) -> None:
         raise ViewError(f'wrong image size or type: expected {lens.height} x {lens.width} x 3 '
                         f'uint8, as the camera says, got {image.shape} '
                         f'{image.dtype}', 'image_size')
-
-
-def _seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
-             beyond: int = cv2.BORDER_REPLICATE) -> NDArray[np.uint8]:
-    """Return a camera's image warped to the target, (S, S, C), via the plane that faces it."""
-    size = target.intrinsics.width
-    seen = _seen(camera, target, size)
-    if _is_whole_image(seen, camera, size):
-        return _shrunk(image, size, size)
-    left, top, right, bottom = _window(seen, camera, size)
-    width, height = (_few_pixels(count, size) for count in (right - left, bottom - top))
-    window = _shrunk(image[top:bottom, left:right], width, height)
-    scale = np.array([width / (right - left), height / (bottom - top)])
-    fine = size * _samples(seen * scale)
-    # OpenCV's (0, 0) is the centre of the first pixel, ours its corner
-    where = (_seen(camera, target, fine) - [left, top]) * scale - 0.5
-    where = np.clip(where, -1, [width, height]).astype(np.float32)
-    sampled = cv2.remap(window, where[..., 0], where[..., 1], cv2.INTER_LINEAR,
-                        borderMode=beyond)
-    return _shrunk(np.asarray(sampled, np.uint8), size, size)
-
-
-def _seen(camera: Camera, target: Camera, size: int) -> NDArray[np.float64]:
-    """Return the camera's pixel coordinates of size x size target pixels, (size, size, 2)."""
-    if camera.intrinsics.distortion is None and np.array_equal(camera.position, target.position):
-        fine = Camera(target.pose, target.intrinsics.resized(size, size))  # fifty times as fast
-        across = np.arange(size) + 0.5
-        x, y, depth = (row[0] * across + (row[1] * across + row[2])[:, None]
-                       for row in _turn(camera, fine))
-        depth = np.where(depth > 0, depth, -1e-9)
-        return np.stack([x / depth, y / depth], axis=-1)
-    rays = Camera(target.pose, target.intrinsics.resized(size, size)).ray_directions()
-    pixels, depth = camera.project((target.position + target.distance * rays).reshape(-1, 3))
-    pixels[depth <= 0] = -1e9  # nowhere in the image
-    return np.nan_to_num(pixels, nan=-1e9).reshape(size, size, 2)
-
-
-def _turn(camera: Camera, target: Camera) -> NDArray[np.float64]:
-    """Return the homography, (3, 3), from the target's pixels to those of a camera beside it."""
-    return np.asarray(camera.intrinsics.matrix @ camera.pose[:3, :3].T @ target.pose[:3, :3]
-                      @ np.linalg.inv(target.intrinsics.matrix))
-
-
-def _within(camera: Camera, target: Camera, size: int) -> NDArray[np.bool_]:
-    """Return which of the target's pixels lie in the camera's image, (size, size)."""
-    where, lens = _seen(camera, target, size), camera.intrinsics
-    return np.asarray(np.all((where >= 0) & (where <= [lens.width, lens.height]), axis=-1))
-
-
-def _is_whole_image(seen: NDArray[np.float64], camera: Camera, size: int) -> bool:
-    """Return whether the target's image is the camera's, resized."""
-    column, row = np.meshgrid(*[np.arange(size) + 0.5] * 2)
-    lens = camera.intrinsics
-    whole = np.stack([column * lens.width, row * lens.height], axis=-1) / size
-    return lens.distortion is None and np.allclose(seen, whole, rtol=0, atol=0.01)
-
-
-def _window(seen: NDArray[np.float64], camera: Camera, size: int) -> tuple[int, int, int, int]:
-    """Return left, top, right, bottom of the required part of the camera's image, in pixels."""
-    whole = np.array([camera.intrinsics.width, camera.intrinsics.height])
-    first, last = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
-    first, last = np.clip(first, 0, whole), np.clip(last, 0, whole)
-    margin = (last - first) / size + 1
-    left, top = np.maximum(np.floor(first - margin), 0).astype(int)
-    right, bottom = np.minimum(np.ceil(last + margin), whole).astype(int)
-    return int(left), int(top), int(right), int(bottom)
-
-
-def _few_pixels(count: int, size: int) -> int:
-    return math.ceil(count / max(count // (_FINEST * size), 1))
-
-
-def _samples(seen: NDArray[np.float64]) -> int:
-    """Return the number of samples along each side of a target pixel that avoids aliasing."""
-    steps = np.concatenate([np.diff(seen, axis=0).reshape(-1, 2),
-                            np.diff(seen, axis=1).reshape(-1, 2)])
-    apart = float(np.median(np.linalg.norm(steps, axis=1)))
-    return min(max(1, math.ceil(apart / _SAMPLE_EVERY)), _MOST_SAMPLES)
-
-
-def _shrunk(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    resized = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-    return np.asarray(resized, np.uint8)

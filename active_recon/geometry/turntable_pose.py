@@ -8,7 +8,6 @@ from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 DIRECTIONS = (-1, 1)
 """The rotation, seen from above, in which the joint's angle increases: clockwise or not."""
@@ -44,6 +43,8 @@ class FixedCamera:
         Both are in the object frame at joint angle 0. Raises ConfigError that names the parameter
         `camera_position` or `camera_orientation`.
         """
+        from scipy.spatial.transform import Rotation  # half of the start of a node without poses
+
         if len(position) != 3 or not np.isfinite(position).all() or not np.any(position):
             raise ConfigError('camera_position: invalid position: expected x, y, z of the camera '
                               'in the object frame, metres, other than 0, 0, 0, got '
@@ -64,6 +65,8 @@ class FixedCamera:
         Its azimuth is that at angle 0 minus the object's counter-clockwise rotation. Raises
         ViewError where the angle is not finite.
         """
+        from scipy.spatial.transform import Rotation
+
         if not math.isfinite(angle):
             raise ViewError("invalid joint position: expected a finite angle of the turntable's "
                             f'joint, got {angle}', 'joint')

@@ -175,7 +175,8 @@ class Lifting(ReconstructionNetwork):
         count = (state['views'][:, 0].long() - 1).clamp(0, _COUNTS - 1)
         scale, weight, bias = self.calibration[count].T[..., None, None, None]  # (B, 1, 1, 1)
         found = self.logits(state)
-        return scale * found.logits + weight * found.evidence + bias
+        calibrated: Tensor = scale * found.logits + weight * found.evidence + bias
+        return calibrated
 
     def logits(self, state: State) -> Decoded:
         """Return what the decoder gives, before calibration."""

@@ -229,7 +229,6 @@ class ReconstructorNode(ManagedNode):
         mask = None if view.mask is None else mask_from_msg(view.mask)
         image = self._background.cleared(view.image, mask, self._capture.reference)
         reconstruction = self._reconstructor.add_view(image, view.camera)
-        self._check_background(image)
         self._gate.took(view.camera)
         self._check_elevation(view.camera)
         self._reconstruction = reconstruction
@@ -241,6 +240,7 @@ class ReconstructorNode(ManagedNode):
                                     at_once=False)
         self._publisher.publish_view(
             view.stamp, view.camera.pose, reconstruction, None if image is view.image else image)
+        self._check_background(image)  # last: it is for the user, and nothing waits for it
 
     def _check_background(self, image: NDArray[np.uint8]) -> None:
         if self._background.how in ('color', 'reference') and (

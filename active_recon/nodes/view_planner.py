@@ -3,6 +3,7 @@
 import math
 import time
 
+from active_recon.acquisition.goals import Goal
 from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import (
     Camera,
@@ -21,7 +22,7 @@ from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
 from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.view_planner import ViewPlannerParameters
-from active_recon.planner import Decision, Goal, Planner, PlannerView
+from active_recon.planner import Decision, Planner, PlannerView
 from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg

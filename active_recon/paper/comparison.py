@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.ablations import iou_by_yaw
 from active_recon.evaluation.baselines import Baselines
-from active_recon.evaluation.measure import iou_by_yaw
 from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.statistics import Interval, Values
 from active_recon.models.network import Cameras
@@ -20,12 +20,7 @@ from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.measured import measure, Measured
 from active_recon.paper.results import Claim, Column, Table
 from active_recon.paper.study import Study
-from active_recon.paper.systems import (
-    have_systems,
-    MODEL,
-    systems,
-    views_seen,
-)
+from active_recon.paper.systems import have_systems, MODEL, systems, views_seen
 from active_recon.volumes.voxels import RESOLUTION
 import torch
 from torch.utils.flop_counter import FlopCounterMode

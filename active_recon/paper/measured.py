@@ -5,8 +5,8 @@ from pathlib import Path
 
 from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.contenders import contenders
 from active_recon.evaluation.measure import Episodes
-from active_recon.evaluation.policy_study import contenders
 from active_recon.evaluation.rollouts import batches, roll_out
 from active_recon.evaluation.statistics import Values
 from active_recon.evaluation.trial import read_arrays, Trial, write_arrays

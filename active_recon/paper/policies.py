@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.config import LossConfig, RewardConfig
-from active_recon.evaluation.policy_study import heuristic_names, policy_study
+from active_recon.evaluation.contenders import heuristic_names
+from active_recon.evaluation.policy_study import policy_study
 from active_recon.evaluation.statistics import Interval
 from active_recon.evaluation.trial import Trial
 from active_recon.models.weights import load_weights
@@ -15,13 +16,7 @@ from active_recon.paper.claims import all_larger, headroom, larger
 from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
 from active_recon.paper.results import Cell, Claim, Column, Result, Table
 from active_recon.paper.study import Study
-from active_recon.paper.systems import (
-    MODEL,
-    policy_training,
-    run_plan,
-    training_plan,
-    TWO_STAGE,
-)
+from active_recon.paper.systems import MODEL, policy_training, run_plan, training_plan, TWO_STAGE
 from active_recon.paper.writing import provenance
 from active_recon.training.loop import TrainingConfig
 from active_recon.training.plan import Plan

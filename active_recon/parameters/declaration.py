@@ -59,6 +59,11 @@ class Declared:
             one = f'{"an integer" if kind is int else "a number"}{between}{absent}'
         return f'a list, each {one}' if self.of else one
 
+    @property
+    def default_words(self) -> list[str]:
+        """The default in words: one, or one for each element of a list."""
+        return [_words(each) for each in (self.default if self.of else (self.default,))]
+
     def checked(self, value: Any) -> Any:
         """Return the value as its kind; ConfigError where it is not allowed."""
         if self.of is not None and (value is None or isinstance(value, Sequence)):
@@ -91,6 +96,12 @@ class Declared:
 def number_words(number: float) -> str:
     """Format a number for messages and tables."""
     return str(int(number)) if number == number // 1 else f'{number:.4g}'
+
+
+def _words(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return number_words(value) if isinstance(value, float) else str(value)
 
 
 def _as(kind: type, value: object) -> object:

@@ -45,13 +45,11 @@ def _table(node: str, parameters: type) -> Iterator[str]:
 
 
 def _default(each: Declared) -> str:
-    if each.of:
-        shown = [str(element) for element in each.default[:_SHOWN]]
-        more = ['...'] if len(each.default) > _SHOWN else []
-        return f'`[{", ".join(shown + more)}]`'
-    if each.kind is bool:
-        return str(each.default).lower()
-    return number_words(each.default) if each.kind is float else str(each.default)
+    words = each.default_words
+    if not each.of:
+        return words[0]
+    more = ['...'] if len(words) > _SHOWN else []
+    return f'`[{", ".join(words[:_SHOWN] + more)}]`'
 
 
 def _allowed(each: Declared) -> str:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from active_recon.geometry.cameras import direction_distance, pose_directions
+from active_recon.geometry.view_distance import direction_distance, pose_directions
 from active_recon.runtimes import State
 import numpy as np
 from numpy.typing import NDArray

@@ -1,6 +1,7 @@
 """The heuristic policies, which use no image: random, uniform, farthest."""
 
-from active_recon.geometry.cameras import direction_distance, pose_azimuths, pose_directions, TURN
+from active_recon.geometry.cameras import pose_azimuths, TURN
+from active_recon.geometry.view_distance import direction_distance, pose_directions
 from active_recon.policies.base import Choice, distance_to_taken, is_fresh, Observation
 from active_recon.runtimes import State
 import numpy as np

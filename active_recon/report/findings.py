@@ -7,7 +7,8 @@ import math
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.bags.runs.missing import describe_lost
 from active_recon.bags.runs.parameters import node_parameters
-from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, view_distance
+from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.geometry.view_distance import view_distance
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import degrees, Subject
 from active_recon.report.words import counted, refused, times, warned

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 import math
 
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
@@ -38,7 +39,7 @@ class Subject:
         decided = [self.episode.first_goal, *(view.goal for view in self.views[:-1])]
         return [goal and goal.final for goal in decided]
 
-    @property
+    @cached_property
     def threshold(self) -> float:
         """The threshold of occupied cells, from the recorded grids."""
         above, below = 1.0, 0.0
@@ -55,7 +56,7 @@ class Subject:
         return [view.entropy if view.entropy is not None and math.isfinite(view.entropy) else None
                 for view in self.views]
 
-    @property
+    @cached_property
     def ious(self) -> list[float | None]:
         """IoU with the true shape after each view, None if unknown."""
         return [None if self.truth is None or view.occupied is None

@@ -8,9 +8,10 @@ from active_recon.bags.runs.run import RecordedRun
 from active_recon.errors import ConfigError, DataError
 from active_recon.objects import find_object, shipped_objects
 from active_recon.report.subject import shown_grid
+from active_recon.volumes.binvox import read_binvox
 from active_recon.volumes.meshes import fit_to_grid, load_mesh, read_mesh
 from active_recon.volumes.voxelisation import voxelise
-from active_recon.volumes.voxels import read_binvox, RESOLUTION, turned, VoxelGrid
+from active_recon.volumes.voxels import RESOLUTION, turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion

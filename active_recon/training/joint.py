@@ -16,7 +16,8 @@ from active_recon.training.loop import (
     train_steps,
     TrainingConfig,
 )
-from active_recon.training.policy_gradient import draw_episodes, policy_losses, run_episodes
+from active_recon.training.policy_gradient import draw_episodes, run_episodes
+from active_recon.training.policy_losses import policy_losses
 from active_recon.training.supervised import ReconstructionLearner
 import numpy as np
 import torch

@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from active_recon.geometry.cameras import Camera, view_distance
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.view_distance import view_distance
 from active_recon.view_colors import Color, view_color
 from active_recon.viewer.state import LoopState, Scores
 from active_recon.viewer.view_result import ViewResult

@@ -1,4 +1,4 @@
-"""The voxel grid: a cube of occupancy probabilities, its measures, and its forms on disk."""
+"""The voxel grid: a cube of occupancy probabilities, its measures, and its mesh."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,19 +7,12 @@ from typing import Any, TYPE_CHECKING
 from active_recon.errors import ConfigError, DataError
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import xlogy
 
 if TYPE_CHECKING:
     import trimesh
 
 RESOLUTION = 32
 FINE_RESOLUTION = 64
-_MOST_CELLS = 256  # a side
-# Centres of cells of different powers of two never coincide: where one fits, no other does
-_RESOLUTIONS = sorted(range(1, _MOST_CELLS + 1), key=lambda side: (side & (side - 1) > 0, side))
-_FEW = 300  # points tested before all of them
-_TELLING = 8  # this many cells of an object are never all a multiple of 3 apart by chance
-_OFF_CENTRE = 1e-3  # in cells: above float32's rounding, below the differences between grids
 MESH_FORMATS = ('ply', 'obj', 'stl')
 PUBLISHED_FLOOR = 0.02
 """Cells up to this occupancy are left out of the published probabilities and their entropy."""
@@ -49,6 +42,8 @@ def entropy(occupancy: Any) -> Any:
 def paper_entropy(occupancy: Any) -> Any:
     """Return -sum(p log p) in nats, the paper's section 4.6: `entropy` without its second term."""
     if isinstance(occupancy, np.ndarray):
+        from scipy.special import xlogy  # slow to import, and not every node needs it
+
         return -xlogy(occupancy, occupancy).sum((-3, -2, -1))
     return -occupancy.xlogy(occupancy).sum((-3, -2, -1))
 
@@ -140,71 +135,6 @@ class VoxelGrid:
         return mesh
 
 
-def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
-                     resolution: int = RESOLUTION) -> VoxelGrid:
-    """
-    Return the grid of points (N, 4): x, y, z, occupancy; the inverse of `VoxelGrid.points`.
-
-    Its resolution is the smallest with every point at the centre of a cell, powers of two first;
-    `resolution` is used where there are no points. Raises DataError of the kind 'cloud' where
-    points are outside of the cube of `size` metres, are not at the centres of one grid's cells,
-    only at every third, fifth ... of them, share a cell, or have an occupancy outside of [0, 1].
-    """
-    if not len(points):
-        return VoxelGrid(np.zeros((resolution,) * 3, np.float32), size)
-    with np.errstate(invalid='ignore', over='ignore'):  # values that are not finite: see below
-        shares = points[:, :3] / size + np.float32(0.5)
-    if not ((shares >= 0) & (shares < 1)).all():  # also where a coordinate is NaN
-        raise DataError(f'point out of the cube: expected all inside a cube of {size} m about the '
-                        'origin', 'cloud')
-    if not ((points[:, 3] >= 0) & (points[:, 3] <= 1)).all():
-        raise DataError(f'invalid occupancy: expected values in [0, 1], got {points[:, 3].min()} '
-                        f'to {points[:, 3].max()}', 'cloud')
-    side = _cells_a_side(shares)
-    if side is None:
-        raise DataError('points between cell centres: expected them at the centres of at '
-                        f'most {_MOST_CELLS} cells a side of a cube of {size} m, got '
-                        f'{len(points)} elsewhere', 'cloud')
-    index = (shares * side).astype(np.intp)
-    if (spacing := _spacing(index)) > 1:
-        raise DataError('points of a cube of another size: expected the cells of a cube of '
-                        f'{size} m beside each other, got {len(points)} that are {spacing} of '
-                        f'{side} a side apart', 'cloud')
-    x, y, z = index.T
-    cells = (x * side + y) * side + z
-    occupancy, filled = np.zeros(side ** 3, np.float32), np.zeros(side ** 3, bool)
-    occupancy[cells], filled[cells] = points[:, 3], True
-    if (count := np.count_nonzero(filled)) < len(points):
-        raise DataError(f'several points in a cell: expected one point a cell, got {len(points)} '
-                        f'in {count} cells of {side} a side', 'cloud')
-    return VoxelGrid(occupancy.reshape((side,) * 3), size)
-
-
-def _cells_a_side(shares: NDArray[np.floating]) -> int | None:
-    """Return the resolution whose cell centres points (N, 3) in [0, 1) are, None if none is."""
-    def fit(shares: NDArray[np.floating], side: int) -> bool:
-        places = shares * side
-        return bool((np.abs(places - np.floor(places) - 0.5) <= _OFF_CENTRE).all())
-
-    return next((side for side in _RESOLUTIONS
-                 if fit(shares[:_FEW], side) and fit(shares, side)), None)
-
-
-def _spacing(index: NDArray[np.intp]) -> int:
-    """
-    Return the spacing of points (N, 3) in cells where it is that of a coarser grid, else 1.
-
-    Grids with the same centre share cell centres only if one is an odd number of times finer.
-    """
-    if len(index) < _TELLING:
-        return 1
-    for points in (index[:_FEW], index):
-        spacing = int(np.gcd.reduce(np.abs(points - index[0]), axis=None))
-        if spacing % 2 == 0 or spacing == 1:
-            return 1
-    return spacing
-
-
 def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
     """Write a mesh as PLY, OBJ or STL, by the file's suffix; raises ConfigError on others."""
     suffix = path.suffix.lower().lstrip('.')
@@ -212,70 +142,6 @@ def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
         raise ConfigError(f'{path}: no mesh has that suffix: expected {", ".join(MESH_FORMATS)}')
     path.parent.mkdir(parents=True, exist_ok=True)
     mesh.export(path)
-
-
-def read_binvox(path: Path) -> VoxelGrid:
-    """
-    Read a binvox file as R2N2 writes it, turned upright: z up, front +x.
-
-    The data are ordered x, z, y, and (x, y, z) -> (x, -z, y) turns the model upright. The grid is
-    centred at the origin with the header's scale as its side; the header's translate is ignored.
-    Raises DataError on an incomplete binvox file.
-    """
-    try:
-        raw = path.read_bytes()
-        header, _, data = raw.partition(b'\ndata\n')
-        lines = header.split(b'\n')
-        if not lines[0].startswith(b'#binvox'):
-            raise ValueError('another first line than #binvox')
-        fields = {line.split()[0]: line.split()[1:] for line in lines if line.strip()}
-        dims = tuple(int(n) for n in fields[b'dim'])
-        scale = float(fields[b'scale'][0])
-        values, counts = np.frombuffer(data, np.uint8).reshape(-1, 2).T
-        cells = np.repeat(values, counts)
-        if len(dims) != 3 or cells.size != np.prod(dims) or cells.max() > 1:
-            raise ValueError(f'{cells.size} cells for the dimensions {dims}')
-        file_order = cells.reshape(dims)  # [x, z, y] of the file's own axes: y is up
-        occupancy = file_order[:, ::-1, :]  # (x, y, z) -> (x, -z, y)
-        return VoxelGrid(np.ascontiguousarray(occupancy, np.float32), scale)
-    except OSError as error:
-        raise DataError(f'{path}: cannot be read: {error.strerror}') from error
-    except KeyError as error:
-        raise DataError(f'{path}: no whole binvox file: its header lacks '
-                        f'{error.args[0].decode()}') from error
-    except (ValueError, IndexError, DataError) as error:
-        raise DataError(f'{path}: no whole binvox file: {error}') from error
-
-
-def binvox_side(path: Path) -> float:
-    """Return the side of a binvox file's grid; raises DataError where its header has none."""
-    try:
-        with path.open('rb') as file:
-            header = file.read(1024).partition(b'\ndata\n')[0]
-        side = [float(line.split()[1]) for line in header.split(b'\n')
-                if line.startswith(b'scale')][0]
-        return VoxelGrid(np.zeros((1, 1, 1), np.float32), side).size
-    except (OSError, ValueError, IndexError) as error:
-        raise DataError(f'{path}: no readable scale: expected a binvox file with one, got: '
-                        f'{error}') from error
-
-
-def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
-    """
-    Write the occupied cells as binvox, as `read_binvox` reads them.
-
-    Not by trimesh: it writes other bytes, and its run lengths overflow for grids that it has read.
-    """
-    cells = grid.occupied(threshold)[:, ::-1, :].reshape(-1).astype(np.uint8)
-    starts = np.flatnonzero(np.r_[True, cells[1:] != cells[:-1]])
-    runs = bytearray()
-    for value, length in zip(cells[starts], np.diff(np.r_[starts, cells.size]), strict=True):
-        whole, rest = divmod(int(length), 255)
-        runs += bytes((value, 255)) * whole + (bytes((value, rest)) if rest else b'')
-    dims = ' '.join(map(str, grid.occupancy.shape))
-    header = f'#binvox 1\ndim {dims}\ntranslate 0 0 0\nscale {grid.size:.9g}\ndata\n'
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(header.encode() + runs)
 
 
 def turned(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:

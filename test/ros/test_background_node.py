@@ -126,6 +126,14 @@ def test_an_image_of_the_empty_scene_is_asked_for_kept_over_episodes_and_forgott
     room.until(lambda: refused(bench, 'no_reference')() > before, SHOWN)
 
 
-def test_what_is_of_the_background_s_color_becomes_white(bench, start_node):
-    start(start_node, background='color', background_color=list(WALL))
-    np.testing.assert_array_equal(Room(bench).take(SHOWN), on_white(SHOWN, off_color(SHOWN, WALL)))
+def test_what_is_of_the_background_s_color_becomes_white_also_where_it_cuts_the_object(
+        bench, start_node):
+    node = start(start_node, background='color', background_color=list(WALL))
+    room = Room(bench)
+    np.testing.assert_array_equal(room.take(SHOWN), on_white(SHOWN, off_color(SHOWN, WALL)))
+    assert not node.log('in pieces')
+    cut = SHOWN.copy()
+    cut[60:80] = WALL
+    np.testing.assert_array_equal(room.take(cut), on_white(cut, off_color(cut, WALL)))
+    bench.until(lambda: bench.counts('reconstructor').get('warned/background'), 'the warning')
+    assert node.log('in pieces')

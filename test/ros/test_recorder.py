@@ -132,19 +132,17 @@ def test_diagnostics_are_recorded_by_default_and_tell_the_state(bench, start_nod
     assert kinds == {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
 
 
-def test_start_and_stop_out_of_turn_are_refused_and_say_why(bench, recorder):
-    answer = bench.call('start')
-    assert not answer.success and 'already recording into' in answer.message
-    assert bench.call('stop').success
-    answer = bench.call('stop')
-    assert not answer.success and 'there is none' in answer.message
-
-
-def test_a_recorder_told_to_wait_records_when_it_is_asked(bench, start_node, tmp_path):
+def test_a_recorder_told_to_wait_starts_and_stops_when_asked_and_refuses_it_out_of_turn(
+        bench, start_node, tmp_path):
     start_node('recorder', output_dir=tmp_path / 'bags', record_at_start=False)
     assert not (tmp_path / 'bags').exists()
+    refused = bench.call('stop')
+    assert not refused.success and 'there is none' in refused.message
     answer = bench.call('start')
     assert answer.success and Path(answer.message).is_dir()
+    refused = bench.call('start')
+    assert not refused.success and 'already recording into' in refused.message
+    assert bench.call('stop').success
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])

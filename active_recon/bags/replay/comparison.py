@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from active_recon.acquisition.goals import Goal
 from active_recon.bags.replay.replay import ReplayedEpisode, ReplayStep
 from active_recon.bags.runs.run import RecordedGoal
-from active_recon.geometry.cameras import Camera, view_distance
-from active_recon.planner import Goal
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.view_distance import view_distance
 from active_recon.volumes.voxels import PUBLISHED_FLOOR, VoxelGrid
 from msg_tools.cameras import pose_through_msg
 import numpy as np

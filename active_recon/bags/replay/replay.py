@@ -4,10 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import hashlib
 
+from active_recon.acquisition.goals import Goal
 from active_recon.bags.runs.recorded_object import replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun, RecordedView
 from active_recon.geometry.cameras import Camera
-from active_recon.planner import Decision, Goal, Planner
+from active_recon.planner import Decision, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.volumes.voxels import entropy, PUBLISHED_FLOOR
 import numpy as np

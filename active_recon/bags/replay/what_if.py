@@ -14,7 +14,8 @@ from active_recon.bags.runs.recorded_object import RecordedObject, replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
 from active_recon.environment import run_episode, TimeStep
 from active_recon.errors import DataError
-from active_recon.geometry.cameras import Camera, nearest_camera, view_distance
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.view_distance import nearest_camera, view_distance
 from active_recon.planner import Decision, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.volumes.voxels import PUBLISHED_FLOOR

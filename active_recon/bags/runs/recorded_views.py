@@ -13,7 +13,8 @@ from active_recon.bags.runs.loop_record import LoopRecord
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedView
 from active_recon.bags.runs.scene import Scene
 from active_recon.errors import DataError, MessageError, ViewError
-from active_recon.geometry.cameras import azimuth_difference, Camera, OrbitCamera, view_distance
+from active_recon.geometry.cameras import azimuth_difference, Camera, OrbitCamera
+from active_recon.geometry.view_distance import view_distance
 from msg_tools.episodes import Episode
 from msg_tools.views import View
 

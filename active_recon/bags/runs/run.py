@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from active_recon.acquisition.goals import Goal
 from active_recon.bags.runs.image_gaps import ImageGaps
 from active_recon.bags.storage.metadata import QosProfile
 from active_recon.geometry.cameras import Camera
-from active_recon.planner import Goal
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray

@@ -16,7 +16,7 @@ from active_recon.evaluation.posed.walking import (
     walk,
 )
 from active_recon.evaluation.rollouts import batches, Observer
-from active_recon.geometry.cameras import pose_directions
+from active_recon.geometry.view_distance import pose_directions
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit

@@ -12,7 +12,8 @@ from active_recon.evaluation.posed.scene import Scene
 from active_recon.evaluation.posed.scoring import iou_scores, pooled, Scores, Target
 from active_recon.evaluation.posed.walking import some_objects, walk
 from active_recon.evaluation.rollouts import batches, Observer
-from active_recon.geometry.cameras import pose_directions, TURN
+from active_recon.geometry.cameras import TURN
+from active_recon.geometry.view_distance import pose_directions
 from active_recon.models.lifted import projected, projection
 from active_recon.models.network import Cameras
 from active_recon.volumes.voxels import turned

@@ -8,10 +8,10 @@ from active_recon.evaluation.rollouts import Observer
 from active_recon.geometry.cameras import (
     CANONICAL_ELEVATION,
     ELEVATION_TOLERANCE,
-    pose_directions,
     TURN,
     VIEW_COUNT,
 )
+from active_recon.geometry.view_distance import pose_directions
 import numpy as np
 from numpy.typing import NDArray
 import torch

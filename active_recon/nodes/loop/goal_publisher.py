@@ -2,9 +2,9 @@
 
 import math
 
+from active_recon.acquisition.goals import Goal
 from active_recon.geometry.cameras import Camera
 from active_recon.nodes.runtime.qos import LATCHED_QOS
-from active_recon.planner import Goal
 from geometry_msgs.msg import PoseStamped
 from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds

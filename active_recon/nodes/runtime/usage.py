@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 import textwrap
 
-from active_recon.parameters.declaration import Declared, declared, number_words
+from active_recon.parameters.declaration import Declared, declared
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
 
 _WIDTH, _INDENT = 79, ' ' * 6
@@ -28,8 +28,7 @@ def usage(node: str) -> str:
 
 
 def _parameter(each: Declared) -> Iterator[str]:
-    default = number_words(each.default) if each.kind is float else each.default
-    shown = ', '.join(map(str, default)) if each.of else str(default)
+    shown = ', '.join(each.default_words)
     yield '  ' + textwrap.shorten(f'{each.name} (default: {shown or "empty"})', _WIDTH - 2,
                                   placeholder=' ...)')
     yield from textwrap.wrap(f'{each.description}; {each.expected}', _WIDTH,
