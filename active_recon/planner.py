@@ -223,8 +223,9 @@ class Planner:
         if last.volume is None and self._policy.wants_volume:
             raise ViewError('no probabilities: expected them beside the latent, as this policy '
                             'looks at them, got none', 'volume')
+        unit = 1.0 if last.volume is None else 1 / last.volume.size
         taken, candidates = (
-            np.stack([each.turned(-self._yaw).pose for each in cameras])[None]
+            np.stack([each.turned(-self._yaw).scaled(unit).pose for each in cameras])[None]
             for cameras in ([view.camera for view in views], self._candidates))
         volume = None if last.volume is None else turned(
             last.volume.occupancy, -self._yaw)[None]

@@ -73,8 +73,8 @@ def test_every_other_object_stands_turned_where_that_is_asked_for():
 
 
 def test_a_viewing_that_is_none_is_refused():
-    for wrong in (('dome', 3), ('any', 0)):
-        with pytest.raises(ConfigError, match='expected one of turntable, any'):
+    for wrong in (('sphere', 3), ('any', 0)):
+        with pytest.raises(ConfigError, match='expected one of turntable, dome, any'):
             Viewing(*wrong)
 
 

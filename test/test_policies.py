@@ -238,7 +238,8 @@ def test_policies_are_loaded_by_name(tmp_path, network, attention, tiny):
     path = tmp_path / 'weights.safetensors'
     save_weights(path, Bundle(network, attention, tiny, 0.4))
     kinds = [type(load_policy(name, PolicyOptions(weights=path))).__name__ for name in POLICIES]
-    assert kinds == ['AttentionPolicy', 'RandomPolicy', 'UniformPolicy', 'FarthestPolicy']
+    assert kinds == ['AttentionPolicy', 'RandomPolicy', 'UniformPolicy', 'FarthestPolicy',
+                     *['RenderedPolicy'] * 3]
     with pytest.raises(ConfigError, match="'greedy': expected one of attention, random"):
         load_policy('greedy')
     with pytest.raises(WeightsError, match='no such file'):

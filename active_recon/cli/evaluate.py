@@ -29,8 +29,8 @@ def evaluate(
              '2d3d-attention.')] = None,
     policy: Annotated[str | None, typer.Option(
         help=f'Policies, separated by commas: {", ".join(POLICIES)}, oracle (uses the true '
-             'shape; takes ninety times as long). Default: all but oracle; attention only if '
-             'the model has it.')] = None,
+             'shape; takes ninety times as long). Default: those that use the cameras only, and '
+             'attention if the model has it.')] = None,
     against: Annotated[str | None, typer.Option(
         help='Second model, measured on the same objects and starts: prints the difference '
              'to it, with its interval.')] = None,

@@ -13,6 +13,7 @@ from active_recon.cli.evaluate import evaluate
 from active_recon.cli.making import dataset, render
 from active_recon.cli.paper import paper
 from active_recon.cli.play import play
+from active_recon.cli.policies import policies
 from active_recon.cli.record_sweep import record_sweep
 from active_recon.cli.replay import replay
 from active_recon.cli.report import report
@@ -27,7 +28,7 @@ import typer
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 for command in (demo, up, calibrate, view, report, replay, play, record_sweep, render, train,
-                evaluate, study, paper, sheet):
+                evaluate, study, policies, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

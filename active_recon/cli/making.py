@@ -19,8 +19,9 @@ Samples = Annotated[int, typer.Option(
 Fine = Annotated[bool, typer.Option(
     '--fine', help='Also voxelise at 64 cells a side; finished objects get only these voxels.')]
 Cameras = Annotated[str, typer.Option(
-    help="'turntable' (24 azimuths, elevation 30 degrees) or 'any' (random for each object: "
-         'elevation -10 to 85 degrees, any distance and lens; images of 160 pixels).')]
+    help="'turntable' (24 azimuths, elevation 30 degrees), 'dome' (12 azimuths at elevations of "
+         "10, 30, 50 and 70 degrees) or 'any' (random for each object: elevation -10 to 85 "
+         'degrees, any distance and lens; images of 160 pixels).')]
 Views = Annotated[int, typer.Option(
     min=1, max=99, help='Number of views of each object, with --cameras any.')]
 Turned = Annotated[bool, typer.Option(

@@ -1,4 +1,4 @@
-"""Cameras and light for rendering an object: a turntable's 24 views, or drawn at random."""
+"""Cameras and light for rendering an object: a turntable's, a dome's, or drawn at random."""
 
 from dataclasses import dataclass
 import hashlib
@@ -10,7 +10,9 @@ from active_recon.geometry.framing import cube_corners
 import numpy as np
 from numpy.typing import NDArray
 
-KINDS = ('turntable', 'any')
+KINDS = ('turntable', 'dome', 'any')
+DOME_AZIMUTHS: NDArray[np.float64] = AZIMUTHS[::2]
+DOME_ELEVATIONS = tuple(map(math.radians, (10, 30, 50, 70)))
 LOWEST, HIGHEST = math.radians(-10), math.radians(85)
 _SIDE = 160  # pixels of an image
 _FOCAL = (0.8, 3.0)  # focal length, in image sides
@@ -26,8 +28,9 @@ class Viewing:
     """
     The cameras that an object is rendered from, and the object's yaw.
 
-    - cameras: 'turntable' (24 azimuths, elevation 30 degrees) or 'any' (random azimuth, elevation
-      from -10 to 85 degrees, roll, distance and focal length, seeded by the object's name)
+    - cameras: 'turntable' (24 azimuths, elevation 30 degrees), 'dome' (12 azimuths at each of
+      four elevations, 10 to 70 degrees) or 'any' (random azimuth, elevation from -10 to 85
+      degrees, roll, distance and focal length, seeded by the object's name)
     - count: number of cameras of kind 'any', 1 to 99
     - turned: half of the objects get a random yaw, the others keep their front at +x
 
@@ -58,6 +61,10 @@ class Viewing:
         """
         if self.cameras == 'turntable':
             return [orbit_camera(azimuth) for azimuth in AZIMUTHS], [None] * len(AZIMUTHS)
+        if self.cameras == 'dome':
+            dome: list[Camera] = [orbit_camera(azimuth, elevation)
+                                  for elevation in DOME_ELEVATIONS for azimuth in DOME_AZIMUTHS]
+            return dome, [None] * len(dome)
         rng = _generator(name, 'cameras')
         cameras = [draw_camera(rng) for _ in range(self.count)]
         light = np.array([-0.45, -0.65, -0.61]) + rng.normal(0, _LIGHT_SPREAD, 3)

@@ -15,8 +15,8 @@ from torch import nn
 
 
 def heuristic_names() -> list[str]:
-    """Return the names of the policies that are not learned."""
-    return [name for name, entry in POLICIES.items() if not entry.is_learned]
+    """Return the names of the policies that are not learned and use the cameras only."""
+    return [name for name, entry in POLICIES.items() if not (entry.is_learned or entry.looks)]
 
 
 def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
@@ -39,9 +39,10 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
     """
     made: list[Contender] = []
     for name in names:
-        if name not in contender_names():
+        known = dict.fromkeys((*contender_names(), *POLICIES))
+        if name not in known:
             raise ConfigError('policy: no such policy: expected some of '
-                              f'{", ".join(contender_names())}, got {name!r}')
+                              f'{", ".join(known)}, got {name!r}')
         if name not in POLICIES:
             made.append(Contender(name, name, None))
         elif POLICIES[name].is_learned:

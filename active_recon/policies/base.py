@@ -19,7 +19,8 @@ class Observation:
     - candidates: (B, K, 4, 4), poses of cameras; one set for all where B is 1 there
     - occupancy: (B, R, R, R), the published probabilities, for policies of `wants_volume`
 
-    Poses are object from optical frame, in the frame in which the network predicts.
+    Poses are object from optical frame, in the frame in which the network predicts. Where there is
+    an occupancy, their lengths count in sides of its grid.
     """
 
     latent: NDArray[np.float32]

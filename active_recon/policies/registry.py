@@ -10,6 +10,12 @@ from active_recon.plugins import installed, load_installed, POLICIES_GROUP
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.base import Policy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+from active_recon.policies.rendered import (
+    rendered_uncertainty,
+    RenderedPolicy,
+    unseen_entropy,
+    visible_entropy,
+)
 from active_recon.runtimes import load_policy_runtime, PolicyRuntime
 import numpy as np
 
@@ -38,10 +44,12 @@ class PolicyEntry:
 
     - parameters: those of the planner that it depends on, beside its name: a change of one of
       them makes it anew; one of `seed` draws, one of `weights` is learned
+    - looks: whether it looks at the probabilities, and not at the cameras alone
     """
 
     make: Callable[[PolicyOptions], Policy]
     parameters: tuple[str, ...] = ()
+    looks: bool = False
 
     @property
     def is_learned(self) -> bool:
@@ -79,6 +87,10 @@ POLICIES: dict[str, PolicyEntry] = {
     'random': PolicyEntry(lambda options: RandomPolicy(options.rng), ('seed',)),
     'uniform': PolicyEntry(lambda options: UniformPolicy(options.views), ('max_views',)),
     'farthest': PolicyEntry(lambda options: FarthestPolicy()),
+    'visible_entropy': PolicyEntry(lambda options: RenderedPolicy(visible_entropy), looks=True),
+    'unseen_entropy': PolicyEntry(lambda options: RenderedPolicy(unseen_entropy), looks=True),
+    'rendered_uncertainty': PolicyEntry(
+        lambda options: RenderedPolicy(rendered_uncertainty), looks=True),
 }
 
 

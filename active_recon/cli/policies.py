@@ -1,0 +1,131 @@
+"""`active-recon policies`: what view policies are worth on a network of posed views."""
+
+from collections.abc import Mapping
+import json
+from pathlib import Path
+import shlex
+import sys
+from typing import Annotated, Any, TYPE_CHECKING
+
+from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
+from active_recon.policies import POLICIES
+import typer
+
+if TYPE_CHECKING:
+    from active_recon.evaluation.next_view.study import Episodes
+    from active_recon.evaluation.posed.entrants import Entrant
+    from active_recon.evaluation.posed.study import Extent
+
+_ROBOTS = tuple(name for name, entry in POLICIES.items() if not entry.is_learned)
+
+
+def policies(
+    data: Annotated[list[Path], typer.Argument(
+        help="Folders of objects in R2N2's layout, each measured by itself; `--cameras turntable` "
+             'leaves azimuths to choose, `--cameras dome` elevations too.')],
+    model: Annotated[str, typer.Option(
+        help='A network of posed views: a model that ships, or a weights file.')] = 'lifting',
+    names: Annotated[str | None, typer.Option(
+        '--policies', help=f'Policies, separated by commas, out of {", ".join(_ROBOTS)}, sequence '
+        '(the best that is the same for all objects, found on --training), peeking and oracle '
+        '(which see what no robot does). Default: all, sequence only with --training.')] = None,
+    training: Annotated[Path | None, typer.Option(
+        help='Folder of other objects, on which the sequence is found.')] = None,
+    objects: Annotated[int, typer.Option(
+        min=2, help='At most so many objects of a folder, drawn.')] = 24,
+    training_objects: Annotated[int, typer.Option(
+        min=1, help='The same of the training folder.')] = 16,
+    category: Annotated[str | None, typer.Option(
+        help="Objects of these categories alone, as a pattern: 'thing_*', or '!thing_*' for all "
+             'others.')] = None,
+    views: Annotated[int, typer.Option(min=2, max=24, help='Views of an episode.')] = 5,
+    starts: Annotated[int, typer.Option(min=1, help='First views of each object, drawn.')] = 2,
+    seeds: Annotated[int, typer.Option(min=1, help='How often random is drawn.')] = 3,
+    seed: Annotated[int, typer.Option(
+        help='Draws objects, first views, renderings and random views.')] = 0,
+    out: Annotated[Path, typer.Option(
+        help='Folder where policies.json and policies.md go.')] = Path('study'),
+    bf16: Annotated[bool, typer.Option(
+        help='Half precision where it is safe: half the time.')] = True,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+) -> None:
+    """
+    Measure what choosing views is worth: policies beside chance, a fixed sequence and an oracle.
+
+    Views are chosen on one rendering of the objects and judged on another (other light, image
+    noise, poses off by half a degree), so that what the oracle is ahead of random by luck does not
+    count: what is left is the repeatable gap. An object takes one to two minutes of a core, most
+    of it for the oracle and peeking.
+
+    For example:
+
+      active-recon policies data/test --training data/train --out build/policies
+
+      active-recon policies data/test --policies random,uniform,farthest --objects 60
+    """
+    from active_recon.evaluation.next_view.study import Episodes
+    from active_recon.evaluation.posed.entrants import load_entrants
+    from active_recon.evaluation.posed.study import Extent
+    import torch
+
+    wanted = [*_ROBOTS, *['sequence'] * (training is not None), 'peeking', 'oracle']
+    if names is not None:
+        wanted = [name.strip() for name in names.split(',') if name.strip()]
+    if 'sequence' in wanted and training is None:
+        raise ConfigError('policies: no training objects: expected --training with a folder, on '
+                          'which a sequence is found, got none; give one, or leave sequence out')
+    episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, bf16)
+    torch.set_num_threads(threads)
+    entrant, *others = load_entrants(model)
+    if others:
+        raise ConfigError(f'model: several networks: expected one, got {model!r}')
+    result: dict[str, Any] = {
+        'command': shlex.join(['active-recon', *sys.argv[1:]]), 'model': entrant.name,
+        'weights': entrant.weights, 'sets': []}
+    if training is not None and 'sequence' in wanted:
+        result['sequence'] = _sequence(training, entrant, episodes,
+                                       Extent(category, training_objects))
+    for folder in data:
+        result['sets'].append(_set_figures(folder, entrant, episodes, Extent(category, objects),
+                                           result.get('sequence')))
+        _write(result, out)  # what is done is kept, should a later folder fail
+    for name in ('policies.json', 'policies.md'):
+        typer.echo(f'wrote {out / name}')
+
+
+def _sequence(folder: Path, entrant: 'Entrant', episodes: 'Episodes',
+              extent: 'Extent') -> dict[str, Any]:
+    from active_recon.evaluation.next_view.study import find_offsets
+    from active_recon.evaluation.posed.study import read_set
+    import numpy as np
+
+    scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
+    with progress_bar('finding a sequence', len(scene) * (episodes.count - 1)) as advance:
+        offsets = find_offsets(scene, entrant, episodes, lambda done: advance(done, ''))
+    return {'data': str(folder), 'objects': len(scene),
+            'offsets_deg': np.degrees(offsets).round(1).tolist()}
+
+
+def _set_figures(folder: Path, entrant: 'Entrant', episodes: 'Episodes', extent: 'Extent',
+                 sequence: Mapping[str, Any] | None) -> dict[str, Any]:
+    from active_recon.evaluation.next_view.study import figures, run_episodes
+    from active_recon.evaluation.posed.study import read_set
+    import numpy as np
+
+    scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
+    offsets = None if sequence is None else np.radians(sequence['offsets_deg'])
+    with progress_bar(f'choosing views of {folder.name}', len(scene)) as advance:
+        found = run_episodes(scene, entrant, episodes, offsets, lambda done: advance(done, ''))
+    return {'data': str(folder), 'category': extent.category, 'objects': len(scene),
+            'views': scene.view_count, 'starts': min(episodes.starts, scene.view_count),
+            'side': max(side for side in entrant.sides if side in scene.truths),
+            'unreadable': list(scene.views.unreadable), **figures(found)}
+
+
+def _write(result: Mapping[str, Any], out: Path) -> None:
+    from active_recon.evaluation.next_view.summary import markdown
+
+    out.mkdir(parents=True, exist_ok=True)
+    (out / 'policies.json').write_text(json.dumps(result, indent=1) + '\n')
+    (out / 'policies.md').write_text(markdown(result))

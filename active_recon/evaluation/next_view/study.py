@@ -1,0 +1,181 @@
+"""Policies, a sequence and oracles on one frozen network: what each gains, how much repeats."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from active_recon.errors import ConfigError
+from active_recon.evaluation.next_view.choosing import chosen_ahead, chosen_by, judged, Order
+from active_recon.evaluation.next_view.fixed_sequence import find_sequence, FixedSequence, Offsets
+from active_recon.evaluation.next_view.renderings import another_rendering
+from active_recon.evaluation.next_view.watching import Ahead, WatchedObject
+from active_recon.evaluation.posed.entrants import Entrant
+from active_recon.evaluation.posed.scene import Scene
+from active_recon.evaluation.posed.walking import some_objects
+from active_recon.evaluation.statistics import difference, gap_closed, mean_interval, Values
+from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
+import numpy as np
+import torch
+
+ORACLE, PEEKING, SEQUENCE = 'oracle', 'peeking', 'sequence'
+_WORTH: dict[str, Callable[[Ahead], Values]] = {
+    ORACLE: lambda ahead: ahead.iou, PEEKING: lambda ahead: ahead.expected}
+_ON_BOTH = ('random', ORACLE)  # the gap between them is told on either rendering
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """
+    What is run of every object.
+
+    - policies: names of the registry, `sequence`, `peeking` and `oracle`
+    - starts: first views of each object, drawn; count: views of an episode
+    - seeds: how often a policy that draws is run
+    - seed: draws the starts, the renderings and what policies draw
+    """
+
+    policies: tuple[str, ...]
+    starts: int = 2
+    count: int = 5
+    seeds: int = 3
+    seed: int = 0
+    bfloat16: bool = True
+
+    def __post_init__(self) -> None:
+        """Reject policies that there are not, and episodes without a choice."""
+        known = known_names()
+        if unknown := [name for name in self.policies if name not in known]:
+            raise ConfigError(f'policies: no such policy: expected some of {", ".join(known)}, '
+                              f'got {unknown[0]!r}')
+        if self.count < 2:
+            raise ConfigError('views: nothing to choose: expected 2 views of an episode or more, '
+                              f'got {self.count}')
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """
+    The IoU of episodes by policy, (objects, starts, seeds, T) each.
+
+    `same`: on the rendering on which views were chosen, of random and the oracle alone; `other`:
+    on another rendering of the same views.
+    """
+
+    same: Mapping[str, Values]
+    other: Mapping[str, Values]
+
+
+def known_names() -> list[str]:
+    """Return what can be measured on any network: all policies that are not learned, and more."""
+    return [*(name for name, entry in POLICIES.items() if not entry.is_learned),
+            SEQUENCE, PEEKING, ORACLE]
+
+
+def find_offsets(scene: Scene, entrant: Entrant, episodes: Episodes,
+                 advance: Callable[[int], None] = lambda done: None) -> Offsets:
+    """Return the best sequence of views that is the same for all of a set's objects."""
+    rows = range(len(scene))
+    return find_sequence([_watched(scene, entrant, episodes, row, None) for row in rows],
+                         [_starts(scene, episodes, row)[0] for row in rows], episodes.count,
+                         advance)
+
+
+def run_episodes(scene: Scene, entrant: Entrant, episodes: Episodes,
+                 offsets: Offsets | None = None,
+                 advance: Callable[[int], None] = lambda done: None) -> Found:
+    """
+    Choose the views of all episodes on one rendering of the objects, and judge them on another.
+
+    A choice by luck is no better on the other rendering than any other choice.
+    """
+    same: dict[str, list[Values]] = {name: [] for name in episodes.policies}
+    others: dict[str, list[Values]] = {name: [] for name in episodes.policies}
+    for row in range(len(scene)):
+        own, other = (_watched(scene, entrant, episodes, row, 2 * episodes.seed + rendering)
+                      for rendering in range(2))
+        for name in episodes.policies:
+            orders = [[_order(name, own, start, seed, row, episodes, offsets)
+                       for seed in range(_seeds(name, episodes))]
+                      for start in _starts(scene, episodes, row)]
+            others[name].append(_judged(other, orders))
+            if name in _ON_BOTH:
+                same[name].append(_judged(own, orders))
+        advance(1)
+    return Found({name: np.array(rows) for name, rows in same.items() if rows},
+                 {name: np.array(rows) for name, rows in others.items()})
+
+
+def figures(found: Found) -> dict[str, Any]:
+    """
+    Return what is said of episodes, with 95 % intervals over objects and starts, ready for JSON.
+
+    - policies: the IoU after each view, and the area under that curve (its mean), on the other
+      rendering; `ahead` of other policies, paired by object and start; `share` of the repeatable
+      gap, None where there surely is none
+    - gap: what the oracle is ahead of random, `same`: on the rendering that it chose on;
+      `repeatable`: on the other one
+    """
+    areas = {name: values.mean(axis=3) for name, values in found.other.items()}
+    has_gap = {'random', ORACLE} <= areas.keys()
+    policies: dict[str, Any] = {}
+    for name, values in found.other.items():
+        policies[name] = {
+            'iou': [asdict(mean_interval(of_view)) for of_view in np.moveaxis(values, 3, 0)],
+            'area': asdict(mean_interval(areas[name])),
+            'ahead': {rival: asdict(difference(areas[name], areas[rival]))
+                      for rival in areas if rival != name}}
+        if has_gap:
+            share = gap_closed(areas[name], areas['random'], areas[ORACLE])
+            policies[name]['share'] = share and asdict(share)
+    if not has_gap:
+        return {'policies': policies}
+    same = {name: values.mean(axis=3) for name, values in found.same.items()}
+    return {'policies': policies, 'gap': {
+        'same': asdict(difference(same[ORACLE], same['random'])),
+        'repeatable': asdict(difference(areas[ORACLE], areas['random']))}}
+
+
+def _judged(watched: WatchedObject, orders: Sequence[Sequence[Order]]) -> Values:
+    """Return the IoU after each view of orders, (starts, seeds, T)."""
+    return np.array([[judged(watched, order) for order in seeds] for seeds in orders])
+
+
+def _order(name: str, watched: WatchedObject, start: int, seed: int, row: int,
+           episodes: Episodes, offsets: Offsets | None) -> Order:
+    if name in _WORTH:
+        return chosen_ahead(_WORTH[name], watched, start, episodes.count)
+    return chosen_by(_policy(name, [episodes.seed, seed, row, start], episodes, offsets), watched,
+                     start, episodes.count)
+
+
+def _policy(name: str, seed: Sequence[int], episodes: Episodes,
+            offsets: Offsets | None) -> Policy:
+    if name != SEQUENCE:
+        return load_policy(name, PolicyOptions(np.random.default_rng(seed), episodes.count))
+    if offsets is None:
+        raise ConfigError('sequence: none was found: expected training objects to find one on')
+    return FixedSequence(offsets)
+
+
+def _seeds(name: str, episodes: Episodes) -> int:
+    return episodes.seeds if name in POLICIES and POLICIES[name].draws else 1
+
+
+def _starts(scene: Scene, episodes: Episodes, row: int) -> list[int]:
+    drawn = np.random.default_rng([episodes.seed, row]).permutation(scene.view_count)
+    return [int(view) for view in drawn[:episodes.starts]]
+
+
+def _watched(scene: Scene, entrant: Entrant, episodes: Episodes, row: int,
+             rendering: int | None) -> WatchedObject:
+    """Return one object of a set under a rendering; None: as it was rendered."""
+    shown = scene.shown_to(entrant.network)
+    if shown is None:
+        raise ConfigError(f'{entrant.name}: cannot be shown these views: expected a network that '
+                          'takes any cameras, such as lifting')
+    views = some_objects(shown, torch.tensor([row]))
+    if rendering is not None:
+        views = another_rendering(views, 100_000 * rendering + row)
+    side = max(side for side in entrant.sides if side in scene.truths)
+    return WatchedObject(entrant.network, views, scene.truths[side][row],
+                         entrant.thresholds[side], episodes.bfloat16)

@@ -1,0 +1,52 @@
+"""`active-recon policies`, from the command line to the files that it writes."""
+
+import json
+
+from active_recon.cli.main import main
+import pytest
+import torch
+
+
+@pytest.fixture(autouse=True)
+def as_many_threads_as_before():
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+def command(monkeypatch, *arguments):
+    """Run `active-recon policies`; return its exit code."""
+    monkeypatch.setattr('sys.argv', ['active-recon', 'policies', *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code or 0
+
+
+def test_policies_are_measured_set_by_set_and_told_in_a_table(dataset, tmp_path, monkeypatch):
+    assert command(monkeypatch, dataset, '--model', 'carving', '--policies',
+                   'random,sequence,oracle', '--training', dataset, '--training-objects', 2,
+                   '--objects', 2, '--starts', 1, '--views', 2, '--threads', 1, '--out',
+                   tmp_path) == 0
+    result = json.loads((tmp_path / 'policies.json').read_text())
+    [figures] = result['sets']
+    assert list(figures['policies']) == ['random', 'sequence', 'oracle']
+    assert (figures['objects'], figures['views'], figures['side']) == (2, 24, 32)
+    assert len(result['sequence']['offsets_deg']) == 1 and result['sequence']['objects'] == 2
+    assert {'same', 'repeatable'} == set(figures['gap'])
+    text = (tmp_path / 'policies.md').read_text()
+    assert '| oracle |' in text and 'the repeatable gap' in text
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    (['--policies', 'random,best'], "got 'best'"),
+    (['--policies', 'sequence'], 'no training objects: expected --training'),
+    (['--model', 'carving,lifting'], 'several networks: expected one'),
+    (['--category', 'ship'], 'no such objects'),
+])
+def test_what_cannot_be_measured_is_refused_in_one_line(
+        arguments, said, dataset, tmp_path, monkeypatch, capsys):
+    capsys.readouterr()
+    assert command(monkeypatch, dataset, '--model', 'carving', '--views', 2, '--objects', 2,
+                   *arguments, '--threads', 1, '--out', tmp_path) == 2
+    line = [line for line in capsys.readouterr().err.splitlines() if 'active-recon: ' in line]
+    assert len(line) == 1 and said in line[0]

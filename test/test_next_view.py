@@ -1,0 +1,260 @@
+"""What choosing views is worth: renderings, oracles, sequences, and luck that does not repeat."""
+
+from dataclasses import replace
+import json
+import math
+
+from active_recon.datasets.drawn_cameras import DOME_ELEVATIONS, Viewing
+from active_recon.datasets.layout import list_objects
+from active_recon.datasets.making import make_dataset, shape_jobs
+from active_recon.errors import ConfigError, DataError
+from active_recon.evaluation.next_view.choosing import chosen_ahead, chosen_by, judged
+from active_recon.evaluation.next_view.fixed_sequence import find_sequence, FixedSequence
+from active_recon.evaluation.next_view.renderings import another_rendering, POSE_ERROR
+from active_recon.evaluation.next_view.study import (
+    Episodes,
+    figures,
+    find_offsets,
+    Found,
+    known_names,
+    run_episodes,
+)
+from active_recon.evaluation.next_view.summary import markdown
+from active_recon.evaluation.next_view.watching import Ahead, Walk, WatchedObject
+from active_recon.evaluation.posed.entrants import Entrant
+from active_recon.evaluation.posed.scene import read_scene
+from active_recon.evaluation.posed.scoring import pooled
+from active_recon.evaluation.posed.walking import some_objects
+from active_recon.evaluation.rollouts import Observer
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
+from active_recon.geometry.view_distance import pose_directions
+from active_recon.models.carving import Carving
+from active_recon.models.network import ReconstructionNetwork
+from active_recon.policies import load_policy, Observation
+from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
+from active_recon.volumes.occupancy_threshold import expected_iou
+import numpy as np
+import pytest
+import torch
+
+
+class Chance(ReconstructionNetwork):
+    """What it predicts depends on the last bits of its images alone: all IoU is luck."""
+
+    image_size, resolution, needs_front = 128, 32, False
+
+    def initial_state(self, batch):
+        return {'sum': torch.zeros(batch, dtype=torch.float64),
+                'latent': torch.zeros(batch, 1, 4, 4)}
+
+    def encode(self, images, cameras):
+        return images.double().mean(dim=(1, 2, 3))
+
+    def update(self, encoded, cameras, state):
+        return {'sum': state['sum'] + encoded, 'latent': state['latent']}
+
+    def decode(self, state):
+        level = (state['sum'] * 1e6) % 1
+        filled = (torch.arange(32 ** 3) + 0.5) / 32 ** 3 < level[:, None]
+        return torch.where(filled, 5.0, -5.0).reshape(-1, 32, 32, 32)
+
+
+def made(folder, cameras, categories):
+    for category in categories:
+        list(make_dataset(shape_jobs(category, range(2), folder), 1,
+                          viewing=Viewing(cameras, 6)))
+    return folder
+
+
+@pytest.fixture(scope='module')
+def scene(tmp_path_factory):
+    """Return two lamps and two chairs on a turntable, 32 cells a side."""
+    folder = made(tmp_path_factory.mktemp('turntable'), 'turntable', ['lamp', 'chair'])
+    return read_scene(list_objects(folder), [Carving(0)])
+
+
+@pytest.fixture
+def carving():
+    return Entrant('carving', Carving(0).eval(), {64: 0.5, 32: 0.5})
+
+
+@pytest.fixture
+def watched(scene, carving):
+    views = some_objects(scene.views, torch.tensor([1]))
+    return WatchedObject(carving.network, views, scene.truths[32][1], 0.5)
+
+
+@pytest.fixture
+def short():
+    return Episodes(('random', 'uniform', 'visible_entropy', 'peeking', 'oracle'), 2, 3, 2,
+                    bfloat16=False)
+
+
+def test_two_renderings_show_the_same_outlines_in_another_light_from_a_little_beside(scene):
+    one, other = (another_rendering(scene.views, seed) for seed in (1, 2))
+    colors = [rendering.images[..., :3].double() for rendering in (one, other)]
+    alpha = scene.views.images[..., 3:]
+    for rendering in (one, other):
+        torch.testing.assert_close(rendering.images[..., 3:], alpha)
+        assert (rendering.images[..., :3] <= alpha).all()
+        turn = rendering.poses[..., :3, :3] @ scene.views.poses[..., :3, :3].mT
+        angle = torch.acos((turn.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2)
+        torch.testing.assert_close(angle, torch.full_like(angle, POSE_ERROR), rtol=1e-3, atol=0)
+    on_object = (alpha > 0).expand_as(one.images[..., :3])
+    apart = (colors[0] - colors[1])[on_object].abs().mean()
+    assert 3 < apart < 60
+    again = another_rendering(scene.views, 1)
+    torch.testing.assert_close(again.images, one.images)
+    torch.testing.assert_close(again.poses, one.poses)
+
+
+def test_looking_ahead_knows_what_walking_there_brings(watched):
+    walk = watched.step(watched.begin(3), 10)
+    ahead = watched.ahead(walk)
+    assert np.flatnonzero(np.isnan(ahead.iou)).tolist() == [3, 10]
+    for view in (0, 7, 23):
+        assert judged(watched, (3, 10, view))[2] == pytest.approx(ahead.iou[view], abs=1e-5)
+
+
+@torch.inference_mode()
+def test_the_iou_that_is_expected_is_that_of_the_probabilities(scene, watched, carving):
+    observer, state = Observer(carving.network, scene.views), carving.network.initial_state(1)
+    for view in (0, 5):
+        state = observer.update(torch.tensor([1]), torch.tensor([view]), state)
+    occupancy = pooled(observer.occupancy(state)[0].numpy(), 32)
+    assert watched.ahead(watched.begin(0)).expected[5] == pytest.approx(
+        expected_iou(occupancy, occupancy > 0.5), abs=1e-4)
+
+
+def test_the_oracle_takes_what_is_best_and_no_policy_has_a_better_second_view(watched):
+    order = chosen_ahead(lambda ahead: ahead.iou, watched, 5, 3)
+    assert order[0] == 5 and len(set(order)) == 3
+    best = judged(watched, order)[1]
+    assert best == pytest.approx(np.nanmax(watched.ahead(watched.begin(5)).iou))
+    for policy in (UniformPolicy(3), FarthestPolicy(), load_policy('unseen_entropy')):
+        assert judged(watched, chosen_by(policy, watched, 5, 3))[1] <= best + 1e-6
+
+
+def test_a_policy_s_views_are_where_it_goes(watched):
+    assert chosen_by(UniformPolicy(4), watched, 5, 4) == (5, 11, 17, 23)
+    assert chosen_by(FarthestPolicy(), watched, 0, 2) == (0, 12)
+    assert sorted(chosen_by(FarthestPolicy(), watched, 3, 30)) == list(range(24))
+
+
+class Planted:
+    """A ring of cameras of which the same places around the first are always best."""
+
+    def __init__(self, best, azimuths=AZIMUTHS, easy=0.0):
+        self.views = self
+        self.poses = torch.from_numpy(np.stack([orbit_camera(at).pose for at in azimuths]))[None]
+        self.best, self.count, self.easy = best, len(azimuths), easy
+
+    def begin(self, view):
+        return Walk((view,), {})
+
+    def step(self, walk, view):
+        return Walk((*walk.taken, view), {})
+
+    def ahead(self, walk):
+        worth = self.easy + np.arange(self.count) / 1000
+        worth[(walk.taken[0] + self.best[len(walk.taken) - 1]) % self.count] += 0.1
+        worth[list(walk.taken)] = np.nan
+        return Ahead(worth, worth)
+
+    def observation(self, walk, wants_volume):
+        poses = self.poses.numpy()
+        return Observation(np.zeros((1, 1, 4, 4), np.float32), poses[:, list(walk.taken)], poses)
+
+
+def test_a_sequence_that_is_best_for_all_is_found_and_followed_from_any_start():
+    objects, starts = [Planted((7, 18, 3)) for _ in range(5)], [0, 3, 11, 20, 23]
+    offsets = find_sequence(objects, starts, 4)
+    np.testing.assert_allclose(np.degrees(offsets), [[105, 30], [270, 30], [45, 30]], atol=0.1)
+    taken = chosen_by(FixedSequence(offsets), objects[0], 22, 4)
+    assert taken == (22, 5, 16, 1)
+    assert len(set(chosen_by(FixedSequence(np.zeros((3, 2))), objects[0], 4, 4))) == 4
+
+
+def test_places_that_only_an_easy_object_has_are_not_therefore_better():
+    whole = [Planted((4,)) for _ in range(3)]
+    easy = [Planted((1,), AZIMUTHS[::2], easy=0.8) for _ in range(4)]  # 30 degrees on
+    common = find_sequence([*whole, *easy], [0] * 7, 2)
+    np.testing.assert_allclose(np.degrees(common), [[30, 30]], atol=0.1)
+    rest = find_sequence([*[Planted((3,)) for _ in range(5)], *easy], [0] * 9, 2)
+    np.testing.assert_allclose(np.degrees(rest), [[45, 30]], atol=0.1)  # of the five alone
+
+
+def test_without_common_places_there_is_no_sequence():
+    rng = np.random.default_rng(0)
+    objects = [Planted((1, 2), rng.uniform(0, math.tau, 6)) for _ in range(4)]
+    with pytest.raises(DataError, match='expected a grid of azimuths'):
+        find_sequence(objects, [0, 1, 2, 3], 3)
+
+
+def test_luck_does_not_repeat(scene):
+    full = replace(scene, truths={32: torch.ones(4, 32, 32, 32, dtype=torch.bool)})
+    found = figures(run_episodes(full, Entrant('chance', Chance(), {32: 0.5}), Episodes(
+        ('random', 'oracle'), 6, 4, 3, bfloat16=False)))
+    assert found['gap']['same']['low'] > 0.2
+    assert found['gap']['repeatable']['low'] < 0 < found['gap']['repeatable']['high']
+
+
+def test_a_study_tells_every_policy_s_figures_and_json_holds_them(scene, carving, short):
+    told = []
+    found = run_episodes(scene, carving, short, advance=told.append)
+    assert sum(told) == 4
+    assert found.other['random'].shape == (4, 2, 2, 3)
+    assert found.other['oracle'].shape == (4, 2, 1, 3) and set(found.same) == {'random', 'oracle'}
+    result = figures(found)
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+    shares = [result['policies'][name]['share'] for name in ('random', 'oracle')]
+    assert [share['mean'] for share in shares] == pytest.approx([0, 1])
+    assert result['gap']['same']['low'] > 0
+    ahead = result['policies']['uniform']['ahead']
+    assert set(ahead) == set(short.policies) - {'uniform'}
+    first = {json.dumps(own['iou'][0]['mean'])[:8] for own in result['policies'].values()}
+    assert len(first) == 1  # no policy chose it
+    again = run_episodes(scene, carving, replace(short, policies=('random',)))
+    np.testing.assert_array_equal(again.other['random'], found.other['random'])
+
+
+def test_a_sequence_found_on_objects_is_measured_like_a_policy(scene, carving):
+    episodes = Episodes(('sequence', 'uniform'), 1, 3, bfloat16=False)
+    with pytest.raises(ConfigError, match='expected training objects'):
+        run_episodes(scene, carving, episodes)
+    offsets = find_offsets(scene, carving, episodes)
+    assert offsets.shape == (2, 2)
+    result = figures(run_episodes(scene, carving, episodes, offsets))
+    assert 'gap' not in result and 'share' not in result['policies']['sequence']
+    text = markdown({'command': 'a command', 'sets': [
+        {'data': 'd', 'objects': 4, 'views': 24, 'starts': 1, 'side': 32, **result}],
+        'sequence': {'offsets_deg': np.degrees(offsets).tolist(), 'objects': 4, 'data': 't'}})
+    assert '| sequence |' in text and 'ahead of uniform' in text
+
+
+def test_without_a_gap_nothing_has_a_share_of_it():
+    alike = np.random.default_rng(0).random((5, 2, 1, 3))
+    result = figures(Found({'random': alike, 'oracle': alike},
+                           {'random': alike, 'oracle': alike}))
+    assert result['policies']['random']['share'] is None
+    assert result['gap']['repeatable']['mean'] == 0
+
+
+def test_policies_that_there_are_not_and_episodes_without_a_choice_are_refused():
+    with pytest.raises(ConfigError, match="no such policy: expected some of random.*'best'"):
+        Episodes(('random', 'best'))
+    with pytest.raises(ConfigError, match='nothing to choose'):
+        Episodes(('random',), count=1)
+    assert 'attention' not in known_names()
+
+
+def test_a_dome_is_a_grid_of_azimuths_at_four_elevations(tmp_path):
+    cameras, lights = Viewing('dome').of('chair/one')
+    directions = pose_directions(np.array([camera.pose for camera in cameras]))
+    elevations = np.arcsin(directions[:, 2]).round(6)
+    assert sorted(set(elevations)) == pytest.approx(DOME_ELEVATIONS)
+    assert len(cameras) == len(lights) == 48 == len(set(map(tuple, directions.round(6))))
+    assert [camera.azimuth for camera in cameras[:12]] == pytest.approx(AZIMUTHS[::2])
+    scene = read_scene(list_objects(made(tmp_path, 'dome', ['lamp'])), [Carving(0)])
+    np.testing.assert_allclose(pose_directions(scene.views.poses[0].numpy()), directions,
+                               atol=1e-6)
