@@ -1,5 +1,6 @@
 """Views of any cameras: drawn, written, read and framed as the robot frames them."""
 
+from active_recon.datasets import framed
 from active_recon.datasets.drawn_cameras import draw_camera, filling_distance, TURNTABLE, Viewing
 from active_recon.datasets.layout import list_objects, ObjectFolder, write_object
 from active_recon.datasets.making import make_dataset, shape_jobs
@@ -184,6 +185,24 @@ def test_views_that_are_read_when_shown_are_the_same(views, made):
     torch.testing.assert_close(lazy.voxels[objects], views.voxels[objects])
     torch.testing.assert_close(lazy.poses, views.poses)
     torch.testing.assert_close(lazy.white(objects, chosen[0]), views.white(objects, chosen[0]))
+
+
+def test_images_beyond_what_memory_may_keep_are_read_again_and_are_the_same(
+        views, made, monkeypatch):
+    monkeypatch.setattr(framed, '_KEPT_IMAGES', 2 * 5 * 128 ** 2)  # two images
+    reads = []
+    read = ObjectFolder.image
+    monkeypatch.setattr(ObjectFolder, 'image', lambda folder, view: (
+        reads.append(view), read(folder, view))[1])
+    lazy = read_views(list_objects(made), resolution=64, image_size=128, framed=True,
+                      at_once=False)
+    objects, chosen = torch.tensor([0, 1, 2, 3]), torch.tensor([0, 1, 2, 0])
+    for _ in range(2):
+        torch.testing.assert_close(lazy.images[objects, chosen], views.images[objects, chosen])
+    assert len(reads) == 8
+    last = objects[-1:], chosen[-1:]
+    torch.testing.assert_close(lazy.seen[last], views.seen[last])
+    assert len(reads) == 8  # kept
 
 
 def test_as_many_views_are_read_as_every_object_has(made, tmp_path):

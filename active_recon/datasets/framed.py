@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.errors import DataError
@@ -12,12 +13,16 @@ from numpy.typing import NDArray
 import torch
 from torch import Tensor
 
+_KEPT_IMAGES, _KEPT_VOXELS = 4 << 30, 1 << 30
+"""Bytes of images and of voxels that are kept in memory; others are read again."""
+
 
 class FramedViews:
     """
-    Images, cameras and voxels of N objects with V views each; for the arrays, see `ViewSet`.
+    Reads images, cameras and voxels of N objects with V views each; for the arrays, see `ViewSet`.
 
-    V is the smallest number of views of any object. Raises DataError where the side of an
+    V is the smallest number of views of any object. What was read is kept, up to some gigabytes,
+    the least recently used of it being dropped first. Raises DataError where the side of an
     object's voxel grid cannot be read.
     """
 
@@ -25,11 +30,7 @@ class FramedViews:
                  resolution: int, image_size: int) -> None:
         count, views = len(folders), min(map(len, shown))
         self.folders, self._shown, self._size = folders, shown, image_size
-        self.images = np.empty((count, views, image_size, image_size, 4), np.uint8)
-        self.seen = np.empty((count, views, image_size, image_size), np.bool_)
-        self.voxels = np.empty((count, *(resolution,) * 3), np.bool_)
-        self._has_image = np.zeros((count, views), np.bool_)
-        self._has_voxels = np.zeros(count, np.bool_)
+        self._resolution = resolution
         self._sides = np.ones(count)
         self.poses = np.empty((count, views, 4, 4))
         self.intrinsics = np.empty((count, views, 3, 3))
@@ -39,39 +40,35 @@ class FramedViews:
                 target = framing_camera(camera, side, image_size)
                 self.poses[index, view] = target.scaled(1 / side).pose
                 self.intrinsics[index, view] = target.intrinsics.matrix
+        self.image_shapes = ((count, views, image_size, image_size, 4),
+                             (count, views, image_size, image_size))
+        self.voxels_shape = (count, resolution, resolution, resolution)
+        self.image = lru_cache(_KEPT_IMAGES // (5 * image_size ** 2))(self.read_image)
+        self.voxels = lru_cache(_KEPT_VOXELS // resolution ** 3)(self.read_voxels)
 
-    def read_images(self, index: int, views: Sequence[int]) -> None:
-        """Read those views of one object that are not read yet; raises DataError on bad images."""
-        for view in views:
-            if self._has_image[index, view]:
-                continue
-            layers = np.asarray(weighted(self.folders[index].image(view)).round(), np.uint8)
-            self.images[index, view], self.seen[index, view], _ = framed_layers(
-                layers, self._shown[index][view], self._sides[index], self._size)
-            self._has_image[index, view] = True
+    def read_image(self, index: int, view: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        """Read an image, (S, S, 4), and its mask `seen`, (S, S); raises DataError on bad ones."""
+        layers = np.asarray(weighted(self.folders[index].image(view)).round(), np.uint8)
+        return framed_layers(layers, self._shown[index][view], self._sides[index], self._size)[:2]
 
-    def read_voxels(self, index: int) -> None:
-        """Read the voxels of one object, once; raises DataError where they cannot be read."""
-        if not self._has_voxels[index]:
-            self.voxels[index] = self.folders[index].voxels(
-                self.voxels.shape[-1]).occupied(0.5)
-            self._has_voxels[index] = True
+    def read_voxels(self, index: int) -> NDArray[np.bool_]:
+        """Read the voxels of one object, (R, R, R); raises DataError where they are unreadable."""
+        return self.folders[index].voxels(self._resolution).occupied(0.5)
 
 
 class OnDemand:
-    """An array of `FramedViews` that is indexed like a tensor; rows are read when indexed."""
+    """
+    Rows of a tensor that are read when indexed.
 
-    def __init__(self, array: NDArray[np.generic], read: Callable[..., None]) -> None:
-        self._array, self._read = array, read
+    `read` returns the row of an object, or of an object and a view, as an array.
+    """
 
-    @property
-    def shape(self) -> torch.Size:
-        """The array's shape."""
-        return torch.Size(self._array.shape)
+    def __init__(self, shape: Sequence[int], read: Callable[..., NDArray[np.generic]]) -> None:
+        self.shape, self._read = torch.Size(shape), read
 
     def __len__(self) -> int:
         """Return the number of objects."""
-        return len(self._array)
+        return self.shape[0]
 
     def __getitem__(self, index: Tensor | tuple[Tensor, Tensor]) -> Tensor:
         """Return the rows of objects (...), or of objects (...) and views (...)."""
@@ -79,8 +76,8 @@ class OnDemand:
             *(index if isinstance(index, tuple) else (index,)))]
         rows = torch.stack(places, -1).reshape(-1, len(places)).tolist()
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(lambda row: self._read(row[0], *[row[1:]] * (len(row) > 1)), rows))
-        return torch.from_numpy(self._array[tuple(place.numpy() for place in places)])
+            found = np.stack(list(pool.map(lambda row: self._read(*row), rows)))
+        return torch.from_numpy(found.reshape(*places[0].shape, *found.shape[1:]))
 
 
 def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],

@@ -154,17 +154,21 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
                         + ''.join(f'\n  {error}' for error in lacking[:5]))
     views = FramedViews(folders, shown, resolution, image_size)
     poses, intrinsics = torch.from_numpy(views.poses), torch.from_numpy(views.intrinsics)
+    image_shape, seen_shape = views.image_shapes
     if not at_once:
-        on_demand: Any = [OnDemand(views.images, views.read_images),
-                          OnDemand(views.voxels, views.read_voxels),
-                          OnDemand(views.seen, views.read_images)]
+        on_demand: Any = [OnDemand(image_shape, lambda *place: views.image(*place)[0]),
+                          OnDemand(views.voxels_shape, views.voxels),
+                          OnDemand(seen_shape, lambda *place: views.image(*place)[1])]
         return ViewSet(on_demand[0], poses, intrinsics, on_demand[1], tuple(folders), lacking,
                        on_demand[2])
+    images, seen = np.empty(image_shape, np.uint8), np.empty(seen_shape, np.bool_)
+    voxels = np.empty(views.voxels_shape, np.bool_)
 
     def read(index: int) -> str:
         try:
-            views.read_voxels(index)
-            views.read_images(index, range(views.images.shape[1]))
+            voxels[index] = views.read_voxels(index)
+            for view in range(images.shape[1]):
+                images[index, view], seen[index, view] = views.read_image(index, view)
             return ''
         except DataError as error:
             return str(error)
@@ -172,9 +176,9 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
             progress()
 
     kept, unreadable = _read_all(read, len(folders))
-    return ViewSet(torch.from_numpy(views.images[kept]), poses[kept], intrinsics[kept],
-                   torch.from_numpy(views.voxels[kept]), tuple(np.array(folders, object)[kept]),
-                   lacking + unreadable, torch.from_numpy(views.seen[kept]))
+    return ViewSet(torch.from_numpy(images[kept]), poses[kept], intrinsics[kept],
+                   torch.from_numpy(voxels[kept]), tuple(np.array(folders, object)[kept]),
+                   lacking + unreadable, torch.from_numpy(seen[kept]))
 
 
 def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
