@@ -38,7 +38,7 @@ def azimuth_goal_from_msg(msg: JointState) -> float:
                            f'got {len(msg.position)}', 'goal')
     azimuth = float(msg.position[0])
     if not math.isfinite(azimuth):
-        raise MessageError(f'azimuth goal not finite: got {azimuth}', 'goal')
+        raise MessageError(f'azimuth goal not finite: expected radians, got {azimuth}', 'goal')
     return wrap_azimuth(azimuth)
 
 
