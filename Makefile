@@ -11,6 +11,8 @@ TORCH ?= torch==2.13.0
 # .venv has a ROS of its own, from wheels: one that is sourced must not be mixed into it.
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION ROS_DISTRO
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# Hundreds of processes start in the tests: each would compile all modules once more.
+unexport PYTHONDONTWRITEBYTECODE
 
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet

@@ -26,8 +26,8 @@ from rich.console import Console, RenderableType
 from rich.live import Live
 
 _LIKELY_RESOLUTION = 64
-_START_S = 20.0
-_VIEW_S = 30.0
+_START_S = 60.0  # also where the machine is busy
+_VIEW_S = 60.0
 _ANSWER_S = 10.0
 
 

@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 import re
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -32,7 +31,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 import trimesh
 
-ROOT = Path(__file__).parents[2]
+from .processes import Forked, Started
+
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=100)
 BUDGET_S = 60.0  # for what takes a second on an idle machine
@@ -47,16 +47,15 @@ class NodeProcess:
     def __init__(self, name: str, parameters: dict[str, Any], folder: Path,
                  program: Sequence[str] = (), namespace: str = '') -> None:
         arguments = [f'{key}:={value}' for key, value in parameters.items()]
-        program = program or ('-m', f'active_recon.nodes.{name}')
-        command = [sys.executable, *program, '--ros-args', '-r', f'__ns:=/{namespace}']
+        options = ['--ros-args', '-r', f'__ns:=/{namespace}']
         for argument in arguments:
-            command += ['-p', argument]
+            options += ['-p', argument]
         folder.mkdir(parents=True, exist_ok=True)
         self._log_path = folder / f'{name}.log'
-        with self._log_path.open('w') as log:
-            self._process = subprocess.Popen(
-                command, cwd=folder, stdout=log, stderr=subprocess.STDOUT,
-                env={**os.environ, 'PYTHONPATH': str(ROOT)})
+        self._log_path.touch()
+        self._process: Forked | Started = (
+            Started([sys.executable, *program, *options], folder, self._log_path) if program
+            else Forked(name, options, folder, self._log_path))
 
     @property
     def pid(self) -> int:
@@ -64,7 +63,7 @@ class NodeProcess:
 
     @property
     def running(self) -> bool:
-        return self._process.poll() is None
+        return self._process.wait(0) is None
 
     def log(self, pattern: str = '.') -> list[str]:
         """Return the log's lines in which the pattern is found."""
@@ -81,23 +80,20 @@ class NodeProcess:
 
     def wait(self, timeout_s: float = BUDGET_S) -> int | None:
         """Return the exit code, None if it still runs after that time."""
-        try:
-            return self._process.wait(timeout_s)
-        except subprocess.TimeoutExpired:
-            return None
+        return self._process.wait(timeout_s)
 
     def ask_to_stop(self, how: signal.Signals = signal.SIGINT) -> None:
         """Send the signal, unless the node has ended."""
         if self.running:
-            self._process.send_signal(how)
+            os.kill(self.pid, how)
 
     def stop(self, how: signal.Signals = signal.SIGINT) -> int | None:
         """Ask the node to stop; return its exit code, None if it had to be killed."""
         self.ask_to_stop(how)
         code = self.wait()
         if code is None:
-            self._process.kill()
-            self._process.wait()
+            os.kill(self.pid, signal.SIGKILL)
+            self.wait()
         return code
 
 

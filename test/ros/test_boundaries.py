@@ -16,7 +16,8 @@ import active_recon
 import pytest
 from sensor_msgs.msg import PointCloud2
 
-from .conftest import BUDGET_S, LATCHED_QOS, ROOT
+from .conftest import BUDGET_S, LATCHED_QOS
+from .processes import ROOT
 
 pytestmark = pytest.mark.ros
 LISTENS = '0A'

@@ -15,7 +15,7 @@ from active_recon.nodes.runtime.graph_access import (
 )
 import pytest
 
-from .conftest import ROOT
+from .processes import ROOT
 
 pytestmark = pytest.mark.ros
 POLICIES = ROOT / 'security' / 'policies.xml'

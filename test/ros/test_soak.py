@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from .conftest import ROOT
+from .processes import ROOT
 
 pytestmark = pytest.mark.ros
 LONG = pytest.param(2, marks=pytest.mark.slow)

@@ -8,7 +8,8 @@ import sys
 
 import pytest
 
-from .conftest import BUDGET_S, ROOT
+from .conftest import BUDGET_S
+from .processes import ROOT
 
 pytestmark = pytest.mark.ros
 

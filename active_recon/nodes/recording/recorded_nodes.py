@@ -15,29 +15,34 @@ class RecordedNodes:
                  on_parameters: Callable[[str, dict[str, object]], None]) -> None:
         self._node = node
         self._collector = ParameterCollector(node, on_parameters)
-        self._publishing: set[str] = set()
+        self._publishing: dict[bytes, str] = {}  # by the publisher's GID
 
     def __contains__(self, name: str) -> bool:
         """Return whether a node publishes a recorded topic."""
-        return name in self._publishing
+        return name in self._publishing.values()
 
     def forget(self) -> None:
         """Request the parameters of every node again."""
         self._collector.forget()
 
     def add_publishers(self, publishers: Iterable[TopicEndpointInfo]) -> None:
-        """Request new publishers' parameters again: a node may declare more when configured."""
-        names = set(filter(None, map(endpoint_node, publishers)))
-        for name in names - self._publishing:
-            self._collector.forget(name)
-        self._publishing |= names
+        """
+        Request the parameters of nodes with new publishers again.
+
+        A node may declare more when it is configured, or may have been restarted since.
+        """
+        for publisher in publishers:
+            gid, name = bytes(publisher.endpoint_gid), endpoint_node(publisher)
+            if name is not None and gid not in self._publishing:
+                self._publishing[gid] = name
+                self._collector.forget(name)
 
     def update(self) -> None:
         """Request the parameters of nodes that are not known yet; to be called repeatedly."""
         own = self._node.get_fully_qualified_name()
         running = {f'{namespace.rstrip("/")}/{name}'
                   for name, namespace in self._node.get_node_names_and_namespaces()}
-        self._collector.request(name for name in running - {own} if name in self._publishing or (
+        self._collector.request(name for name in running - {own} if name in self or (
             name.rpartition('/')[0] == own.rpartition('/')[0] and not _is_hidden(name)))
 
     def pause(self) -> None:

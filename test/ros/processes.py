@@ -1,0 +1,81 @@
+"""Processes of nodes: programs, and forks of a process that has imported what all nodes import."""
+
+from collections.abc import Sequence
+from importlib import import_module
+import multiprocessing
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+_NODES = ('reconstructor', 'view_planner', 'turntable_camera', 'recorder', 'viewer', 'player')
+_FORKS = multiprocessing.get_context('forkserver')
+# The last is what a reconstructor imports with its weights
+_FORKS.set_forkserver_preload([*(f'active_recon.nodes.{name}' for name in _NODES),
+                               'active_recon.runtimes.torch', __name__])
+
+
+class Started:
+    """A command that runs in a folder; its output goes to a log."""
+
+    def __init__(self, command: Sequence[str], folder: Path, log: Path) -> None:
+        with log.open('a') as out:
+            self._process = subprocess.Popen(
+                command, cwd=folder, stdout=out, stderr=subprocess.STDOUT,
+                env=_environment())
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def wait(self, timeout_s: float) -> int | None:
+        """Return the exit code, None if it still runs after that time."""
+        try:
+            return self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return None
+
+
+class Forked:
+    """
+    A node as `python -m active_recon.nodes.NAME` would run it, with all imports done before.
+
+    These take more computing than most tests: a second for each node, two for a reconstructor.
+    """
+
+    def __init__(self, name: str, options: Sequence[str], folder: Path, log: Path) -> None:
+        self._process = _FORKS.Process(target=_run, daemon=True, args=(
+            name, [f'{name}.py', *options], folder, log, _environment()))
+        with pytest.MonkeyPatch.context() as patch:  # for the process that is forked
+            patch.setenv('PYTHONPATH', f'{ROOT}{os.pathsep}{ROOT / "test"}')
+            self._process.start()
+
+    @property
+    def pid(self) -> int:
+        pid = self._process.pid
+        assert pid is not None
+        return pid
+
+    def wait(self, timeout_s: float) -> int | None:
+        """Return the exit code, None if it still runs after that time."""
+        self._process.join(timeout_s)
+        return self._process.exitcode
+
+
+def _environment() -> dict[str, str]:
+    return {**os.environ, 'PYTHONPATH': str(ROOT)}
+
+
+def _run(name: str, argv: list[str], folder: Path, log: Path, environment: dict[str, str]) -> None:
+    output = os.open(log, os.O_WRONLY | os.O_APPEND)
+    for descriptor in (1, 2):
+        os.dup2(output, descriptor)
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(folder)
+    sys.path.insert(0, str(folder))  # as `python -m` has it
+    sys.argv = argv
+    import_module(f'active_recon.nodes.{name}').main()
