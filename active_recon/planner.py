@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from active_recon.acquisition.goals import best_goal, Goal, Ring, Wanted
+from active_recon.acquisition.goal_places import goal_places
+from active_recon.acquisition.goals import best_goal, Goal, Wanted
 from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
 from active_recon.errors import ConfigError, ViewError
-from active_recon.geometry.cameras import AZIMUTHS, Camera, CANONICAL_DISTANCE, OrbitCamera, TURN
+from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, OrbitCamera
 from active_recon.geometry.view_distance import view_distance
 from active_recon.policies import (
     Choice,
@@ -57,18 +59,22 @@ class Planner:
     Decides after every view of an episode: where next, or that it is enough.
 
     Goals are cameras in the object frame that look at its centre, upright. They stand at
-    `elevation` (radians; None: that of the camera's last view) and `distance` (metres).
-    `object_yaw` is the azimuth of the object's front (radians): a policy that was learned with a
-    network that needs it thinks relative to the front. A goal is what the policy chooses, or the
-    best of the candidates where the camera cannot go there, was there already, or has too long a
-    way: `motion_weight` is what half a turn costs, beside 1 for what lies between the policy's
-    worst and best candidate. A view is asked for again only when no other is left.
+    `elevation` (radians; None: that of the camera's last view) and `distance` (metres), or
+    anywhere in `elevation_range`, or at the `reachable_views`: see `goal_places`. `object_yaw` is
+    the azimuth of the object's front (radians): a policy that was learned with a network that
+    needs it thinks relative to the front. A goal is what the policy chooses, or the best of the
+    candidates where the camera cannot go there, was there already, or has too long a way:
+    `motion_weight` is what half a turn costs, beside 1 for what lies between the policy's worst
+    and best candidate, and `motion` what a second costs instead. A view is asked for again only
+    when no other is left.
     """
 
     def __init__(self, policy: Policy, max_views: int = 5, entropy_tolerance: float = 0.01,
                  object_yaw: float = 0.0, limits: MotionLimits | None = None,
                  motion_weight: float = 0.0, elevation: float | None = None,
-                 distance: float = CANONICAL_DISTANCE) -> None:
+                 distance: float = CANONICAL_DISTANCE, elevation_range: Sequence[float] = (),
+                 reachable_views: Sequence[float] = (),
+                 motion: TimedMotion | None = None) -> None:
         if max_views < 1:
             raise ConfigError(f'max_views: too few: expected 1 or more, got {max_views}')
         if not 0 <= entropy_tolerance < 1:
@@ -76,17 +82,14 @@ class Planner:
                               f'{entropy_tolerance}')
         if not math.isfinite(object_yaw):
             raise ConfigError(f'object_yaw: not finite: expected radians, got {object_yaw}')
-        if not 0 <= motion_weight < math.inf:
-            raise ConfigError('motion_weight: out of range: expected 0 or more, got '
-                              f'{motion_weight}')
         self._policy = policy
         self._max_views = max_views
         self._entropy_tolerance = entropy_tolerance
         self._yaw = object_yaw
         self._limits = limits or MotionLimits()
-        self._motion_weight = motion_weight
-        self._ring = Ring(self._limits.candidates((AZIMUTHS + object_yaw) % TURN), elevation,
-                          distance)
+        self._cost = MotionCost(motion_weight, motion or TimedMotion())
+        self._places = goal_places(self._limits, object_yaw, elevation, distance, elevation_range,
+                                   reachable_views)
         self.reset()
 
     @classmethod
@@ -94,12 +97,14 @@ class Planner:
              max_views: int = 5, entropy_tolerance: float = 0.01, object_yaw: float = 0.0,
              device: str = 'cpu', limits: MotionLimits | None = None,
              motion_weight: float = 0.0, elevation: float | None = None,
-             distance: float = CANONICAL_DISTANCE, threads: int | None = None) -> 'Planner':
+             distance: float = CANONICAL_DISTANCE, elevation_range: Sequence[float] = (),
+             reachable_views: Sequence[float] = (), motion: TimedMotion | None = None,
+             threads: int | None = None) -> 'Planner':
         """Build the planner of a policy's name; raises ConfigError and WeightsError."""
         options = PolicyOptions(np.random.default_rng(seed), max_views, weights, device=device,
                                 threads=threads)
         return cls(load_policy(policy, options), max_views, entropy_tolerance, object_yaw, limits,
-                   motion_weight, elevation, distance)
+                   motion_weight, elevation, distance, elevation_range, reachable_views, motion)
 
     @property
     def wants_volume(self) -> bool:
@@ -111,6 +116,7 @@ class Planner:
         self._views: list[PlannerView] = []
         self._state = self._policy.initial_state(1)
         self._choice: Choice | None = None
+        self._first: Camera | None = None
         self._wanted: Wanted | None = None
         self._candidates: list[OrbitCamera] = []
         self._failed: list[Camera] = []
@@ -127,14 +133,15 @@ class Planner:
         self._failed, self._stopped = list(other._failed), other._stopped
         if self._views:
             self._look_from(self._views[-1].camera)
-            if self._policy is other._policy and self._is_ring_of(other):
+            if (self._policy is other._policy and self._yaw == other._yaw
+                    and self._places == other._places):
                 self._choice, self._state = other._choice, other._state
             else:
                 for count in range(1, len(self._views) + 1):
                     self._choose(self._views[:count])
             self._aim(self._views[-1].camera)
-        elif other._wanted is not None and other._wanted.camera is not None:
-            self._aim_first(other._wanted.camera)
+        elif other._first is not None:
+            self._aim_first(other._first)
 
     def first_goal(self, camera: Camera) -> Goal:
         """
@@ -209,13 +216,7 @@ class Planner:
 
     def _look_from(self, camera: Camera) -> None:
         """Place the candidates, where their elevation is the camera's."""
-        elevation = self._ring.elevation_for(camera)
-        if not self._candidates or self._candidates[0].elevation != elevation:
-            self._candidates = self._ring.candidates(camera)
-
-    def _is_ring_of(self, other: 'Planner') -> bool:
-        return (self._ring.elevation == other._ring.elevation and self._yaw == other._yaw
-                and np.array_equal(self._ring.azimuths, other._ring.azimuths))
+        self._candidates = self._places.candidates(camera)
 
     def _choose(self, views: Sequence[PlannerView]) -> None:
         """Let the policy choose after the last of some views."""
@@ -234,9 +235,11 @@ class Planner:
 
     def _aim_first(self, camera: Camera) -> None:
         """Make the best of a camera that no policy chose."""
+        self._first = camera
         self._look_from(camera)
         away = [view_distance(each, camera) for each in self._candidates]
-        self._wanted = Wanted(self._ring.goal(camera.azimuth, camera), -np.array(away, np.float32))
+        self._wanted = Wanted(
+            self._places.goal(camera.azimuth, camera), -np.array(away, np.float32))
         self._goal = self._best(camera)
 
     def _aim(self, camera: Camera) -> None:
@@ -244,8 +247,8 @@ class Planner:
         assert self._choice is not None
         proposed = np.nan if self._choice.azimuth is None else float(self._choice.azimuth[0])
         self._wanted = Wanted(
-            None if math.isnan(proposed) else self._ring.goal(proposed + self._yaw, camera),
-            self._choice.scores[0])
+            None if math.isnan(proposed) else self._places.goal(proposed + self._yaw, camera),
+            self._choice.scores[0], self._choice.is_gain)
         self._goal = self._best(camera)
 
     def _best(self, camera: Camera) -> Goal | None:
@@ -253,7 +256,7 @@ class Planner:
         assert self._wanted is not None
         return best_goal(
             self._wanted, self._candidates, camera, [view.camera for view in self._views],
-            self._failed, self._limits, self._motion_weight if self._views else 0.0)
+            self._failed, self._limits, self._cost if self._views else MotionCost())
 
     def _settled(self) -> bool:
         """Whether the last two views each changed the entropy by no more than the tolerance."""

@@ -54,7 +54,8 @@ def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
         '/policies_1': {'reconstructor': {
             'output_dir': folder, 'background': 'mask', 'pose_source': 'turntable_joint',
             'camera_position': [position.x, position.y, position.z],
-            'camera_orientation': [turn.x, turn.y, turn.z, turn.w]}},
+            'camera_orientation': [turn.x, turn.y, turn.z, turn.w]},
+            'turntable_camera': {'mesh': MESH, 'follows': 'view'}},
         RECORDED: {'recorder': {'output_dir': folder}}}
 
 

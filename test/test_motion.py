@@ -3,7 +3,8 @@
 from dataclasses import replace
 import math
 
-from active_recon.acquisition.motion import MotionLimits, utility
+from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion_cost import utility
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.planner import Planner

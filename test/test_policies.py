@@ -2,8 +2,11 @@
 
 import math
 
+from active_recon.acquisition.goal_places import goal_places
+from active_recon.acquisition.motion import MotionLimits
 from active_recon.errors import ConfigError, ViewError, WeightsError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
+from active_recon.geometry.view_distance import direction_distance, pose_directions
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.policies import load_policy, Observation, POLICIES, PolicyOptions
 from active_recon.policies.attention import AttentionPolicy, enforce_separation, gaps_to_taken
@@ -112,6 +115,86 @@ def test_uniform_for_n_views_divides_the_turn_into_n(latent, count):
 def test_uniform_keeps_to_its_sweep_however_roughly_it_is_followed(latent):
     choice, _ = choose(UniformPolicy(4), latent[:1], np.array([[1.0, 2.9, 3.9]]))
     assert choice.azimuth[0] == pytest.approx(1.0 + 3 * math.pi / 2)
+
+
+def dome(low, high, limits=None):
+    """Return the poses of a planner's candidates between two elevations, (K, 4, 4)."""
+    places = goal_places(limits or MotionLimits(), elevation_range=(low, high))
+    return np.stack([camera.pose for camera in places.candidates(orbit_camera(0.0))])
+
+
+def on_dome(policy, candidates, start, count, latent):
+    """Return the poses of an episode over candidates, (count, 4, 4)."""
+    taken = [candidates[start]]
+    while len(taken) < count:
+        choice, _ = policy.choose(
+            Observation(latent[:1], np.stack(taken)[None], candidates[None]), {})
+        assert choice.azimuth is None or np.isnan(choice.azimuth).all()
+        taken.append(candidates[choice.scores[0].argmax()])
+    return np.stack(taken)
+
+
+def uncovered(candidates, taken):
+    """Return how far candidates are from the nearest view, radians, on average."""
+    return direction_distance(pose_directions(candidates)[:, None],
+                              pose_directions(taken)).min(axis=1).mean()
+
+
+@pytest.mark.parametrize('count', [3, 5, 8])
+@pytest.mark.parametrize('ends', [(0.0, 1.2), (0.2, 1.2), (-0.5, 1.0)])
+def test_uniform_covers_a_dome_better_than_its_own_height_alone_and_than_chance(
+        latent, ends, count):
+    candidates = dome(*ends)
+    rng = np.random.default_rng(0)
+    swept, level, drawn = [], [], []
+    for start in range(0, len(candidates), 5):
+        swept.append(uncovered(candidates, on_dome(
+            UniformPolicy(count), candidates, start, count, latent)))
+        drawn.append(uncovered(candidates, on_dome(
+            RandomPolicy(rng), candidates, start, count, latent)))
+        x, y, z = pose_directions(candidates[start])
+        level.append(uncovered(candidates, poses(
+            [math.atan2(y, x) + np.arange(count) * math.tau / count], math.asin(z))[0]))
+    assert np.mean(swept) < min(np.mean(level), np.mean(drawn))
+
+
+@pytest.mark.parametrize('ends', [(0.0, 1.2), (-0.5, 1.0)])
+def test_the_first_views_of_a_long_sweep_of_a_dome_are_spread_too(latent, ends):
+    candidates, rng = dome(*ends), np.random.default_rng(0)
+    episodes = [[on_dome(policy, candidates, start, 8, latent)
+                 for start in range(0, len(candidates), 5)]
+                for policy in (UniformPolicy(8), RandomPolicy(rng))]
+    for views in range(2, 9):
+        swept, drawn = (np.mean([uncovered(candidates, taken[:views]) for taken in each])
+                        for each in episodes)
+        assert swept < 0.95 * drawn
+
+
+@pytest.mark.parametrize('count', [3, 5, 8])
+def test_uniform_keeps_its_azimuths_on_a_dome_and_spreads_its_heights(latent, count):
+    rng = np.random.default_rng(0)
+    anywhere = np.stack([orbit_camera(*place).pose for place in zip(
+        rng.uniform(0, math.tau, 3000), np.arcsin(rng.uniform(-0.99, 0.99, 3000)), strict=True)])
+    taken = pose_directions(on_dome(UniformPolicy(count), anywhere, 45, count, latent))
+    across = np.hypot(taken[:, 0], taken[:, 1])
+    turned = np.arctan2(taken[:, 1], taken[:, 0]) - np.arctan2(taken[0, 1], taken[0, 0])
+    steps = np.rint(turned * count / math.tau)
+    assert sorted(steps % count) == list(range(count))
+    assert (np.abs(turned - steps * math.tau / count) * across < math.radians(5)).all()
+    gaps = np.diff(np.sort(taken[:, 2]))
+    assert gaps.min() > 0.3 * 2 / count
+
+
+@pytest.mark.parametrize('policy', [UniformPolicy(5), FarthestPolicy()])
+def test_elevations_that_hardly_differ_are_those_of_a_turntable(latent, policy):
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        taken = poses([rng.uniform(0, 6, 3)], 0.45)
+        level = policy.choose(Observation(latent[:1], taken, poses([AZIMUTHS], 0.45)), {})[0]
+        shaken = np.stack([orbit_camera(azimuth, 0.45 + away).pose for azimuth, away in zip(
+            AZIMUTHS, rng.uniform(-0.08, 0.08, 24), strict=True)])[None]
+        other = policy.choose(Observation(latent[:1], taken, shaken), {})[0]
+        np.testing.assert_array_equal(other.azimuth, level.azimuth)
 
 
 @pytest.mark.parametrize('start', AZIMUTHS)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion_cost import TimedMotion
 from active_recon.bags.replay.comparison import (
     compare,
     DIFFERENT,
@@ -204,6 +205,29 @@ def test_goals_that_were_given_up_are_left_out_again(make_loop, given_up, views,
 def test_a_run_under_limits_replays_otherwise_without_them(make_loop):
     run = run_of([episode_of(*make_loop(**LIMITED), SECOND, 1.0)])
     assert compare(replay(run, *make_loop(views=4)), THRESHOLD).verdict == DIFFERENT
+
+
+@pytest.mark.parametrize('where', [
+    {'elevation_range': (-0.2, 1.1)}, {'reachable_views': (
+        0.9, 0.4, 0.0, 1.5, 1.1, 2.5, 3.0, -0.4, 0.0, 5.0, 0.6, 2.0)}])
+@pytest.mark.parametrize('given_up', [(), (1, 0, 0)])
+def test_goals_at_several_elevations_that_cost_time_replay_to_the_same_bits(
+        make_loop, where, given_up):
+    settings = {'views': 3, 'motion': TimedMotion(0.5, 0.3, 1.0, 0.05), **where}
+    episode = episode_of(*make_loop(**settings), SECOND, orbit_camera(1.0, 0.8), given_up)
+    again = replay(run_of([episode]), *make_loop(**settings))
+    assert compare(again, THRESHOLD).verdict == SAME_BITS
+
+
+def test_the_setup_has_the_places_of_goals_and_the_cost_of_time():
+    recorded = {'elevation_range': [0, 1.1], 'reachable_views': [], 'motion_cost': 0.3,
+                'azimuth_speed': 0.02, 'elevation_speed': 1, 'view_time': 2.0}
+    planner = recorded_setup(replace(run_of([]), parameters={
+        'view_planner': {'policy': 'farthest', **recorded}})).load_planner()
+    planner.first_goal(orbit_camera(1.0, 0.3))
+    goal = planner.add_view(np.zeros((1, 4, 4), np.float32), orbit_camera(1.0, 0.3), 9.0).goal
+    assert abs(goal.camera.azimuth - 1.0) < 0.2
+    assert goal.camera.elevation > 0.6
 
 
 def test_an_end_that_a_service_asked_for_is_no_difference(run, make_loop):

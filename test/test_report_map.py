@@ -31,6 +31,22 @@ def bars(run, scores):
     return np.array(trace['r'])
 
 
+def test_of_several_elevations_a_bar_shows_the_best_candidate_near_its_azimuth(run):
+    rng = np.random.default_rng(2)
+    cameras = [orbit_camera(azimuth + turn, elevation) for elevation, turn in (
+        (0.1, 0.0), (0.6, 0.05), (1.2, -0.05)) for azimuth in AZIMUTHS]
+    scores = rng.normal(size=(3, 24)).astype(np.float32)
+    goal = RecordedGoal(cameras[0], 0, Candidates.of(cameras), scores.ravel(), 0)
+    [trace] = [trace for trace in drawn(changed(run, first_goal=goal))['data']
+               if trace['type'] == 'barpolar' and trace['meta'] == {'of': 0}]
+    np.testing.assert_allclose(trace['theta'], np.degrees(AZIMUTHS))
+    best = scores.max(axis=0)
+    np.testing.assert_array_equal(np.argsort(trace['r']), np.argsort(best))
+    elevations = np.degrees([0.1, 0.6, 1.2]).round().astype(int)[scores.argmax(axis=0)]
+    for words, score, elevation in zip(trace['text'], best, elevations, strict=True):
+        assert words.endswith(f'elevation {elevation}°: score {score:.4g}')
+
+
 @pytest.mark.parametrize(('azimuth_deg', 'at'), [
     (0, (0, -1)), (90, (1, 0)), (180, (0, 1)), (270, (-1, 0))])
 def test_front_is_below_and_azimuths_run_counter_clockwise(azimuth_deg, at):

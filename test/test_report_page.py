@@ -13,6 +13,7 @@ import sys
 
 from active_recon.bags.runs.run import TopicSummary
 from active_recon.errors import ConfigError, DataError
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
@@ -62,6 +63,15 @@ def drawn_in(page):
     """Return what the page's script draws from."""
     packed = page.split('id="drawn">')[1].split('<')[0]
     return json.loads(gzip.decompress(b64decode(packed)))
+
+
+def test_elevations_are_told_where_they_differ_and_only_there(run, page):
+    views = [replace(view, camera=orbit_camera(view.camera.azimuth, 0.2 * number))
+             for number, view in enumerate(run.episodes[0].views)]
+    told = Elements(page_of(changed(run, views=views))).text
+    for number in range(5):
+        assert f'elevation {round(math.degrees(0.2 * number))}°' in told
+    assert 'elevation ' not in Elements(page).text.replace('elevation of', '')
 
 
 def test_page_of_five_views_is_small(page):

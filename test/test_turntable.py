@@ -3,8 +3,14 @@
 import math
 
 from active_recon.errors import ConfigError, DataError, MeshError, ViewError
-from active_recon.geometry.cameras import azimuth_difference, CANONICAL_DISTANCE
-from active_recon.simulation.shown_object import rendered_object
+from active_recon.geometry.cameras import (
+    azimuth_difference,
+    CANONICAL_DISTANCE,
+    CANONICAL_ELEVATION,
+    orbit_camera,
+)
+from active_recon.simulation.orbit import Orbit
+from active_recon.simulation.shown_object import object_anywhere, rendered_object
 from active_recon.simulation.turntable import Turntable
 import numpy as np
 import pytest
@@ -76,6 +82,25 @@ def test_another_speed_counts_from_where_the_camera_is():
     assert azimuth_difference(turntable.azimuth_at(200.0), 1.0) == pytest.approx(0)
 
 
+def test_an_orbit_turns_as_a_turntable_does_and_keeps_its_elevation():
+    orbit, turntable = Orbit(1.0, speed=0.5), Turntable(1.0, 0.5)
+    for motion in (orbit, turntable):
+        motion.turn_to(5.5, now=2.0)
+    for time in np.linspace(2.0, 9.0, 50):
+        assert orbit.at(time) == (turntable.azimuth_at(time), pytest.approx(CANONICAL_ELEVATION))
+
+
+@pytest.mark.parametrize('elevation', [-1.2, -0.1, 0.0, 0.7, 1.5])
+def test_an_orbit_goes_around_and_up_at_once_and_gets_to_the_view(elevation):
+    orbit, goal = Orbit(0.3, 0.2, speed=0.5), orbit_camera(2.3, elevation)
+    orbit.go_to(goal, now=1.0)
+    assert orbit.at(1.0) == pytest.approx((0.3, 0.2))
+    azimuth, height = orbit.at(1.2)
+    assert azimuth == pytest.approx(0.4)
+    assert abs(height - 0.2) == pytest.approx(min(0.1, abs(elevation - 0.2)))
+    assert orbit.at(1.0 + max(2.0, abs(elevation - 0.2)) / 0.5) == pytest.approx((2.3, elevation))
+
+
 @pytest.fixture(scope='module')
 def shown(tmp_path_factory):
     path = tmp_path_factory.mktemp('mesh') / 'box.ply'
@@ -90,6 +115,35 @@ def test_an_object_is_shown_by_the_nearest_of_its_views_and_says_which_it_is(sho
         assert abs(azimuth_difference(camera.azimuth, azimuth)) <= math.radians(7.5)
         assert camera.distance == pytest.approx(CANONICAL_DISTANCE * 0.5)
     assert shown.seen_from(0.12)[0] is shown.seen_from(0.0)[0]
+
+
+@pytest.fixture(scope='module')
+def anywhere(tmp_path_factory):
+    path = tmp_path_factory.mktemp('mesh') / 'box.ply'
+    trimesh.creation.box((2, 1, 1)).export(path)
+    return object_anywhere(path, object_size=0.5, background=10)
+
+
+def test_an_object_seen_from_anywhere_is_seen_from_exactly_there(anywhere):
+    for place in ((0.1, -0.4), (0.1, 1.4), (4.0, 0.0)):
+        image, camera = anywhere.seen_from(*place)
+        assert (camera.azimuth, camera.elevation) == pytest.approx(place)
+        assert camera.distance == pytest.approx(CANONICAL_DISTANCE * 0.5)
+        assert anywhere.seen_from(*place)[0] is image
+    assert (anywhere.seen_from(0.1, 1.4)[0] != anywhere.seen_from(0.1, -0.4)[0]).any()
+
+
+def test_on_the_turntable_s_own_places_both_show_the_same_image(shown, anywhere):
+    for camera, image in zip(shown.cameras, shown.images, strict=True):
+        rendered, own = anywhere.seen_from(camera.azimuth, CANONICAL_ELEVATION)
+        assert (rendered != image).mean() < 0.01  # edges, where the azimuth was rounded
+        np.testing.assert_allclose(own.pose, camera.pose, atol=1e-9)
+
+
+def test_of_stored_images_that_in_the_nearest_direction_is_shown(shown):
+    image, camera = shown.seen_from(0.12, 1.2)
+    assert camera is shown.cameras[0]
+    assert image is shown.images[0]
 
 
 def test_the_background_shows_around_the_object(shown):

@@ -2,8 +2,8 @@
 
 from types import SimpleNamespace
 
-from active_recon.geometry.cameras import AZIMUTHS
-from active_recon.viewer.scene import relative_scores, Scene
+from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
+from active_recon.viewer.scene import relative_scores, Scene, score_boxes
 from active_recon.viewer.state import LoopState, Scores
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
@@ -31,6 +31,11 @@ def shown():
     return Shown()
 
 
+def standing(azimuths, elevation=0.5):
+    """Return the positions of cameras, (N, 3)."""
+    return np.array([orbit_camera(azimuth, elevation).position for azimuth in azimuths])
+
+
 def heights(bars):
     """Return how high the browser shows the bars: it reads scales as 32 bits each."""
     scales = np.frombuffer(bars.batched_scales.tobytes(), np.float32).reshape(-1, 3)
@@ -41,12 +46,21 @@ def heights(bars):
 def test_bars_are_as_high_as_the_scores_say_at_first_and_when_they_change(shown):
     scene = Scene(shown, 1.0)
     for scores in (np.arange(24.0), np.arange(24.0)[::-1] ** 2):
-        scene.draw(LoopState(scores=Scores(AZIMUTHS, scores)), 0.5)
+        scene.draw(LoopState(scores=Scores(standing(AZIMUTHS), scores)), 0.5)
         bars = shown.boxes['/scores']
         found = heights(bars)
         np.testing.assert_allclose(found, 0.3 * relative_scores(scores), rtol=1e-5)
         # They stand on the floor
         np.testing.assert_allclose(bars.batched_positions[:, 2] - found / 2, -0.5, atol=1e-6)
+
+
+def test_scores_at_several_elevations_are_cubes_in_their_directions_the_larger_the_better():
+    positions = np.concatenate([standing(AZIMUTHS), standing(AZIMUTHS, 1.0)])
+    scores = np.random.default_rng(0).normal(size=48)
+    centers, sides = score_boxes(Scores(positions, scores))
+    np.testing.assert_allclose(np.cross(centers, positions), 0, atol=1e-9)
+    np.testing.assert_array_equal(np.argsort(sides[:, 0]), np.argsort(scores))
+    assert (sides == sides[:, :1]).all()
 
 
 @pytest.mark.parametrize('cells', [32, 64])

@@ -30,7 +30,8 @@ import pytest
 GRID = VoxelGrid(np.random.default_rng(0).random((8, 8, 8), np.float32))
 OCCUPIED = VoxelGrid(np.full((8, 8, 8), 0.405, np.float32))
 LATER_GRID = VoxelGrid(np.ones((8, 8, 8), np.float32))
-SCORES = Scores(AZIMUTHS, np.arange(24.0))
+SCORES = Scores(
+    np.array([orbit_camera(azimuth).position for azimuth in AZIMUTHS]), np.arange(24.0))
 TOPICS = {'image': '/camera/image_raw', 'view': '/view', 'occupancy': '/occupancy',
           'goal': '/next_view'}
 
@@ -223,7 +224,7 @@ def test_a_recorded_goal_is_shown_where_its_own_camera_stands():
                       0, 1)
     (state,) = recorded_states(run)
     assert state.goal is camera
-    np.testing.assert_allclose(state.scores.azimuths, AZIMUTHS)
+    np.testing.assert_allclose(state.scores.positions, ring.positions)
 
 
 def test_what_nodes_warn_of_stands_right_after_how_far_the_loop_is():

@@ -1,16 +1,14 @@
-"""The goals that a camera is sent to: a ring of candidates around the object, and the best one."""
+"""The goal that a camera is sent to: the best of the candidates, or what lies between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import math
 
-from active_recon.acquisition.motion import MotionLimits, utility
-from active_recon.geometry.cameras import azimuth_difference, Camera, orbit_camera, OrbitCamera
+from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion_cost import MotionCost
+from active_recon.geometry.cameras import Camera
 from active_recon.geometry.view_distance import nearest_camera
 import numpy as np
 from numpy.typing import NDArray
-
-_STEEPEST = math.radians(89)  # of goals at the camera's own elevation: above, nothing is upright
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,50 +27,26 @@ class Goal:
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """A camera between the candidates, if one is wanted, and the candidates' scores (N,)."""
+    """
+    A camera between the candidates, if one is wanted, and the candidates' scores (N,).
+
+    `is_gain`: whether the scores are expected gains of IoU.
+    """
 
     camera: Camera | None
     scores: NDArray[np.float32]
-
-
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """
-    Where goals stand: upright, looking at the object's centre.
-
-    - azimuths: (N,) of the candidates, radians in the object frame
-    - elevation: radians; None: that of the camera's last view, up to 89 degrees
-    - distance: metres
-    """
-
-    azimuths: NDArray[np.float64]
-    elevation: float | None
-    distance: float
-
-    def candidates(self, camera: Camera) -> list[OrbitCamera]:
-        """Return the N candidates while that is the camera of the last view."""
-        return [self.goal(float(azimuth), camera) for azimuth in self.azimuths]
-
-    def goal(self, azimuth: float, camera: Camera) -> OrbitCamera:
-        """Return the goal at an azimuth while that is the camera of the last view."""
-        return orbit_camera(azimuth, self.elevation_for(camera), self.distance)
-
-    def elevation_for(self, camera: Camera) -> float:
-        """Return the elevation of goals while that is the camera of the last view."""
-        if self.elevation is not None:
-            return self.elevation
-        return min(max(camera.elevation, -_STEEPEST), _STEEPEST)
+    is_gain: bool = False
 
 
 def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
               taken: Sequence[Camera], failed: Sequence[Camera], limits: MotionLimits,
-              motion_weight: float) -> Goal | None:
+              cost: MotionCost) -> Goal | None:
     """
     Return the best goal for a camera that is somewhere; None where none is left.
 
     What is wanted between the candidates is worth as much as the best of them. The views `taken`
-    are asked for again only where no other is left, those that `failed` never; `motion_weight` is
-    as in `utility`.
+    are asked for again only where no other is left, those that `failed` never; `cost` is that of
+    the way to a goal.
     """
     scores, options = wanted.scores, list(candidates)
     nearest = np.arange(len(candidates))
@@ -88,8 +62,7 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
     if not is_open.any():
         return None
     fresh = is_open & ~is_taken
-    travel = np.abs(azimuth_difference(azimuths, camera.azimuth))
-    value = utility(scores, travel, motion_weight)
+    value = cost.utility(scores, wanted.is_gain, camera, options, limits)
     best = int(np.where(fresh if fresh.any() else is_open, value, -np.inf).argmax())
     own = slice(len(options) - len(candidates), None)
     return Goal(options[best], [each for each, free in zip(

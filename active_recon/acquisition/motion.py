@@ -1,4 +1,4 @@
-"""Limits of the camera's motion, and the cost of travel."""
+"""Limits of the camera's motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -75,6 +75,31 @@ class MotionLimits:
                    and not ((free - low) % TURN <= width).any()]
         return np.append(grid, middles)
 
+    def way(self, azimuth: float, goals: ArrayLike) -> NDArray[np.float64]:
+        """
+        Return how far it is around the object from an azimuth to each of N others, radians (N,).
+
+        It is the shorter of the two ways that leaves `azimuth_range` nowhere and crosses no
+        forbidden sector; where neither does, the shorter.
+        """
+        onward = (np.asarray(goals, np.float64) - azimuth) % TURN
+        back = (TURN - onward) % TURN
+        ways = np.stack([onward, back])
+        free = ~np.stack([self._is_barred(azimuth, onward),
+                          self._is_barred(azimuth - back, back)])
+        return np.asarray(np.where(free | ~free.any(axis=0), ways, np.inf).min(axis=0))
+
+    def _is_barred(self, start: ArrayLike, width: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether any of the ways counter-clockwise from a start is barred, (N,)."""
+        barred = np.zeros(width.shape, np.bool_)
+        low, high = self.azimuth_range
+        behind = [] if _width(low, high) == TURN else [(high, low)]
+        for low, high in [*self._sectors, *behind]:
+            low, breadth = low + END_TOLERANCE, _width(low, high) - 2 * END_TOLERANCE
+            begins_inside = (np.asarray(start) - low) % TURN < breadth
+            barred |= (breadth > 0) & (begins_inside | ((low - np.asarray(start)) % TURN < width))
+        return barred
+
     @property
     def _sectors(self) -> list[tuple[float, float]]:
         return list(zip(self.forbidden_sectors[::2], self.forbidden_sectors[1::2], strict=True))
@@ -86,21 +111,6 @@ class MotionLimits:
         marks = np.unique([wrap_azimuth(end) for end in (*ends, *self.forbidden_sectors)])
         widths = np.diff(marks, append=marks[:1] + TURN)
         return list(zip(marks.tolist(), widths.tolist(), strict=True))
-
-
-def utility(scores: NDArray[np.float32], travel: NDArray[np.float64],
-            motion_weight: float) -> NDArray[np.float32]:
-    """
-    Return the utility of candidates, (N,): a policy's scores less the cost of `travel` (radians).
-
-    The scores are scaled to [0, 1], and half a turn costs `motion_weight`, so that one weight
-    means the same for every policy. With 0 the scores are returned unchanged.
-    """
-    if motion_weight == 0:
-        return scores
-    spread = max(float(np.ptp(scores)), 1e-9)
-    quality = (scores - scores.min()).astype(np.float64) / spread
-    return np.asarray(quality - motion_weight * travel / math.pi, np.float32)
 
 
 def _are_sectors(ends: Sequence[float]) -> bool:

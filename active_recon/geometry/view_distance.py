@@ -1,10 +1,13 @@
 """How far views are from each other: angles at the object between cameras, and nearest ones."""
 
 from collections.abc import Sequence
+import math
 
 from active_recon.geometry.cameras import Camera
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+_ONE_ELEVATION = math.radians(10)
 
 
 def view_distance(a: Camera, b: Camera) -> float:
@@ -31,5 +34,21 @@ def nearest_camera(camera: Camera, cameras: Sequence[Camera]) -> int:
 
 def pose_directions(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return unit vectors from the origin to cameras, (..., 3), of poses (..., 4, 4)."""
-    positions = poses[..., :3, 3]
-    return np.asarray(positions / np.linalg.norm(positions, axis=-1, keepdims=True))
+    return directions_of(poses[..., :3, 3])
+
+
+def directions_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return unit vectors from the origin to positions (..., 3)."""
+    exact = np.asarray(positions, np.float64)
+    return np.asarray(exact / np.linalg.norm(exact, axis=-1, keepdims=True))
+
+
+def at_one_elevation(directions: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """
+    Return whether the elevations of directions (..., N, 3) differ by 10 degrees at most, (...).
+
+    Then a camera goes around the object as on a turntable, give or take how it is held.
+    """
+    heights = directions[..., 2].clip(-1, 1)
+    return np.asarray(np.arcsin(heights.max(axis=-1)) - np.arcsin(heights.min(axis=-1))
+                      <= _ONE_ELEVATION)

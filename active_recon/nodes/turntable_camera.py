@@ -1,5 +1,6 @@
 """ROS node of the simulated turntable: a camera stream of an object that turns."""
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -14,11 +15,16 @@ from active_recon.nodes.runtime.run import one_line, run_node
 from active_recon.objects import find_object
 from active_recon.parameters.turntable_camera import TurntableCameraParameters
 from active_recon.simulation.faults import CameraFaults, read_faults, Sent, Shot
-from active_recon.simulation.shown_object import rendered_object, ShownObject, stored_object
-from active_recon.simulation.turntable import Turntable
+from active_recon.simulation.orbit import Orbit
+from active_recon.simulation.shown_object import (
+    object_anywhere,
+    rendered_object,
+    Shown,
+    stored_object,
+)
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs
-from msg_tools.goals import azimuth_goal_from_msg
+from msg_tools.goals import azimuth_goal_from_msg, view_goal_from_msg
 from msg_tools.images import image_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -39,18 +45,21 @@ class TurntableCameraNode(QosWarnings):
         self._params = Parameters(self, TurntableCameraParameters)
         self._params.on_change(self._change)
         params = self._params.values
-        self._turntable = _at_start(params)
+        self._motion = _at_start(params)
         self._faults = CameraFaults(read_faults(params.faults), params.faults_seed)
         self._objects = _objects(params)
         self._index = 0
         first = self._objects[0]()
-        self._shown: ShownObject | None = first
+        self._shown: Shown | None = first
         set_read_only_parameter(self, 'object', first.name, 'name of the first object')
         self._diagnostics = Diagnostics(self)
         self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM_QOS)
         self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM_QOS)
         self._pose_pub = self.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
-        self.create_subscription(JointState, 'next_azimuth', self._on_goal, SENSOR_QOS)
+        if params.follows == 'view':
+            self.create_subscription(PoseStamped, 'next_view', self._on_view_goal, SENSOR_QOS)
+        else:
+            self.create_subscription(JointState, 'next_azimuth', self._on_goal, SENSOR_QOS)
         self._start_episode = self.create_client(Trigger, 'start_episode')
         # In a group of its own: the answer must arrive while the service waits for it.
         self.create_service(Trigger, 'next_object', self._on_next_object,
@@ -64,7 +73,7 @@ class TurntableCameraNode(QosWarnings):
         faults = read_faults(params.faults)
 
         def commit() -> None:
-            self._turntable.set_speed(params.speed, params.time_scale, self._motor_s())
+            self._motion.set_speed(params.speed, params.time_scale, self._motor_s())
             self._faults.change(faults)
             self._timer.timer_period_ns = round(1e9 / params.rate)
             self._timer.reset()
@@ -72,7 +81,7 @@ class TurntableCameraNode(QosWarnings):
         return commit
 
     def _clock_went_back(self, how: str) -> None:
-        self._turntable = _at_start(self._params.values)
+        self._motion = _at_start(self._params.values)
         self.get_logger().warning(f'{how}: the turntable is back at its start')
 
     def _now_s(self) -> float:
@@ -86,10 +95,11 @@ class TurntableCameraNode(QosWarnings):
             return
         now = self.get_clock().now().nanoseconds
         if not self._faults.is_there(now / 1e9):
-            self._turntable = _at_start(self._params.values)
+            self._motion = _at_start(self._params.values)
             return
+        azimuth, elevation = self._motion.at(self._faults.motor_time(now / 1e9))
         image, camera = self._shown.seen_from(
-            self._turntable.azimuth_at(self._faults.motor_time(now / 1e9)))
+            azimuth, elevation if self._params.values.follows == 'view' else None)
         # The image is last: by then its camera info and pose have been published.
         for sent in self._faults.sent(Shot(now, image, camera), now / 1e9):
             self._send(sent)
@@ -113,7 +123,15 @@ class TurntableCameraNode(QosWarnings):
         if not self._faults.is_there(self._now_s()):
             return
         with self._diagnostics.rejecting():
-            self._turntable.turn_to(azimuth_goal_from_msg(msg), self._motor_s())
+            self._motion.turn_to(azimuth_goal_from_msg(msg), self._motor_s())
+            self._diagnostics.count('goals')
+
+    def _on_view_goal(self, msg: PoseStamped) -> None:
+        if not self._faults.is_there(self._now_s()):
+            return
+        with self._diagnostics.rejecting():
+            goal = view_goal_from_msg(msg, self._params.values.object_frame)
+            self._motion.go_to(goal, self._motor_s())
             self._diagnostics.count('goals')
 
     async def _on_next_object(self, _request: Trigger.Request,
@@ -151,15 +169,16 @@ class TurntableCameraNode(QosWarnings):
         return answer is not None and answer.success
 
 
-def _at_start(params: TurntableCameraParameters) -> Turntable:
-    return Turntable(params.start_azimuth, params.speed, params.time_scale)
+def _at_start(params: TurntableCameraParameters) -> Orbit:
+    return Orbit(params.start_azimuth, speed=params.speed, time_scale=params.time_scale)
 
 
-def _objects(params: TurntableCameraParameters) -> list[partial[ShownObject]]:
+def _objects(params: TurntableCameraParameters) -> Sequence[Callable[[], Shown]]:
     """Return functions that load each object: only one is in memory at a time."""
     size, background = params.object_size, params.background
     if params.mesh:
-        return [partial(rendered_object, find_object(params.mesh), size, background,
+        made = object_anywhere if params.follows == 'view' else rendered_object
+        return [partial(made, find_object(params.mesh), size, background,
                         params.up or None, params.front or None)]
     folders = list_objects(Path(params.dataset))
     if not folders:

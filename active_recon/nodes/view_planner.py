@@ -7,7 +7,6 @@ from active_recon.acquisition.goals import Goal
 from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import (
     Camera,
-    CANONICAL_DISTANCE,
     CANONICAL_ELEVATION,
     orbit_camera,
 )
@@ -93,10 +92,8 @@ class ViewPlannerNode(ManagedNode):
     def _planner_of(self, params: ViewPlannerParameters, policy: Policy) -> Planner:
         return Planner(
             policy, params.max_views, params.entropy_tolerance, params.object_yaw,
-            params.limits(), params.motion_weight,
-            None if math.isnan(params.elevation) else params.elevation,
-            CANONICAL_DISTANCE * params.object_size if math.isnan(params.distance)
-            else params.distance)
+            params.limits(), params.motion_weight, params.goal_elevation, params.goal_distance,
+            params.elevation_range, params.reachable_views, params.motion())
 
     def _change(self, params: ViewPlannerParameters) -> Commit | None:
         """Return a function that applies a change of parameters."""
@@ -227,9 +224,9 @@ class ViewPlannerNode(ManagedNode):
             return
         decision = self._planner.give_up(failed, self._camera)
         instead = ('no reachable goal is left' if decision.goal is None else
-                   f'the next best is {math.degrees(decision.goal.camera.azimuth):.1f} degrees')
+                   f'the next best is {_place_words(decision.goal.camera)}')
         self._diagnostics.warn('goal_timeout', (
-            f'no view from {math.degrees(failed.azimuth):.1f} degrees: expected one within '
+            f'no view from {_place_words(failed)}: expected one within '
             f'{timeout:g} s, got none; it is left out of this episode, {instead}'))
         self._follow(decision, self.get_clock().now().nanoseconds)
 
@@ -261,6 +258,11 @@ class ViewPlannerNode(ManagedNode):
         if not self._done:
             self._follow(self._planner.stop(), self.get_clock().now().nanoseconds)
         return response
+
+
+def _place_words(camera: Camera) -> str:
+    return (f'azimuth {math.degrees(camera.azimuth):.1f}, elevation '
+            f'{math.degrees(camera.elevation):.1f} degrees')
 
 
 def main(args: list[str] | None = None) -> None:

@@ -19,8 +19,12 @@ class TurntableCameraParameters(CubeParameters):
     background: float = parameter(255.0, 'gray value of the background', low=0.0, high=255.0)
     start_azimuth: float = parameter(
         0.0, 'azimuth of the camera at the start, rad', low=-2 * math.pi, high=2 * math.pi)
+    follows: str = parameter(
+        'azimuth', 'goals that the camera goes to: those on next_azimuth by turning, or those on '
+        'next_view, up and down too', choices=('azimuth', 'view'))
     speed: float = parameter(
-        1.0, 'speed of the turntable, rad/s', low=0.001, high=100.0, dynamic=True)
+        1.0, 'speed of the turntable, and of the camera up and down, rad/s', low=0.001,
+        high=100.0, dynamic=True)
     time_scale: float = parameter(
         1.0, 'how many times faster than the clock it turns', low=0.001, high=1000.0, dynamic=True)
     rate: float = parameter(10.0, 'image rate, Hz', low=0.1, high=1000.0, dynamic=True)

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 import math
 
+from active_recon.acquisition.goal_places import goal_places, STEEPEST
 from active_recon.acquisition.motion import MotionLimits
-from active_recon.geometry.cameras import TURN
+from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
+from active_recon.geometry.cameras import CANONICAL_DISTANCE, TURN
 from active_recon.parameters.declaration import parameter
 from active_recon.parameters.shared import (
     CubeParameters,
@@ -41,6 +43,19 @@ class ViewPlannerParameters(FrontParameters, CubeParameters, NetworkParameters, 
     motion_weight: float = parameter(
         0.0, "cost of half a turn, relative to the policy's scores, which are scaled to [0, 1]",
         low=0.0, high=1000.0, dynamic=True)
+    motion_cost: float = parameter(
+        0.0, 'cost of each second until the view is taken: of IoU where the scores of the policy '
+        'are expected gains of it, else of scores scaled to [0, 1]; instead of motion_weight',
+        low=0.0, high=1000.0, dynamic=True)
+    azimuth_speed: float = parameter(
+        1.0, 'speed of the camera around the object, for motion_cost, rad/s', low=0.001,
+        high=1000.0, dynamic=True)
+    elevation_speed: float = parameter(
+        1.0, 'speed of the camera up and down, for motion_cost, rad/s', low=0.001, high=1000.0,
+        dynamic=True)
+    view_time: float = parameter(
+        0.0, 'time of a view once the camera is there, settling included, for motion_cost, s',
+        low=0.0, high=3600.0, dynamic=True)
     goal_timeout: float = parameter(
         0.0, 'time after which a goal without a view is replaced by the next best, s; 0 for never',
         low=0.0, high=86400.0, dynamic=True)
@@ -48,14 +63,39 @@ class ViewPlannerParameters(FrontParameters, CubeParameters, NetworkParameters, 
         math.nan, 'azimuth of the first view, rad; nan for that of the camera',
         low=-2 * math.pi, high=2 * math.pi)
     elevation: float = parameter(
-        math.nan, 'elevation of the goals, rad; nan for that of the camera', low=-1.5, high=1.5)
+        math.nan, 'elevation of the goals, rad; nan for that of the camera', low=-STEEPEST,
+        high=STEEPEST)
+    elevation_range: tuple[float, ...] = parameter(
+        (), 'low and high elevation of goals that may stand anywhere between them, rad; empty for '
+        'goals at one elevation', low=-STEEPEST, high=STEEPEST)
+    reachable_views: tuple[float, ...] = parameter(
+        (), 'azimuth (rad), elevation (rad), distance (m; 0 for `distance`), azimuth, ... of the '
+        'only views that the camera can reach; empty for any', low=-2 * TURN, high=10000.0)
     distance: float = parameter(
         math.nan, 'distance of the goals, m; nan for 2.1 object_size', low=0.001, high=10000.0)
 
     def __post_init__(self) -> None:
-        """Reject limits that leave no azimuth."""
-        self.limits()
+        """Reject limits that leave no view, and places or costs that contradict each other."""
+        goal_places(self.limits(), 0.0, self.goal_elevation, self.goal_distance,
+                    self.elevation_range, self.reachable_views)
+        MotionCost(self.motion_weight, self.motion())
+
+    @property
+    def goal_elevation(self) -> float | None:
+        """The elevation of the goals, radians; None: that of the camera."""
+        return None if math.isnan(self.elevation) else self.elevation
+
+    @property
+    def goal_distance(self) -> float:
+        """The distance of the goals, metres."""
+        return (CANONICAL_DISTANCE * self.object_size if math.isnan(self.distance)
+                else self.distance)
 
     def limits(self) -> MotionLimits:
         """Return the limits of the camera's motion; raises ConfigError."""
         return MotionLimits(self.azimuth_range, self.forbidden_sectors, self.reachable_azimuths)
+
+    def motion(self) -> TimedMotion:
+        """Return the time that views take and its cost; raises ConfigError."""
+        return TimedMotion(self.azimuth_speed, self.elevation_speed, self.view_time,
+                           self.motion_cost)

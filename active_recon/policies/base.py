@@ -37,10 +37,12 @@ class Choice:
     - scores: (B, K), of the candidates; higher is better
     - azimuth: (B,), radians, that the policy prefers to all candidates; NaN where it prefers
       none; None: for no episode
+    - is_gain: whether the scores are expected gains of IoU, and not only an order
     """
 
     scores: NDArray[np.float32]
     azimuth: NDArray[np.float64] | None = None
+    is_gain: bool = False
 
 
 class Policy(Protocol):

@@ -1,10 +1,19 @@
 """The heuristic policies, which use no image: random, uniform, farthest."""
 
+import math
+
 from active_recon.geometry.cameras import pose_azimuths, TURN
-from active_recon.geometry.view_distance import direction_distance, pose_directions
+from active_recon.geometry.view_distance import (
+    at_one_elevation,
+    direction_distance,
+    pose_directions,
+)
 from active_recon.policies.base import Choice, distance_to_taken, is_fresh, Observation
 from active_recon.runtimes import State
 import numpy as np
+from numpy.typing import NDArray
+
+_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 class HeuristicPolicy:
@@ -31,20 +40,45 @@ class RandomPolicy(HeuristicPolicy):
 
 
 class UniformPolicy(HeuristicPolicy):
-    """An equidistant sweep from the first view around +z, for a given number of views."""
+    """
+    An equidistant sweep from the first view around +z, for a given number of views.
+
+    Where the candidates' elevations differ by more than 10 degrees, the sweep goes up and down
+    besides: from azimuth to azimuth the height, the sine of the elevation, grows by 0.618 of the
+    candidates' range, and goes on from the lowest where that is above the highest. These are
+    points of a Fibonacci lattice, which gives equal areas of a sphere about equally many. They are
+    taken in steps of about 137 degrees, so that few of them are spread too. Then the best
+    candidate is the goal, and no azimuth between candidates is preferred.
+    """
 
     def __init__(self, views: int) -> None:
-        self._step = TURN / max(views, 1)
+        self._views = max(views, 1)
+        self._step = TURN / self._views
+        around = np.arange(self._views) * (1 - _GOLDEN) % 1
+        self._order: NDArray[np.intp] = np.argsort(np.argsort(around))
 
     def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
-        """Choose the next azimuth of the sweep, counted from its start; see Policy."""
+        """Choose the next place of the sweep, counted from its start; see Policy."""
         first, count = seen.taken[:, 0], seen.taken.shape[1]
-        target = (pose_azimuths(first) + count * self._step) % TURN
-        height = pose_directions(first)[:, 2]
+        directions = pose_directions(seen.candidates)
+        turns, rest = divmod(count, self._views)
+        is_ring = at_one_elevation(directions)
+        place = np.where(is_ring, count, turns * self._views + self._order[rest])
+        target = (pose_azimuths(first) + place * self._step) % TURN
+        height = np.where(is_ring, pose_directions(first)[:, 2],
+                          _risen(pose_directions(first)[:, 2], directions[..., 2], place))
         across = np.sqrt(np.maximum(1 - height ** 2, 0))
         wanted = np.stack([across * np.cos(target), across * np.sin(target), height], axis=-1)
-        away = direction_distance(pose_directions(seen.candidates), wanted[:, None])
-        return Choice((-away).astype(np.float32), target), state
+        away = direction_distance(directions, wanted[:, None])
+        return Choice((-away).astype(np.float32), np.where(is_ring, target, np.nan)), state
+
+
+def _risen(first: NDArray[np.float64], heights: NDArray[np.float64],
+           steps: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the height so many steps of a sweep after the first, within those of candidates."""
+    low, high = heights.min(axis=1), heights.max(axis=1)
+    share = ((first - low) / np.maximum(high - low, 1e-9)).clip(0, 1)
+    return np.asarray(low + (high - low) * ((share + steps * _GOLDEN) % 1))
 
 
 class FarthestPolicy(HeuristicPolicy):

@@ -15,7 +15,7 @@ from active_recon.report.findings import findings, stopped
 from active_recon.report.images import data_uri
 from active_recon.report.scene import scene
 from active_recon.report.stages import median, STAGES, timings
-from active_recon.report.subject import degrees, Subject
+from active_recon.report.subject import degrees, elevation_degrees, Subject
 from active_recon.report.turntable_map import turntable_map
 from active_recon.report.words import key_words
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -48,7 +48,8 @@ def report_page(subjects: Sequence[Subject]) -> str:
     environment = Environment(
         loader=PackageLoader('active_recon.report', 'templates'), autoescape=True,
         trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
-    environment.filters |= {'number': _number, 'degrees': degrees, 'words': key_words}
+    environment.filters |= {'number': _number, 'degrees': degrees, 'elevation': elevation_degrees,
+                            'words': key_words}
     return environment.get_template('page.html').render(
         panels=panels, several=several, known_truth=known_truth, stages=STAGES,
         drawn=_compressed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),

@@ -7,6 +7,7 @@ import math
 
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
 from active_recon.geometry.cameras import azimuth_difference
+from active_recon.geometry.view_distance import at_one_elevation
 from active_recon.volumes.voxels import iou, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,12 @@ class Subject:
                 else float(iou(view.occupied.occupied(0), self.truth)) for view in self.views]
 
     @property
+    def has_elevations(self) -> bool:
+        """Whether the views' elevations differ by more than a turntable's camera lets them."""
+        directions = np.array([view.camera.direction for view in self.views])
+        return not at_one_elevation(directions)
+
+    @property
     def travel(self) -> float:
         """Radians between consecutive views, each the shorter way, summed."""
         azimuths = [view.camera.azimuth for view in self.views]
@@ -84,3 +91,8 @@ def letters() -> Iterator[str]:
 def degrees(radians: float) -> int:
     """Return an azimuth as whole degrees in [0, 360)."""
     return round(math.degrees(radians)) % 360
+
+
+def elevation_degrees(radians: float) -> int:
+    """Return an elevation as whole degrees in [-90, 90]."""
+    return round(math.degrees(radians))

@@ -10,10 +10,17 @@ import math
 from typing import Any
 
 from active_recon.bags.runs.run import RecordedGoal, RecordedView
-from active_recon.geometry.cameras import azimuth_difference, TURN, VIEW_COUNT
+from active_recon.geometry.cameras import (
+    azimuth_difference,
+    AZIMUTHS,
+    Camera,
+    TURN,
+    VIEW_COUNT,
+)
+from active_recon.geometry.view_distance import at_one_elevation, directions_of
 from active_recon.report.charts import Figure, view_color
 from active_recon.report.images import data_uri
-from active_recon.report.subject import degrees, shown_grid, Subject
+from active_recon.report.subject import degrees, elevation_degrees, shown_grid, Subject
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,10 +50,9 @@ def turntable_map(subject: Subject) -> Figure:
         own = [*_from_above(view, subject.threshold), *_decision(subject.goals[index])]
         data += [{**trace, 'meta': {'of': index}} for trace in own]
     data += _path(azimuths)
-    data += [_goal(goal.camera.azimuth, 8, '--quiet')
-             for goal in subject.goals if goal is not None]
-    data += [_camera(number, azimuth, azimuths[:number - 1])
-             for number, azimuth in enumerate(azimuths, 1)]
+    data += [_goal(goal.camera, 8, '--quiet') for goal in subject.goals if goal is not None]
+    data += [_camera(number, view.camera, azimuths[:number - 1])
+             for number, view in enumerate(subject.views, 1)]
     return {
         'data': data,
         'layout': {
@@ -103,26 +109,51 @@ def _from_above(view: RecordedView, threshold: float) -> list[dict[str, Any]]:
 
 
 def _decision(goal: RecordedGoal | None) -> list[dict[str, Any]]:
-    """Return the goal, and a bar for each candidate azimuth that is longer for a better score."""
+    """
+    Return the goal, and a bar for each candidate that is longer for a better score.
+
+    Where the candidates' elevations differ by more than 10 degrees, a bar stands for the best of
+    those nearest to one of 24 azimuths.
+    """
     if goal is None:
         return []
-    chosen = _goal(goal.camera.azimuth, 15, '--goal')
+    chosen = _goal(goal.camera, 15, '--goal')
     if goal.candidates is None or goal.scores is None:
         return [chosen]
-    finite = np.isfinite(goal.scores) & np.isfinite(goal.candidates.azimuths)
-    azimuths, scores = goal.candidates.azimuths[finite], goal.scores[finite].astype(np.float64)
-    if not len(scores):
+    finite = np.isfinite(goal.scores) & np.isfinite(goal.candidates.positions).all(axis=1)
+    if not finite.any():
         return [chosen]
+    positions, scores = goal.candidates.positions[finite], goal.scores[finite].astype(np.float64)
+    azimuths = goal.candidates.azimuths[finite]
+    elevations = np.arctan2(positions[:, 2], np.hypot(positions[:, 0], positions[:, 1]))
+    around = azimuths
+    if not at_one_elevation(directions_of(positions)):
+        sectors, best = _best_of_sectors(azimuths, scores)
+        azimuths, elevations, scores = azimuths[best], elevations[best], scores[best]
+        around = AZIMUTHS[sectors]
     shares = (scores - scores.min()) / (np.ptp(scores) or 1.0)
-    gaps = np.diff(np.unique(azimuths), append=azimuths.min() + TURN)
+    gaps = np.diff(np.unique(around), append=around.min() + TURN)
     return [{
-        'type': 'barpolar', 'theta': np.degrees(azimuths).tolist(), 'base': _SCORES[0],
+        'type': 'barpolar', 'theta': np.degrees(around).tolist(), 'base': _SCORES[0],
         'r': (_SHORTEST + shares * (_SCORES[1] - _SCORES[0])).tolist(),
         'width': math.degrees(0.8 * min(TURN / VIEW_COUNT, gaps.min())),
         'marker': {'color': '--score', 'line': {'width': 0}},
-        'text': [f'{degrees(azimuth)}°: score {score:.4g}' for azimuth, score in
-                 zip(azimuths.tolist(), scores.tolist(), strict=True)],
+        'text': [f'{_words(*place)}: score {score:.4g}' for *place, score in zip(
+            azimuths.tolist(), elevations.tolist(), scores.tolist(), strict=True)],
         'hovertemplate': '%{text}<extra></extra>'}, chosen]
+
+
+def _best_of_sectors(azimuths: NDArray[np.float64], scores: NDArray[np.float64]
+                     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return which of the 24 azimuths have candidates near them, and the best one's index each."""
+    sectors = np.rint(azimuths * VIEW_COUNT / TURN).astype(np.int64) % VIEW_COUNT
+    order = np.lexsort((-scores, sectors))
+    found, first = np.unique(sectors[order], return_index=True)
+    return found, order[first]
+
+
+def _words(azimuth: float, elevation: float) -> str:
+    return f'{degrees(azimuth)}°, elevation {elevation_degrees(elevation)}°'
 
 
 def _path(azimuths: Sequence[float]) -> list[dict[str, Any]]:
@@ -135,21 +166,22 @@ def _path(azimuths: Sequence[float]) -> list[dict[str, Any]]:
     }] if len(points) > 1 else []
 
 
-def _goal(azimuth: float, size: int, color: str) -> dict[str, Any]:
-    x, y = place(azimuth, _GOALS)
+def _goal(camera: Camera, size: int, color: str) -> dict[str, Any]:
+    x, y = place(camera.azimuth, _GOALS)
     return {'type': 'scatter', 'mode': 'markers', 'x': [x], 'y': [y], 'cliponaxis': False,
             'marker': {'symbol': 'diamond-open', 'size': size, 'color': color,
                        'line': {'width': 2}},
-            'hovertemplate': f'goal at {degrees(azimuth)}°<extra></extra>'}
+            'hovertemplate': f'goal at {_words(camera.azimuth, camera.elevation)}<extra></extra>'}
 
 
-def _camera(number: int, azimuth: float, earlier: Sequence[float]) -> dict[str, Any]:
-    again = int((np.abs(azimuth_difference(earlier, azimuth)) < _TOGETHER).sum())
-    x, y = place(azimuth, 1 - 0.17 * min(again, 4))
+def _camera(number: int, camera: Camera, earlier: Sequence[float]) -> dict[str, Any]:
+    again = int((np.abs(azimuth_difference(earlier, camera.azimuth)) < _TOGETHER).sum())
+    x, y = place(camera.azimuth, 1 - 0.17 * min(again, 4))
     return {'type': 'scatter', 'mode': 'markers+text', 'x': [x], 'y': [y], 'text': [str(number)],
             'textfont': {'color': '--on-view', 'size': 12},
             'marker': {'size': 22, 'color': view_color(number)},
-            'hovertemplate': f'view {number} at {degrees(azimuth)}°<extra></extra>'}
+            'hovertemplate': (f'view {number} at {_words(camera.azimuth, camera.elevation)}'
+                              '<extra></extra>')}
 
 
 def _leader(number: int, azimuth: float, at: float) -> dict[str, Any]:

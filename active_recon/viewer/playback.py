@@ -42,7 +42,7 @@ def _episode_states(episode: RecordedEpisode) -> Iterator[LoopState]:
 def _set_goal(observer: Observer, goal: RecordedGoal) -> None:
     observer.set_goal(goal.stamp, goal.camera)
     if goal.candidates is not None and goal.scores is not None:
-        observer.set_scores(goal.stamp, Scores(goal.candidates.azimuths, goal.scores))
+        observer.set_scores(goal.stamp, Scores(goal.candidates.positions, goal.scores))
 
 
 class Playback:

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from active_recon.geometry.cameras import Camera
-from active_recon.geometry.view_distance import view_distance
+from active_recon.geometry.view_distance import at_one_elevation, directions_of, view_distance
 from active_recon.view_colors import Color, view_color
 from active_recon.viewer.state import LoopState, Scores
 from active_recon.viewer.view_result import ViewResult
@@ -24,6 +24,7 @@ _FLOOR = -0.5  # the grid's lowest side
 _BAR_RADIUS = 1.15  # outside of the cube, inside the cameras
 _BAR_HEIGHT = 0.3
 _BAR_WIDTH = 0.06
+_CUBE_SIDE = 0.1
 _FRUSTUM = 0.22
 _BOX: Any = trimesh.creation.box()
 _COLORS: NDArray[np.uint8] = np.asarray(cv2.applyColorMap(
@@ -86,14 +87,10 @@ class Scene:
         if scores is None:
             self._remove('/scores')
             return
-        heights = _BAR_HEIGHT * relative_scores(scores.scores)
-        centers = np.column_stack([
-            _BAR_RADIUS * np.cos(scores.azimuths), _BAR_RADIUS * np.sin(scores.azimuths),
-            _FLOOR + heights / 2])
-        colors = np.full((len(heights), 3), _BAR_COLOR, np.uint8)
+        centers, sides = score_boxes(scores)
+        colors = np.full((len(centers), 3), _BAR_COLOR, np.uint8)
         colors[np.argmax(scores.scores)] = _NEXT_COLOR
-        self._boxes('/scores', _BAR_WIDTH, centers, colors,
-                    np.column_stack([np.ones((len(heights), 2)), heights / _BAR_WIDTH]))
+        self._boxes('/scores', _BAR_WIDTH, centers, colors, sides / _BAR_WIDTH)
 
     def _draw_views(self, before: tuple[ViewResult, ...], views: tuple[ViewResult, ...]) -> None:
         kept = before == views[:len(before)]
@@ -197,6 +194,23 @@ def shown_cells(grid: VoxelGrid, threshold: float) -> NDArray[np.float32]:
 def certainty_colors(occupancy: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return colours, (N, 3) RGB, from light (probability 0) to dark (probability 1)."""
     return _COLORS[np.rint(235 - 195 * occupancy).astype(np.uint8)]
+
+
+def score_boxes(scores: Scores) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """
+    Return the centres and the sides of the boxes that show scores, (N, 3) each, in grid sides.
+
+    They are bars around the turntable, the higher the better. Where the candidates' elevations
+    differ by more than 10 degrees they are cubes on a sphere, the larger the better.
+    """
+    directions = directions_of(scores.positions)
+    shares = relative_scores(scores.scores)
+    if not at_one_elevation(directions):
+        return _BAR_RADIUS * directions, np.repeat(_CUBE_SIDE * shares[:, None], 3, axis=1)
+    heights = _BAR_HEIGHT * shares
+    around = directions[:, :2] / np.linalg.norm(directions[:, :2], axis=1, keepdims=True)
+    return (np.column_stack([_BAR_RADIUS * around, _FLOOR + heights / 2]),
+            np.column_stack([np.full((len(heights), 2), _BAR_WIDTH), heights]))
 
 
 def relative_scores(scores: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -16,9 +16,9 @@ _PICTURE_PIXELS = 160  # the largest size of a picture in the scene
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """The planner's candidates: azimuths (N,) in radians, scores (N,)."""
+    """The planner's candidates: positions (N, 3) in metres, scores (N,)."""
 
-    azimuths: NDArray[np.floating]
+    positions: NDArray[np.floating]
     scores: NDArray[np.floating]
 
 

@@ -102,7 +102,8 @@ def observed(views):
         grid = ball(0.1 + 0.1 * number)
         observer.add_view(taken(number), grid, grid.above(0.5))
     observer.set_goal(1000, orbit_camera(5.5))
-    observer.set_scores(1000, Scores(AZIMUTHS, np.arange(24.0)))
+    around = np.array([orbit_camera(azimuth).position for azimuth in AZIMUTHS])
+    observer.set_scores(1000, Scores(around, np.arange(24.0)))
     return observer.state
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion_cost import TimedMotion
 from active_recon.bags.runs.parameters import node_parameters
 from active_recon.bags.runs.run import RecordedRun
 from active_recon.errors import WeightsError
@@ -18,8 +19,10 @@ from active_recon.reconstructor import Reconstructor
 
 _OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
 _OF_LIMITS = tuple(field.name for field in fields(MotionLimits))
+_OF_MOTION = tuple(field.name for field in fields(TimedMotion))
 _OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw', 'motion_weight',
-               'elevation', 'distance', *_OF_LIMITS)
+               'elevation', 'elevation_range', 'reachable_views', 'distance', *_OF_LIMITS,
+               *_OF_MOTION)
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,12 @@ class LoopSetup:
         """Return the planner, None if the policy is unknown; raises WeightsError, ConfigError."""
         if self.planner is None:
             return None
-        limits = MotionLimits(**{name: self.planner[name] for name in _OF_LIMITS
-                                 if name in self.planner})
+        limits = MotionLimits(**_own(self.planner, _OF_LIMITS))
+        motion = TimedMotion(**_own(self.planner, _OF_MOTION))
         place = {'distance': CANONICAL_DISTANCE * self.reconstructor.get('object_size', 1.0)}
-        return Planner.load(limits=limits, threads=self.threads, **place | {
-            name: value for name, value in self.planner.items() if name not in _OF_LIMITS})
+        return Planner.load(limits=limits, motion=motion, threads=self.threads, **place | {
+            name: value for name, value in self.planner.items()
+            if name not in (*_OF_LIMITS, *_OF_MOTION)})
 
 
 def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: bool = False,
@@ -114,6 +118,11 @@ def _given(parameters: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, A
     """Return the named parameters that are set: NaN means 'not set'."""
     return {name: value for name in names if (value := parameters.get(name)) is not None
             and not (isinstance(value, float) and math.isnan(value))}
+
+
+def _own(parameters: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    """Return those of the named parameters that there are."""
+    return {name: parameters[name] for name in names if name in parameters}
 
 
 def _named(parameter: str) -> Path | None:

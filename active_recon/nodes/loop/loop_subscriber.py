@@ -167,9 +167,9 @@ class LoopSubscriber:
         self.observer.set_goal(nanoseconds_from_stamp(msg.header.stamp), self._camera(msg))
 
     def _on_scores(self, msg: PointCloud2) -> None:
-        _, azimuths, scores = scores_from_msg(msg)
+        positions, _, scores = scores_from_msg(msg)
         self.observer.set_scores(
-            nanoseconds_from_stamp(msg.header.stamp), Scores(azimuths, scores))
+            nanoseconds_from_stamp(msg.header.stamp), Scores(positions, scores))
 
     def _on_done(self, msg: Header) -> None:
         self.observer.set_done(*done_from_msg(msg))
