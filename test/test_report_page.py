@@ -15,6 +15,7 @@ from active_recon.bags.runs.run import TopicSummary
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
+from active_recon.report.scene import encoded, STEPS
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
 import numpy as np
@@ -194,3 +195,12 @@ def test_page_of_recorded_shapes_does_not_wait_for_torch():
     code = ('import sys, active_recon.report.page, active_recon.report.truth; '
             "sys.exit('torch' in sys.modules)")
     assert subprocess.run([sys.executable, '-c', code], check=False).returncode == 0
+
+
+def test_every_occupancy_on_the_page_keeps_to_its_side_of_the_threshold():
+    threshold = 0.4179
+    near = np.float32(threshold) + np.arange(-40, 41, dtype=np.float32) * np.float32(3e-8)
+    occupancy = np.concatenate([near, np.float32([0, threshold, 1])])
+    steps = np.frombuffer(b64decode(encoded(occupancy, threshold)), '<u2')
+    np.testing.assert_array_equal(steps > threshold * STEPS, occupancy > threshold)
+    assert np.abs(steps / STEPS - occupancy).max() <= 1 / STEPS
