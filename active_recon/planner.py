@@ -20,6 +20,7 @@ from active_recon.policies import (
     Policy,
     PolicyOptions,
 )
+from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,8 @@ class Decision:
     """
     A goal, or the reason why there is none.
 
-    That is max_views, entropy_settled, no_reachable_azimuth or stopped.
+    That is max_views, entropy_settled, target_reached, target_out_of_reach, gain_too_small,
+    no_reachable_azimuth or stopped.
     """
 
     goal: Goal | None
@@ -46,12 +48,14 @@ class PlannerView:
     - camera: of the view that was really taken, in the object frame
     - entropy: of the reconstruction, nats
     - volume: the published probabilities, for a policy that wants them
+    - quality: None where it is not judged
     """
 
     latent: NDArray[np.float32]
     camera: Camera
     entropy: float
     volume: VoxelGrid | None = None
+    quality: Quality | None = None
 
 
 class Planner:
@@ -67,6 +71,11 @@ class Planner:
     `motion_weight` is what half a turn costs, beside 1 for what lies between the policy's worst
     and best candidate, and `motion` what a second costs instead. A view is asked for again only
     when no other is left.
+
+    `target_quality` (0: none) ends an episode once that IoU is promised, or when it is out of
+    reach; `min_gain` (0: none) when no candidate's expected gain of IoU, of a policy that knows
+    it, is as large. While views are flagged as unusual, their quality ends nothing, and an even
+    sweep takes the place of the policy.
     """
 
     def __init__(self, policy: Policy, max_views: int = 5, entropy_tolerance: float = 0.01,
@@ -74,7 +83,8 @@ class Planner:
                  motion_weight: float = 0.0, elevation: float | None = None,
                  distance: float = CANONICAL_DISTANCE, elevation_range: Sequence[float] = (),
                  reachable_views: Sequence[float] = (),
-                 motion: TimedMotion | None = None) -> None:
+                 motion: TimedMotion | None = None,
+                 target_quality: float = 0.0, min_gain: float = 0.0) -> None:
         if max_views < 1:
             raise ConfigError(f'max_views: too few: expected 1 or more, got {max_views}')
         if not 0 <= entropy_tolerance < 1:
@@ -82,6 +92,11 @@ class Planner:
                               f'{entropy_tolerance}')
         if not math.isfinite(object_yaw):
             raise ConfigError(f'object_yaw: not finite: expected radians, got {object_yaw}')
+        for name, share in (('target_quality', target_quality), ('min_gain', min_gain)):
+            if not 0 <= share < 1:
+                raise ConfigError(f'{name}: out of range: expected an IoU in [0, 1), got {share}')
+        self._target_quality, self._min_gain = target_quality, min_gain
+        self._sweep = load_policy('uniform', PolicyOptions(views=max_views))
         self._policy = policy
         self._max_views = max_views
         self._entropy_tolerance = entropy_tolerance
@@ -99,12 +114,14 @@ class Planner:
              motion_weight: float = 0.0, elevation: float | None = None,
              distance: float = CANONICAL_DISTANCE, elevation_range: Sequence[float] = (),
              reachable_views: Sequence[float] = (), motion: TimedMotion | None = None,
-             threads: int | None = None) -> 'Planner':
+             threads: int | None = None, target_quality: float = 0.0,
+             min_gain: float = 0.0) -> 'Planner':
         """Build the planner of a policy's name; raises ConfigError and WeightsError."""
         options = PolicyOptions(np.random.default_rng(seed), max_views, weights, device=device,
                                 threads=threads)
         return cls(load_policy(policy, options), max_views, entropy_tolerance, object_yaw, limits,
-                   motion_weight, elevation, distance, elevation_range, reachable_views, motion)
+                   motion_weight, elevation, distance, elevation_range, reachable_views, motion,
+                   target_quality, min_gain)
 
     @property
     def wants_volume(self) -> bool:
@@ -153,7 +170,7 @@ class Planner:
         return self.plan()
 
     def add_view(self, latent: NDArray[np.float32], camera: Camera, entropy: float,
-                 volume: VoxelGrid | None = None) -> Decision:
+                 volume: VoxelGrid | None = None, quality: Quality | None = None) -> Decision:
         """
         Take in a view and decide.
 
@@ -164,7 +181,7 @@ class Planner:
                             f'{entropy}', 'latent')
         before = self._candidates
         self._look_from(camera)
-        views = [*self._views, PlannerView(latent, camera, entropy, volume)]
+        views = [*self._views, PlannerView(latent, camera, entropy, volume, quality)]
         try:
             self._choose(views)
         except ViewError:
@@ -174,11 +191,8 @@ class Planner:
         self._aim(camera)
         if self._stopped:
             return self.stop()
-        if len(self._views) >= self._max_views:
-            return Decision(None, 'max_views')
-        if self._settled():
-            return Decision(None, 'entropy_settled')
-        return self.next_goal()
+        reason = self._enough()
+        return Decision(None, reason) if reason else self.next_goal()
 
     def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:
         """
@@ -232,6 +246,8 @@ class Planner:
             last.volume.occupancy, -self._yaw)[None]
         seen = Observation(last.latent[None], taken, candidates, volume)
         self._choice, self._state = self._policy.choose(seen, self._state)
+        if last.quality is not None and last.quality.suspect:
+            self._choice, _ = self._sweep.choose(seen, {})
 
     def _aim_first(self, camera: Camera) -> None:
         """Make the best of a camera that no policy chose."""
@@ -257,6 +273,23 @@ class Planner:
         return best_goal(
             self._wanted, self._candidates, camera, [view.camera for view in self._views],
             self._failed, self._limits, self._cost if self._views else MotionCost())
+
+    def _enough(self) -> str:
+        """Return the reason why no further view is needed, '' where one is."""
+        last = self._views[-1].quality
+        known = last if self._target_quality and last and not last.suspect else None
+        if known is not None and known.promise >= self._target_quality:
+            return 'target_reached'
+        if len(self._views) >= self._max_views:
+            return 'max_views'
+        if known is not None and known.attainable < self._target_quality:
+            return 'target_out_of_reach'
+        if self._settled():
+            return 'entropy_settled'
+        choice = self._choice
+        if self._min_gain and choice and choice.is_gain and choice.scores.max() < self._min_gain:
+            return 'gain_too_small'
+        return ''
 
     def _settled(self) -> bool:
         """Whether the last two views each changed the entropy by no more than the tolerance."""

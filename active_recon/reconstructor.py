@@ -1,5 +1,6 @@
 """A network and the state of one episode: the core of the reconstructor's node."""
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
@@ -8,11 +9,18 @@ from pathlib import Path
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.canonical import network_image, NetworkSpec
-from active_recon.models.weights_files import find_weights
+from active_recon.models.weights_files import find_weights, SHIPPED
+from active_recon.quality.judge import Judge
+from active_recon.quality.quality import Quality
+from active_recon.quality.silhouettes import SeenView
+from active_recon.quality.tables import find_tables, QualityTables
 from active_recon.runtimes import load_runtime, Runtime
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
+
+_COMPARED_VIEWS = 24
+"""Views, the last ones, whose silhouettes are compared: a stream of views must not get slower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,12 +29,13 @@ class Reconstruction:
     The reconstruction after a view: the grid in the object frame, and the latent (C, h, w).
 
     `image` is the network's input, (S, S, 3 or 4) uint8; the fourth channel is 255 where the
-    camera saw the pixel.
+    camera saw the pixel. `quality` is None where the weights have no quality tables.
     """
 
     grid: VoxelGrid
     latent: NDArray[np.float32]
     image: NDArray[np.uint8] | None = None
+    quality: Quality | None = None
 
 
 class Reconstructor:
@@ -35,11 +44,11 @@ class Reconstructor:
 
     `object_size` is the side of the voxel grid in metres. `object_yaw` is the azimuth of the
     object's front in the object frame, radians. Only networks that predict with the front at +x
-    use it. `threshold` None is that of the weights.
+    use it. `threshold` None is that of the weights. `tables` None: quality is not judged.
     """
 
     def __init__(self, runtime: Runtime, object_size: float = 1.0, object_yaw: float = 0.0,
-                 threshold: float | None = None) -> None:
+                 threshold: float | None = None, tables: QualityTables | None = None) -> None:
         if not object_size > 0:
             raise ConfigError('object_size: out of range: expected metres above 0, got '
                               f'{object_size}')
@@ -49,15 +58,26 @@ class Reconstructor:
         self.set_threshold(threshold)
         self.object_size = object_size
         self._yaw = object_yaw if runtime.spec.needs_front else 0.0
+        self._judge = None if tables is None else Judge(tables)
+        self.no_quality = ''
+        """Why quality is not judged, in words, where it might be expected."""
         self.reset()
 
     @classmethod
     def load(cls, weights: Path | None = None, device: str = 'cpu', object_size: float = 1.0,
              object_yaw: float = 0.0, threshold: float | None = None,
              threads: int | None = None, runtime: str = 'torch') -> 'Reconstructor':
-        """Load weights (None: those that ship); raises WeightsError and ConfigError."""
-        return cls(load_runtime(weights, runtime, device, threads), object_size, object_yaw,
-                   threshold)
+        """
+        Load weights (None: those that ship), and the quality tables beside them if there are any.
+
+        Raises WeightsError and ConfigError.
+        """
+        loaded = load_runtime(weights, runtime, device, threads)
+        tables, without = find_tables(
+            weights or SHIPPED, loaded.provenance.get('weights_sha256', ''))
+        reconstructor = cls(loaded, object_size, object_yaw, threshold, tables)
+        reconstructor.no_quality = without
+        return reconstructor
 
     @property
     def spec(self) -> NetworkSpec:
@@ -69,6 +89,11 @@ class Reconstructor:
         """What diagnostics and bags record of the network and its runtime."""
         needs_front = str(self._runtime.spec.needs_front).lower()
         return {**self._runtime.provenance, 'needs_front': needs_front}
+
+    @property
+    def judges_quality(self) -> bool:
+        """Whether reconstructions come with their quality."""
+        return self._judge is not None
 
     @property
     def view_count(self) -> int:
@@ -91,6 +116,7 @@ class Reconstructor:
         """Clear the state for a new episode."""
         self._state = self._runtime.initial_state()
         self._view_count = 0
+        self._seen: deque[SeenView] = deque(maxlen=_COMPARED_VIEWS)
 
     def add_view(self, image: NDArray[np.uint8], camera: Camera) -> Reconstruction:
         """
@@ -100,11 +126,20 @@ class Reconstructor:
         which leaves the state unchanged.
         """
         shown, seen_by = network_image(image, camera, self._runtime.spec, self.object_size)
-        occupancy, latent, self._state = self._runtime.step(
-            shown, seen_by.turned(-self._yaw).scaled(1 / self.object_size), self._state)
+        placed = seen_by.turned(-self._yaw).scaled(1 / self.object_size)
+        occupancy, latent, self._state = self._runtime.step(shown, placed, self._state)
         self._view_count += 1
         grid = VoxelGrid(turned(occupancy, self._yaw), self.object_size)
-        return Reconstruction(grid, latent, shown)
+        return Reconstruction(grid, latent, shown, self._quality(occupancy, latent, placed))
+
+    def _quality(self, occupancy: NDArray[np.float32], latent: NDArray[np.float32],
+                 camera: Camera) -> Quality | None:
+        """Judge the state after a view, from the network's frame."""
+        if self._judge is None or 'foreground' not in self._state:
+            return None
+        foreground, seen = self._state['foreground'][0]
+        self._seen.append(SeenView(camera, foreground.copy(), seen.copy()))
+        return self._judge.judge(occupancy, self.threshold, latent, self._seen, self._view_count)
 
 
 def load(model: str | Path | None = None, object_size: float = 1.0,

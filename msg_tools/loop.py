@@ -3,11 +3,13 @@
 from typing import Any
 
 from active_recon.geometry.cameras import Camera, OBJECT_FRAME
+from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import VoxelGrid
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
 from msg_tools.entropy import entropy_to_msg
 from msg_tools.goals import azimuth_goal_to_msg, score_table_to_msg, view_goal_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
+from msg_tools.quality import quality_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
@@ -28,7 +30,8 @@ def image_to_msgs(stamp: int, image: NDArray[np.uint8], camera: Camera,
 
 def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
                  occupied: VoxelGrid | None, latent: NDArray[np.float32] | None,
-                 entropy: float | None, object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
+                 entropy: float | None, quality: Quality | None = None,
+                 object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
     """
     Return the reconstructor's messages for a view, at the stamp of its image in ns.
 
@@ -45,6 +48,8 @@ def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
         messages['probabilities'] = voxel_grid_to_msg(probabilities, 0, header)
     if entropy is not None:
         messages['entropy'] = entropy_to_msg(entropy, header)
+    if quality is not None:
+        messages['quality'] = quality_to_msg(quality, header)
     return messages
 
 

@@ -14,7 +14,7 @@ ROWS: tuple[set[str], ...] = (
     {'errors'},
     {'config', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting', 'view_colors'},
     {'volumes'},
-    {'acquisition', 'calibration', 'models', 'shapes'},
+    {'acquisition', 'calibration', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},
     {'environment', 'policies', 'simulation'},
     {'parameters', 'planner', 'reconstructor'},

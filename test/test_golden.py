@@ -78,7 +78,7 @@ def test_all_of_it_replays_to_what_was_recorded(run, loop):
     assert verified.comparison.verdict in (SAME_BITS, WITHIN_TOLERANCE)
     assert {name: found.compared for name, found in verified.comparison.deviations.items()} == {
         'probabilities': 4, 'occupancy': 4, 'latent': 4, 'entropy': 4, 'goal': 3, 'scores': 3,
-        'stop': 4}
+        'stop': 4, 'quality': sum(view.quality is not None for view in run.episodes[0].views)}
 
 
 @pytest.mark.parametrize('count', [10, pytest.param(100, marks=pytest.mark.slow)])

@@ -5,10 +5,12 @@ import math
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, Camera, orbit_camera
 from active_recon.planner import Planner
+from active_recon.policies import Choice
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.volumes.voxels import VoxelGrid
+from judged_quality import quality_of
 import numpy as np
 import pytest
 
@@ -248,3 +250,91 @@ def test_a_policy_that_looks_at_the_volume_cannot_go_on_from_views_without_one()
     before, _ = seen(Planner(FarthestPolicy(), max_views=9), 2)
     with pytest.raises(ViewError, match='no probabilities: expected them beside the latent'):
         Planner(Looking(), max_views=9).go_on_from(before)
+
+
+def ends_after(planner, qualities):
+    """Follow every goal; return the number of views taken and the reason for the end."""
+    camera = planner.first_goal(orbit_camera(0.0)).camera
+    for count, quality in enumerate(qualities, 1):
+        decision = planner.add_view(LATENT, camera, 100.0 / count, quality=quality)
+        if decision.goal is None:
+            return count, decision.reason
+        camera = decision.goal.camera
+    return len(qualities), ''
+
+
+def test_it_stops_once_the_target_is_promised():
+    rising = [quality_of(promise=promise) for promise in (0.0, 0.5, 0.6, 0.7)]
+    for target, count in ((0.5, 2), (0.55, 3), (0.7, 4)):
+        planner = Planner(FarthestPolicy(), 24, 0, target_quality=target)
+        assert ends_after(planner, rising) == (count, 'target_reached')
+
+
+def test_it_says_early_that_the_target_is_out_of_reach():
+    planner = Planner(FarthestPolicy(), 24, 0, target_quality=0.8)
+    falling = [quality_of(attainable=best) for best in (0.95, 0.85, 0.75, 0.7)]
+    assert ends_after(planner, falling) == (3, 'target_out_of_reach')
+
+
+def test_without_a_target_or_a_quality_nothing_is_said_of_one():
+    poor = [quality_of(promise=0.9, attainable=0.1)] * 4
+    assert ends_after(Planner(FarthestPolicy(), 4, 0), poor) == (4, 'max_views')
+    blind = Planner(FarthestPolicy(), 4, 0, target_quality=0.5)
+    assert ends_after(blind, [None] * 4) == (4, 'max_views')
+
+
+def test_a_target_that_is_reached_with_the_last_view_is_reached():
+    planner = Planner(FarthestPolicy(), 2, 0, target_quality=0.5)
+    assert ends_after(planner, [quality_of(), quality_of(promise=0.5)]) == (2, 'target_reached')
+
+
+def test_while_views_are_unusual_their_quality_ends_nothing():
+    planner = Planner(FarthestPolicy(), 3, 0, target_quality=0.5)
+    unusual = [quality_of(promise=0.9, attainable=0.1, suspect='pose')] * 3
+    assert ends_after(planner, unusual) == (3, 'max_views')
+
+
+def test_while_views_are_unusual_an_even_sweep_takes_the_place_of_the_policy():
+    def goals(policy, suspect):
+        planner = Planner(policy, 5, 0)
+        camera, azimuths = planner.first_goal(orbit_camera(0.5)).camera, []
+        for _ in range(4):
+            camera = planner.add_view(
+                LATENT, camera, 1.0, quality=quality_of(suspect=suspect)).goal.camera
+            azimuths.append(camera.azimuth)
+        return azimuths
+
+    sweep = goals(UniformPolicy(5), '')
+    assert goals(FarthestPolicy(), 'mask') == sweep
+    assert goals(FarthestPolicy(), '') != sweep
+
+
+class Knowing:
+    """A policy that knows what each view gains, or only orders them."""
+
+    wants_volume = False
+
+    def __init__(self, gains, is_gain):
+        self._gains, self._is_gain = iter(gains), is_gain
+
+    def initial_state(self, batch):
+        return {}
+
+    def choose(self, seen, state):
+        best = next(self._gains)
+        scores = np.full((1, seen.candidates.shape[1]), best, np.float32)
+        return Choice(scores, is_gain=self._is_gain), state
+
+
+@pytest.mark.parametrize(('is_gain', 'count', 'reason'), [
+    (True, 3, 'gain_too_small'), (False, 4, 'max_views')])
+def test_it_stops_where_no_view_gains_enough_if_the_policy_knows(is_gain, count, reason):
+    planner = Planner(Knowing([0.1, 0.03, 0.01, 0.1], is_gain), 4, 0, min_gain=0.02)
+    assert ends_after(planner, [None] * 4) == (count, reason)
+
+
+@pytest.mark.parametrize('name', ['target_quality', 'min_gain'])
+@pytest.mark.parametrize('share', [-0.1, 1.0, math.nan])
+def test_a_target_that_no_iou_can_be_is_refused(name, share):
+    with pytest.raises(ConfigError, match=f'{name}: out of range'):
+        Planner(FarthestPolicy(), **{name: share})

@@ -14,6 +14,7 @@ from active_recon.cli.making import dataset, render
 from active_recon.cli.paper import paper
 from active_recon.cli.play import play
 from active_recon.cli.policies import policies
+from active_recon.cli.quality import quality
 from active_recon.cli.record_sweep import record_sweep
 from active_recon.cli.replay import replay
 from active_recon.cli.report import report
@@ -32,6 +33,7 @@ for command in (demo, up, calibrate, view, report, replay, play, record_sweep, r
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')
+app.add_typer(quality, name='quality')
 
 
 def _print_version(asked: bool) -> None:

@@ -16,6 +16,7 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.bags.replay.replay import ReplayedEpisode
     from active_recon.bags.replay.verification import Verification
     from active_recon.bags.runs.loop_setup import LoopSetup, Overrides
     from active_recon.bags.runs.run import RecordedRun
@@ -114,7 +115,16 @@ def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
             f'reconstructed from {len(episode.steps)} views: {count} of {last.occupancy.size} '
             f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():.0f} to '
             f'{last.entropy():.0f} nats; the bag has no record to compare with')
+        _print_quality(episode)
     typer.echo(f'hash {verified.hash}')
+
+
+def _print_quality(episode: 'ReplayedEpisode') -> None:
+    """Print how good the shape of an episode is after its last view."""
+    quality = episode.steps[-1].reconstruction.quality if episode.steps else None
+    if quality is not None:
+        warning = f'; {quality.warning}' if quality.warning else ''
+        typer.echo(f'quality: {quality.summary}{warning}')
 
 
 def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
@@ -131,6 +141,8 @@ def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: floa
     for number, episode in enumerate(run.episodes, 1):
         if episode.begun_before:
             typer.echo(f'episode {number} began before the recording: it is not compared')
+    for replayed in verified.episodes:
+        _print_quality(replayed)
     if not verified.knows_policy:
         typer.echo('the bag does not name its policy: goals and stop are not compared')
     typer.echo(f'hash {verified.hash}')

@@ -110,7 +110,8 @@ def _draw_view(picture: NDArray[np.uint8], left: int, top: int, number: int, vie
     if view.occupied is not None:
         paste(picture, _voxel_tile(view.occupied, heights), left, top + TILE + 26)
     if view.iou is not None:
-        centred(picture, f'IoU {view.iou:.2f}', middle, top + _BLOCK - 32, 19)
+        expected = f', expected {view.quality.expected_iou:.2f}' if view.quality else ''
+        centred(picture, f'IoU {view.iou:.2f}{expected}', middle, top + _BLOCK - 32, 19)
 
 
 def _draw_truth(picture: NDArray[np.uint8], left: int, top: int, mesh: trimesh.Trimesh,

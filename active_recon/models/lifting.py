@@ -16,7 +16,13 @@ from active_recon.models.lifted import (
     summarise,
 )
 from active_recon.models.lifting_decoder import Decoded, FINE_SIDE, HullUnet
-from active_recon.models.lifting_encoder import IMAGE_SIZE, Maps, NO_EVIDENCE, PyramidEncoder
+from active_recon.models.lifting_encoder import (
+    FINE,
+    IMAGE_SIZE,
+    Maps,
+    NO_EVIDENCE,
+    PyramidEncoder,
+)
 from active_recon.models.network import Cameras, init_occupancy_bias, ReconstructionNetwork, State
 from active_recon.models.visibility import add_visible, visible_mean
 import torch
@@ -83,8 +89,10 @@ class Lifting(ReconstructionNetwork):
     squares, maximum and minimum of the lifted features at 16 and 32 cells a side; at 64, the two
     lowest foreground logits at a cell's projection, less 6 (`hull`); and the number of views, by
     which the calibration is chosen. With `visibility`, each view and cell at 16 also get
-    a logit, and the state two sums more (see `add_visible`). All of it is 0 before the first
-    view, and cells that a camera does not see (outside its image, behind it) stay as they are.
+    a logit, and the state two sums more (see `add_visible`). `foreground`, (B, 2, 64, 64), is what
+    the last view showed: the foreground's probability and the share of each pixel that was seen;
+    the occupancy does not depend on it. All of it is 0 before the first view, and cells that a
+    camera does not see (outside its image, behind it) stay as they are.
     The network needs no front.
     """
 
@@ -126,6 +134,7 @@ class Lifting(ReconstructionNetwork):
                 **_named('coarse', coarse), **_named('fine', fine),
                 **(visible if self._visibility else {}),
                 'hull': torch.zeros(batch, 2, side, side, side, device=device),
+                'foreground': torch.zeros(batch, 2, FINE, FINE, device=device),
                 'latent': torch.zeros(batch, self._coarse_channels, _LATENT_SIDE, _LATENT_SIDE,
                                       device=device)}
 
@@ -163,6 +172,7 @@ class Lifting(ReconstructionNetwork):
                 **_named('coarse', at_16), **_named('fine', aggregate(_of('fine', state), *fine)),
                 **self._visible(state, features, logits, inside),
                 'hull': self._carved(maps.foreground, matrices, state['hull']),
+                'foreground': maps.shown()[-batch:] * inside[-1].amax(dim=2)[..., None, None],
                 'latent': functional.adaptive_avg_pool2d(mean.mean(dim=4), _LATENT_SIDE)}
 
     def decode(self, state: State) -> Tensor:

@@ -40,6 +40,12 @@ class Maps(NamedTuple):
         """Return all of it as (B, F)."""
         return torch.cat([part.flatten(1) for part in self], dim=1)
 
+    @torch.no_grad()
+    def shown(self) -> Tensor:
+        """Return the foreground's probability and `seen`, (B, 2, 64, 64) in [0, 1]."""
+        share = functional.avg_pool2d(self.foreground.float().sigmoid(), 2)
+        return torch.cat([share, self.seen.float()], dim=1)
+
     @classmethod
     def unpacked(cls, packed: Tensor, coarse: int, fine: int) -> Self:
         """Return the maps that were packed, of so many channels."""

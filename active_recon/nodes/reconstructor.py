@@ -49,7 +49,7 @@ FACTS = {'weights_sha256': 'SHA-256 of the weights',
 """Read-only parameters that describe the network, with their descriptions."""
 TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'next_view',
           'view', 'view_image', 'network_image', 'occupancy', 'probabilities', 'latent', 'entropy',
-          'episode')
+          'quality', 'episode')
 """Topics that the node subscribes to and publishes."""
 
 
@@ -79,7 +79,10 @@ class ReconstructorNode(ManagedNode):
         self._object_frame = params.object_frame
         self._reconstruction: Reconstruction | None = None
         self.add_cleanup(self._free_network)
-        self._publisher = ReconstructionPublisher(self, self._object_frame)
+        self._publisher = ReconstructionPublisher(
+            self, self._object_frame, self._reconstructor.judges_quality)
+        if self._reconstructor.no_quality:
+            self.get_logger().info(self._reconstructor.no_quality)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED_QOS)
         self._diagnostics.measure_rates('images', 'poses', 'views')
         for fact, name in (('weights_sha256', 'Weights SHA-256'), ('runtime', 'Runtime')):
@@ -146,6 +149,7 @@ class ReconstructorNode(ManagedNode):
         self._reconstruction = None
         self._episode = Episode(uuid.uuid4().hex[:12], self.get_clock().now().nanoseconds)
         self._joiner.clear(self._episode.begin)
+        self._diagnostics.clear_warning('unusual_views', log=False)
         self._diagnostics.count('episodes')
         self._diagnostics.set_value('Episode', self._episode.id)
         self._diagnostics.set_value('Views of the episode', '0')
@@ -240,7 +244,18 @@ class ReconstructorNode(ManagedNode):
                                     at_once=False)
         self._publisher.publish_view(
             view.stamp, view.camera.pose, reconstruction, None if image is view.image else image)
+        self._check_quality(reconstruction)
         self._check_background(image)  # last: it is for the user, and nothing waits for it
+
+    def _check_quality(self, reconstruction: Reconstruction) -> None:
+        quality = reconstruction.quality
+        if quality is None:
+            return
+        self._diagnostics.set_value('Quality', quality.summary, at_once=False)
+        if quality.suspect:
+            self._diagnostics.raise_warning('unusual_views', quality.warning)
+        else:
+            self._diagnostics.clear_warning('unusual_views')
 
     def _check_background(self, image: NDArray[np.uint8]) -> None:
         if self._background.how in ('color', 'reference') and (

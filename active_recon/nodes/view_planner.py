@@ -36,8 +36,8 @@ REPEAT_S = 1.0
 FIND_CAMERA_S = 1.0
 """Time to wait for a publisher of the camera's pose after an episode began."""
 _STEEPEST = 1.5  # rad, of a first view
-TOPICS = ('camera/pose', 'view', 'latent', 'entropy', 'probabilities', 'episode', 'next_view',
-          'next_azimuth', 'azimuth_scores', 'done')
+TOPICS = ('camera/pose', 'view', 'latent', 'entropy', 'quality', 'probabilities', 'episode',
+          'next_view', 'next_azimuth', 'azimuth_scores', 'done')
 """Topics that the node subscribes to and publishes."""
 
 
@@ -93,7 +93,8 @@ class ViewPlannerNode(ManagedNode):
         return Planner(
             policy, params.max_views, params.entropy_tolerance, params.object_yaw,
             params.limits(), params.motion_weight, params.goal_elevation, params.goal_distance,
-            params.elevation_range, params.reachable_views, params.motion())
+            params.elevation_range, params.reachable_views, params.motion(),
+            params.target_quality, params.min_gain)
 
     def _change(self, params: ViewPlannerParameters) -> Commit | None:
         """Return a function that applies a change of parameters."""
@@ -189,7 +190,8 @@ class ViewPlannerNode(ManagedNode):
     def _decide(self, stamp: int, view: PlannerView) -> None:
         if self._episode is None:
             return
-        decision = self._planner.add_view(view.latent, view.camera, view.entropy, view.volume)
+        decision = self._planner.add_view(view.latent, view.camera, view.entropy, view.volume,
+                                          view.quality)
         self._started = True
         self._diagnostics.count('views')
         self._follow(decision, stamp)

@@ -31,6 +31,14 @@ class ViewPlannerParameters(FrontParameters, CubeParameters, NetworkParameters, 
     entropy_tolerance: float = parameter(
         0.01, 'an episode is done after two views that each change the entropy by at most this '
         'fraction; 0 to continue until max_views', low=0.0, high=0.99, dynamic=True)
+    target_quality: float = parameter(
+        0.0, 'an episode is done when this IoU with the true shape is promised, in [0, 1), or is '
+        'out of reach; 0 for no target. Needs weights with quality tables', low=0.0, high=0.99,
+        dynamic=True)
+    min_gain: float = parameter(
+        0.0, 'an episode is done when no candidate has an expected gain of IoU as large, in '
+        '[0, 1); 0 for any gain. Needs a policy whose scores are expected gains', low=0.0,
+        high=0.99, dynamic=True)
     azimuth_range: tuple[float, ...] = parameter(
         (0.0, TURN), 'low and high end, counter-clockwise, of the azimuths in reach, rad',
         low=-2 * TURN, high=2 * TURN, dynamic=True)

@@ -18,6 +18,11 @@ _STOPPED = {
                                 'allowed.'),
     'entropy_settled': ('settled', 'It stopped by itself: the last two views hardly changed '
                                    'the entropy.'),
+    'target_reached': ('target reached', 'It stopped because the IoU that was asked for is '
+                                         'promised.'),
+    'target_out_of_reach': ('target out of reach', 'It stopped because the IoU that was asked for '
+                                                   'is out of reach for this object.'),
+    'gain_too_small': ('gain too small', 'It stopped because no further view was worth taking.'),
     'no_reachable_azimuth': ('no reachable goal', 'It stopped because the camera could not reach '
                                                   'any of the remaining azimuths.'),
     'stopped': ('stopped', 'It was stopped by a service call.'),
@@ -38,7 +43,8 @@ def findings(subject: Subject) -> list[Finding]:
     """Return the findings on an episode, warnings first."""
     found = [Finding(level, text) for level, text in (
         *_beginning(subject), *_stop(subject), *_counted(subject), *_missing(subject),
-        *_lost(subject), *_off_goal(subject), *_off_elevation(subject), *_estimate(subject))]
+        *_lost(subject), *_off_goal(subject), *_unusual(subject),
+        *_off_elevation(subject), *_estimate(subject))]
     return sorted(found, key=lambda finding: finding.level != 'warning')
 
 
@@ -109,6 +115,12 @@ def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
         if away > tolerance:
             yield 'warning', (f'View {number} was taken {math.degrees(away):.0f}° away from its '
                               'goal.')
+
+
+def _unusual(subject: Subject) -> Iterator[tuple[str, str]]:
+    for number, view in enumerate(subject.views, 1):
+        if view.quality is not None and view.quality.suspect:
+            yield 'warning', f'After view {number}: {view.quality.warning}'
 
 
 def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:

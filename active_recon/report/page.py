@@ -82,6 +82,7 @@ def _panel(subject: Subject) -> dict[str, Any]:
         'images': [data_uri(view.image, _IMAGE_SIDE) for view in subject.views],
         'entropies': subject.entropies,
         'ious': subject.ious,
+        'qualities': [view.quality for view in subject.views],
         'timings': times,
         'timed': any(stage is not None for timing in times for stage in timing.stages[1:]),
         'image_to_goal_ms': median([timing.total for timing in times]),

@@ -14,6 +14,7 @@ _REFUSED = {
     'out_of_image': 'too much of the object was outside of the image',
 }
 _WARNED = {
+    'unusual_views': 'views unlike those it knows',
     'stalled': 'a camera that stood still away from its goal',
     'noisy_poses': 'poses that jump',
     'goal_timeout': 'a goal that was not reached in time',

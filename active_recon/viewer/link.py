@@ -29,7 +29,7 @@ def status_lines(links: Mapping[str, TopicLink], state: LoopState,
     if not any(link.publishers or link.age_s is not None for link in links.values()):
         return ['Waiting for a loop: no publisher yet on '
                 f'{", ".join(link.topic for link in links.values())}.', *warnings]
-    lines = [_progress(links['view'], state), *warnings]
+    lines = [_progress(links['view'], state), *quality_lines(state), *warnings]
     for link in links.values():
         if not link.publishers:
             lines.append(f'No publisher on {link.topic} '
@@ -40,6 +40,15 @@ def status_lines(links: Mapping[str, TopicLink], state: LoopState,
     if state.episode:
         lines.append(f'Episode {state.episode}.')
     return lines
+
+
+def quality_lines(state: LoopState) -> list[str]:
+    """Return how good the shape is after the last view, and a warning; none if not known."""
+    quality = state.views[-1].quality if state.views else None
+    if quality is None:
+        return []
+    summary = f'{quality.summary[0].upper()}{quality.summary[1:]}.'
+    return [summary, *filter(None, [quality.warning])]
 
 
 def ago(seconds: float) -> str:

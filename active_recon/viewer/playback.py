@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun
 from active_recon.errors import DataError
+from active_recon.viewer.link import quality_lines
 from active_recon.viewer.page import Page
 from active_recon.viewer.state import (
     LoopState,
@@ -28,7 +29,8 @@ def _episode_states(episode: RecordedEpisode) -> Iterator[LoopState]:
     for view in episode.views:
         grid = view.occupied if view.reconstruction is None else view.reconstruction
         observer.add_view(
-            ViewResult(view.stamp, view.camera, thumbnail(view.image), view.entropy), grid,
+            ViewResult(view.stamp, view.camera, thumbnail(view.image), view.entropy,
+                       quality=view.quality), grid,
             view.occupied)
         end = view.stamp
         if view.goal is not None:
@@ -88,6 +90,7 @@ class Playback:
                  f'{sum(known.episode == state.episode for known in self._states)}']
         if len(episodes) > 1:
             words[0] += f', episode {episodes.index(state.episode) + 1} of {len(episodes)}'
+        words += quality_lines(state)
         if state.done:
             words.append(f'Done: {state.done.replace("_", " ")}.')
         return words

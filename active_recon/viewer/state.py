@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import math
 
 from active_recon.geometry.cameras import Camera
+from active_recon.quality.quality import Quality
 from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import cv2
@@ -59,6 +60,7 @@ class Observer:
         self.state = LoopState()
         self._begin = 0
         self._goal_stamp = self._scores_stamp = self._done_stamp = self._image_stamp = -1
+        self._quality: tuple[int, Quality | None] = -1, None
 
     def begin_episode(self, identity: str, begin: int) -> None:
         """Begin an episode, unless it is the current one; keep what already belongs to it."""
@@ -90,11 +92,20 @@ class Observer:
         known = self.state.views
         if view.stamp < self._begin or any(view.stamp == old.stamp for old in known):
             return
+        if view.stamp == self._quality[0]:
+            view = replace(view, quality=self._quality[1])
         views = tuple(sorted((*known, view), key=lambda each: each.stamp))
         self.state = replace(self.state, views=views)
         if views[-1] is view:
             threshold = None if occupied is None else own_threshold(occupied)
             self.state = replace(self.state, grid=grid, threshold=threshold)
+
+    def set_quality(self, stamp: int, quality: Quality) -> None:
+        """Set the quality after the view of a stamp, which may not be known yet."""
+        self._quality = stamp, quality
+        self.state = replace(self.state, views=tuple(
+            replace(view, quality=quality) if view.stamp == stamp else view
+            for view in self.state.views))
 
     def set_network_image(self, stamp: int, image: NDArray[np.uint8]) -> None:
         """Set the last view as the network received it, (S, S, 3) uint8 RGB."""

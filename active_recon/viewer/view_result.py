@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from active_recon.geometry.cameras import Camera
+from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ class ViewResult:
     - entropy: of the reconstruction after the view, nats
     - latency: from the image's stamp until the occupancy was received, seconds
     - occupied: the occupied cells after the view; iou: theirs with the true object
+    - quality: as the reconstructor judges it
     """
 
     stamp: int
@@ -27,3 +29,4 @@ class ViewResult:
     latency: float | None = None
     occupied: VoxelGrid | None = None
     iou: float | None = None
+    quality: Quality | None = None

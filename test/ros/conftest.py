@@ -13,6 +13,7 @@ from typing import Any, IO
 
 from active_recon.geometry.cameras import CANONICAL_ELEVATION, orbit_camera
 from active_recon.nodes.runtime.shared_memory import PROFILE
+from active_recon.quality.quality import Quality
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
@@ -20,6 +21,7 @@ from msg_tools.diagnostics import diagnostics_from_msg, NodeStatus
 from msg_tools.entropy import entropy_to_msg
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
+from msg_tools.quality import quality_to_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 import numpy as np
 import pytest
@@ -254,9 +256,10 @@ class FakeReconstructor:
     """A reconstructor in the bench's hand; it begins to publish when it is made."""
 
     TOPICS = {'episode': Header, 'latent': Image, 'view': PoseStamped,
-              'entropy': JointState}
+              'entropy': JointState, 'quality': DiagnosticArray}
+    PARTS = ('entropy', 'latent', 'view')
 
-    def __init__(self, bench: Bench, topics: Sequence[str] = tuple(TOPICS),
+    def __init__(self, bench: Bench, topics: Sequence[str] = ('episode', *PARTS),
                  heard: bool = True) -> None:
         self.bench = bench
         self.goals = bench.subscribe(PoseStamped, 'next_view', LATCHED_QOS)
@@ -276,14 +279,16 @@ class FakeReconstructor:
         self._publishers['episode'].publish(episode_to_msg(Episode(name, begin)))
 
     def show(self, latent: np.ndarray, azimuth: float, stamp: int | None = None,
-             parts: Sequence[str] = ('entropy', 'latent', 'view'),
-             elevation: float = CANONICAL_ELEVATION) -> int:
+             parts: Sequence[str] = PARTS, elevation: float = CANONICAL_ELEVATION,
+             quality: Quality | None = None) -> int:
         """Publish a view's parts; return their stamp."""
         stamp = self.bench.now() if stamp is None else stamp
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
         messages = {'entropy': entropy_to_msg(_ENTROPY, header),
                     'latent': latent_to_msg(latent, header),
                     'view': pose_to_msg(orbit_camera(azimuth, elevation).pose, header)}
+        if quality is not None:
+            messages['quality'] = quality_to_msg(quality, header)
         for part in parts:
             self._publishers[part].publish(messages[part])
         return stamp

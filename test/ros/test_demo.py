@@ -120,7 +120,7 @@ def messages(finished):
 
 
 def rows(out):
-    """Return view, azimuth, entropy, IoU and milliseconds as the table says them."""
+    """Return view, azimuth, entropy, expected and least IoU, IoU and ms as the table has them."""
     cells = [re.findall(r'[\d.]+', line) for line in out.splitlines() if line.startswith('│')]
     return [tuple(map(float, row)) for row in cells]
 
@@ -143,15 +143,20 @@ def test_demo_tells_of_each_view_what_the_bag_holds(finished, messages):
     resolution = load_runtime().spec.resolution
     truth = voxelise(load_mesh(find_object('chair')), resolution).occupied(0.5)
     assert [row[0] for row in told] == list(range(1, VIEWS + 1))
-    for row, view, occupancy in zip(told, messages['/view'], messages['/occupancy'], strict=True):
+    for row, view, occupancy, judged in zip(
+            told, *(messages[topic] for topic in ('/view', '/occupancy', '/quality')),
+            strict=True):
         position = view.pose.position
         azimuth = math.degrees(math.atan2(position.y, position.x)) % 360
         points = np.frombuffer(occupancy.data.tobytes(), np.float32).reshape(-1, 4)
-        assert stamp(view) == stamp(occupancy)
+        assert stamp(view) == stamp(occupancy) == stamp(judged)
+        quality = {pair.key: pair.value for pair in judged.status[0].values}
+        assert row[3:5] == pytest.approx(
+            (float(quality['expected_iou']), float(quality['lower_bound'])), abs=6e-3)
         assert abs((row[1] - azimuth + 180) % 360 - 180) <= 0.51
-        assert row[3] == pytest.approx(
+        assert row[5] == pytest.approx(
             iou(grid_from_points(points).occupied(0), truth), abs=6e-4)
-        assert 0 < row[4] < 60_000
+        assert 0 < row[6] < 60_000
 
 
 def test_every_view_is_an_image_that_the_camera_took(messages):
@@ -161,8 +166,9 @@ def test_every_view_is_an_image_that_the_camera_took(messages):
 
 def test_the_whole_loop_is_in_the_bag(messages):
     assert {'/camera/image_raw', '/camera/camera_info', '/camera/pose', '/view', '/occupancy',
-            '/probabilities', '/latent', '/entropy', '/episode', '/next_view', '/next_azimuth',
-            '/azimuth_scores', '/done', '/diagnostics'} == set(messages)
+            '/probabilities', '/latent', '/entropy', '/quality', '/episode',
+            '/next_view', '/next_azimuth', '/azimuth_scores', '/done',
+            '/diagnostics'} == set(messages)
     assert messages['/done'][-1].frame_id == 'max_views'
     refused = {value.key for msg in messages['/diagnostics'] for status in msg.status
                for value in status.values if value.key.startswith('refused')}

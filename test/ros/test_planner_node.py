@@ -7,6 +7,7 @@ from active_recon.geometry.cameras import azimuth_difference, orbit_camera
 from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.runtimes import load_policy_runtime
 from geometry_msgs.msg import PoseStamped
+from judged_quality import quality_of
 from msg_tools.cameras import pose_to_msg
 from msg_tools.goals import scores_from_msg, view_goal_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
@@ -127,3 +128,18 @@ def test_goals_stand_at_the_camera_s_elevation_unless_another_is_given(
         assert (goal.elevation, goal.distance) == pytest.approx((elevation, 0.7))
     positions, _, _ = scores_from_msg(scores[-1])
     np.testing.assert_allclose(positions[:, 2], 0.7 * math.sin(elevation), atol=1e-6)
+
+
+def test_a_planner_waits_for_the_quality_of_a_view_and_stops_by_it(start_node, bench, latent):
+    start_node('view_planner', policy='farthest', start_azimuth=1.0, target_quality=0.5)
+    fake = FakeReconstructor(bench, ('episode', *FakeReconstructor.PARTS, 'quality'))
+    fake.begin('only')
+    fake.wait_goal(0)
+    first = fake.show(latent, 1.0)
+    assert not bench.within(1.0, lambda: bench.counts('view_planner').get('views'))
+    fake.show(latent, 1.0, first, parts=('quality',), quality=quality_of())
+    goal = view_goal_from_msg(fake.wait_goal(first))
+    second = fake.show(latent, goal.azimuth, parts=('quality', *FakeReconstructor.PARTS),
+                       quality=quality_of(promise=0.5))
+    done = bench.until(lambda: fake.done and fake.done[-1].frame_id and fake.done[-1], 'the end')
+    assert (done.frame_id, nanoseconds_from_stamp(done.stamp)) == ('target_reached', second)

@@ -1,13 +1,14 @@
 """Comparison of a replay with the recording: the same bits, or the largest deviation."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
 from active_recon.acquisition.goals import Goal
 from active_recon.bags.replay.replay import ReplayedEpisode, ReplayStep
 from active_recon.bags.runs.run import RecordedGoal
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.view_distance import view_distance
+from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import PUBLISHED_FLOOR, VoxelGrid
 from msg_tools.cameras import pose_through_msg
 import numpy as np
@@ -17,13 +18,14 @@ TOLERANCES: Mapping[str, float] = {
     'occupancy': 1e-4,
     'latent': 1e-4,
     'entropy': 1e-4,
+    'quality': 1e-3,
     'goal': 1e-4,
     'scores': 1e-3,
     'stop': 0.0,
 }
 """The accepted deviations on another machine: absolute for probabilities and latents, relative for
-entropy, radians between the views for goals, in the policy's units for scores; none for the end of
-an episode."""
+entropy, shares for quality, radians between the views for goals, in the policy's units for scores;
+none for the end of an episode."""
 
 SAME_BITS, WITHIN_TOLERANCE, DIFFERENT, NOTHING_RECORDED = (
     'same bits', 'within tolerance', 'different', 'nothing recorded')
@@ -101,6 +103,9 @@ def _deviations(step: ReplayStep, done: str,
         entropy = grid.entropy()
         yield ('entropy', recorded.entropy == entropy,
                abs(recorded.entropy - entropy) / max(abs(recorded.entropy), 1e-9))
+    judged = step.reconstruction.quality
+    if recorded.quality is not None and judged is not None:
+        yield 'quality', recorded.quality == judged, _quality(recorded.quality, judged)
     if step.decision is None:
         return
     if done != 'stopped' and (recorded.goal is not None or done):  # a service call has no time
@@ -137,6 +142,14 @@ def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, fl
     apart = np.where(published, np.abs(recorded.occupancy - grid.occupancy),
                      np.maximum(grid.occupancy - np.float32(above), 0))
     return np.array_equal(recorded.occupancy, grid.above(above).occupancy), float(apart.max())
+
+
+def _quality(recorded: Quality, replayed: Quality) -> float:
+    """Return the largest deviation of two qualities' numbers; infinite for other suspects."""
+    if recorded.suspect != replayed.suspect:
+        return np.inf
+    pairs = zip(astuple(recorded)[:-1], astuple(replayed)[:-1], strict=True)
+    return float(max(abs(own - other) for own, other in pairs))
 
 
 def _largest(recorded: np.ndarray, replayed: np.ndarray) -> float:

@@ -9,6 +9,7 @@ from active_recon.bags.runs.recorded_object import replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun, RecordedView
 from active_recon.geometry.cameras import Camera
 from active_recon.planner import Decision, Planner
+from active_recon.quality.quality import Quality
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.volumes.voxels import entropy, PUBLISHED_FLOOR
 import numpy as np
@@ -56,7 +57,9 @@ def _replay_episode(episode: RecordedEpisode, reconstructor: Reconstructor,
     for step in replay_views(episode.views, reconstructor):
         decision = None
         if planner is not None:
-            decision = decide(planner, step.known, step.view.camera)
+            # A loop whose bag has no quality decided without it
+            quality = None if step.view.quality is None else step.known.quality
+            decision = decide(planner, step.known, step.view.camera, quality)
             _give_up(planner, episode.given_up(step.view))
         steps.append(ReplayStep(step.view, step.known, decision))
         advance()
@@ -69,15 +72,16 @@ def _give_up(planner: Planner, goals: Sequence[Camera]) -> None:
         planner.give_up(goal)
 
 
-def decide(planner: Planner, reconstruction: Reconstruction, camera: Camera) -> Decision:
+def decide(planner: Planner, reconstruction: Reconstruction, camera: Camera,
+           quality: Quality | None) -> Decision:
     """Return the planner's decision from what its node receives."""
     grid = reconstruction.grid
     return planner.add_view(reconstruction.latent, camera, grid.entropy(),
-                            grid.above(PUBLISHED_FLOOR) if planner.wants_volume else None)
+                            grid.above(PUBLISHED_FLOOR) if planner.wants_volume else None, quality)
 
 
 def replay_hash(episodes: Sequence[ReplayedEpisode]) -> str:
-    """Return the SHA-256 of all that a replay computed."""
+    """Return the SHA-256 of all occupancies, latents, entropies and decisions of a replay."""
     digest = hashlib.sha256()
     for step in (step for episode in episodes for step in episode.steps):
         reconstruction, decision = step.reconstruction, step.decision

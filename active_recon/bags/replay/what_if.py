@@ -106,7 +106,7 @@ def replan_episode(episode: RecordedEpisode, reconstructor: Reconstructor, plann
     for step in run_episode(RecordedObject(reconstructor),
                             _nearest(episode.views, first.camera, goal_tolerance, 0), follow):
         stamp = episode.begin + step.number * _VIEW_PERIOD_NS
-        decision = decide(planner, step.known, step.view.camera)
+        decision = decide(planner, step.known, step.view.camera, step.known.quality)
         view = _reconstructed(step.view, step.known, reconstructor.threshold)
         views.append(replace(
             view, stamp=stamp, received={}, done=decision.reason,
@@ -137,4 +137,4 @@ def _reconstructed(view: RecordedView, reconstruction: Reconstruction,
     grid = reconstruction.grid
     return replace(
         view, reconstruction=grid.above(PUBLISHED_FLOOR), occupied=grid.above(threshold),
-        latent=reconstruction.latent, entropy=grid.entropy())
+        latent=reconstruction.latent, entropy=grid.entropy(), quality=reconstruction.quality)

@@ -20,9 +20,9 @@ from active_recon.reconstructor import Reconstructor
 _OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
 _OF_LIMITS = tuple(field.name for field in fields(MotionLimits))
 _OF_MOTION = tuple(field.name for field in fields(TimedMotion))
-_OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'object_yaw', 'motion_weight',
-               'elevation', 'elevation_range', 'reachable_views', 'distance', *_OF_LIMITS,
-               *_OF_MOTION)
+_OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'target_quality', 'min_gain',
+               'object_yaw', 'motion_weight', 'elevation', 'elevation_range', 'reachable_views',
+               'distance', *_OF_LIMITS, *_OF_MOTION)
 
 
 @dataclass(frozen=True)

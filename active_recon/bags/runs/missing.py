@@ -10,11 +10,14 @@ _PLANNED = 'goal'
 
 def missing_parts(episode: RecordedEpisode) -> Mapping[str, Sequence[int]]:
     """Return the numbers of the views that lack a part, by the part; a goal follows its view."""
+    qualities = [view.quality for view in episode.views]
     parts: dict[str, list[Any]] = {
         'probabilities': [view.reconstruction for view in episode.views],
         'occupancy': [view.occupied for view in episode.views],
         'entropy': [view.entropy for view in episode.views],
         'latent': [view.latent for view in episode.views],
+        # Not every network's weights have tables to judge it by
+        'quality': qualities if any(qualities) else [],
         _PLANNED: [view.goal for view in episode.views[:-1]],
     }
     without = {part: [number for number, value in enumerate(values, 1) if value is None]

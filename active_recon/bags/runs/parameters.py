@@ -12,6 +12,7 @@ from active_recon.parameters.node_parameters import NODE_PARAMETERS
 _NEEDED = frozenset((
     'weights', 'threads', 'object_size', 'object_frame', 'object_yaw', 'threshold',
     'goal_tolerance', 'max_pose_gap', 'policy', 'seed', 'max_views', 'entropy_tolerance',
+    'target_quality', 'min_gain',
     'azimuth_range', 'forbidden_sectors', 'reachable_azimuths', 'motion_weight', 'motion_cost',
     'azimuth_speed', 'elevation_speed', 'view_time', 'elevation', 'elevation_range',
     'reachable_views', 'distance'))

@@ -44,5 +44,6 @@ def _reconstructed(episode: RecordedEpisode, reconstructor: Reconstructor) -> Re
     for step in replay_views(episode.views, reconstructor):
         grid = step.known.grid
         views.append(replace(step.view, reconstruction=grid, entropy=grid.entropy(),
-                             occupied=grid.above(reconstructor.threshold)))
+                             occupied=grid.above(reconstructor.threshold),
+                             quality=step.known.quality))
     return replace(episode, views=views)

@@ -156,4 +156,4 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
         image = scene.cleared(view.image)
     return RecordedView(view.stamp, image, view.camera,
                         part('probabilities'), part('occupancy'), part('latent'), part('entropy'),
-                        goal, received, (part('done') or (0, ''))[1])
+                        goal, received, (part('done') or (0, ''))[1], part('quality'))

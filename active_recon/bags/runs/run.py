@@ -9,6 +9,7 @@ from active_recon.acquisition.goals import Goal
 from active_recon.bags.runs.image_gaps import ImageGaps
 from active_recon.bags.storage.metadata import QosProfile
 from active_recon.geometry.cameras import Camera
+from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ class RecordedView:
     - stamp: of the image, nanoseconds; image: (H, W, 3) uint8 RGB; camera: in the object frame
     - reconstruction: the probabilities, 0 below the floor of what is published
     - occupied: the cells above the threshold
-    - latent: A_t, (C, h, w); entropy: nats
+    - latent: A_t, (C, h, w); entropy: nats; quality: as it was judged
     - goal: decided after this view; None also if the episode was done
     - done: the reason if the episode was done after this view, else ''; a goal may follow if
       `plan` was called then
@@ -99,6 +100,7 @@ class RecordedView:
     goal: RecordedGoal | None
     received: Mapping[str, int]
     done: str = ''
+    quality: Quality | None = None
 
 
 @dataclass(frozen=True, eq=False)

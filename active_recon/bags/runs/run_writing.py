@@ -58,7 +58,7 @@ def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, 
     for view in episode.views:
         messages = image_to_msgs(view.stamp, view.image, view.camera, frame) | view_to_msgs(
             view.stamp, view.camera, view.reconstruction, view.occupied, view.latent,
-            view.entropy, frame)
+            view.entropy, view.quality, frame)
         yield from _at(messages, view.stamp, view.received)
         if reason := episode.done_after(view):
             received = max([view.stamp, *view.received.values()])

@@ -24,6 +24,7 @@ from msg_tools.episodes import done_from_msg, episode_from_msg
 from msg_tools.goals import scores_from_msg
 from msg_tools.images import image_from_msg
 from msg_tools.joins import StampJoiner
+from msg_tools.quality import quality_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
@@ -69,6 +70,7 @@ class LoopSubscriber:
                 (PoseStamped, 'view', self._on_view),
                 (PointCloud2, 'occupancy', self._on_occupancy),
                 (PointCloud2, 'probabilities', self._on_probabilities),
+                (DiagnosticArray, 'quality', self._on_quality),
                 (Image, 'network_image', self._on_network_image),
                 (PoseStamped, 'next_view', self._on_goal),
                 (PointCloud2, 'azimuth_scores', self._on_scores),
@@ -152,6 +154,9 @@ class LoopSubscriber:
         if self._loop.has_size:
             self._join(
                 'probabilities', msg.header, voxel_grid_from_msg(msg, self._loop.object_size))
+
+    def _on_quality(self, msg: DiagnosticArray) -> None:
+        self.observer.set_quality(nanoseconds_from_stamp(msg.header.stamp), quality_from_msg(msg))
 
     def _join(self, name: str, header: Header, part: object) -> None:
         stamp = nanoseconds_from_stamp(header.stamp)

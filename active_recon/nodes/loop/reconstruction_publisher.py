@@ -3,10 +3,12 @@
 from active_recon.nodes.runtime.qos import LATCHED_QOS
 from active_recon.reconstructor import Reconstruction
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_to_msg
 from msg_tools.entropy import entropy_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
+from msg_tools.quality import quality_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
@@ -17,9 +19,13 @@ from std_msgs.msg import Header
 
 
 class ReconstructionPublisher:
-    """Publishes `occupancy`, `probabilities`, `latent`, `entropy`, `view` and its images."""
+    """
+    Publishes `occupancy`, `probabilities`, `latent`, `entropy`, `view` and its images.
 
-    def __init__(self, node: Node, frame: str) -> None:
+    And `quality`, where the network `judges_quality`: elsewhere nobody is to wait for it.
+    """
+
+    def __init__(self, node: Node, frame: str, judges_quality: bool) -> None:
         self._frame = frame
         self._view_pub = node.create_publisher(PoseStamped, 'view', LATCHED_QOS)
         self._view_image_pub = node.create_publisher(Image, 'view_image', LATCHED_QOS)
@@ -28,6 +34,8 @@ class ReconstructionPublisher:
         self._probabilities_pub = node.create_publisher(PointCloud2, 'probabilities', LATCHED_QOS)
         self._latent_pub = node.create_publisher(Image, 'latent', LATCHED_QOS)
         self._entropy_pub = node.create_publisher(JointState, 'entropy', LATCHED_QOS)
+        self._quality_pub = node.create_publisher(
+            DiagnosticArray, 'quality', LATCHED_QOS) if judges_quality else None
 
     def publish_occupancy(self, stamp: int, reconstruction: Reconstruction,
                           threshold: float) -> None:
@@ -44,6 +52,8 @@ class ReconstructionPublisher:
         - cleared_image: (H, W, 3) uint8 RGB, the image without its background; None: unchanged
         """
         header = self._header(stamp)
+        if self._quality_pub is not None and reconstruction.quality is not None:
+            self._quality_pub.publish(quality_to_msg(reconstruction.quality, header))
         self._latent_pub.publish(latent_to_msg(reconstruction.latent, header))
         if cleared_image is not None:
             self._view_image_pub.publish(image_to_msg(cleared_image, header))

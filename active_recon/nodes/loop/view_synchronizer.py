@@ -9,11 +9,14 @@ from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.life_cycle import ManagedNode
 from active_recon.nodes.runtime.qos import LATCHED_QOS
 from active_recon.planner import PlannerView
+from active_recon.quality.quality import Quality
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.entropy import entropy_from_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
+from msg_tools.quality import quality_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 from sensor_msgs.msg import Image, JointState, PointCloud2
@@ -26,6 +29,7 @@ class ViewSynchronizer:
     """
     Joins `latent`, `view` and `entropy`, which arrive in any order while the node is active.
 
+    With them goes the `quality` of their stamp, for which they wait while it has a publisher.
     `on_view` is called with the stamp (nanoseconds) and the view when all parts have arrived,
     unless it is older than the episode. `last` keeps the last one: it may arrive before the
     message of the episode that it belongs to.
@@ -46,6 +50,10 @@ class ViewSynchronizer:
             (Image, 'latent', 'latent', latent_from_msg),
             (PoseStamped, 'view', 'camera', lambda msg: Camera(pose_from_msg(msg, frame))),
             (JointState, 'entropy', 'entropy', entropy_from_msg))]
+        self._waiting: dict[int, dict[str, Any]] = {}
+        self._qualities: dict[int, Quality] = {}
+        self._quality = node.create_subscription(
+            DiagnosticArray, 'quality', self._on_quality, LATCHED_QOS)
 
     def subscribe_volume(self, object_size: float) -> None:
         """Join the probabilities, too, of a voxel grid of that side in metres, for the policy."""
@@ -63,6 +71,9 @@ class ViewSynchronizer:
             self.clear()
         self._begin = stamp
         self._joiner.forget_before(stamp)
+        for parts in (self._waiting, self._qualities):
+            for old in [each for each in parts if each < stamp]:
+                del parts[old]
         if self.last is not None and self.last[0] < stamp:
             self.last = None
 
@@ -70,6 +81,8 @@ class ViewSynchronizer:
         """Forget the messages and the episode."""
         self._begin = 0
         self._joiner.clear()
+        self._waiting.clear()
+        self._qualities.clear()
         self.last = None
 
     def is_caught_up(self) -> bool:
@@ -94,5 +107,24 @@ class ViewSynchronizer:
             return
         parts = self._joiner.add(name, stamp, part)
         if parts is not None:
-            self.last = stamp, PlannerView(**parts)
+            self._waiting[stamp] = parts
+            self._hand_over()
+
+    def _on_quality(self, msg: DiagnosticArray) -> None:
+        with self._diagnostics.rejecting():
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            if stamp >= self._begin and not self._node.clock_monitor.is_ahead(stamp):
+                self._qualities[stamp] = quality_from_msg(msg)
+                self._hand_over()
+
+    def _hand_over(self) -> None:
+        """Pass on the complete views whose quality is there, or will not come."""
+        comes = self._quality.get_publisher_count() > 0
+        for stamp in sorted(self._waiting):
+            if comes and stamp not in self._qualities and stamp == max(self._waiting):
+                return  # a later view shows that it was lost
+            parts = self._waiting.pop(stamp)
+            self.last = stamp, PlannerView(**parts, quality=self._qualities.get(stamp))
+            for old in [each for each in self._qualities if each <= stamp]:
+                del self._qualities[old]
             self._on_view(*self.last)

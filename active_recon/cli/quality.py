@@ -1,0 +1,143 @@
+"""`active-recon quality`: measures, fits and tests how the quality of a shape is judged."""
+
+import json
+from pathlib import Path
+import shlex
+import sys
+from typing import Annotated
+
+from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
+import typer
+
+quality = typer.Typer(help='How good a shape is, judged without the truth.', no_args_is_help=True)
+
+Model = Annotated[str | None, typer.Option(
+    help='The network: a model that ships, or a weights file.')]
+_BATCH = 4
+
+
+@quality.command()
+def measure(
+    data: Annotated[Path, typer.Argument(help="Folder of objects in R2N2's layout, voxelised "
+                                              'at the resolution of the network.')],
+    out: Annotated[Path, typer.Argument(help='The npz file to write.')],
+    views: Annotated[int, typer.Option(min=1, help='Views of each object.')] = 5,
+    kind: Annotated[str, typer.Option(help="Order of the views: 'random' or 'even'.")] = 'random',
+    fault: Annotated[str | None, typer.Option(
+        help='Spoil the views: unknown (noise), pose, object_size, mask.')] = None,
+    objects: Annotated[int | None, typer.Option(
+        min=1, help='Largest number of objects, drawn at random; default: all.')] = None,
+    seed: Annotated[int, typer.Option(help='Seed of objects, orders and faults.')] = 0,
+    model: Model = None,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+) -> None:
+    """
+    Reconstruct objects view by view, and write what their quality is judged by beside the truth.
+
+    Example: active-recon quality measure data/real_val real.npz --views 6
+    """
+    from active_recon.datasets.layout import list_objects
+    from active_recon.datasets.views import read_views
+    from active_recon.evaluation.posed.scene import chosen_folders
+    from active_recon.evaluation.quality.faults import FAULTS
+    from active_recon.evaluation.quality.measuring import KINDS, Measured
+    from active_recon.evaluation.quality.measuring import measure as measured
+    from active_recon.models.weights import load_weights
+    from active_recon.models.weights_files import find_weights
+    import torch
+
+    for name, value, known in (('kind', kind, KINDS), ('fault', fault or '', ('', *FAULTS))):
+        if value not in known:
+            raise ConfigError(f'--{name}: unknown value: expected one of '
+                              f'{", ".join(filter(None, known))}, got {value!r}')
+    torch.set_num_threads(threads)
+    bundle = load_weights(find_weights(model))
+    network = bundle.reconstruction
+    folders = chosen_folders(list_objects(data), None, objects, seed)
+    parts = []
+    with progress_bar(f'measuring {data.name}', len(folders)) as advance:
+        for at in range(0, len(folders), _BATCH):
+            some = read_views(folders[at:at + _BATCH], resolution=network.resolution,
+                              image_size=network.image_size, framed=True)
+            parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
+                                  seed + at))
+            advance(len(some), '')
+    Measured.joined(parts).write(out)
+    typer.echo(f'wrote {out}')
+
+
+@quality.command()
+def fit(
+    known: Annotated[list[Path], typer.Option(
+        help='Measured without faults: objects of training and validation (may be given several '
+             'times).')],
+    calibration: Annotated[list[Path], typer.Option(
+        help='Measured on other objects, with and without faults (may be given several times). '
+             'The first of two halves, split by source, is used.')],
+    out: Annotated[Path | None, typer.Option(
+        help='The JSON file to write; default: beside the weights, where it is used.')] = None,
+    model: Model = None,
+) -> None:
+    """
+    Fit the tables by which the quality of a network's shapes is judged.
+
+    Example: active-recon quality fit --known train.npz --calibration real.npz --calibration
+    real-pose.npz
+    """
+    from active_recon.evaluation.quality.fitting import fit as fitted
+    from active_recon.evaluation.quality.measuring import halves, Measured
+    from active_recon.models.weights_files import find_weights, weights_hash
+    from active_recon.quality.tables import tables_path
+
+    weights = find_weights(model)
+    together = Measured.joined([Measured.read(path) for path in calibration])
+    first = together.rows(halves(together))
+    tables = fitted(Measured.joined([Measured.read(path) for path in known]), first,
+                    weights_hash(weights))
+    path = out or tables_path(weights)
+    tables.write(path, command=_command(), calibrated_on=sorted(set(first.source.tolist())))
+    typer.echo(f'wrote {path}')
+
+
+@quality.command()
+def study(
+    files: Annotated[list[Path] | None, typer.Argument(
+        help='Measured objects that nothing was fitted to; each file is a set.')] = None,
+    halved: Annotated[list[Path] | None, typer.Option(
+        help='The files that `fit` was calibrated on: the other half of them is one set.')] = None,
+    out: Annotated[Path, typer.Option(
+        help='Folder for quality.json and quality.md.')] = Path('quality'),
+    model: Model = None,
+    tables: Annotated[Path | None, typer.Option(
+        help='The JSON file of `fit`; default: that beside the weights.')] = None,
+) -> None:
+    """
+    Test what is said of quality on objects that nothing was fitted to.
+
+    Example: active-recon quality study test.npz --halved real.npz --halved real-pose.npz
+    """
+    from active_recon.evaluation.quality.measuring import halves, Measured
+    from active_recon.evaluation.quality.study import study as studied
+    from active_recon.evaluation.quality.summary import markdown
+    from active_recon.models.weights_files import find_weights
+    from active_recon.quality.tables import QualityTables, tables_path
+
+    if not files and not halved:
+        raise ConfigError('study: nothing to measure: expected files of `quality measure`, or '
+                          '--halved with some, got neither')
+    found = QualityTables.read(tables or tables_path(find_weights(model)))
+    sets = {path.stem: Measured.read(path) for path in files or []}
+    if halved:
+        together = Measured.joined([Measured.read(path) for path in halved])
+        sets[f'{halved[0].stem}, second half'] = together.rows(~halves(together))
+    result = {'command': _command(), 'weights_sha256': found.weights_sha256,
+              'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}
+    out.mkdir(parents=True, exist_ok=True)
+    (out / 'quality.json').write_text(json.dumps(result, indent=1) + '\n')
+    (out / 'quality.md').write_text(markdown(result))
+    typer.echo(f'wrote {out / "quality.json"} and {out / "quality.md"}')
+
+
+def _command() -> str:
+    return shlex.join(['active-recon', *sys.argv[1:]])

@@ -1,0 +1,1 @@
+"""How well the quality of a reconstruction is judged: measured, fitted, tested."""

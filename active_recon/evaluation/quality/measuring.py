@@ -1,0 +1,159 @@
+"""Roll-outs of a frozen network: what its quality is judged by after each view, and the truth."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Self
+
+from active_recon.datasets.views import ViewSet
+from active_recon.errors import DataError
+from active_recon.evaluation.posed.walking import even_orders, Order
+from active_recon.evaluation.quality.faults import FAULTS, sources_of
+from active_recon.evaluation.quality.shells import HOLLOW, hollow_share
+from active_recon.evaluation.rollouts import Observer
+from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.geometry.view_distance import pose_directions
+from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.quality.features import features
+from active_recon.quality.latents import pooled
+from active_recon.quality.silhouettes import SeenView
+from active_recon.volumes.voxels import iou
+import numpy as np
+from numpy.typing import NDArray
+import torch
+
+KINDS = ('random', 'even')
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """
+    N reconstructions, each after some views of an object.
+
+    - numbers: (N, F), the features; latents: (N, D), pooled; iou: (N,) with the truth, NaN where a
+      fault makes it meaningless; hollow: (N,), see `hollow_share`
+    - count: (N,), views so far; episode: (N,), the same for all of one episode
+    - object, source: (N,), names; fault: (N,), '' for none; kind: (N,), random or even orders
+    """
+
+    numbers: NDArray[np.float64]
+    latents: NDArray[np.float64]
+    iou: NDArray[np.float64]
+    hollow: NDArray[np.float64]
+    count: NDArray[np.int64]
+    episode: NDArray[np.str_]
+    object: NDArray[np.str_]
+    source: NDArray[np.str_]
+    fault: NDArray[np.str_]
+    kind: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        """Return N."""
+        return len(self.iou)
+
+    def rows(self, chosen: NDArray[np.bool_]) -> Self:
+        """Return some rows, by (N,) booleans."""
+        return type(self)(**{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
+
+    @property
+    def solid(self) -> Self:
+        """The rows of objects that are not hollow."""
+        return self.rows(self.hollow <= HOLLOW)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return all rows of several."""
+        return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts])
+                      for each in fields(cls)})
+
+    def write(self, path: Path) -> None:
+        """Write it as an npz file."""
+        np.savez_compressed(path, **{each.name: getattr(self, each.name)
+                                     for each in fields(self)})
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read it again; raises DataError where it cannot be read."""
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                return cls(**{each.name: stored[each.name] for each in fields(cls)})
+        except (OSError, ValueError, KeyError) as error:
+            raise DataError(f'{path}: no measured qualities: expected a file that `active-recon '
+                            f'quality measure` wrote, got: {error!r}') from error
+
+
+def orders_of(views: ViewSet, kind: str, count: int, seed: int) -> Order:
+    """Return the first `count` views of each object, (N, count), in an order of a kind."""
+    shape = views.poses.shape[:2]
+    rng = np.random.default_rng([seed, 20])
+    if kind == 'random':
+        return np.stack([rng.permutation(shape[1])[:count] for _ in range(shape[0])])
+    first = rng.integers(shape[1], size=shape[0])
+    return even_orders(pose_directions(views.poses.numpy()), count, first)
+
+
+@torch.inference_mode()
+def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, count: int,
+            kind: str = 'random', fault: str = '', seed: int = 0) -> Measured:
+    """
+    Measure the objects of a set after 1 to `count` views each, all at once.
+
+    Raises DataError where the network keeps no foreground, from which silhouettes are had.
+    """
+    shown = FAULTS[fault](views, seed) if fault else views
+    order = orders_of(shown, kind, min(count, shown.poses.shape[1]), seed)
+    observer, objects = Observer(network, shown), torch.arange(len(shown))
+    state = observer.initial_state(len(shown))
+    if 'foreground' not in state:
+        raise DataError('quality: a network without a foreground: expected one that keeps the '
+                        'foreground of each view in its state, as `lifting` does')
+    seen: list[list[SeenView]] = [[] for _ in objects]
+    found: list[tuple[NDArray[np.float64], NDArray[np.float64], float, int, int]] = []
+    for number, chosen in enumerate(order.T, 1):
+        at = torch.from_numpy(chosen)
+        state = observer.update(objects, at, state)
+        foreground = state['foreground'].cpu().numpy()
+        for row, camera in enumerate(_cameras(shown.cameras(objects, at), shown.image_size)):
+            seen[row].append(SeenView(camera, *foreground[row]))
+        occupancy = observer.occupancy(state).cpu().numpy()
+        latents = pooled(state['latent'].cpu().numpy())
+        for row, cells in enumerate(occupancy):
+            truth = np.nan if fault else float(iou(cells > threshold, views.voxels[row].numpy()))
+            found.append((features(cells, threshold, seen[row]), latents[row], truth, number,
+                          row))
+    numbers, pools, ious, counts, rows = zip(*found, strict=True)
+    names = np.array([f'{folder.category}/{folder.name}' for folder in views.folders])
+    at_row = np.array(rows)
+    return Measured(
+        np.array(numbers), np.array(pools), np.array(ious),
+        np.array([hollow_share(truth.numpy()) for truth in views.voxels])[at_row],
+        np.array(counts),
+        np.array([f'{name} {kind} {fault} {seed}' for name in names])[at_row], names[at_row],
+        np.array(sources_of(views.folders))[at_row], np.full(len(rows), fault, '<U16'),
+        np.full(len(rows), kind, '<U16'))
+
+
+def _cameras(cameras: Cameras, size: int) -> Iterator[Camera]:
+    for pose, matrix in zip(cameras.poses.numpy(), cameras.intrinsics.numpy(), strict=True):
+        yield Camera(pose, Intrinsics(matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
+                                      size, size))
+
+
+def halves(measured: Measured) -> NDArray[np.bool_]:
+    """
+    Return which rows belong to the first of two halves, split by source, (N,).
+
+    The sources, from that with most objects that are not hollow, each join the half with fewer of
+    them so far.
+    """
+    solid = measured.solid
+    pairs = set(zip(solid.source.tolist(), solid.object.tolist(), strict=True))
+    sizes = [(-sum(source == each for source, _ in pairs), each)
+             for each in sorted(set(measured.source.tolist()))]
+    held: tuple[set[str], set[str]] = (set(), set())
+    counts = [0, 0]
+    for size, source in sorted(sizes):
+        least = int(counts[1] < counts[0])
+        held[least].add(source)
+        counts[least] -= size
+    return np.isin(measured.source, sorted(held[0]))

@@ -1,0 +1,1 @@
+"""How good a reconstruction is, and whether its network knows such views; numbers only."""

@@ -1,0 +1,114 @@
+"""The silhouettes that a reconstruction predicts, beside those that the network saw."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from active_recon.geometry.cameras import Camera
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class SeenView:
+    """
+    What the network saw of a view.
+
+    - camera: of the network's image; lengths in sides of the grid
+    - foreground: (S, S) in [0, 1], the probability that a pixel shows the object
+    - seen: (S, S) in [0, 1], the share of each pixel that the camera's image holds
+    """
+
+    camera: Camera
+    foreground: NDArray[np.float32]
+    seen: NDArray[np.float32]
+
+    @cached_property
+    def sized_camera(self) -> Camera:
+        """The camera of an image of S x S pixels."""
+        side = len(self.foreground)
+        return Camera(self.camera.pose, self.camera.intrinsics.resized(side, side))
+
+    @cached_property
+    def outline(self) -> Mask:
+        """The pixels of S x S whose rays meet the cube."""
+        return cube_outline(self.sized_camera)
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """
+    How a predicted silhouette and the foreground that was seen agree, each in [0, 1].
+
+    - iou: of the two, on the pixels that the camera saw; 1 where both are empty
+    - missed: share of the foreground within the cube's outline that the reconstruction leaves out
+    - extra: share of the predicted silhouette where no foreground was seen
+    - outside: share of the foreground that lies outside of the cube's outline
+    - unsure: share of the cube's outline whose foreground is in doubt (0.2 to 0.8)
+    - filled: share of the cube's outline that is foreground
+    """
+
+    iou: float
+    missed: float
+    extra: float
+    outside: float
+    unsure: float
+    filled: float
+
+
+def eroded(cells: Mask) -> Mask:
+    """Return the cells (R, R, R) all of whose six neighbours are there too."""
+    left = cells.copy()
+    for axis in range(3):
+        own, kept = np.moveaxis(cells, axis, 0), np.moveaxis(left, axis, 0)
+        kept[1:] &= own[:-1]
+        kept[:-1] &= own[1:]
+        kept[[0, -1]] = False  # nothing is outside of the grid
+    return left
+
+
+def silhouette(points: NDArray[np.float64], camera: Camera) -> Mask:
+    """
+    Return the pixels that points (N, 3) project onto, (height, width).
+
+    It is the silhouette of a shape if the points are the centres of its surface cells and at most
+    a pixel apart, as 64 cells a side are in an image of 64 pixels that holds the whole cube.
+    """
+    lens = camera.intrinsics
+    mask = np.zeros((lens.height, lens.width), np.bool_)
+    pixels, depth = camera.project(points)
+    place = np.floor(pixels[depth > 0])
+    inside = ((place >= 0) & (place < [lens.width, lens.height])).all(axis=1)
+    across, down = place[inside].astype(np.intp).T
+    mask[down, across] = True
+    return mask
+
+
+def cube_outline(camera: Camera) -> Mask:
+    """Return the pixels whose rays meet the unit cube about the origin, (height, width)."""
+    rays = camera.ray_directions()
+    with np.errstate(divide='ignore', invalid='ignore'):
+        ends = np.stack([(side - camera.position) / rays for side in (-0.5, 0.5)])
+    enter, leave = np.nanmin(ends, axis=0).max(axis=-1), np.nanmax(ends, axis=0).min(axis=-1)
+    return np.asarray((enter <= leave) & (leave > 0))
+
+
+def agreement(points: NDArray[np.float64], view: SeenView) -> Agreement:
+    """Compare the silhouette of a shape's surface points (N, 3) with what a view showed."""
+    known = view.seen > 0.5
+    predicted = silhouette(points, view.sized_camera) & known
+    shown = (view.foreground > 0.5) & known
+    outline = view.outline & known
+    within = shown & outline
+    doubt = (np.abs(view.foreground - 0.5) < 0.3) & outline
+    return Agreement(
+        iou=_share(predicted & within, predicted | within, 1.0),
+        missed=_share(within & ~predicted, within), extra=_share(predicted & ~shown, predicted),
+        outside=_share(shown & ~outline, shown), unsure=_share(doubt, outline),
+        filled=_share(within, outline))
+
+
+def _share(part: Mask, whole: Mask, empty: float = 0.0) -> float:
+    count = np.count_nonzero(whole)
+    return np.count_nonzero(part) / count if count else empty

@@ -1,0 +1,106 @@
+"""The numbers that the quality of a network's reconstructions is judged by, in a JSON file."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+import json
+from pathlib import Path
+from typing import Any, Self
+
+from active_recon.errors import WeightsError
+from active_recon.quality.features import FEATURES
+from active_recon.quality.latents import KnownLatents
+from active_recon.quality.quality import SUSPECTS
+import numpy as np
+
+
+@dataclass(frozen=True)
+class QualityTables:
+    """
+    What `active-recon quality fit` found for a network, as plain numbers.
+
+    F features, first those of `FEATURES`, then the latent's distance; K numbers of views, the last
+    of which stands for all more; D pooled channels; P targets.
+
+    - weights_sha256: of the network's weights
+    - centre, scale: (F,), by which features are standardised
+    - head: (2 F,), the weights of the standardised features and of their squares in the log odds
+      of the IoU; intercepts: (K,)
+    - margin: (K,), between expected IoU and lower bound
+    - targets: (P,), increasing, that can be promised; needed: (P,), the expected IoU for that
+    - growth: (K,), between expected and attainable IoU
+    - latent_mean: (D,); latent_whitening: (D, D)
+    - suspects: names of faults; fault_head: (faults, F + 1), their log odds against no fault
+    - usual_scores: (K, ...), increasing: the scores of usual views, which are the log odds of any
+      fault; usual_distances: (K, ...), those of the latent's distance
+    """
+
+    weights_sha256: str
+    centre: Sequence[float]
+    scale: Sequence[float]
+    head: Sequence[float]
+    intercepts: Sequence[float]
+    margin: Sequence[float]
+    targets: Sequence[float]
+    needed: Sequence[float]
+    growth: Sequence[float]
+    latent_mean: Sequence[float]
+    latent_whitening: Sequence[Sequence[float]]
+    suspects: Sequence[str]
+    fault_head: Sequence[Sequence[float]]
+    usual_scores: Sequence[Sequence[float]]
+    usual_distances: Sequence[Sequence[float]]
+
+    def __post_init__(self) -> None:
+        """Raise WeightsError where shapes do not fit each other, or names are unknown."""
+        size, counts, width = len(FEATURES) + 1, len(self.margin), len(self.latent_mean)
+        expected = {
+            'centre': (size,), 'scale': (size,), 'head': (2 * size,), 'intercepts': (counts,),
+            'growth': (counts,), 'needed': (len(self.targets),),
+            'latent_whitening': (width, width), 'fault_head': (len(self.suspects), size + 1)}
+        for name, shape in expected.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise WeightsError(f'quality tables: {name} of a wrong shape: expected {shape}, '
+                                   f'got {found}')
+        if not counts or {len(self.usual_scores), len(self.usual_distances)} != {counts}:
+            raise WeightsError('quality tables: no usual scores for some numbers of views: '
+                               f'expected those of {counts}, got {len(self.usual_scores)}')
+        if unknown := set(self.suspects) - SUSPECTS.keys():
+            raise WeightsError('quality tables: unknown suspects: expected some of '
+                               f'{", ".join(SUSPECTS)}, got {", ".join(sorted(unknown))}')
+
+    @property
+    def known_latents(self) -> KnownLatents:
+        """The latents of the training objects."""
+        return KnownLatents(np.array(self.latent_mean), np.array(self.latent_whitening))
+
+    def write(self, path: Path, **notes: Any) -> None:
+        """Write the tables, and notes on how they were made, as JSON."""
+        path.write_text(json.dumps({**asdict(self), **notes}) + '\n')
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read tables; raises WeightsError where they cannot be used."""
+        try:
+            found = json.loads(path.read_text())
+            return cls(**{each.name: found[each.name] for each in fields(cls)})
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise WeightsError(f'{path}: no readable quality tables: expected those that '
+                               f'`active-recon quality fit` writes, got: {error!r}') from error
+
+
+def tables_path(weights: Path) -> Path:
+    """Return the file beside weights that their quality tables are in."""
+    return weights.with_name(f'{weights.stem}-quality.json')
+
+
+def find_tables(weights: Path, sha256: str) -> tuple[QualityTables | None, str]:
+    """Return the tables beside weights of a SHA-256, None where there are none, and why."""
+    path = tables_path(weights)
+    if not path.is_file():
+        return None, f'no quality: expected its tables in {path.name}, beside the weights'
+    tables = QualityTables.read(path)
+    if tables.weights_sha256 != sha256:
+        return None, (f'no quality: {path.name} is of other weights: expected SHA-256 '
+                      f'{sha256[:12]}, got {tables.weights_sha256[:12]}')
+    return tables, ''

@@ -1,0 +1,47 @@
+"""The quality between ROS and the core."""
+
+from active_recon.errors import MessageError
+from active_recon.quality.quality import Quality, SUSPECTS
+from diagnostic_msgs.msg import DiagnosticStatus
+from judged_quality import quality_of
+from msg_tools.quality import quality_from_msg, quality_to_msg
+from msg_tools.stamps import stamp_from_nanoseconds
+import pytest
+from std_msgs.msg import Header
+
+HEADER = Header(stamp=stamp_from_nanoseconds(1_795_000_000_123_456_789), frame_id='object')
+
+
+@pytest.mark.parametrize('suspect', ['', *SUSPECTS])
+def test_a_quality_comes_back_to_the_bit_under_its_stamp(suspect):
+    quality = Quality(1 / 3, 0.1, 0.0, 1.0, 1e-3, 2 / 3, suspect)
+    msg = quality_to_msg(quality, HEADER)
+    assert quality_from_msg(msg) == quality
+    assert msg.header == HEADER
+
+
+def test_a_suspect_is_a_warning_with_its_question():
+    usual, unusual = (quality_to_msg(quality_of(suspect=suspect), HEADER).status[0]
+                      for suspect in ('', 'pose'))
+    assert (usual.level, usual.message) == (DiagnosticStatus.OK, 'ok')
+    assert unusual.level == DiagnosticStatus.WARN
+    assert SUSPECTS['pose'] in unusual.message
+
+
+@pytest.mark.parametrize(('name', 'value'), [
+    ('expected_iou', '1.5'), ('p_value', 'nan'), ('lower_bound', 'much'), ('suspect', 'luck')])
+def test_values_that_are_no_quality_are_refused(name, value):
+    msg = quality_to_msg(quality_of(), HEADER)
+    for pair in msg.status[0].values:
+        if pair.key == name:
+            pair.value = value
+    with pytest.raises(MessageError) as caught:
+        quality_from_msg(msg)
+    assert caught.value.kind == 'quality'
+
+
+def test_a_quality_that_lacks_a_value_is_refused():
+    msg = quality_to_msg(quality_of(), HEADER)
+    msg.status[0].values = msg.status[0].values[1:]
+    with pytest.raises(MessageError, match='expected expected_iou too'):
+        quality_from_msg(msg)

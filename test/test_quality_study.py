@@ -1,0 +1,221 @@
+"""Fitting and testing the tables of quality: on numbers whose truth is known."""
+
+import json
+
+from active_recon.datasets.views import read_views
+from active_recon.errors import DataError
+from active_recon.evaluation.quality.faults import (
+    broken_masks,
+    FAULTS,
+    noise,
+    SIZE_FACTOR,
+    wrong_poses,
+    wrong_size,
+)
+from active_recon.evaluation.quality.fitting import fit
+from active_recon.evaluation.quality.measuring import halves, measure, Measured
+from active_recon.evaluation.quality.promises import (
+    BROKEN,
+    Episodes,
+    kept_at_least,
+    needed_for,
+    NEVER,
+)
+from active_recon.evaluation.quality.shells import hollow_share
+from active_recon.evaluation.quality.study import study
+from active_recon.evaluation.quality.summary import markdown
+from active_recon.models.lifting import Lifting, LiftingConfig
+from active_recon.models.weights_files import SHIPPED, weights_hash
+from active_recon.quality.features import FEATURES
+from active_recon.quality.tables import QualityTables
+from command_line import command, refusal
+import numpy as np
+import pytest
+import torch
+
+COUNTS = 3
+
+
+def made_up(objects, seed, fault='', noise=0.4, sources=20):
+    """Return episodes whose log odds of IoU are a feature's, with noise; faults shift another."""
+    rng = np.random.default_rng(seed)
+    count = np.tile(np.arange(1, COUNTS + 1), objects)
+    item = np.repeat(np.arange(objects), COUNTS)
+    numbers = rng.normal(size=(len(count), len(FEATURES)))
+    quality = rng.normal(size=objects)[item] + 0.3 * count
+    numbers[:, 0] = quality
+    iou = 1 / (1 + np.exp(-quality - noise * rng.normal(size=len(count))))
+    if fault:
+        numbers[:, 1 + list(FAULTS).index(fault)] += 6
+    names = np.array([f'{seed}/{each}' for each in item])
+    return Measured(
+        numbers, rng.normal(size=(len(count), 4)), np.full(len(count), np.nan) if fault else iou,
+        np.zeros(len(count)), count, np.array([f'{name} {fault}' for name in names]), names,
+        np.array([f'source {each % sources}' for each in item]),
+        np.full(len(count), fault, '<U16'), np.full(len(count), 'random', '<U16'))
+
+
+@pytest.fixture(scope='module')
+def tables():
+    calibration = [made_up(400, 1), *(made_up(60, 2, fault) for fault in FAULTS)]
+    return fit(made_up(400, 0), Measured.joined(calibration), 'abc')
+
+
+@pytest.fixture(scope='module')
+def figures(tables):
+    return study(Measured.joined([made_up(400, 3), *(made_up(60, 4, fault) for fault in FAULTS)]),
+                 tables)
+
+
+def test_new_objects_are_above_the_lower_bound_nine_times_in_ten(figures):
+    for after in figures['views'].values():
+        assert 0.85 < after['solid']['covered'] < 0.95
+
+
+def test_the_expected_iou_is_off_by_no_more_than_the_noise(figures):
+    assert all(after['solid']['error'][0] < 0.09 for after in figures['views'].values())
+
+
+def test_false_alarms_are_as_rare_as_was_asked_for_and_faults_are_found_and_named(figures):
+    assert all(after['flagged'] < 0.08 for after in figures['views'].values())
+    for by_count in figures['faults'].values():
+        assert all(found['flagged'] > 0.9 and found['named'] > 0.9
+                   for found in by_count.values())
+
+
+def test_promises_that_were_calibrated_are_kept_by_new_objects(figures):
+    made = [found for found in figures['promises']['random'].values() if found['stopped']]
+    assert len(made) > 2
+    assert all(found['kept'] > 1 - BROKEN - 0.04 for found in made)
+
+
+def test_a_promise_that_is_broken_too_often_is_never_made():
+    rng = np.random.default_rng(5)
+    expected = rng.uniform(size=(200, 3)).cumsum(axis=1) / 3
+    assert needed_for(0.6, Episodes(expected, np.full_like(expected, 0.55))) == NEVER
+    assert needed_for(0.6, Episodes(expected, np.full_like(expected, 0.65))) < 0.6
+
+
+def test_an_episode_stops_at_the_first_view_that_is_enough():
+    expected = np.array([[0.2, 0.7, 0.6], [0.1, 0.2, 0.3], [0.9, 0.1, np.nan]])
+    episodes = Episodes(expected, np.array([[0.0, 1, 2], [3, 4, 5], [6, 7, 8]]))
+    assert episodes.stops(0.55).tolist() == [1, -1, 0]
+    assert episodes.stopped(0.55).tolist() == [1, 6]
+
+
+def test_the_exact_bound_of_a_share_is_missed_as_rarely_as_it_says():
+    rng = np.random.default_rng(6)
+    bounds = np.array([kept_at_least(kept, 80) for kept in range(81)])
+    assert (bounds[rng.binomial(80, 0.9, size=20000)] > 0.9).mean() < 0.055
+    assert (np.diff(bounds) > 0).all() and bounds[0] == 0
+
+
+def test_the_two_halves_share_no_source_and_are_of_like_size():
+    measured = made_up(90, 7, sources=7)
+    first = halves(measured)
+    assert not set(measured.source[first]) & set(measured.source[~first])
+    assert 0.35 < first.mean() < 0.65
+
+
+def test_what_was_measured_comes_back_from_its_file(tmp_path):
+    measured = made_up(5, 8)
+    measured.write(tmp_path / 'm.npz')
+    again = Measured.read(tmp_path / 'm.npz')
+    assert np.array_equal(again.numbers, measured.numbers)
+    assert again.episode.tolist() == measured.episode.tolist()
+    (tmp_path / 'm.npz').write_text('no')
+    with pytest.raises(DataError, match='no measured qualities'):
+        Measured.read(tmp_path / 'm.npz')
+
+
+def test_without_faults_to_learn_nothing_is_fitted():
+    with pytest.raises(DataError, match='no faulty objects'):
+        fit(made_up(20, 9), made_up(20, 10), 'abc')
+
+
+def test_the_text_has_every_set_and_fault(figures):
+    text = markdown({'command': 'c', 'sets': [{'name': 'made up', **figures}]})
+    assert all(word in text for word in ('made up', *FAULTS, 'given up'))
+
+
+def test_a_solid_is_not_hollow_and_a_box_without_a_bottom_is():
+    cells = np.zeros((16,) * 3, bool)
+    cells[3:13, 3:13, 3:13] = True
+    assert hollow_share(cells) == 0
+    cells[4:12, 4:12, 3:12] = False
+    assert hollow_share(cells) == pytest.approx(576 / 1000)
+
+
+@pytest.fixture(scope='module')
+def seen(tmp_path_factory):
+    """Two objects from any cameras."""
+    from active_recon.datasets.drawn_cameras import Viewing
+    from active_recon.datasets.making import make_dataset, shape_jobs
+
+    out = tmp_path_factory.mktemp('any')
+    jobs = shape_jobs('chair', range(2), out)
+    assert not any(each.refusal for each in make_dataset(
+        jobs, 1, 1, True, Viewing('any', 4)))
+    return read_views([job.folder for job in jobs], resolution=64, image_size=128, framed=True)
+
+
+def test_every_fault_spoils_the_views_and_leaves_the_truth_and_the_original(seen):
+    before = seen.images.clone(), seen.poses.clone()
+    for spoil in FAULTS.values():
+        spoilt = spoil(seen, 1)
+        assert (spoilt.images != seen.images).any() or (spoilt.poses != seen.poses).any()
+        assert spoilt.voxels is seen.voxels
+    assert (seen.images == before[0]).all() and (seen.poses == before[1]).all()
+
+
+def test_wrong_poses_are_off_by_the_angle_and_other_faults_keep_the_poses(seen):
+    turn = wrong_poses(seen, 1).poses[..., :3, :3] @ seen.poses[..., :3, :3].transpose(-1, -2)
+    angle = torch.arccos((turn.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2)
+    np.testing.assert_allclose(torch.rad2deg(angle), 20, atol=1e-4)
+    for spoil in (noise, broken_masks):
+        assert (spoil(seen, 1).poses == seen.poses).all()
+
+
+def test_a_wrong_size_scales_the_distances_of_the_cameras(seen):
+    ratio = wrong_size(seen, 0).poses[..., :3, 3].norm(dim=-1) / seen.poses[..., :3, 3].norm(
+        dim=-1)
+    np.testing.assert_allclose(ratio[0], 1 / SIZE_FACTOR, rtol=1e-9)
+    np.testing.assert_allclose(ratio[1], SIZE_FACTOR, rtol=1e-9)
+
+
+def test_measured_are_all_objects_after_every_view(seen):
+    torch.manual_seed(0)
+    network = Lifting.from_config(LiftingConfig((8, 8, 8, 8), 8, 8, 4, 4, (8, 8, 8), 8)).eval()
+    found = measure(seen, network, 0.1, 3, 'even')
+    assert found.count.tolist() == [1, 1, 2, 2, 3, 3]
+    assert np.isfinite(found.numbers).all() and ((found.iou >= 0) & (found.iou <= 1)).all()
+    assert len(set(found.episode)) == 2
+    alone = measure(seen, network, 0.1, 1, 'even')
+    np.testing.assert_allclose(alone.numbers, found.numbers[:2], atol=1e-5)
+    spoilt = measure(seen, network, 0.1, 2, fault='mask')
+    assert np.isnan(spoilt.iou).all() and set(spoilt.fault) == {'mask'}
+
+
+def test_the_commands_fit_tables_and_test_them_on_the_other_half(tmp_path, monkeypatch):
+    made_up(200, 0).write(tmp_path / 'known.npz')
+    made_up(200, 1).write(tmp_path / 'real.npz')
+    faults = Measured.joined([made_up(60, 1, fault) for fault in FAULTS])
+    faults.write(tmp_path / 'faults.npz')
+    assert command(monkeypatch, 'quality', 'fit', '--known', tmp_path / 'known.npz',
+                   '--calibration', tmp_path / 'real.npz', '--calibration',
+                   tmp_path / 'faults.npz', '--out', tmp_path / 'tables.json') == 0
+    tables = QualityTables.read(tmp_path / 'tables.json')
+    assert tables.weights_sha256 == weights_hash(SHIPPED)
+    assert command(monkeypatch, 'quality', 'study', tmp_path / 'known.npz', '--halved',
+                   tmp_path / 'real.npz', '--halved', tmp_path / 'faults.npz', '--tables',
+                   tmp_path / 'tables.json', '--out', tmp_path) == 0
+    whole, half = json.loads((tmp_path / 'quality.json').read_text())['sets']
+    assert (whole['objects'], half['objects']) == (200, 100)
+    used = json.loads((tmp_path / 'tables.json').read_text())['calibrated_on']
+    assert not set(used) & set(half['sources'])
+
+
+def test_a_study_of_nothing_and_an_unknown_fault_are_refused(tmp_path, monkeypatch, capsys):
+    assert 'nothing to measure' in refusal(monkeypatch, capsys, 'quality', 'study')
+    assert 'unknown value' in refusal(monkeypatch, capsys, 'quality', 'measure', tmp_path,
+                                      tmp_path / 'm.npz', '--fault', 'luck')
