@@ -20,6 +20,7 @@ from active_recon.policies import (
     Policy,
     PolicyOptions,
 )
+from active_recon.policies.reasons import goal_reason
 from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
@@ -223,6 +224,16 @@ class Planner:
                 if self._wanted else
                 'no view in this episode yet: expected one before a plan', 'plan')
         return self._goal
+
+    def reason(self) -> str:
+        """Return why the goal is worth its view; '' where the policy does not look at volumes."""
+        last = self._views[-1] if self._views else None
+        if last is None or last.volume is None or self._goal is None:
+            return ''
+        poses = np.stack([camera.scaled(1 / last.volume.size).pose for camera in (
+            self._goal.camera, *(view.camera for view in self._views))])
+        return goal_reason(Observation(last.latent[None], poses[None, 1:], poses[None, :1],
+                                       last.volume.occupancy[None]), poses[0])
 
     def next_goal(self) -> Decision:
         """Return the goal after the views so far, or that none can be reached."""

@@ -338,3 +338,16 @@ def test_it_stops_where_no_view_gains_enough_if_the_policy_knows(is_gain, count,
 def test_a_target_that_no_iou_can_be_is_refused(name, share):
     with pytest.raises(ConfigError, match=f'{name}: out of range'):
         Planner(FarthestPolicy(), **{name: share})
+
+
+def test_a_goal_has_a_reason_where_the_policy_looks_at_the_volume():
+    cells = np.zeros((32,) * 3, np.float32)
+    cells[10:22, 10:22, 10:22] = 0.5
+    planner = Planner.load('unseen_entropy')
+    camera = orbit_camera(0.0)
+    assert planner.reason() == ''
+    planner.add_view(np.zeros((1, 4, 4), np.float32), camera, 10.0, VoxelGrid(cells))
+    assert planner.reason().startswith('shows the side towards azimuth')
+    blind = Planner.load('farthest')
+    blind.add_view(np.zeros((1, 4, 4), np.float32), camera, 10.0)
+    assert blind.reason() == ''

@@ -17,7 +17,7 @@ def demo(
         'Policy that chooses the next view.')] = DEFAULT_POLICY,
     model: Annotated[str | None, typer.Option(
         help='Name of a model that ships, or a weights file; the policy attention needs '
-             '2d3d-attention.')
+             'lifting or 2d3d-attention.')
     ] = None,
     seed: Annotated[int, typer.Option(
         min=0, help='Seed of the first view and of the policy random.')] = 0,

@@ -82,6 +82,7 @@ def evaluate(
     from active_recon.evaluation.paired import require_same_episodes, write_rows
     from active_recon.evaluation.policy_study import compare, run_all
     from active_recon.evaluation.trial import Trial
+    from active_recon.models.scorer_weights import policy_module
     from active_recon.models.weights import load_weights
     from active_recon.models.weights_files import find_weights, weights_hash
     import torch
@@ -97,7 +98,8 @@ def evaluate(
 
     def measure(weights: Path) -> _Measured:
         bundle = load_weights(weights)
-        attentions = [bundle.attention] if bundle.attention else []
+        learned = policy_module(weights, bundle)
+        attentions = [learned] if learned else []
         held_out = read_objects([data], 'objects', bundle.reconstruction.spec, split_file, 'test')
         shown = held_out.azimuths.shape[1]
         if max(views, starts) > shown:

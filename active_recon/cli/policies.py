@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from active_recon.evaluation.posed.entrants import Entrant
     from active_recon.evaluation.posed.study import Extent
 
-_ROBOTS = tuple(name for name, entry in POLICIES.items() if not entry.is_learned)
+_UNLEARNED = [name for name, entry in POLICIES.items() if not entry.is_learned]
+_LEARNED = [name for name in POLICIES if name not in _UNLEARNED]
 
 
 def policies(
@@ -27,9 +28,10 @@ def policies(
     model: Annotated[str, typer.Option(
         help='A network of posed views: a model that ships, or a weights file.')] = 'lifting',
     names: Annotated[str | None, typer.Option(
-        '--policies', help=f'Policies, separated by commas, out of {", ".join(_ROBOTS)}, sequence '
-        '(the best that is the same for all objects, found on --training), peeking and oracle '
-        '(which see what no robot does). Default: all, sequence only with --training.')] = None,
+        '--policies', help=f'Policies, separated by commas, out of {", ".join(POLICIES)}, '
+        'sequence (the best that is the same for all objects, found on --training), peeking and '
+        'oracle (which see what no robot does). Default: all, attention only where the model has '
+        'a learned policy, sequence only with --training.')] = None,
     training: Annotated[Path | None, typer.Option(
         help='Folder of other objects, on which the sequence is found.')] = None,
     objects: Annotated[int, typer.Option(
@@ -67,19 +69,21 @@ def policies(
     from active_recon.evaluation.next_view.study import Episodes
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.evaluation.posed.study import Extent
+    from active_recon.models.scorer_weights import scorer_path
     import torch
 
-    wanted = [*_ROBOTS, *['sequence'] * (training is not None), 'peeking', 'oracle']
+    torch.set_num_threads(threads)
+    entrant, *others = load_entrants(model)
+    if others:
+        raise ConfigError(f'model: several networks: expected one, got {model!r}')
+    learned = _LEARNED if scorer_path(entrant.path).is_file() else []
+    wanted = [*_UNLEARNED, *learned, *['sequence'] * (training is not None), 'peeking', 'oracle']
     if names is not None:
         wanted = [name.strip() for name in names.split(',') if name.strip()]
     if 'sequence' in wanted and training is None:
         raise ConfigError('policies: no training objects: expected --training with a folder, on '
                           'which a sequence is found, got none; give one, or leave sequence out')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, bf16)
-    torch.set_num_threads(threads)
-    entrant, *others = load_entrants(model)
-    if others:
-        raise ConfigError(f'model: several networks: expected one, got {model!r}')
     result: dict[str, Any] = {
         'command': shlex.join(['active-recon', *sys.argv[1:]]), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}

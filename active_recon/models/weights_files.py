@@ -12,6 +12,8 @@ from safetensors import safe_open, SafetensorError
 
 DEFAULT_MODEL, PAPER_MODEL = 'lifting', '2d3d-attention'
 FOLDER = Path(__file__).parents[1] / 'weights'
+SCORER = '-scorer'
+"""What the name of a network's weights is followed by in that of its view policy's."""
 SHIPPED = FOLDER / f'{DEFAULT_MODEL}.safetensors'
 
 
@@ -55,7 +57,8 @@ def find_weights(model: str | Path | None = None) -> Path:
         return path
     shipped = FOLDER / f'{model}.safetensors'
     if not shipped.is_file():
-        names = ', '.join(sorted(file.stem for file in FOLDER.glob('*.safetensors')))
+        names = ', '.join(sorted(file.stem for file in FOLDER.glob('*.safetensors')
+                                 if not file.stem.endswith(SCORER)))
         raise WeightsError(f'{model}: neither a weights file (.safetensors) nor a model whose '
                            f'weights ship ({names}); `active-recon train` makes weights')
     return shipped

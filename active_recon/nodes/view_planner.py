@@ -202,6 +202,9 @@ class ViewPlannerNode(ManagedNode):
         """Publish the goal, or that the episode is done, at a stamp in nanoseconds."""
         if decision.goal is not None:
             self._publish_goal(decision.goal)
+            if reason := self._planner.reason():
+                self.get_logger().info(
+                    f'goal at {math.degrees(decision.goal.camera.azimuth):.0f} degrees: {reason}')
             return
         self._goals.close()
         self._started = True

@@ -23,8 +23,8 @@ class ViewPlannerParameters(FrontParameters, CubeParameters, NetworkParameters, 
 
     policy: str = parameter(
         DEFAULT_POLICY, 'policy that chooses the next view; attention is learned and needs '
-        'weights that contain it, such as those of 2d3d-attention', choices=tuple(POLICIES),
-        dynamic=True)
+        'weights that have one, such as those of lifting or 2d3d-attention',
+        choices=tuple(POLICIES), dynamic=True)
     seed: int = parameter(0, 'seed of the policy random', low=0, high=2**32 - 1, dynamic=True)
     max_views: int = parameter(
         5, 'number of views after which an episode is done', low=1, high=1000, dynamic=True)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from active_recon.errors import ConfigError, WeightsError
+from active_recon.errors import ConfigError
 from active_recon.models.weights_files import read_metadata, SHIPPED
 from active_recon.plugins import installed, load_installed, POLICIES_GROUP
 from active_recon.policies.attention import AttentionPolicy
@@ -16,6 +16,7 @@ from active_recon.policies.rendered import (
     unseen_entropy,
     visible_entropy,
 )
+from active_recon.policies.scoring import ScoringPolicy
 from active_recon.runtimes import load_policy_runtime, PolicyRuntime
 import numpy as np
 
@@ -65,15 +66,16 @@ class PolicyEntry:
 DEFAULT_POLICY = 'uniform'  # the best on validation of those that the default network can have
 
 LEARNED: dict[str, Callable[[PolicyRuntime], Policy]] = {'2d3d-attention': AttentionPolicy}
-"""What makes a policy of the model that was trained beside a network, by the network's name."""
+"""
+What makes a policy of the model that was trained with a network, by the network's name.
+
+Of all others it is a ScoringPolicy: of the scorer that `active-recon train-policy` made for them.
+"""
 
 
 def learned_policy(model: str, runtime: PolicyRuntime) -> Policy:
-    """Return the policy of a network's name; WeightsError where it brings none."""
-    if model not in LEARNED:
-        raise WeightsError(f'{model}: network without a view policy: expected one with its own, '
-                           f'out of {", ".join(LEARNED)}; choose another policy')
-    return LEARNED[model](runtime)
+    """Return the policy of the model that was trained for a network of this name."""
+    return LEARNED.get(model, ScoringPolicy)(runtime)
 
 
 def _attention(options: PolicyOptions) -> Policy:

@@ -9,8 +9,10 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.geometry.cameras import Camera, orbit_camera
 from active_recon.geometry.canonical import network_image
 from active_recon.models.network import Cameras, ReconstructionNetwork
-from active_recon.models.weights import Bundle, load_weights
-from active_recon.models.weights_files import config_hash, SHIPPED, weights_hash
+from active_recon.models.registry import network_entry
+from active_recon.models.scorer_weights import load_scorer
+from active_recon.models.weights import load_weights
+from active_recon.models.weights_files import config_hash, read_metadata, SHIPPED, weights_hash
 from active_recon.runtimes.base import State
 import numpy as np
 from numpy.typing import NDArray
@@ -80,25 +82,28 @@ class TorchPolicyRuntime:
 
 def load_network(weights: Path | None, device: str, threads: int | None) -> TorchRuntime:
     """Return the network of a weights file; see `load_runtime`."""
-    bundle = _load(weights, device)
+    _require(device)
+    bundle = load_weights(weights, device)
     return TorchRuntime(bundle.reconstruction, bundle.threshold, threads, {
         'weights_sha256': weights_hash(weights), 'config_sha256': config_hash(bundle.config)})
 
 
 def load_policy(weights: Path | None, device: str, threads: int | None) -> TorchPolicyRuntime:
-    """Return the policy of a weights file; raises WeightsError where it has none."""
-    model = _load(weights, device).attention
+    """Return the policy in a weights file, or beside it; raises WeightsError without one."""
+    _require(device)
+    if network_entry(read_metadata(weights or SHIPPED).model).policy is None:
+        return TorchPolicyRuntime(load_scorer(weights, device), threads)
+    model = load_weights(weights, device).attention
     if model is None:
         raise WeightsError(f'{(weights or SHIPPED).name}: no view policy in these weights: take '
-                           'those of 2d3d-attention, or a policy that is not learned')
+                           'those of lifting or 2d3d-attention, or a policy that is not learned')
     return TorchPolicyRuntime(model, threads)
 
 
-def _load(weights: Path | None, device: str) -> Bundle:
+def _require(device: str) -> None:
     if device == 'cuda' and not torch.cuda.is_available():
         raise ConfigError('parameter device: cuda not available: expected a device that torch can '
                           'use, but this torch finds no GPU; use cpu')
-    return load_weights(weights, device)
 
 
 def _provenance(device: torch.device, threads: int | None) -> dict[str, str]:

@@ -67,7 +67,8 @@ def test_weights_that_cannot_be_used_are_refused(start_node, tmp_path, make, sai
 def test_a_planner_without_its_weights_is_refused(start_node, tmp_path):
     assert 'no such file' in refusal(
         start_node, 'view_planner', policy='attention', weights=missing_weights(tmp_path))
-    assert 'no view policy' in refusal(start_node, 'view_planner', policy='attention')
+    assert 'no view policy' in refusal(
+        start_node, 'view_planner', policy='attention', weights='2d3d')
 
 
 def missing_mesh(folder):

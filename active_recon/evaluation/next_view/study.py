@@ -66,9 +66,8 @@ class Found:
 
 
 def known_names() -> list[str]:
-    """Return what can be measured on any network: all policies that are not learned, and more."""
-    return [*(name for name, entry in POLICIES.items() if not entry.is_learned),
-            SEQUENCE, PEEKING, ORACLE]
+    """Return what can be measured: all policies, learned ones if there are any, and more."""
+    return [*POLICIES, SEQUENCE, PEEKING, ORACLE]
 
 
 def find_offsets(scene: Scene, entrant: Entrant, episodes: Episodes,
@@ -94,7 +93,8 @@ def run_episodes(scene: Scene, entrant: Entrant, episodes: Episodes,
         own, other = (_watched(scene, entrant, episodes, row, 2 * episodes.seed + rendering)
                       for rendering in range(2))
         for name in episodes.policies:
-            orders = [[_order(name, own, start, seed, row, episodes, offsets)
+            orders = [[_order(name, own, start, [episodes.seed, seed, row, start], entrant,
+                              episodes, offsets)
                        for seed in range(_seeds(name, episodes))]
                       for start in _starts(scene, episodes, row)]
             others[name].append(_judged(other, orders))
@@ -140,18 +140,19 @@ def _judged(watched: WatchedObject, orders: Sequence[Sequence[Order]]) -> Values
     return np.array([[judged(watched, order) for order in seeds] for seeds in orders])
 
 
-def _order(name: str, watched: WatchedObject, start: int, seed: int, row: int,
+def _order(name: str, watched: WatchedObject, start: int, seed: Sequence[int], entrant: Entrant,
            episodes: Episodes, offsets: Offsets | None) -> Order:
     if name in _WORTH:
         return chosen_ahead(_WORTH[name], watched, start, episodes.count)
-    return chosen_by(_policy(name, [episodes.seed, seed, row, start], episodes, offsets), watched,
-                     start, episodes.count)
+    return chosen_by(_policy(name, seed, entrant, episodes, offsets), watched, start,
+                     episodes.count)
 
 
-def _policy(name: str, seed: Sequence[int], episodes: Episodes,
+def _policy(name: str, seed: Sequence[int], entrant: Entrant, episodes: Episodes,
             offsets: Offsets | None) -> Policy:
     if name != SEQUENCE:
-        return load_policy(name, PolicyOptions(np.random.default_rng(seed), episodes.count))
+        return load_policy(name, PolicyOptions(np.random.default_rng(seed), episodes.count,
+                                               entrant.path))
     if offsets is None:
         raise ConfigError('sequence: none was found: expected training objects to find one on')
     return FixedSequence(offsets)

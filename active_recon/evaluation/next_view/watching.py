@@ -86,11 +86,12 @@ class WatchedObject:
         fresh = [view for view in range(self.count) if view not in walk.taken]
         found = np.full((2, self.count), np.nan)
         for low in range(0, len(fresh), _ROWS):
-            chosen = torch.tensor(fresh[low:low + _ROWS])
+            numbers = fresh[low:low + _ROWS]
+            chosen = torch.tensor(numbers)
             state = {name: part.expand(len(chosen), *part.shape[1:])
                      for name, part in walk.state.items()}
             after = self._observer.update(torch.zeros_like(chosen), chosen, state)
-            found[:, chosen] = torch.stack(self._measured(after)).double().numpy()
+            found[:, numbers] = torch.stack(self._measured(after)).double().numpy()
         self._ahead[walk.taken] = Ahead(*found)
         self._iou |= {(*walk.taken, view): float(found[0, view]) for view in fresh}
         return self._ahead[walk.taken]

@@ -25,7 +25,7 @@ class Entrant:
     - grid_temperatures: the same, fitted to cells anywhere, for the expected IoU. Temperatures
       fitted near surfaces, where cells are uncertain, would make all of empty space uncertain
     - chosen_on: the source of thresholds and temperatures: 'card' or a validation folder
-    - weights: SHA-256 of the weights file
+    - weights: SHA-256 of the weights file; path: where it lies, None: nowhere
     """
 
     name: str
@@ -35,6 +35,7 @@ class Entrant:
     grid_temperatures: Mapping[int, float] = field(default_factory=dict)
     chosen_on: str = 'card'
     weights: str = ''
+    path: Path | None = None
 
     @property
     def sides(self) -> tuple[int, ...]:
@@ -60,7 +61,7 @@ def load_entrants(models: str) -> list[Entrant]:
             raise ConfigError('models: ambiguous name: expected a different name for each, got '
                               f'{name!r} twice; name one as NAME=FILE')
         entrants.append(Entrant(name, bundle.reconstruction, dict.fromkeys(
-            SIDES, bundle.threshold), weights=weights_hash(path)))
+            SIDES, bundle.threshold), weights=weights_hash(path), path=path))
     if not entrants:
         raise ConfigError('models: empty list: expected one or more, separated by commas, got '
                           'none')

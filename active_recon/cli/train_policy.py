@@ -1,0 +1,138 @@
+"""`active-recon train-policy`: a view policy for a frozen network, learned from measured gains."""
+
+from functools import partial
+from pathlib import Path
+import shlex
+import sys
+from typing import Annotated, Any, TYPE_CHECKING
+
+from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
+import typer
+
+if TYPE_CHECKING:
+    from active_recon.evaluation.posed.entrants import Entrant
+    from active_recon.models.view_scorer import ViewScorer
+    from active_recon.training.gain_files import Collecting
+    from active_recon.training.looked import LookedStates
+
+
+def train_policy(
+    data: Annotated[list[Path], typer.Argument(
+        help="Folders of training objects in R2N2's layout, seen from any cameras (see "
+             '`active-recon dataset build --fine`).')],
+    validation: Annotated[list[Path], typer.Option(
+        help='Folder of other objects, on which the expected gains are calibrated; may be given '
+             'several times.')],
+    model: Annotated[str, typer.Option(
+        help='The network, which stays as it is: a model that ships, or a weights file.'
+        )] = 'lifting',
+    out: Annotated[Path, typer.Option(
+        help='Folder of the measured gains, and of the weights at the end.'
+        )] = Path('runs/policy'),
+    rounds: Annotated[int, typer.Option(
+        min=1, help='How often states are collected: first of mixed policies, then each time of '
+                    'the policy that was learned before.')] = 2,
+    objects: Annotated[int, typer.Option(
+        min=1, help='At most so many objects of a folder and round, drawn.')] = 200,
+    candidates: Annotated[int, typer.Option(
+        min=3, help='Views of an object that are candidates, drawn.')] = 8,
+    starts: Annotated[int, typer.Option(min=1, help='Episodes of an object.')] = 2,
+    views: Annotated[int, typer.Option(
+        min=2, help='Views of the longest episode; all but the last give a state.')] = 5,
+    epochs: Annotated[int, typer.Option(min=1, help='Passes over all states.')] = 40,
+    batch_size: Annotated[int, typer.Option(min=1, help='States of a batch.')] = 32,
+    learning_rate: Annotated[float, typer.Option(help='Peak learning rate.')] = 1.5e-3,
+    seed: Annotated[int, typer.Option(help='Seed of the weights and batches.')] = 0,
+    bf16: Annotated[bool, typer.Option(
+        help='Half precision of the network where it is safe.')] = True,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+) -> None:
+    """
+    Train a view policy for a frozen network: which view adds most IoU.
+
+    In states of objects that are known, every candidate is tried, and a small network learns the
+    order of what they add, and how much that is. Gains are kept in OUT/gains-N, so that an
+    interrupted run continues where it stopped; an object takes some seconds of a core. Writes
+    OUT/<weights>-scorer.safetensors and its card: copy both beside the network's weights, and
+    `policy: attention` finds them.
+
+    For example:
+
+      active-recon train-policy turn/train things/train --validation turn/val --out runs/policy
+    """
+    from active_recon.evaluation.posed.entrants import load_entrants
+    from active_recon.models.scorer_weights import save_scorer, scorer_path
+    from active_recon.models.view_scorer import ScorerConfig
+    from active_recon.models.weights_files import find_weights
+    from active_recon.training.gain_files import Collecting
+    from active_recon.training.looked import joined
+    from active_recon.training.scorer import (
+        calibrate,
+        gap_shares,
+        ScorerTraining,
+        train_scorer,
+    )
+    import torch
+
+    torch.set_num_threads(threads)
+    entrant, *others = load_entrants(model)
+    if others or entrant.network.needs_front:
+        raise ConfigError('--model: no such network: expected one that takes any cameras, such as '
+                          f'lifting, got {model!r}')
+    source = _Source(entrant, Collecting(objects, candidates, starts, views, bf16), out)
+    config = ScorerConfig()
+    training = ScorerTraining(epochs, batch_size, learning_rate, seed=seed)
+    learned: list[LookedStates] = []
+    held_out: list[LookedStates] = []
+    scorer = None
+    told: list[dict[str, Any]] = []
+    for number in range(1, rounds + 1):
+        learned += source.states(data, number, scorer)
+        held_out += source.states(validation, number, scorer)
+        train, test = joined(learned), joined(held_out)
+        with progress_bar(f'training, round {number}', epochs) as advance:
+            scorer = train_scorer(train, config, training, partial(advance, 1))
+        calibrate(scorer, test)
+        shares = gap_shares(scorer, test)
+        told.append({'train_states': sum(map(len, train)),
+                     'validation_states': sum(map(len, test)),
+                     'validation_share_of_the_one_step_gap': shares})
+        typer.echo(f'round {number}: {shares["all"]:.2f} of the one-step gap on validation')
+    assert scorer is not None
+    path = out / scorer_path(find_weights(model)).name
+    save_scorer(path, scorer, config, entrant.weights, {
+        'command': shlex.join(['active-recon', *sys.argv[1:]]), 'network': entrant.name,
+        'training': training.to_dict(), 'collecting': source.collecting.to_dict(),
+        'data': {str(folder): count for folder, count in source.counts.items()},
+        'rounds': told, 'calibration': scorer.calibration.tolist()})
+    typer.echo(f'wrote {path}')
+
+
+class _Source:
+    """Where states come from; `counts` tells the objects of each folder and round."""
+
+    def __init__(self, entrant: 'Entrant', collecting: 'Collecting', out: Path) -> None:
+        self._entrant, self.collecting, self._out = entrant, collecting, out
+        self.counts: dict[str, int] = {}
+
+    def states(self, folders: list[Path], number: int,
+               scorer: 'ViewScorer | None') -> list['LookedStates']:
+        """Return the states of folders in a round, measuring those that are not yet."""
+        from active_recon.policies.scoring import ScoringPolicy
+        from active_recon.runtimes.torch import TorchPolicyRuntime
+        from active_recon.training.gain_files import collect_gains, drawn_objects
+        from active_recon.training.looked import looked_states
+        from active_recon.training.view_gains import ViewGains
+
+        policy = None if scorer is None else ScoringPolicy(TorchPolicyRuntime(scorer))
+        found = []
+        for folder in folders:
+            kept = self._out / f'gains-{number}' / '-'.join(folder.parts).strip('/-')
+            drawn = drawn_objects(folder, self.collecting.objects, number)
+            with progress_bar(f'gains of {folder}, round {number}', len(drawn)) as advance:
+                files = collect_gains(drawn, self._entrant, self.collecting, kept, policy,
+                                      partial(advance, 1))
+            self.counts[f'{folder}, round {number}'] = len(files)
+            found += [looked_states(ViewGains.load(file)) for file in files]
+        return found

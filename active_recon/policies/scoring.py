@@ -1,0 +1,45 @@
+"""The learned policy of a lifting network: the expected gain of IoU of every candidate."""
+
+import math
+
+from active_recon.policies.base import Choice, distance_to_taken, Observation
+from active_recon.policies.candidate_rendering import coarse_volume
+from active_recon.runtimes import PolicyRuntime, State
+import numpy as np
+
+_LESS = np.float32(1e-6)
+_SAME = math.radians(10)
+"""Angle to a view taken below which a candidate is worth the less, the nearer it is."""
+
+
+class ScoringPolicy:
+    """
+    Scores each candidate by the gain of IoU that its model expects, given the probabilities.
+
+    It has no front and no fixed candidates: any cameras that look at the object. A candidate
+    within 10 degrees of a view taken is worth the less, the nearer it is; one at a view taken is
+    worth nothing, and comes after all others.
+    """
+
+    wants_volume = True
+
+    def __init__(self, runtime: PolicyRuntime) -> None:
+        self._runtime = runtime
+
+    def initial_state(self, batch: int) -> State:
+        """Return the model's state before any view."""
+        return self._runtime.initial_state(batch)
+
+    def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
+        """Return expected gains of IoU as scores; see Policy."""
+        assert seen.occupancy is not None
+        volume = coarse_volume(seen.occupancy)
+        found, state = self._runtime.step(
+            {'occupancy': volume.occupancy, 'entropy': volume.entropy,
+             'taken': seen.taken.astype(np.float32),
+             'candidates': seen.candidates.astype(np.float32)}, state)
+        gains = found['gain']
+        least = np.minimum(gains.min(axis=1, keepdims=True), 0)
+        new = np.minimum(distance_to_taken(seen) / _SAME, 1)
+        scores = least + (gains - least) * new - _LESS * (1 - new)
+        return Choice(scores.astype(np.float32), is_gain=True), state

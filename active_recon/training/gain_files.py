@@ -1,0 +1,118 @@
+"""Gains of a dataset's objects, measured once and kept in files."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import hashlib
+from pathlib import Path
+
+from active_recon.config import Config
+from active_recon.datasets.layout import list_objects, ObjectFolder
+from active_recon.errors import ConfigError, DataError
+from active_recon.evaluation.next_view.renderings import another_rendering
+from active_recon.evaluation.next_view.watching import WatchedObject
+from active_recon.evaluation.posed.entrants import Entrant
+from active_recon.evaluation.posed.scene import read_scene
+from active_recon.policies import load_policy, Policy, PolicyOptions
+from active_recon.training.view_gains import (
+    by_gain,
+    by_policy,
+    Chooser,
+    measure_gains,
+    some_views,
+    spread_views,
+    ViewGains,
+)
+import numpy as np
+
+_MIXED = ('random', 'farthest', 'uniform')
+_BY_GAIN = 0.4  # share of the episodes in which the best view is taken, where no policy is given
+
+
+@dataclass(frozen=True)
+class Collecting(Config):
+    """
+    What is measured of each object.
+
+    - objects: at most so many of a folder; candidates: views of an object that are kept, all of
+      which are candidates
+    - starts: episodes of an object; views: of the longest of them; all but its last view give a
+      state
+    """
+
+    objects: int = 200
+    candidates: int = 8
+    starts: int = 2
+    views: int = 5
+    bfloat16: bool = True
+
+    def __post_init__(self) -> None:
+        """Reject numbers that leave no choice."""
+        if min(self.objects, self.starts) < 1 or self.views < 2 or self.candidates < 3:
+            raise ConfigError('Collecting: no choice left: expected 1 object, 1 start, 2 views '
+                              f'and 3 candidates or more, got {self.objects}, {self.starts}, '
+                              f'{self.views} and {self.candidates}')
+
+
+def drawn_objects(data: Path, most: int, number: int = 1) -> list[ObjectFolder]:
+    """
+    Return at most so many objects of a folder for a round, from 1 on, drawn by their names.
+
+    Each round has objects of its own, as long as there are any; then it begins again.
+    """
+    drawn = sorted(list_objects(data), key=_key)
+    first = (number - 1) * most % max(len(drawn), 1)
+    return drawn[first:first + most]
+
+
+def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting: Collecting,
+                  out: Path, policy: Policy | None = None,
+                  advance: Callable[[str], None] = lambda note: None) -> list[Path]:
+    """
+    Measure the gains of objects into files, one an object; return the files.
+
+    Files that are there already are kept. Views are chosen by the policy, or by a mixture of
+    random, farthest, an even sweep and the greatest gain. Each object is shown under a light,
+    noise and pose errors of its own. Objects that cannot be read are left out; raises DataError
+    where none is left.
+    """
+    files = []
+    for folder in folders:
+        path = out / f'{folder.category}__{folder.name}.npz'
+        note = ''
+        if not path.is_file():
+            try:
+                _measured(folder, entrant, collecting, policy).save(path)
+            except DataError as error:
+                note = str(error).splitlines()[0]
+        if path.is_file():
+            files.append(path)
+        advance(note)
+    if not files:
+        raise DataError(f'{out}: no object whose gains can be measured: expected one or more '
+                        'with images and voxels, got none')
+    return files
+
+
+def _measured(folder: ObjectFolder, entrant: Entrant, collecting: Collecting,
+              policy: Policy | None) -> ViewGains:
+    seed = int.from_bytes(_key(folder)[:6], 'big')
+    rng = np.random.default_rng(seed)
+    scene = read_scene([folder], [entrant.network])
+    views = some_views(scene.views, spread_views(scene.view_count, collecting.candidates, rng))
+    side = max(side for side in entrant.sides if side in scene.truths)
+    watched = WatchedObject(
+        entrant.network, another_rendering(views, seed % 2 ** 31), scene.truths[side][0],
+        entrant.thresholds[side], collecting.bfloat16)
+    chooser = _mixed(rng) if policy is None else by_policy(policy)
+    return measure_gains(watched, chooser, collecting.starts, collecting.views, rng)
+
+
+def _mixed(rng: np.random.Generator) -> Chooser:
+    """Return the chooser of one episode, drawn."""
+    if rng.random() < _BY_GAIN:
+        return by_gain
+    return by_policy(load_policy(str(rng.choice(_MIXED)), PolicyOptions(rng)))
+
+
+def _key(folder: ObjectFolder) -> bytes:
+    return hashlib.sha256(f'{folder.category}/{folder.name}'.encode()).digest()

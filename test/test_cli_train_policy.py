@@ -1,0 +1,74 @@
+"""`active-recon train-policy`, from the command line to a policy that chooses."""
+
+import json
+import shutil
+
+from active_recon.cli.main import main
+from active_recon.errors import WeightsError
+from active_recon.models.weights_files import find_weights
+from active_recon.policies import load_policy, PolicyOptions
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+import torch
+
+
+@pytest.fixture(autouse=True)
+def as_many_threads_as_before():
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+def command(monkeypatch, name, *arguments):
+    monkeypatch.setattr('sys.argv', ['active-recon', name, *map(str, arguments)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code or 0
+
+
+@pytest.fixture
+def weights(tmp_path):
+    """Return weights of carving in a folder of their own, without a scorer."""
+    for file in find_weights('carving').parent.glob('carving.*'):
+        shutil.copy(file, tmp_path)
+    return tmp_path / 'carving.safetensors'
+
+
+def test_a_policy_is_learned_in_two_rounds_and_chooses(
+        dataset, weights, tmp_path, monkeypatch, capsys):
+    arguments = [dataset, '--validation', dataset, '--model', weights, '--out', tmp_path / 'run',
+                 '--objects', 2, '--candidates', 4, '--starts', 1, '--views', 3, '--epochs', 2,
+                 '--threads', 1]
+    assert command(monkeypatch, 'train-policy', *arguments) == 0
+    made = tmp_path / 'run' / 'carving-scorer.safetensors'
+    card = json.loads(made.with_suffix('.json').read_text())
+    assert len(card['rounds']) == 2 and card['rounds'][1]['train_states'] >= 4
+    rounds = [sorted(file.name for file in (tmp_path / 'run' / f'gains-{number}').rglob('*.npz'))
+              for number in (1, 2)]
+    assert len(rounds[0]) == len(rounds[1]) == 2 and not set(rounds[0]) & set(rounds[1])
+    for file in made.parent.glob('carving-scorer.*'):
+        shutil.copy(file, weights.parent)
+    assert load_policy('attention', PolicyOptions(weights=weights)).wants_volume
+    written = load_file(made)
+    before = {file: file.stat().st_mtime_ns for file in (tmp_path / 'run').rglob('*.npz')}
+    made.unlink()
+    assert command(monkeypatch, 'train-policy', *arguments) == 0  # nothing is measured again
+    assert before == {file: file.stat().st_mtime_ns
+                      for file in (tmp_path / 'run').rglob('*.npz')}
+    np.testing.assert_equal(load_file(made), written)
+    assert command(monkeypatch, 'policies', dataset, '--model', weights, '--policies',
+                   'random,attention', '--objects', 2, '--starts', 1, '--seeds', 1, '--views', 3,
+                   '--threads', 1, '--out', tmp_path) == 0
+    assert '| attention |' in (tmp_path / 'policies.md').read_text()
+
+
+def test_weights_without_a_scorer_have_no_learned_policy(weights):
+    with pytest.raises(WeightsError, match='no view policy'):
+        load_policy('attention', PolicyOptions(weights=weights))
+
+
+def test_a_network_that_needs_the_front_is_refused(dataset, tmp_path, monkeypatch, capsys):
+    assert command(monkeypatch, 'train-policy', dataset, '--validation', dataset, '--model',
+                   '2d3d', '--out', tmp_path, '--threads', 1) == 2
+    assert 'expected one that takes any cameras' in capsys.readouterr().err
