@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 import json
 from pathlib import Path
-import shlex
-import sys
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 from active_recon.policies import POLICIES
@@ -85,7 +84,7 @@ def policies(
                           'which a sequence is found, got none; give one, or leave sequence out')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, bf16)
     result: dict[str, Any] = {
-        'command': shlex.join(['active-recon', *sys.argv[1:]]), 'model': entrant.name,
+        'command': command_line(), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}
     if training is not None and 'sequence' in wanted:
         result['sequence'] = _sequence(training, entrant, episodes,

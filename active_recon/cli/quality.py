@@ -2,10 +2,9 @@
 
 import json
 from pathlib import Path
-import shlex
-import sys
 from typing import Annotated
 
+from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
@@ -96,7 +95,7 @@ def fit(
     tables = fitted(Measured.joined([Measured.read(path) for path in known]), first,
                     weights_hash(weights))
     path = out or tables_path(weights)
-    tables.write(path, command=_command(), calibrated_on=sorted(set(first.source.tolist())))
+    tables.write(path, command=command_line(), calibrated_on=sorted(set(first.source.tolist())))
     typer.echo(f'wrote {path}')
 
 
@@ -131,13 +130,9 @@ def study(
     if halved:
         together = Measured.joined([Measured.read(path) for path in halved])
         sets[f'{halved[0].stem}, second half'] = together.rows(~halves(together))
-    result = {'command': _command(), 'weights_sha256': found.weights_sha256,
+    result = {'command': command_line(), 'weights_sha256': found.weights_sha256,
               'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}
     out.mkdir(parents=True, exist_ok=True)
     (out / 'quality.json').write_text(json.dumps(result, indent=1) + '\n')
     (out / 'quality.md').write_text(markdown(result))
     typer.echo(f'wrote {out / "quality.json"} and {out / "quality.md"}')
-
-
-def _command() -> str:
-    return shlex.join(['active-recon', *sys.argv[1:]])

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 import json
 from pathlib import Path
-import shlex
-import sys
 from typing import Annotated, Any
 
+from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
@@ -100,7 +99,7 @@ def study(
         folders = [folder for root in training for folder in list_objects(root)]
         with progress_bar('reading training images', len(folders)) as advance:
             library = read_library(folders, lambda done: advance(done, ''))
-    result: dict[str, Any] = {'command': shlex.join(['active-recon', *sys.argv[1:]]),
+    result: dict[str, Any] = {'command': command_line(),
                               'sets': []}
     for folder in data or []:
         result['sets'].append(study_set(folder, entrants, plan, extent, library, progress_bar))

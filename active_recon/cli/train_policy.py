@@ -2,10 +2,9 @@
 
 from functools import partial
 from pathlib import Path
-import shlex
-import sys
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
@@ -102,7 +101,7 @@ def train_policy(
     assert scorer is not None
     path = out / scorer_path(find_weights(model)).name
     save_scorer(path, scorer, config, entrant.weights, {
-        'command': shlex.join(['active-recon', *sys.argv[1:]]), 'network': entrant.name,
+        'command': command_line(), 'network': entrant.name,
         'training': training.to_dict(), 'collecting': source.collecting.to_dict(),
         'data': {str(folder): count for folder, count in source.counts.items()},
         'rounds': told, 'calibration': scorer.calibration.tolist()})

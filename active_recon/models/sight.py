@@ -9,6 +9,7 @@ even steps instead of cut at each cell's border, which takes less time.
 from dataclasses import dataclass
 import math
 
+from active_recon.models.lifted import cell_centers
 import torch
 from torch import Tensor
 
@@ -92,9 +93,7 @@ def cells_in_sight(frames: Frames, occupied: Tensor, side: int) -> Tensor:
     a step or more before a cell: a cell does not hide itself.
     """
     device, (steps, rays) = occupied.device, occupied.shape[1:3]
-    along = (torch.arange(side, device=device) + 0.5) / side - 0.5
-    centers = torch.stack(torch.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
-    away = centers - frames.origin[:, None]  # (N, cells, 3)
+    away = cell_centers(side, device) - frames.origin[:, None]  # (N, cells, 3)
     depth = (away * frames.forward[:, None]).sum(-1).clamp(min=1e-6)
     column, row = (((away * axis[:, None]).sum(-1) / depth / frames.spread[:, None] + 1) / 2 * rays
                    for axis in (frames.right, frames.down))

@@ -4,6 +4,7 @@ import math
 
 from active_recon.policies.base import Observation
 from active_recon.policies.candidate_rendering import coarse_volume, in_sight
+from active_recon.policies.sight_lines import cell_centers
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,9 +38,8 @@ def goal_reason(seen: Observation, goal: NDArray[np.float64], gain: float | None
 def _part(occupancy: NDArray[np.float32], weight: NDArray[np.float32]) -> str:
     """Return the name of the part where weights of cells (S, S, S) lie, from the middle."""
     side = len(weight)
-    along = (np.arange(side) + 0.5) / side - 0.5
-    centers = np.stack(np.meshgrid(along, along, along, indexing='ij'), -1)
-    where, middle = (np.average(centers.reshape(-1, 3), axis=0, weights=each.ravel())
+    centers = cell_centers(side)
+    where, middle = (np.average(centers, axis=0, weights=each.ravel())
                      if each.sum() > 0 else np.zeros(3) for each in (weight, occupancy))
     x, y, z = where - middle
     if abs(z) > math.hypot(x, y):

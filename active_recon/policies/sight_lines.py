@@ -47,6 +47,12 @@ def cell_lines(pose: NDArray[np.float64], side: int) -> SightLines:
     return _cell_lines(np.ascontiguousarray(pose[:3, 3], np.float64).tobytes(), side)
 
 
+def cell_centers(side: int) -> NDArray[np.float64]:
+    """Return the centres of all cells of a grid, (S ** 3, 3) of a unit cube, in flat order."""
+    along = (np.arange(side) + 0.5) / side - 0.5
+    return np.stack(np.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
+
+
 @lru_cache(maxsize=8)
 def _image_lines(poses: bytes, side: int, rays: int) -> SightLines:
     cameras = np.frombuffer(poses).reshape(-1, 4, 4)
@@ -67,8 +73,7 @@ def _image_lines(poses: bytes, side: int, rays: int) -> SightLines:
 
 @lru_cache(maxsize=64)
 def _cell_lines(position: bytes, side: int) -> SightLines:
-    along = (np.arange(side) + 0.5) / side - 0.5
-    centers = np.stack(np.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
+    centers = cell_centers(side)
     origin = np.frombuffer(position)
     lines = _crossed(np.broadcast_to(origin, centers.shape), centers - origin, side)
     own = lines.cells == np.arange(side ** 3)

@@ -33,9 +33,10 @@ def features(occupancy: NDArray[np.floating], threshold: float,
     kept = values > threshold
     count = int(np.count_nonzero(kept))
     some = max(count, 1)
-    shell = kept & ~eroded(kept)
+    below = eroded(kept)
+    shell = kept & ~below
     points = (np.argwhere(shell) + 0.5) / len(kept) - 0.5
-    deep = eroded(eroded(eroded(kept)))
+    deep = eroded(eroded(below))
     box = np.ptp(points, axis=0).max() + 1 / len(kept) if count else 0.0
     inner = np.count_nonzero(kept[1:-1, 1:-1, 1:-1])
     doubt = (values * (1 - values)).sum() / (count + 1)
