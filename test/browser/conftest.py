@@ -37,11 +37,17 @@ class Browser:
         options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
         self.driver = Chrome(options=options, service=ChromeService(driver))
 
-    def open(self, url: str, size: tuple[int, int] = LAPTOP, scheme: str = 'light') -> None:
-        """Show a page at a size, (width, height) pixels, to who prefers light or dark."""
+    def prefer(self, scheme: str = 'light', motion: str = 'reduce') -> None:
+        """Be someone who prefers light or dark, and to `reduce` motion or has `no-preference`."""
+        self.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': [
+            {'name': 'prefers-color-scheme', 'value': scheme},
+            {'name': 'prefers-reduced-motion', 'value': motion}]})
+
+    def open(self, url: str, size: tuple[int, int] = LAPTOP, scheme: str = 'light',
+             motion: str = 'reduce') -> None:
+        """Show a page at a size, (width, height) pixels; for the preferences see `prefer`."""
         width, height = size
-        self.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
-            'features': [{'name': 'prefers-color-scheme', 'value': scheme}]})
+        self.prefer(scheme, motion)
         self.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
             'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': size == PHONE})
         self.driver.get('about:blank')

@@ -26,6 +26,9 @@ _CLICK = """
 """
 
 
+_SMALL = (640, 480)  # fast to draw without a graphics card
+
+
 class Command:
     """A command of ours in a process of its own, and what it has said."""
 
@@ -85,7 +88,7 @@ def late_view(demo, tmp_path):
 
 def test_the_page_follows_the_loop_and_begins_a_new_episode_when_asked(demo, chromium):
     url = demo.said(r'the page is at (http://127\.0\.0\.1:\d+)')
-    chromium.open(url)
+    chromium.open(url, _SMALL)
     chromium.until(lambda: 'Done (max views): 2 views' in chromium.text(), 'the end', BUDGET_S)
     demo.said('(run until Ctrl-C)')
     first = episode(chromium.text())
@@ -101,7 +104,7 @@ def test_who_comes_late_is_shown_what_is_latched_at_another_port(demo, late_view
     first = demo.said(r'the page is at (http://127\.0\.0\.1:\d+)')
     url = late_view.said(r'the page is at (http://127\.0\.0\.1:\d+)')
     assert url != first
-    chromium.open(url)
+    chromium.open(url, _SMALL)
     chromium.until(lambda: 'Done (max views): 1 view, the last' in chromium.text(),
                    'the latched view', BUDGET_S)
     code, said = late_view.interrupt()
@@ -126,7 +129,7 @@ def test_a_loop_of_other_size_and_names_is_shown_without_being_told(
         small_loop, tmp_path, chromium):
     command = Command(tmp_path / 'view', 'view', '--port', '0', **small_loop)
     try:
-        chromium.open(command.said(r'the page is at (http://127\.0\.0\.1:\d+)'))
+        chromium.open(command.said(r'the page is at (http://127\.0\.0\.1:\d+)'), _SMALL)
         chromium.until(lambda: 'Done (max views)' in chromium.text(), 'the views', BUDGET_S)
         assert 'No publisher' not in chromium.text()
         assert not chromium.errors()

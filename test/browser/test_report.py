@@ -24,12 +24,11 @@ def pages(tmp_path_factory):
 
 @pytest.fixture
 def opened(chromium, pages):
-    """Return a function that opens a page, waits until it is drawn, and lets it stand still."""
-    def opened(name='one', size=LAPTOP, scheme='light'):
-        chromium.open(pages[name], size, scheme)
+    """Return a function that opens a page and waits until it is drawn."""
+    def opened(name='one', size=LAPTOP, scheme='light', motion='reduce'):
+        chromium.open(pages[name], size, scheme, motion)
         chromium.until(lambda: chromium.run('return document.documentElement.dataset.ready'),
                        'the drawings')
-        chromium.run('document.querySelectorAll(".turn").forEach((button) => button.click())')
         return chromium
     return opened
 
@@ -102,8 +101,7 @@ def test_another_view_shows_another_shape_and_what_was_thought_then(opened, chan
 def test_page_turns_dark_with_its_reader(opened, changed_share):
     page = opened()
     light = shape(page)
-    page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
-        'features': [{'name': 'prefers-color-scheme', 'value': 'dark'}]})
+    page.prefer('dark')
     page.until(lambda: changed_share(light, shape(page)) > 0.9, 'the dark')
     ink = page.run('return [document.body, document.querySelector(".chart .xtick text")].map('
                    '(each) => getComputedStyle(each)[each === document.body ? "color" : "fill"])')
@@ -139,7 +137,9 @@ def test_at_the_recorded_threshold_just_the_recorded_cells_are_drawn(opened):
 
 
 def test_object_turns_until_it_is_paused(opened, changed_share):
-    page = opened()
+    page = opened(motion='no-preference')
+    assert button(page) == 'Pause'
+    page.run('document.querySelector(".turn").click()')
     assert button(page) == 'Turn'
     before = shape(page)
     assert changed_share(before, shape(page)) < 0.001
@@ -147,3 +147,10 @@ def test_object_turns_until_it_is_paused(opened, changed_share):
     assert button(page) == 'Pause'
     page.until(lambda: changed_share(before, shape(page)) > 0.02, 'the object to turn')
     assert page.errors() == []
+
+
+def test_object_stands_still_for_who_prefers_less_motion(opened, changed_share):
+    page = opened()
+    assert button(page) == 'Turn'
+    before = shape(page)
+    assert changed_share(before, shape(page)) < 0.001
