@@ -25,7 +25,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full doc html bench soak policies chromium lint clean
+.PHONY: help venv demo golden test test-full doc html bench soak policies ready chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -42,13 +42,17 @@ golden: .venv/installed  ## the golden run anew, once weights or loop have chang
 	@rm -rf bags/golden/run && mkdir -p bags/golden/run
 	@mv build/golden/*/*.mcap build/golden/*/metadata.yaml bags/golden/run/
 
-test: lint html chromium .venv/colcon/installed  ## style, types, documentation, every test but the long ones; ARGS go to pytest
+test: ready  ## style, types, documentation, every test but the long ones; ARGS go to pytest
 	@echo '== testing; the long tests run with `make test-full`'
 	@$(TEST) -m 'not slow' $(ARGS)
 
-test-full: lint html chromium .venv/colcon/installed  ## every test, high counts and soak too
+test-full: ready  ## every test, high counts and soak too
 	@echo '== testing everything'
 	@$(TEST) $(ARGS)
+
+# What the tests begin with; two at a time, since each keeps one core busy.
+ready:
+	@$(MAKE) --no-print-directory -j2 lint html chromium .venv/colcon/installed
 
 # The pages are tested in Debian's Chromium, which only root can install.
 chromium:
