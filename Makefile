@@ -93,6 +93,7 @@ clean:  ## forget .venv and what was built
 	@echo '== removing .venv and what was built'
 	@rm -rf .venv build install log *.egg-info
 
+# Modules are compiled when they are first used: compiling all of them takes half a minute.
 # torch goes first, by itself: what needs torch would otherwise choose the build.
 .venv/torch:
 	@test -n '$(PYTHON)' || { echo 'expected Python 3.11 or 3.12 with venv on the PATH, found' \
@@ -100,7 +101,7 @@ clean:  ## forget .venv and what was built
 	@echo '== making .venv with $(PYTHON) (a few minutes, once)'
 	@$(PYTHON) -m venv --clear .venv
 	@echo '== installing $(TORCH)'
-	@$(PIP) install -c constraints.txt $(TORCH) setuptools
+	@$(PIP) install --no-compile -c constraints.txt $(TORCH) setuptools
 	@touch $@
 
 # A copy is installed, since an editable install leaves out lib/active_recon/ and the ament index;
@@ -108,7 +109,7 @@ clean:  ## forget .venv and what was built
 .venv/installed: .venv/torch $(SOURCES)
 	@echo '== installing active_recon and what it needs'
 	@rm -rf build
-	@$(PIP) install --no-build-isolation -c constraints.txt '.[doc,lint,test]'
+	@$(PIP) install --no-compile --no-build-isolation -c constraints.txt '.[doc,lint,test]'
 	@rm -rf build active_recon.egg-info
 	@touch $@
 
@@ -116,5 +117,5 @@ clean:  ## forget .venv and what was built
 .venv/colcon/installed: constraints-colcon.txt | .venv/torch
 	@echo '== installing colcon'
 	@rm -rf .venv/colcon
-	@$(PIP) install --target .venv/colcon -c $< setuptools colcon-common-extensions
+	@$(PIP) install --no-compile --target .venv/colcon -c $< setuptools colcon-common-extensions
 	@touch $@
