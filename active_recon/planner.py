@@ -13,14 +13,16 @@ from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, OrbitCamera
 from active_recon.geometry.view_distance import view_distance
 from active_recon.policies import (
+    AUTO,
     Choice,
-    DEFAULT_POLICY,
     load_policy,
     Observation,
     Policy,
     PolicyOptions,
 )
-from active_recon.policies.reasons import goal_reason
+from active_recon.policies.automatic import SWEEP
+from active_recon.policies.reasons import goal_reason, GoalReason
+from active_recon.policies.stopping import StoppingRule
 from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
@@ -73,9 +75,8 @@ class Planner:
     and best candidate, and `motion` what a second costs instead. A view is asked for again only
     when no other is left.
 
-    `target_quality` (0: none) ends an episode once that IoU is promised, or when it is out of
-    reach; `min_gain` (0: none) when no candidate's expected gain of IoU, of a policy that knows
-    it, is as large. While views are flagged as unusual, their quality ends nothing, and an even
+    `max_views`, `entropy_tolerance`, `target_quality` and `min_gain` end an episode: see
+    `StoppingRule`. While views are flagged as unusual, their quality ends nothing, and an even
     sweep takes the place of the policy.
     """
 
@@ -86,21 +87,11 @@ class Planner:
                  reachable_views: Sequence[float] = (),
                  motion: TimedMotion | None = None,
                  target_quality: float = 0.0, min_gain: float = 0.0) -> None:
-        if max_views < 1:
-            raise ConfigError(f'max_views: too few: expected 1 or more, got {max_views}')
-        if not 0 <= entropy_tolerance < 1:
-            raise ConfigError('entropy_tolerance: out of range: expected a share in [0, 1), got '
-                              f'{entropy_tolerance}')
         if not math.isfinite(object_yaw):
             raise ConfigError(f'object_yaw: not finite: expected radians, got {object_yaw}')
-        for name, share in (('target_quality', target_quality), ('min_gain', min_gain)):
-            if not 0 <= share < 1:
-                raise ConfigError(f'{name}: out of range: expected an IoU in [0, 1), got {share}')
-        self._target_quality, self._min_gain = target_quality, min_gain
-        self._sweep = load_policy('uniform', PolicyOptions(views=max_views))
+        self._stopping = StoppingRule(max_views, entropy_tolerance, target_quality, min_gain)
+        self._sweep = load_policy(SWEEP, PolicyOptions(views=max_views))
         self._policy = policy
-        self._max_views = max_views
-        self._entropy_tolerance = entropy_tolerance
         self._yaw = object_yaw
         self._limits = limits or MotionLimits()
         self._cost = MotionCost(motion_weight, motion or TimedMotion())
@@ -109,7 +100,7 @@ class Planner:
         self.reset()
 
     @classmethod
-    def load(cls, policy: str = DEFAULT_POLICY, weights: Path | None = None, seed: int = 0,
+    def load(cls, policy: str = AUTO, weights: Path | None = None, seed: int = 0,
              max_views: int = 5, entropy_tolerance: float = 0.01, object_yaw: float = 0.0,
              device: str = 'cpu', limits: MotionLimits | None = None,
              motion_weight: float = 0.0, elevation: float | None = None,
@@ -192,7 +183,8 @@ class Planner:
         self._aim(camera)
         if self._stopped:
             return self.stop()
-        reason = self._enough()
+        worth = None if self._goal is None else self._goal.worth
+        reason = self._stopping.reason([view.entropy for view in views], quality, worth)
         return Decision(None, reason) if reason else self.next_goal()
 
     def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:
@@ -225,15 +217,15 @@ class Planner:
                 'no view in this episode yet: expected one before a plan', 'plan')
         return self._goal
 
-    def reason(self) -> str:
-        """Return why the goal is worth its view; '' where the policy does not look at volumes."""
+    def reason(self) -> GoalReason | None:
+        """Return why the goal is worth its view; None without probabilities after a view."""
         last = self._views[-1] if self._views else None
         if last is None or last.volume is None or self._goal is None:
-            return ''
+            return None
         poses = np.stack([camera.scaled(1 / last.volume.size).pose for camera in (
             self._goal.camera, *(view.camera for view in self._views))])
         return goal_reason(Observation(last.latent[None], poses[None, 1:], poses[None, :1],
-                                       last.volume.occupancy[None]), poses[0])
+                                       last.volume.occupancy[None]), poses[0], self._goal.gain)
 
     def next_goal(self) -> Decision:
         """Return the goal after the views so far, or that none can be reached."""
@@ -284,28 +276,3 @@ class Planner:
         return best_goal(
             self._wanted, self._candidates, camera, [view.camera for view in self._views],
             self._failed, self._limits, self._cost if self._views else MotionCost())
-
-    def _enough(self) -> str:
-        """Return the reason why no further view is needed, '' where one is."""
-        last = self._views[-1].quality
-        known = last if self._target_quality and last and not last.suspect else None
-        if known is not None and known.promise >= self._target_quality:
-            return 'target_reached'
-        if len(self._views) >= self._max_views:
-            return 'max_views'
-        if known is not None and known.attainable < self._target_quality:
-            return 'target_out_of_reach'
-        if self._settled():
-            return 'entropy_settled'
-        choice = self._choice
-        if self._min_gain and choice and choice.is_gain and choice.scores.max() < self._min_gain:
-            return 'gain_too_small'
-        return ''
-
-    def _settled(self) -> bool:
-        """Whether the last two views each changed the entropy by no more than the tolerance."""
-        if self._entropy_tolerance == 0 or len(self._views) < 3:
-            return False
-        recent = np.array([view.entropy for view in self._views[-3:]])
-        change = np.abs(np.diff(recent)) / np.maximum(recent[:-1], 1e-9)
-        return bool((change <= self._entropy_tolerance).all())

@@ -3,6 +3,7 @@
 from typing import Any
 
 from active_recon.geometry.cameras import Camera, OBJECT_FRAME
+from active_recon.policies.reasons import GoalReason
 from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import VoxelGrid
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
@@ -10,6 +11,7 @@ from msg_tools.entropy import entropy_to_msg
 from msg_tools.goals import azimuth_goal_to_msg, score_table_to_msg, view_goal_to_msg
 from msg_tools.images import image_to_msg, latent_to_msg
 from msg_tools.quality import quality_to_msg
+from msg_tools.reasons import goal_reason_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
@@ -56,11 +58,12 @@ def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,
 def goal_to_msgs(
         stamp: int, camera: Camera,
         scores: tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]] | None,
-        object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
+        reason: GoalReason | None = None, object_frame: str = OBJECT_FRAME) -> dict[str, Any]:
     """
-    Return the planner's messages for a goal at a stamp in ns: its camera and candidates.
+    Return the planner's messages for a goal at a stamp in ns: camera, candidates and reason.
 
-    `scores` are the candidates' positions (N, 3), azimuths (N,) and scores (N,); None omits them.
+    `scores` are the candidates' positions (N, 3), azimuths (N,) and scores (N,); None omits them,
+    and the reason.
     """
     header = _header(stamp, object_frame)
     messages: dict[str, Any] = {}
@@ -68,6 +71,8 @@ def goal_to_msgs(
         messages['azimuth_scores'] = score_table_to_msg(*scores, header)
     messages['next_view'] = view_goal_to_msg(camera, header)
     messages['next_azimuth'] = azimuth_goal_to_msg(camera.azimuth, header)
+    if reason is not None:
+        messages['goal_reason'] = goal_reason_to_msg(reason, header)
     return messages
 
 

@@ -12,7 +12,8 @@ PACKAGES = ('active_recon', 'msg_tools')
 # A room imports itself and what stands in the rows above its own
 ROWS: tuple[set[str], ...] = (
     {'errors'},
-    {'config', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting', 'view_colors'},
+    {'config', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting', 'view_colors',
+     'whole_files'},
     {'volumes'},
     {'acquisition', 'calibration', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},

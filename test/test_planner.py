@@ -2,6 +2,8 @@
 
 import math
 
+from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion_cost import TimedMotion
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, Camera, orbit_camera
 from active_recon.planner import Planner
@@ -345,9 +347,73 @@ def test_a_goal_has_a_reason_where_the_policy_looks_at_the_volume():
     cells[10:22, 10:22, 10:22] = 0.5
     planner = Planner.load('unseen_entropy')
     camera = orbit_camera(0.0)
-    assert planner.reason() == ''
+    assert planner.reason() is None
     planner.add_view(np.zeros((1, 4, 4), np.float32), camera, 10.0, VoxelGrid(cells))
-    assert planner.reason().startswith('shows the side towards azimuth')
+    assert planner.reason().shows.startswith('shows the side towards azimuth')
+    assert planner.reason().gain is None
     blind = Planner.load('farthest')
     blind.add_view(np.zeros((1, 4, 4), np.float32), camera, 10.0)
-    assert blind.reason() == ''
+    assert blind.reason() is None
+
+
+class Gainful:
+    """A policy that looks at the volume and expects a gain of each of its candidates."""
+
+    wants_volume = True
+
+    def __init__(self, gains):
+        self._gains = np.array([gains], np.float32)
+
+    def initial_state(self, batch):
+        return {}
+
+    def choose(self, seen, state):
+        return Choice(self._gains, is_gain=True), state
+
+
+def ring(gain_at):
+    """Return a gain for each of the 24 azimuths: those named, and 0.01 elsewhere."""
+    return [gain_at.get(round(math.degrees(azimuth)), 0.01) for azimuth in AZIMUTHS]
+
+
+def after_one_view(gains, **settings):
+    """Return a planner that took one view at azimuth 0, and what it decided."""
+    planner = Planner(Gainful(gains), 5, 0, **settings)
+    return planner, planner.add_view(np.zeros((1, 4, 4), np.float32), orbit_camera(0.0), 10.0,
+                                     VoxelGrid(np.full((32,) * 3, 0.5, np.float32)))
+
+
+def test_the_reason_tells_the_gain_of_the_goal_and_not_of_a_better_one_out_of_reach():
+    planner, decision = after_one_view(
+        ring({180: 0.3, 90: 0.2}), limits=MotionLimits(azimuth_range=(-2.0, 2.0)))
+    assert math.degrees(decision.goal.camera.azimuth) == pytest.approx(90)
+    assert planner.reason().gain == pytest.approx(0.2)
+    planner.give_up(decision.goal.camera)
+    assert planner.reason().gain == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(('best_in_reach', 'reason'), [(0.06, ''), (0.04, 'gain_too_small')])
+def test_a_gain_out_of_reach_keeps_no_episode_going(best_in_reach, reason):
+    _, decision = after_one_view(
+        ring({180: 0.3, 90: best_in_reach}), limits=MotionLimits(azimuth_range=(-2.0, 2.0)),
+        min_gain=0.05)
+    assert decision.reason == reason
+
+
+def test_a_gain_that_was_already_taken_keeps_no_episode_going():
+    _, decision = after_one_view(ring({0: 0.3}), min_gain=0.05)
+    assert decision.reason == 'gain_too_small'
+
+
+@pytest.mark.parametrize(('cost', 'reason'), [
+    (0.0, ''), (0.009, ''), (0.011, 'gain_too_small')])
+def test_what_the_way_to_a_view_costs_counts_against_its_gain(cost, reason):
+    motion = TimedMotion(azimuth_speed=math.pi / 10, motion_cost=cost)  # half a turn: ten seconds
+    _, decision = after_one_view(ring({180: 0.15}), min_gain=0.05, motion=motion)
+    assert decision.reason == reason
+
+
+def test_a_motion_weight_has_no_unit_and_takes_nothing_off_a_gain():
+    _, decision = after_one_view(ring({180: 0.15}), min_gain=0.1, motion_weight=50.0)
+    assert abs(azimuth_difference(decision.goal.camera.azimuth, 0)) < 0.3
+    assert (decision.goal.gain, decision.goal.worth) == pytest.approx((0.01, 0.15))

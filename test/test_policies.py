@@ -323,7 +323,7 @@ def test_policies_are_loaded_by_name(tmp_path, network, attention, tiny):
     kinds = [type(load_policy(name, PolicyOptions(weights=path))).__name__ for name in POLICIES]
     assert kinds == ['AttentionPolicy', 'RandomPolicy', 'UniformPolicy', 'FarthestPolicy',
                      *['RenderedPolicy'] * 3]
-    with pytest.raises(ConfigError, match="'greedy': expected one of attention, random"):
+    with pytest.raises(ConfigError, match="'greedy': expected one of auto, attention, random"):
         load_policy('greedy')
     with pytest.raises(WeightsError, match='no such file'):
         load_policy('attention', PolicyOptions(weights=tmp_path / 'nothing.safetensors'))

@@ -30,7 +30,7 @@ def reason(goal, *taken, gain=None):
 
 @pytest.mark.parametrize('azimuth_deg', [0, 90, 180, 270])
 def test_a_side_that_no_view_has_seen_is_named_by_its_azimuth(azimuth_deg):
-    told = reason(pose(azimuth_deg), pose(azimuth_deg + 180))
+    told = reason(pose(azimuth_deg), pose(azimuth_deg + 180)).shows
     found = float(told.split('azimuth ')[1].split(' degrees')[0])
     assert abs((found - azimuth_deg + 180) % 360 - 180) < 15
     assert told.startswith('shows the side')
@@ -38,19 +38,24 @@ def test_a_side_that_no_view_has_seen_is_named_by_its_azimuth(azimuth_deg):
 
 @pytest.mark.parametrize(('elevation_deg', 'part'), [(80, 'the top'), (-80, 'the underside')])
 def test_top_and_underside_are_named(elevation_deg, part):
-    assert reason(pose(0, elevation_deg), pose(0, -elevation_deg)).startswith(f'shows {part}: ')
+    told = reason(pose(0, elevation_deg), pose(0, -elevation_deg)).shows
+    assert told.startswith(f'shows {part}: ')
 
 
 def test_a_side_that_was_seen_is_looked_at_again():
-    assert reason(pose(0), pose(0)).startswith('looks again at the side towards azimuth')
+    assert reason(pose(0), pose(0)).shows.startswith('looks again at the side towards azimuth')
 
 
 def test_the_expected_gain_is_told_where_it_is_known():
-    assert reason(pose(0), pose(180), gain=0.0421).endswith('; expected gain of IoU 0.042')
-    assert 'gain' not in reason(pose(0), pose(180))
+    told = reason(pose(0), pose(180), gain=0.0421)
+    assert told.sentence == f'{told.shows}; expected gain of IoU 0.042'
+    assert told.gain == 0.0421
+    unknown = reason(pose(0), pose(180))
+    assert (unknown.gain, unknown.sentence) == (None, told.shows)
 
 
 def test_an_empty_volume_has_a_reason_too():
     seen = Observation(np.zeros((1, 1, 4, 4), np.float32), np.array([[pose(0)]]),
                        np.array([[pose(90)]]), np.zeros((1, SIDE, SIDE, SIDE), np.float32))
-    assert goal_reason(seen, pose(90)) == 'looks again at the whole object, where doubt is left'
+    assert goal_reason(seen, pose(90)).shows == (
+        'looks again at the whole object, where doubt is left')

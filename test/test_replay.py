@@ -312,6 +312,13 @@ def test_the_setup_is_that_of_the_bag_with_the_cores_defaults():
     assert setup.load_reconstructor().object_size == 0.25
 
 
+def test_a_replay_has_the_policy_that_auto_came_to():
+    bag = replace(run_of([]), provenance={'weights_sha256': weights_hash()}, parameters={
+        'view_planner': {'policy': 'auto', 'policy_in_use': 'uniform'}})
+    assert recorded_setup(bag).planner['policy'] == 'uniform'
+    assert not recorded_setup(bag).load_planner().wants_volume
+
+
 def test_a_bag_that_names_no_policy_has_no_planner():
     assert recorded_setup(run_of([])).load_planner() is None
 

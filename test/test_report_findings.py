@@ -6,6 +6,7 @@ import math
 from active_recon.bags.runs.image_gaps import ImageGaps
 from active_recon.bags.runs.run import RecordedGoal
 from active_recon.geometry.cameras import orbit_camera
+from active_recon.policies.reasons import GoalReason
 from active_recon.report.findings import findings
 from active_recon.report.subject import Subject
 from active_recon.report.words import key_words
@@ -80,6 +81,10 @@ def test_what_some_views_lack_was_lost_on_the_way_and_is_told(run):
     [warning] = said(changed(run, views=[
         replace(first, goal=None), replace(second, latent=None), replace(third, latent=None)]))
     assert 'lacks the latent of views 2, 3, the goal after view 1' in warning
+    told = replace(second, goal=replace(second.goal, reason=GoalReason('shows the top')))
+    [warning] = said(changed(run, views=[first, told, third]))
+    assert 'lacks the reason of the goal after view 1:' in warning
+    assert 'reason' not in said(changed(run, views=[replace(first, goal=None), told, third]))[0]
     nothing = [replace(view, latent=None) for view in run.episodes[0].views]
     assert said(changed(run, views=nothing)) == []  # nobody recorded it
 

@@ -14,6 +14,7 @@ import sys
 from active_recon.bags.runs.run import TopicSummary
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
+from active_recon.policies.reasons import GoalReason
 from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
 from active_recon.report.scene import encoded, STEPS
 from active_recon.report.subject import letters, Subject
@@ -75,6 +76,19 @@ def test_elevations_are_told_where_they_differ_and_only_there(run, page):
     assert 'elevation ' not in Elements(page).text.replace('elevation of', '')
 
 
+def with_reasons(run, reason):
+    views = [replace(view, goal=view.goal and replace(view.goal, reason=reason))
+             for view in run.episodes[0].views]
+    return changed(run, views=views)
+
+
+def test_each_view_says_why_it_was_asked_for(run, page):
+    reason = GoalReason('shows the top', 0.0421)
+    told = Elements(page_of(with_reasons(run, reason))).text
+    assert told.count(reason.sentence) == len(run.episodes[0].views) - 1  # not the first
+    assert reason.sentence not in Elements(page).text
+
+
 def test_page_of_five_views_is_small(page):
     assert len(page.encode()) < 6e6
 
@@ -102,7 +116,8 @@ def test_same_run_gives_the_same_bytes_in_another_process(page):
 
 def test_what_comes_from_a_bag_is_text_and_never_markup(run):
     evil = replace(
-        changed(run, id=EVIL, done=EVIL), path=Path(EVIL.replace('/', '')),
+        changed(with_reasons(run, GoalReason(EVIL)), id=EVIL, done=EVIL),
+        path=Path(EVIL.replace('/', '')),
         provenance={'policy': EVIL, 'object': EVIL, EVIL: EVIL},
         parameters={EVIL: {EVIL: EVIL}}, counters={EVIL: {f'refused/{EVIL}': 3}},
         topics=[TopicSummary(EVIL, EVIL, 1)])

@@ -8,6 +8,7 @@ from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.run_writing import write_run
 from active_recon.errors import RecordingError
 from active_recon.geometry.cameras import Camera, orbit_camera
+from active_recon.policies.reasons import GoalReason
 import numpy as np
 import pytest
 from recorded_messages import doctor
@@ -43,6 +44,17 @@ def test_every_topic_of_the_loop_is_there_once_for_each_view_or_goal(run, bag):
         '/episode': 1, '/done': 2, '/camera/image_raw': 3, '/camera/camera_info': 3,
         '/camera/pose': 3, '/view': 3, '/occupancy': 3, '/probabilities': 3, '/latent': 3,
         '/entropy': 3, '/next_view': 3, '/next_azimuth': 3, '/azimuth_scores': 3}
+
+
+def test_the_reason_of_a_goal_comes_back_with_it(run, tmp_path):
+    (episode,) = run.episodes
+    first, *others = episode.views
+    reason = GoalReason('shows the top', 1 / 3)
+    told = replace(first, goal=replace(first.goal, reason=reason))
+    write_run(run_of([replace(episode, views=[told, *others])]), tmp_path / 'told')
+    read, = read_run(tmp_path / 'told').episodes
+    assert read.views[0].goal.reason == reason
+    assert {view.goal.reason for view in read.views[1:] if view.goal} == {None}
 
 
 @pytest.mark.parametrize(('given_up', 'done'), [

@@ -11,7 +11,8 @@ from active_recon.bags.runs.run import (
     RecordedView,
 )
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
-from active_recon.viewer.link import ago, status_lines, TopicLink
+from active_recon.policies.reasons import GoalReason
+from active_recon.viewer.link import ago, goal_lines, status_lines, TopicLink
 from active_recon.viewer.playback import recorded_states
 from active_recon.viewer.scene import certainty_colors, relative_scores, shown_cells
 from active_recon.viewer.state import (
@@ -51,6 +52,9 @@ def summary(state):
             state.goal, state.scores, state.done)
 
 
+REASON = GoalReason('shows the top', 0.0421)
+
+
 GOAL, FIRST, SECOND = orbit_camera(1.0), view(110), view(130)
 MESSAGES = (
     lambda observer: observer.begin_episode('b', 100),
@@ -74,6 +78,37 @@ def test_the_order_in_which_latched_messages_come_makes_no_difference():
     assert all(state_after(order) == expected for order in permutations(MESSAGES))
     assert expected == (
         'b', [110, 130], LATER_GRID, 0.4, None, SCORES, 'max_views')
+
+
+def test_a_reason_belongs_to_the_goal_of_its_stamp_whichever_comes_first():
+    parts = [lambda observer: observer.set_goal(120, GOAL),
+             lambda observer: observer.set_goal_reason(120, REASON)]
+    for order in permutations(parts):
+        observer = Observer()
+        for hear in order:
+            hear(observer)
+        assert observer.state.goal_reason is REASON
+        observer.set_goal(140, GOAL)
+        assert observer.state.goal_reason is None
+
+
+def test_a_reason_goes_with_its_goal():
+    for end in (lambda observer: observer.set_done(130, 'max_views'),
+                lambda observer: observer.begin_episode('c', 200)):
+        observer = Observer()
+        observer.begin_episode('b', 100)
+        observer.set_goal(120, GOAL)
+        observer.set_goal_reason(120, REASON)
+        assert goal_lines(observer.state) == [
+            f'Next view, {np.degrees(1.0):.0f}°: shows the top; expected gain of IoU 0.042.']
+        end(observer)
+        assert observer.state.goal_reason is None
+        assert goal_lines(observer.state) == []
+
+
+def test_why_the_next_view_is_worth_taking_stands_among_the_lines_of_the_page():
+    state = LoopState(goal=GOAL, goal_reason=REASON)
+    assert goal_lines(state)[0] in status_lines(links(), state)
 
 
 def test_what_is_stamped_before_the_episode_is_left_out():
@@ -217,7 +252,7 @@ def test_spans_of_time_are_told_in_whole_units(seconds, words):
 def test_a_recorded_goal_is_shown_where_its_own_camera_stands():
     camera = orbit_camera(2.0, 0.9, 3.0)
     ring = Candidates.of([orbit_camera(azimuth, 0.9, 3.0) for azimuth in AZIMUTHS])
-    goal = RecordedGoal(camera, 101, ring, np.arange(24, dtype=np.float32), 101)
+    goal = RecordedGoal(camera, 101, ring, np.arange(24, dtype=np.float32), 101, reason=REASON)
     taken = RecordedView(100, np.zeros((8, 8, 3), np.uint8), orbit_camera(0.1, 0.9, 3.0), GRID,
                          None, None, 1.0, goal, {})
     run = RecordedRun(Path('run'), [RecordedEpisode('a', 0, None, [taken], '')], {}, {}, {}, [],
@@ -225,6 +260,7 @@ def test_a_recorded_goal_is_shown_where_its_own_camera_stands():
     (state,) = recorded_states(run)
     assert state.goal is camera
     np.testing.assert_allclose(state.scores.positions, ring.positions)
+    assert state.goal_reason is REASON
 
 
 def test_what_nodes_warn_of_stands_right_after_how_far_the_loop_is():

@@ -139,6 +139,16 @@ def test_under_another_model_alone_nothing_tells_who_chose_the_views(weights, tm
     assert same_model.parameters['/reconstructor']['threshold'] == 0.2
 
 
+def test_another_policy_takes_the_place_of_what_auto_came_to(weights, sweep, tmp_path):
+    run = replace(run_of([sweep]), path=tmp_path, parameters={'/view_planner': {
+        'policy': 'auto', 'policy_in_use': 'attention', 'weights': str(weights[0])}})
+    other = run_with_overrides(
+        run, LoopSetup(weights[0], {}, {'policy': 'attention', 'weights': weights[0]}),
+        Overrides(policy='farthest'))
+    assert other.provenance['policy'] == 'farthest'
+    assert recorded_setup(other).planner['policy'] == 'farthest'
+
+
 def test_each_model_has_its_own_threshold_unless_one_is_given(weights):
     recorded = LoopSetup(weights[0], {'threshold': 0.3}, None)
     assert recorded.with_overrides(

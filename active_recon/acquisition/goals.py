@@ -1,7 +1,7 @@
 """The goal that a camera is sent to: the best of the candidates, or what lies between them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost
@@ -18,11 +18,16 @@ class Goal:
 
     - camera: its pose in the object frame; it may lie between the candidates
     - candidates: N cameras; scores: (N,), more is better
+    - gain: the expected gain of IoU of its view; None where the scores are no gains
+    - worth: the most that any goal in reach is expected to gain, less `motion_cost` of the time
+      that its view takes; None likewise
     """
 
     camera: Camera
     candidates: Sequence[Camera]
     scores: NDArray[np.float32]
+    gain: float | None = None
+    worth: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +67,13 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
     if not is_open.any():
         return None
     fresh = is_open & ~is_taken
+    eligible = fresh if fresh.any() else is_open
     value = cost.utility(scores, wanted.is_gain, camera, options, limits)
-    best = int(np.where(fresh if fresh.any() else is_open, value, -np.inf).argmax())
+    best = int(np.where(eligible, value, -np.inf).argmax())
     own = slice(len(options) - len(candidates), None)
-    return Goal(options[best], [each for each, free in zip(
+    goal = Goal(options[best], [each for each, free in zip(
         candidates, is_open[own], strict=True) if free], value[own][is_open[own]])
+    if not wanted.is_gain:
+        return goal
+    worth = cost.less_time(scores, camera, options, limits)
+    return replace(goal, gain=float(scores[best]), worth=float(worth[eligible].max()))

@@ -93,9 +93,15 @@ class MotionCost:
             return utility(scores, np.abs(travel), self.motion_weight)
         if not self.timed.motion_cost:
             return scores
+        return self.less_time(scores if is_gain else scaled(scores), camera, goals, limits)
+
+    def less_time(self, values: NDArray[np.floating], camera: Camera, goals: Sequence[Camera],
+                  limits: MotionLimits) -> Scores:
+        """Return what N goals are worth (N,), less `motion_cost` of the seconds to their views."""
+        if not self.timed.motion_cost:
+            return np.asarray(values, np.float32)
         seconds = self.timed.seconds(camera, goals, limits)
-        quality = scores if is_gain else scaled(scores)
-        return np.asarray(quality - self.timed.motion_cost * seconds, np.float32)
+        return np.asarray(values - self.timed.motion_cost * seconds, np.float32)
 
 
 def utility(scores: Scores, travel: NDArray[np.float64], motion_weight: float) -> Scores:

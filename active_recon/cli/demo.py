@@ -5,7 +5,7 @@ from typing import Annotated
 
 from active_recon.cli.policy_option import policy_option
 from active_recon.interrupts import held_interrupts
-from active_recon.policies import DEFAULT_POLICY
+from active_recon.policies import AUTO
 import typer
 
 
@@ -14,7 +14,8 @@ def demo(
         '--object', help='bed, car, chair, sofa, table, or the path of a mesh file.')] = 'chair',
     views: Annotated[int, typer.Option(min=1, max=24, help='Number of views.')] = 5,
     policy: Annotated[str, policy_option(
-        'Policy that chooses the next view.')] = DEFAULT_POLICY,
+        'Policy that chooses the next view; auto: attention where the model has it, else uniform.',
+        also=(AUTO,))] = AUTO,
     model: Annotated[str | None, typer.Option(
         help='Name of a model that ships, or a weights file; the policy attention needs '
              'lifting or 2d3d-attention.')

@@ -25,6 +25,7 @@ from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.volumes.binvox import binvox_side, read_binvox, write_binvox
 from active_recon.volumes.voxels import RESOLUTION, VoxelGrid
+from active_recon.whole_files import whole_file
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -181,7 +182,5 @@ def _read_cameras(path: Path) -> list[Camera]:
 
 def write_voxels(folder: ObjectFolder, grid: VoxelGrid) -> None:
     """Write the voxels of one object to the path of their resolution, atomically."""
-    path = folder.voxels_path(len(grid.occupancy))
-    unfinished = path.with_suffix('.part')
-    write_binvox(grid, unfinished)
-    unfinished.replace(path)
+    with whole_file(folder.voxels_path(len(grid.occupancy))) as unfinished:
+        write_binvox(grid, unfinished)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ from active_recon.interrupts import held_interrupts
 from active_recon.launching.demo_monitor import demo_monitor, DemoMonitor
 from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.models.weights_files import find_weights
-from active_recon.policies import DEFAULT_POLICY
+from active_recon.policies import AUTO, policy_in_use
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.voxelisation import voxelise
@@ -42,7 +42,7 @@ class Demo:
 
     mesh: Path
     views: int = 5
-    policy: str = DEFAULT_POLICY
+    policy: str = AUTO
     seed: int = 0
     output_dir: Path = Path('bags')
     view: bool = False
@@ -56,7 +56,11 @@ def run_demo(demo: Demo, console: Console) -> Path:
     Raises MeshError where the file is no mesh, NodeError where a node ends, ActiveReconError
     where the loop stalls. The nodes are stopped and the bag is closed in any case.
     """
-    find_weights(demo.model)  # an error here is clearer than one in two nodes
+    # An error here is clearer than one in two nodes
+    in_use = policy_in_use(demo.policy, find_weights(demo.model))
+    if in_use.warning:
+        console.print(in_use.warning, soft_wrap=True)
+    demo = replace(demo, policy=in_use.name)
     mesh = load_mesh(demo.mesh)
     truth = cache(partial(voxelise, mesh))
     truth(_LIKELY_RESOLUTION)  # later it would delay the loop's messages

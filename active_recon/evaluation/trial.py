@@ -16,6 +16,7 @@ from active_recon.evaluation.rollouts import batches
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import state_hash
 from active_recon.policies import Policy
+from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
@@ -110,10 +111,8 @@ def read_arrays(path: Path, names: set[str]) -> dict[str, NDArray[np.float64]]:
 
 def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
     """Write arrays to a cache file, atomically."""
-    unfinished = path.with_suffix('.part')
-    with unfinished.open('wb') as file:
+    with whole_file(path) as unfinished, unfinished.open('wb') as file:
         np.savez(file, allow_pickle=False, **arrays)
-    unfinished.replace(path)
 
 
 def _folder(cache: Path, identity: dict[str, Any]) -> Path:

@@ -24,9 +24,10 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-PROVENANCE = ('weights_sha256', 'config_sha256', 'runtime', 'needs_front', 'policy', 'seed',
-              'object')
-"""Parameters of the loop's nodes that are the bag's provenance."""
+PROVENANCE = {'weights_sha256': 'weights_sha256', 'config_sha256': 'config_sha256',
+              'runtime': 'runtime', 'needs_front': 'needs_front', 'policy': 'policy_in_use',
+              'seed': 'seed', 'object': 'object'}
+"""The bag's provenance: its names, and those of the parameters of the loop's nodes."""
 UPDATE_EVERY_S = 0.1
 FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second
 _UPDATES_AFTER_DONE = 10  # for the episode's last messages to arrive
@@ -152,8 +153,8 @@ class RecorderNode(QosWarnings):
     def _on_parameters(self, node: str, parameters: dict[str, object]) -> None:
         if self._bag is None:
             return
-        provenance = {name: str(parameters[name]) for name in PROVENANCE if name in parameters
-                   and node in self._nodes}
+        provenance = {name: str(parameters[parameter]) for name, parameter in PROVENANCE.items()
+                      if parameter in parameters and node in self._nodes}
         provenance |= self._topics.add_names(full_names(parameters))
         try:
             self._bag.attach_parameters(node, parameters)

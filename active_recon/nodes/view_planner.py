@@ -10,8 +10,8 @@ from active_recon.geometry.cameras import (
     CANONICAL_ELEVATION,
     orbit_camera,
 )
-from active_recon.models.weights_files import find_weights
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
+from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy
 from active_recon.nodes.loop.view_synchronizer import ViewSynchronizer
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.clock import AHEAD_S, STEADY
@@ -22,12 +22,11 @@ from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.view_planner import ViewPlannerParameters
 from active_recon.planner import Decision, Planner, PlannerView
-from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
+from active_recon.policies import Policy
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
-import numpy as np
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
@@ -37,7 +36,7 @@ FIND_CAMERA_S = 1.0
 """Time to wait for a publisher of the camera's pose after an episode began."""
 _STEEPEST = 1.5  # rad, of a first view
 TOPICS = ('camera/pose', 'view', 'latent', 'entropy', 'quality', 'probabilities', 'episode',
-          'next_view', 'next_azimuth', 'azimuth_scores', 'done')
+          'next_view', 'next_azimuth', 'azimuth_scores', 'goal_reason', 'done')
 """Topics that the node subscribes to and publishes."""
 
 
@@ -54,8 +53,9 @@ class ViewPlannerNode(ManagedNode):
         params = self._params.values
         self._frame = params.object_frame
         publish_topic_names(self, TOPICS)
-        self._policy = self._load(params)
-        self._planner = self._planner_of(params, self._policy)
+        self._loaded = loaded_policy(params)
+        self._planner = self._planner_of(params, self._loaded.policy)
+        tell_policy(self, self._diagnostics, self._loaded.in_use)
         self.add_cleanup(self._free_policy)
         self._goals = GoalPublisher(self, self._frame)
         self._done_pub = self.create_publisher(Header, 'done', LATCHED_QOS)
@@ -82,12 +82,7 @@ class ViewPlannerNode(ManagedNode):
         self.create_timer(REPEAT_S, self._goals.repeat, clock=STEADY)
 
     def _free_policy(self) -> None:
-        del self._policy, self._planner
-
-    def _load(self, params: ViewPlannerParameters) -> Policy:
-        return load_policy(params.policy, PolicyOptions(
-            np.random.default_rng(params.seed), params.max_views,
-            find_weights(params.weights or None), threads=params.threads))
+        del self._loaded, self._planner
 
     def _planner_of(self, params: ViewPlannerParameters, policy: Policy) -> Planner:
         return Planner(
@@ -100,15 +95,14 @@ class ViewPlannerNode(ManagedNode):
         """Return a function that applies a change of parameters."""
         if not self.is_configured:
             return None
-        before = self._params.values
-        is_same = all(getattr(before, name) == getattr(params, name)
-                      for name in ('policy', *POLICIES[params.policy].parameters))
-        policy = self._policy if is_same else self._load(params)
-        planner = self._planner_of(params, policy)
+        loaded = loaded_policy(params, self._loaded)
+        planner = self._planner_of(params, loaded.policy)
         planner.go_on_from(self._planner)
 
         def commit() -> None:
-            self._policy, self._planner = policy, planner
+            if loaded.in_use != self._loaded.in_use:
+                tell_policy(self, self._diagnostics, loaded.in_use)
+            self._loaded, self._planner = loaded, planner
             if not self.is_active:
                 return
             if planner.wants_volume:
@@ -116,6 +110,7 @@ class ViewPlannerNode(ManagedNode):
             goal = self._goals.camera
             if goal is not None and not params.limits().allows(goal.azimuth):
                 self._follow(planner.next_goal(), self.get_clock().now().nanoseconds)
+                self._tell_reason()
 
         return commit
 
@@ -154,6 +149,7 @@ class ViewPlannerNode(ManagedNode):
             self._reset_episode()
         elif self._goals.camera is not None:
             self._publish_goal(self._planner.plan())  # with a stamp of the new time
+            self._tell_reason()
 
     def _on_camera(self, msg: PoseStamped) -> None:
         with self._diagnostics.rejecting():
@@ -197,20 +193,27 @@ class ViewPlannerNode(ManagedNode):
         self._follow(decision, stamp)
         if decision.goal is not None:
             self._diagnostics.record_latency(stamp)
+            self._tell_reason()
 
     def _follow(self, decision: Decision, stamp: int) -> None:
         """Publish the goal, or that the episode is done, at a stamp in nanoseconds."""
         if decision.goal is not None:
             self._publish_goal(decision.goal)
-            if reason := self._planner.reason():
-                self.get_logger().info(
-                    f'goal at {math.degrees(decision.goal.camera.azimuth):.0f} degrees: {reason}')
             return
         self._goals.close()
         self._started = True
         self._done = True
         self._publish_done(stamp, decision.reason)
         self.get_logger().info(f'done: {decision.reason}')
+
+    def _tell_reason(self) -> None:
+        """Tell why the goal that was just published is worth its view, where that is known."""
+        camera = self._goals.camera
+        reason = self._planner.reason() if camera is not None else None
+        if camera is None or reason is None:
+            return
+        self._goals.publish_reason(reason)
+        self.get_logger().info(f'goal at {_place_words(camera)}: {reason.sentence}')
 
     def _publish_done(self, stamp: int, reason: str) -> None:
         """Publish why the episode is done, at the stamp of a view; '' while it is not."""
@@ -234,6 +237,7 @@ class ViewPlannerNode(ManagedNode):
             f'no view from {_place_words(failed)}: expected one within '
             f'{timeout:g} s, got none; it is left out of this episode, {instead}'))
         self._follow(decision, self.get_clock().now().nanoseconds)
+        self._tell_reason()
 
     def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Publish the goal after the views so far with a new stamp; answer with its azimuth."""
@@ -249,6 +253,7 @@ class ViewPlannerNode(ManagedNode):
             self._done = False
             self._publish_done(self._episode.begin, '')
         self._publish_goal(goal)
+        self._tell_reason()
         response.success = True
         response.message = f'{goal.camera.azimuth:.6f}'
         return response

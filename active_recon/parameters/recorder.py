@@ -7,7 +7,8 @@ from active_recon.parameters.declaration import parameter
 DIAGNOSTICS = '/diagnostics'
 TOPICS = ('camera/image_raw', 'camera/image_raw/compressed', 'camera/camera_info', 'camera/pose',
           'camera/mask', 'view', 'view_image', 'occupancy', 'probabilities', 'latent', 'entropy',
-          'quality', 'episode', 'next_view', 'next_azimuth', 'azimuth_scores', 'done', DIAGNOSTICS)
+          'quality', 'episode', 'next_view', 'next_azimuth', 'azimuth_scores', 'goal_reason',
+          'done', DIAGNOSTICS)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from active_recon.parameters.shared import (
     ManagedParameters,
     NetworkParameters,
 )
-from active_recon.policies import DEFAULT_POLICY, POLICIES
+from active_recon.policies import AUTO, POLICIES
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class ViewPlannerParameters(FrontParameters, CubeParameters, NetworkParameters, 
     """Parameters of the view planner."""
 
     policy: str = parameter(
-        DEFAULT_POLICY, 'policy that chooses the next view; attention is learned and needs '
-        'weights that have one, such as those of lifting or 2d3d-attention',
-        choices=tuple(POLICIES), dynamic=True)
+        AUTO, 'policy that chooses the next view; attention is learned and needs weights that '
+        'have one, such as those of lifting or 2d3d-attention; auto is attention where the '
+        'weights have it, else uniform, an even sweep', choices=(AUTO, *POLICIES), dynamic=True)
     seed: int = parameter(0, 'seed of the policy random', low=0, high=2**32 - 1, dynamic=True)
     max_views: int = parameter(
         5, 'number of views after which an episode is done', low=1, high=1000, dynamic=True)
@@ -36,9 +36,9 @@ class ViewPlannerParameters(FrontParameters, CubeParameters, NetworkParameters, 
         'out of reach; 0 for no target. Needs weights with quality tables', low=0.0, high=0.99,
         dynamic=True)
     min_gain: float = parameter(
-        0.0, 'an episode is done when no candidate has an expected gain of IoU as large, in '
-        '[0, 1); 0 for any gain. Needs a policy whose scores are expected gains', low=0.0,
-        high=0.99, dynamic=True)
+        0.0, 'an episode is done when no view in reach has an expected gain of IoU as large, less '
+        'the motion_cost of its time, in [0, 1); 0 for any gain. Needs a policy whose scores are '
+        'expected gains', low=0.0, high=0.99, dynamic=True)
     azimuth_range: tuple[float, ...] = parameter(
         (0.0, TURN), 'low and high end, counter-clockwise, of the azimuths in reach, rad',
         low=-2 * TURN, high=2 * TURN, dynamic=True)

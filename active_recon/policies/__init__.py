@@ -1,8 +1,8 @@
 """View policies behind one interface, and the one registry of them."""
 
+from active_recon.policies.automatic import AUTO, policy_in_use, PolicyInUse
 from active_recon.policies.base import Choice, Observation, Policy
 from active_recon.policies.registry import (
-    DEFAULT_POLICY,
     learned_policy,
     load_policy,
     POLICIES,
@@ -10,5 +10,5 @@ from active_recon.policies.registry import (
     PolicyOptions,
 )
 
-__all__ = ['Choice', 'DEFAULT_POLICY', 'Observation', 'POLICIES', 'Policy', 'PolicyEntry',
-           'PolicyOptions', 'learned_policy', 'load_policy']
+__all__ = ['AUTO', 'Choice', 'Observation', 'POLICIES', 'Policy', 'PolicyEntry', 'PolicyInUse',
+           'PolicyOptions', 'learned_policy', 'load_policy', 'policy_in_use']

@@ -1,5 +1,6 @@
 """Why a view is worth taking, in plain words."""
 
+from dataclasses import dataclass
 import math
 
 from active_recon.policies.base import Observation
@@ -12,9 +13,24 @@ _LITTLE = 0.1
 """Share of the doubt in sight below which a view shows nothing that was not in sight before."""
 
 
-def goal_reason(seen: Observation, goal: NDArray[np.float64], gain: float | None = None) -> str:
+@dataclass(frozen=True)
+class GoalReason:
+    """Why a goal is worth its view: what it shows, in words, and its gain of IoU, if expected."""
+
+    shows: str
+    gain: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """Both in words."""
+        return self.shows if self.gain is None else (
+            f'{self.shows}; expected gain of IoU {self.gain:.3f}')
+
+
+def goal_reason(seen: Observation, goal: NDArray[np.float64],
+                gain: float | None = None) -> GoalReason:
     """
-    Return a short sentence on what a camera at a pose (4, 4) would show, for one episode.
+    Return what a camera at a pose (4, 4) would show, for one episode.
 
     It names the part of the object where the doubt (entropy) lies that the camera would have in
     sight and no view had: its top, its underside or a side, and how much of the doubt in sight
@@ -32,7 +48,7 @@ def goal_reason(seen: Observation, goal: NDArray[np.float64], gain: float | None
     part = _part(volume.occupancy[0], new if share >= _LITTLE else doubt)
     what = (f'shows {part}: {share:.0%} of the doubt in sight was hidden from all views'
             if share >= _LITTLE else f'looks again at {part}, where doubt is left')
-    return what if gain is None else f'{what}; expected gain of IoU {gain:.3f}'
+    return GoalReason(what, gain)
 
 
 def _part(occupancy: NDArray[np.float32], weight: NDArray[np.float32]) -> str:

@@ -8,6 +8,7 @@ from active_recon.errors import ConfigError
 from active_recon.models.weights_files import read_metadata, SHIPPED
 from active_recon.plugins import installed, load_installed, POLICIES_GROUP
 from active_recon.policies.attention import AttentionPolicy
+from active_recon.policies.automatic import AUTO, policy_in_use
 from active_recon.policies.base import Policy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 from active_recon.policies.rendered import (
@@ -63,8 +64,6 @@ class PolicyEntry:
         return 'seed' in self.parameters
 
 
-DEFAULT_POLICY = 'uniform'  # the best on validation of those that the default network can have
-
 LEARNED: dict[str, Callable[[PolicyRuntime], Policy]] = {'2d3d-attention': AttentionPolicy}
 """
 What makes a policy of the model that was trained with a network, by the network's name.
@@ -110,7 +109,9 @@ POLICIES |= {name: PolicyEntry(_installed(name), ('seed', 'max_views'))
 
 
 def load_policy(name: str, options: PolicyOptions | None = None) -> Policy:
-    """Return a policy by its name; raises ConfigError and WeightsError."""
-    if name not in POLICIES:
-        raise ConfigError(f'no policy is called {name!r}: expected one of {", ".join(POLICIES)}')
-    return POLICIES[name].make(options or PolicyOptions())
+    """Return a policy by its name, or `auto`; raises ConfigError and WeightsError."""
+    options = options or PolicyOptions()
+    if name not in (AUTO, *POLICIES):
+        raise ConfigError(f'no policy is called {name!r}: expected one of '
+                          f'{", ".join((AUTO, *POLICIES))}')
+    return POLICIES[policy_in_use(name, options.weights).name].make(options)

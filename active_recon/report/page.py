@@ -18,6 +18,7 @@ from active_recon.report.stages import median, STAGES, timings
 from active_recon.report.subject import degrees, elevation_degrees, Subject
 from active_recon.report.turntable_map import turntable_map
 from active_recon.report.words import key_words
+from active_recon.whole_files import whole_file
 from jinja2 import Environment, PackageLoader, StrictUndefined
 import plotly
 
@@ -58,13 +59,11 @@ def report_page(subjects: Sequence[Subject]) -> str:
 
 def write_page(page: str, path: Path) -> None:
     """Write a page atomically; raises DataError if it cannot be written."""
-    partial = path.with_name(f'.{path.name}.partial')
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(page, encoding='utf-8')
-        partial.replace(path)
+        with whole_file(path) as unfinished:
+            unfinished.write_text(page, encoding='utf-8')
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise DataError(f'{path}: cannot be written: {error.strerror}') from error
 
 

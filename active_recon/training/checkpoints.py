@@ -7,6 +7,7 @@ from typing import Any
 
 from active_recon.config import with_current_keys
 from active_recon.errors import ConfigError, DataError
+from active_recon.whole_files import whole_file
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save
 from torch import nn, Tensor
@@ -33,10 +34,9 @@ def save_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
     meta = json.dumps({'step': checkpoint.step, 'settings': checkpoint.settings,
                        'log': checkpoint.log})
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix('.part')
-    # Written here, since safetensors would keep others of the user's group from reading it
-    unfinished.write_bytes(save(tensors, {'checkpoint': meta}))
-    unfinished.replace(path)
+    with whole_file(path) as unfinished:
+        # Written here, since safetensors would keep others of the user's group from reading it
+        unfinished.write_bytes(save(tensors, {'checkpoint': meta}))
 
 
 def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Checkpoint:

@@ -9,6 +9,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.errors import DataError
 from active_recon.evaluation.next_view.watching import Walk, WatchedObject
 from active_recon.policies import Observation, Policy
+from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,11 +53,9 @@ class ViewGains:
     def save(self, path: Path) -> None:
         """Write the file (.npz), whole or not at all."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_suffix('.part')
-        with unfinished.open('wb') as file:
+        with whole_file(path) as unfinished, unfinished.open('wb') as file:
             np.savez_compressed(file, poses=self.poses, occupancy=self.occupancy,
                                 taken=self.taken, iou=self.iou, after=self.after)
-        unfinished.replace(path)
 
     @classmethod
     def load(cls, path: Path) -> 'ViewGains':

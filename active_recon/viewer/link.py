@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import math
 
 from active_recon.viewer.state import LoopState
 
@@ -29,7 +30,8 @@ def status_lines(links: Mapping[str, TopicLink], state: LoopState,
     if not any(link.publishers or link.age_s is not None for link in links.values()):
         return ['Waiting for a loop: no publisher yet on '
                 f'{", ".join(link.topic for link in links.values())}.', *warnings]
-    lines = [_progress(links['view'], state), *quality_lines(state), *warnings]
+    lines = [_progress(links['view'], state), *quality_lines(state), *goal_lines(state),
+             *warnings]
     for link in links.values():
         if not link.publishers:
             lines.append(f'No publisher on {link.topic} '
@@ -49,6 +51,13 @@ def quality_lines(state: LoopState) -> list[str]:
         return []
     summary = f'{quality.summary[0].upper()}{quality.summary[1:]}.'
     return [summary, *filter(None, [quality.warning])]
+
+
+def goal_lines(state: LoopState) -> list[str]:
+    """Return why the next view is worth taking; none if that is not known."""
+    if state.goal is None or state.goal_reason is None:
+        return []
+    return [f'Next view, {math.degrees(state.goal.azimuth):.0f}°: {state.goal_reason.sentence}.']
 
 
 def ago(seconds: float) -> str:

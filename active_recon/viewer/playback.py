@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun
 from active_recon.errors import DataError
-from active_recon.viewer.link import quality_lines
+from active_recon.viewer.link import goal_lines, quality_lines
 from active_recon.viewer.page import Page
 from active_recon.viewer.state import (
     LoopState,
@@ -45,6 +45,8 @@ def _set_goal(observer: Observer, goal: RecordedGoal) -> None:
     observer.set_goal(goal.stamp, goal.camera)
     if goal.candidates is not None and goal.scores is not None:
         observer.set_scores(goal.stamp, Scores(goal.candidates.positions, goal.scores))
+    if goal.reason is not None:
+        observer.set_goal_reason(goal.stamp, goal.reason)
 
 
 class Playback:
@@ -90,7 +92,7 @@ class Playback:
                  f'{sum(known.episode == state.episode for known in self._states)}']
         if len(episodes) > 1:
             words[0] += f', episode {episodes.index(state.episode) + 1} of {len(episodes)}'
-        words += quality_lines(state)
+        words += [*quality_lines(state), *goal_lines(state)]
         if state.done:
             words.append(f'Done: {state.done.replace("_", " ")}.')
         return words

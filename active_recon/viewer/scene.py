@@ -5,6 +5,7 @@ from typing import Any
 
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.view_distance import at_one_elevation, directions_of, view_distance
+from active_recon.policies.reasons import GoalReason
 from active_recon.view_colors import Color, view_color
 from active_recon.viewer.state import LoopState, Scores
 from active_recon.viewer.view_result import ViewResult
@@ -68,8 +69,8 @@ class Scene:
             self._draw_grid(state.grid, threshold)
         if state.views is not before.views:
             self._draw_views(before.views, state.views)
-        if state.goal is not before.goal:
-            self._draw_goal(state.goal)
+        if state.goal is not before.goal or state.goal_reason is not before.goal_reason:
+            self._draw_goal(state.goal, state.goal_reason)
         if state.scores is not before.scores:
             self._draw_scores(state.scores)
         if state.camera is not before.camera or state.picture is not before.picture:
@@ -110,12 +111,14 @@ class Scene:
             self._label(f'{name}/label', f'{number} · {math.degrees(view.camera.azimuth):.0f}°',
                         again)
 
-    def _draw_goal(self, goal: Camera | None) -> None:
+    def _draw_goal(self, goal: Camera | None, reason: GoalReason | None) -> None:
         if goal is None:
             self._remove('/goal/label')
             self._remove('/goal')
             return
         words = f'next · {math.degrees(goal.azimuth):.0f}°'
+        if reason is not None and reason.gain is not None:
+            words += f' · IoU +{reason.gain:.3f}'
         if '/goal' in self._objects:
             self._place(self._objects['/goal'], goal)
             self._objects['/goal/label'].text = words

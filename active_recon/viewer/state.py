@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import math
 
 from active_recon.geometry.cameras import Camera
+from active_recon.policies.reasons import GoalReason
 from active_recon.quality.quality import Quality
 from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import VoxelGrid
@@ -32,7 +33,7 @@ class LoopState:
       is occupied
     - network_image: the last view as the network received it, (S, S, 3) uint8 RGB
     - camera: where the camera is now; picture: its last image, (H, W, 3) uint8 RGB
-    - goal: the camera of the next view
+    - goal: the camera of the next view; goal_reason: why it is worth taking
     - done: the reason why the episode ended, '' before
     """
 
@@ -46,6 +47,7 @@ class LoopState:
     goal: Camera | None = None
     scores: Scores | None = None
     done: str = ''
+    goal_reason: GoalReason | None = None
 
 
 class Observer:
@@ -61,6 +63,7 @@ class Observer:
         self._begin = 0
         self._goal_stamp = self._scores_stamp = self._done_stamp = self._image_stamp = -1
         self._quality: tuple[int, Quality | None] = -1, None
+        self._reason: tuple[int, GoalReason | None] = -1, None
 
     def begin_episode(self, identity: str, begin: int) -> None:
         """Begin an episode, unless it is the current one; keep what already belongs to it."""
@@ -77,7 +80,8 @@ class Observer:
             known.camera, known.picture,
             known.goal if self._goal_stamp >= begin else None,
             known.scores if self._scores_stamp >= begin else None,
-            known.done if self._done_stamp >= begin else '')
+            known.done if self._done_stamp >= begin else '',
+            known.goal_reason if self._goal_stamp >= begin else None)
 
     def set_camera(self, camera: Camera | None = None,
                    picture: NDArray[np.uint8] | None = None) -> None:
@@ -117,7 +121,14 @@ class Observer:
         """Set the goal; the same stamp again is the same goal."""
         if stamp >= self._begin and stamp > max(self._goal_stamp, self._done_stamp):
             self._goal_stamp = stamp
-            self.state = replace(self.state, goal=camera, done='')
+            reason = self._reason[1] if self._reason[0] == stamp else None
+            self.state = replace(self.state, goal=camera, done='', goal_reason=reason)
+
+    def set_goal_reason(self, stamp: int, reason: GoalReason) -> None:
+        """Set why the goal of a stamp, which may not be known yet, is worth its view."""
+        self._reason = stamp, reason
+        if stamp == self._goal_stamp and self.state.goal is not None:
+            self.state = replace(self.state, goal_reason=reason)
 
     def set_scores(self, stamp: int, scores: Scores) -> None:
         """Set the scores of the candidates, at their goal's stamp."""
@@ -131,7 +142,8 @@ class Observer:
             self._done_stamp = stamp if reason else -1
             over = reason and stamp > self._goal_stamp
             self.state = replace(
-                self.state, done=reason, goal=None if over else self.state.goal)
+                self.state, done=reason, goal=None if over else self.state.goal,
+                goal_reason=None if over else self.state.goal_reason)
 
 
 def own_threshold(occupied: VoxelGrid) -> float | None:

@@ -9,6 +9,7 @@ from active_recon.bags.runs.run import (
 )
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
+from active_recon.policies.reasons import GoalReason
 from active_recon.viewer.page import Page
 from active_recon.viewer.playback import PLAY, Playback
 from active_recon.viewer.state import LoopState, Observer, Scores
@@ -208,7 +209,8 @@ def recorded_episode(name, count):
     views = [RecordedView(
         100 * number, picture(number), orbit_camera(1.3 * number), ball(0.1 + 0.1 * number),
         None, None, 1000.0 / number,
-        RecordedGoal(orbit_camera(2.0), 100 * number + 1, ring, scores, 0)
+        RecordedGoal(orbit_camera(2.0), 100 * number + 1, ring, scores, 0,
+                     reason=GoalReason('shows the top', 0.1))
         if number < count else None, {})
         for number in range(1, count + 1)]
     return RecordedEpisode(name, 0, None, views, 'max_views')
@@ -228,6 +230,7 @@ def test_a_bag_is_stepped_through_view_by_view(playback, chromium):
 
     opened(chromium, playback.page.url)
     told('View 1 of 3, episode 1 of 2')
+    told('Next view, 115°: shows the top; expected gain of IoU 0.100.')
     first = shown(chromium, lambda: playback.draw(0.0))
     slider = chromium.driver.find_elements('css selector', '[role=slider]')[0]
     slider.send_keys('\ue014\ue014')  # arrows to the right

@@ -167,9 +167,11 @@ def test_every_view_is_an_image_that_the_camera_took(messages):
 def test_the_whole_loop_is_in_the_bag(messages):
     assert {'/camera/image_raw', '/camera/camera_info', '/camera/pose', '/view', '/occupancy',
             '/probabilities', '/latent', '/entropy', '/quality', '/episode',
-            '/next_view', '/next_azimuth', '/azimuth_scores', '/done',
+            '/next_view', '/next_azimuth', '/azimuth_scores', '/goal_reason', '/done',
             '/diagnostics'} == set(messages)
     assert messages['/done'][-1].frame_id == 'max_views'
+    chosen = sorted({stamp(goal) for goal in messages['/next_view']})[1:]
+    assert [stamp(reason) for reason in messages['/goal_reason']] == chosen
     refused = {value.key for msg in messages['/diagnostics'] for status in msg.status
                for value in status.values if value.key.startswith('refused')}
     assert not refused
@@ -187,7 +189,7 @@ def test_the_bag_replays_to_the_same_bits_on_the_machine_that_made_it(finished):
 def test_the_bag_says_what_made_it(finished):
     summary = open_bag(finished[0]).summary()
     assert summary.provenance == {
-        'version': __version__, 'object': 'chair.glb', 'policy': 'uniform', 'seed': '0',
+        'version': __version__, 'object': 'chair.glb', 'policy': 'attention', 'seed': '0',
         'needs_front': 'false', **load_runtime(threads=1).provenance}
     assert {name: parameters['use_sim_time']
             for name, parameters in summary.parameters.items()} == dict.fromkeys(

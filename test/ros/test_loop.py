@@ -44,7 +44,8 @@ def start_reconstructor(start_shared_node, tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def start_planner(start_shared_node):
-    return partial(start_shared_node, 'view_planner', max_views=VIEWS, entropy_tolerance=0.0)
+    return partial(start_shared_node, 'view_planner', policy='uniform', max_views=VIEWS,
+                   entropy_tolerance=0.0)
 
 
 @pytest.fixture(scope='module')

@@ -1,14 +1,21 @@
 """Parameters that change while a node runs, by the services that `ros2 param` calls."""
 
 import math
+import shutil
 
 from active_recon.geometry.cameras import Camera
+from active_recon.models.weights_files import find_weights, SHIPPED
 from active_recon.parameters.declaration import NEW_START
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
 import pytest
-from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -74,16 +81,32 @@ def test_views_are_taken_by_the_rule_that_was_set_last(start_node, bench):
     camera.show()
 
 
+def in_use(bench):
+    """Return the policy that the planner's read-only parameter names."""
+    answer, = bench.ask(GetParameters, 'view_planner/get_parameters',
+                        GetParameters.Request(names=['policy_in_use'])).values
+    return answer.string_value
+
+
 def test_a_policy_that_is_changed_goes_on_from_what_the_episode_has_seen(
-        start_node, bench, latent):  # noqa: F811
-    start_node('view_planner', policy='uniform', max_views=8, start_azimuth=0.0,
-               entropy_tolerance=0.0)
+        start_node, bench, latent, tmp_path):  # noqa: F811
+    shutil.copy(find_weights('2d3d'), tmp_path / 'mine.safetensors')
+    shutil.copy(SHIPPED.with_name(f'{SHIPPED.stem}-scorer.safetensors'),
+                tmp_path / 'mine-scorer.safetensors')  # of other weights
+    planner = start_node('view_planner', policy='auto', max_views=8, start_azimuth=0.0,
+                         entropy_tolerance=0.0, weights=tmp_path / 'mine.safetensors')
+    bench.until(lambda: 'view policy of other weights' in bench.state('view_planner').problem,
+                'the warning that auto is an even sweep')
+    assert planner.log('policy uniform')
+    assert (in_use(bench), bench.state('view_planner').facts['Policy']) == ('uniform', 'uniform')
     fake = FakeReconstructor(bench)
     fake.begin('only')
     fake.wait_goal(0)
     second = view_goal_from_msg(fake.wait_goal(fake.show(latent, 0.0))).azimuth
     assert second == pytest.approx(math.tau / 8)
     assert change(bench, 'view_planner', policy='farthest')['policy'].successful
+    assert in_use(bench) == 'farthest'
+    bench.until(lambda: not bench.state('view_planner').problem, 'the end of the warning')
     third = view_goal_from_msg(fake.wait_goal(fake.show(latent, second))).azimuth
     assert third == pytest.approx(math.pi + math.tau / 16, abs=0.14)
     assert change(bench, 'view_planner', max_views=3)['max_views'].successful
@@ -112,7 +135,7 @@ def test_the_services_describe_what_may_change(start_node, bench):
     policy, views, tolerance, weights = bench.ask(
         DescribeParameters, 'view_planner/describe_parameters',
         DescribeParameters.Request(names=names)).descriptors
-    assert not policy.read_only and 'one of attention' in policy.additional_constraints
+    assert not policy.read_only and 'one of auto, attention' in policy.additional_constraints
     assert views.integer_range[0].to_value == 1000
     assert tolerance.floating_point_range[0].to_value == pytest.approx(0.99)
     assert weights.read_only and NEW_START in weights.additional_constraints

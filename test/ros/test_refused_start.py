@@ -26,7 +26,7 @@ def refusal(start_node, name, **parameters):
     ('turntable_camera', {'rate': '.inf'}, 'rate: invalid value: expected a number from 0.1 to '
                                            '1000, got inf'),
     ('turntable_camera', {}, 'mesh, dataset: neither given: expected one of them'),
-    ('view_planner', {'policy': 'guess'}, "policy: invalid value: expected one of attention.*, "
+    ('view_planner', {'policy': 'guess'}, "policy: invalid value: expected one of auto, atten.*, "
                                           "got 'guess'"),
     ('view_planner', {'policy': 'random', 'max_views': 0},
      'max_views: invalid value: expected an integer from 1 to 1000, got 0'),

@@ -60,6 +60,7 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
         'weights': str(setup.weights), **setup.reconstructor}}
     if setup.planner is not None and (overrides.policy or not overrides.weights):
         planning = {**node_parameters(run, 'view_planner'), **setup.planner,
+                    'policy_in_use': setup.planner['policy'],
                     'weights': str(setup.planner['weights'])}
         parameters['/view_planner'] = planning
         provenance['policy'] = planning['policy']
@@ -111,7 +112,8 @@ def replan_episode(episode: RecordedEpisode, reconstructor: Reconstructor, plann
         views.append(replace(
             view, stamp=stamp, received={}, done=decision.reason,
             # A nanosecond later: the goal comes after the view that led to it
-            goal=None if decision.goal is None else RecordedGoal.of(decision.goal, stamp + 1)))
+            goal=None if decision.goal is None else RecordedGoal.of(
+                decision.goal, stamp + 1, reason=planner.reason())))
         advance()
     return replace(episode, first_goal=RecordedGoal.of(first, episode.begin), views=views,
                    done=decision.reason)

@@ -23,6 +23,7 @@ from msg_tools.episodes import done_from_msg, episode_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, scores_from_msg, view_goal_from_msg
 from msg_tools.images import image_from_msg, latent_from_msg
 from msg_tools.quality import quality_from_msg
+from msg_tools.reasons import goal_reason_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
@@ -30,7 +31,8 @@ from numpy.typing import NDArray
 
 LOOP = {'episode': HEADER, 'view': POSE, 'occupancy': CLOUD, 'probabilities': CLOUD,
         'latent': IMAGE, 'entropy': JOINT_STATE, 'quality': DIAGNOSTICS, 'next_view': POSE,
-        'next_azimuth': JOINT_STATE, 'azimuth_scores': CLOUD, 'done': HEADER, 'view_image': IMAGE}
+        'next_azimuth': JOINT_STATE, 'azimuth_scores': CLOUD, 'goal_reason': DIAGNOSTICS,
+        'done': HEADER, 'view_image': IMAGE}
 """The loop's own topics and their types."""
 _DIAGNOSTICS = '/diagnostics'
 
@@ -67,6 +69,7 @@ class LoopRecord:
             'next_view': lambda msg: view_goal_from_msg(msg, object_frame),
             'next_azimuth': azimuth_goal_from_msg,
             'azimuth_scores': _scores_from_msg,
+            'goal_reason': goal_reason_from_msg,
             'done': done_from_msg,
         }
         roles = {namespace + role: role for role in LOOP}

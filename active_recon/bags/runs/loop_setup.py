@@ -107,6 +107,7 @@ def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: b
     planner = None
     if 'policy' in of_planner:
         planner = _given(of_planner, _OF_PLANNER)
+        planner['policy'] = of_planner.get('policy_in_use', planner['policy'])
         own = of_planner.get('weights', '')
         same = own == of_reconstructor.get('weights', '')
         planner['weights'] = found if same else find_weights(own or None)

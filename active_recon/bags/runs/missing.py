@@ -6,11 +6,15 @@ from typing import Any
 from active_recon.bags.runs.run import RecordedEpisode
 
 _PLANNED = 'goal'
+_REASON = 'reason of the goal'
+_AFTER = (_PLANNED, _REASON)
 
 
 def missing_parts(episode: RecordedEpisode) -> Mapping[str, Sequence[int]]:
     """Return the numbers of the views that lack a part, by the part; a goal follows its view."""
     qualities = [view.quality for view in episode.views]
+    goals = [view.goal for view in episode.views[:-1]]
+    reasons = [goal and goal.final.reason for goal in goals]
     parts: dict[str, list[Any]] = {
         'probabilities': [view.reconstruction for view in episode.views],
         'occupancy': [view.occupied for view in episode.views],
@@ -18,7 +22,10 @@ def missing_parts(episode: RecordedEpisode) -> Mapping[str, Sequence[int]]:
         'latent': [view.latent for view in episode.views],
         # Not every network's weights have tables to judge it by
         'quality': qualities if any(qualities) else [],
-        _PLANNED: [view.goal for view in episode.views[:-1]],
+        _PLANNED: goals,
+        # Not every policy has reasons; without its goal one is not missed
+        _REASON: [goal is None or reason for goal, reason in zip(goals, reasons, strict=True)]
+        if any(reasons) else [],
     }
     without = {part: [number for number, value in enumerate(values, 1) if value is None]
                for part, values in parts.items()}
@@ -38,9 +45,9 @@ def describe_lost(episode: RecordedEpisode) -> list[str]:
 
 
 def _of_all(episode: RecordedEpisode, part: str, numbers: Sequence[int]) -> bool:
-    return len(numbers) == len(episode.views) - (part == _PLANNED)
+    return len(numbers) == len(episode.views) - (part in _AFTER)
 
 
 def _of_some(part: str, numbers: Sequence[int]) -> str:
     views = f'view{"s" if len(numbers) > 1 else ""} {", ".join(map(str, numbers))}'
-    return f'the {part} {"after" if part == _PLANNED else "of"} {views}'
+    return f'the {part} {"after" if part in _AFTER else "of"} {views}'

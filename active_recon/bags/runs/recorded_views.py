@@ -130,7 +130,8 @@ def _goals(record: LoopRecord, begin: int, end: float) -> list[RecordedGoal]:
             azimuth = record.parts['next_azimuth'].get(stamp)
             goals.append(RecordedGoal(
                 camera if azimuth is None else _with_azimuth(camera, azimuth), stamp, candidates,
-                scores, record.received['next_view'][stamp]))
+                scores, record.received['next_view'][stamp],
+                reason=record.parts['goal_reason'].get(stamp)))
     return goals
 
 

@@ -9,6 +9,7 @@ from active_recon.acquisition.goals import Goal
 from active_recon.bags.runs.image_gaps import ImageGaps
 from active_recon.bags.storage.metadata import QosProfile
 from active_recon.geometry.cameras import Camera
+from active_recon.policies.reasons import GoalReason
 from active_recon.quality.quality import Quality
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
@@ -53,6 +54,7 @@ class RecordedGoal:
     - candidates, N of them, and scores (N,): None if they were not recorded
     - received: when the recorder received the goal, nanoseconds
     - replacements: the goals that followed, as this one and then those were given up
+    - reason: why it is worth its view; None: not told
     """
 
     camera: Camera
@@ -61,12 +63,14 @@ class RecordedGoal:
     scores: NDArray[np.float32] | None
     received: int
     replacements: Sequence['RecordedGoal'] = ()
+    reason: GoalReason | None = None
 
     @classmethod
-    def of(cls, goal: Goal, stamp: int, received: int | None = None) -> 'RecordedGoal':
+    def of(cls, goal: Goal, stamp: int, received: int | None = None,
+           reason: GoalReason | None = None) -> 'RecordedGoal':
         """Return a goal as recorded; by default it is received at its stamp."""
         return cls(goal.camera, stamp, Candidates.of(goal.candidates), goal.scores,
-                   stamp if received is None else received)
+                   stamp if received is None else received, reason=reason)
 
     @property
     def final(self) -> 'RecordedGoal':

@@ -70,7 +70,7 @@ def _of_goal(recorded: RecordedGoal | None, frame: str) -> Iterator[tuple[int, s
     for goal in () if recorded is None else (recorded, *recorded.replacements):
         scores = None if goal.candidates is None or goal.scores is None else (
             goal.candidates.positions, goal.candidates.azimuths, goal.scores)
-        messages = goal_to_msgs(goal.stamp, goal.camera, scores, frame)
+        messages = goal_to_msgs(goal.stamp, goal.camera, scores, goal.reason, frame)
         yield from _at(messages, goal.stamp, dict.fromkeys(messages, goal.received))
 
 

@@ -1,25 +1,19 @@
 """Atomic and durable file operations."""
 
-from contextlib import suppress
 from itertools import count
 import os
 from pathlib import Path
 import re
 
+from active_recon.whole_files import whole_file
+
 
 def write_atomically(path: Path, text: str) -> None:
     """Replace a text file atomically; raises OSError if the disk is full."""
-    unfinished = path.with_name(f'.{path.name}.part')
-    try:
-        with unfinished.open('w') as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-    except OSError:
-        with suppress(OSError):
-            unfinished.unlink()
-        raise
+    with whole_file(path) as unfinished, unfinished.open('w') as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
     sync_folder(path.parent)
 
 

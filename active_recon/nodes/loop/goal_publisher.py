@@ -5,8 +5,11 @@ import math
 from active_recon.acquisition.goals import Goal
 from active_recon.geometry.cameras import Camera
 from active_recon.nodes.runtime.qos import LATCHED_QOS
+from active_recon.policies.reasons import GoalReason
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.goals import azimuth_goal_to_msg, scores_to_msg, view_goal_to_msg
+from msg_tools.reasons import goal_reason_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from rclpy.node import Node
 from sensor_msgs.msg import JointState, PointCloud2
@@ -17,7 +20,8 @@ class GoalPublisher:
     """
     Publishes `next_view`, `next_azimuth` and `azimuth_scores`; at most one goal is open.
 
-    A goal is a camera in the object's frame, and for a turntable its azimuth.
+    A goal is a camera in the object's frame, and for a turntable its azimuth. Its `goal_reason`
+    follows under the same stamp.
     """
 
     def __init__(self, node: Node, frame: str) -> None:
@@ -30,6 +34,7 @@ class GoalPublisher:
         self._next_view_pub = node.create_publisher(PoseStamped, 'next_view', LATCHED_QOS)
         self._next_azimuth_pub = node.create_publisher(JointState, 'next_azimuth', LATCHED_QOS)
         self._scores_pub = node.create_publisher(PointCloud2, 'azimuth_scores', LATCHED_QOS)
+        self._reason_pub = node.create_publisher(DiagnosticArray, 'goal_reason', LATCHED_QOS)
 
     @property
     def open_for(self) -> float:
@@ -49,6 +54,11 @@ class GoalPublisher:
                        azimuth_goal_to_msg(goal.camera.azimuth, header))
         self._scores_pub.publish(scores_to_msg(goal.candidates, goal.scores, header))
         self.repeat()
+
+    def publish_reason(self, reason: GoalReason) -> None:
+        """Publish why the last goal is worth its view."""
+        self._reason_pub.publish(goal_reason_to_msg(reason, Header(
+            stamp=stamp_from_nanoseconds(self._last_stamp), frame_id=self._frame)))
 
     def repeat(self) -> None:
         """Publish the open goal again, with the same stamp: it may have been lost."""

@@ -25,6 +25,7 @@ from msg_tools.goals import scores_from_msg
 from msg_tools.images import image_from_msg
 from msg_tools.joins import StampJoiner
 from msg_tools.quality import quality_from_msg
+from msg_tools.reasons import goal_reason_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
@@ -74,6 +75,7 @@ class LoopSubscriber:
                 (Image, 'network_image', self._on_network_image),
                 (PoseStamped, 'next_view', self._on_goal),
                 (PointCloud2, 'azimuth_scores', self._on_scores),
+                (DiagnosticArray, 'goal_reason', self._on_reason),
                 (Header, 'done', self._on_done), (Header, 'episode', self._on_episode)):
             self._subscribe(kind, name, callback, LATCHED_POLLED_QOS)
 
@@ -175,6 +177,10 @@ class LoopSubscriber:
         positions, _, scores = scores_from_msg(msg)
         self.observer.set_scores(
             nanoseconds_from_stamp(msg.header.stamp), Scores(positions, scores))
+
+    def _on_reason(self, msg: DiagnosticArray) -> None:
+        self.observer.set_goal_reason(
+            nanoseconds_from_stamp(msg.header.stamp), goal_reason_from_msg(msg))
 
     def _on_done(self, msg: Header) -> None:
         self.observer.set_done(*done_from_msg(msg))

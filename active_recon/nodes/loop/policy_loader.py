@@ -1,0 +1,58 @@
+"""Loads the policy that the planner's parameters name, and tells which it is."""
+
+from dataclasses import dataclass
+
+from active_recon.models.weights_files import find_weights
+from active_recon.nodes.runtime.diagnostics import Diagnostics
+from active_recon.nodes.runtime.life_cycle import ManagedNode
+from active_recon.nodes.runtime.parameters import set_read_only_parameter
+from active_recon.parameters.view_planner import ViewPlannerParameters
+from active_recon.policies import (
+    load_policy,
+    POLICIES,
+    Policy,
+    policy_in_use,
+    PolicyInUse,
+    PolicyOptions,
+)
+import numpy as np
+
+_WARNING = 'learned_policy'
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedPolicy:
+    """A policy, what it is called, and the parameters by which it was loaded."""
+
+    policy: Policy
+    in_use: PolicyInUse
+    params: ViewPlannerParameters
+
+
+def loaded_policy(params: ViewPlannerParameters, before: LoadedPolicy | None = None
+                  ) -> LoadedPolicy:
+    """Load a policy, unless the one before is the same; raises ConfigError and WeightsError."""
+    weights = find_weights(params.weights or None)
+    if before is not None and before.params.policy == params.policy:
+        in_use = before.in_use
+    else:
+        in_use = policy_in_use(params.policy, weights)
+    if before is not None and before.in_use.name == in_use.name and all(
+            getattr(before.params, name) == getattr(params, name)
+            for name in POLICIES[in_use.name].parameters):
+        return LoadedPolicy(before.policy, in_use, params)
+    return LoadedPolicy(load_policy(in_use.name, PolicyOptions(
+        np.random.default_rng(params.seed), params.max_views, weights,
+        threads=params.threads)), in_use, params)
+
+
+def tell_policy(node: ManagedNode, diagnostics: Diagnostics, in_use: PolicyInUse) -> None:
+    """Tell which policy chooses, in the log, the diagnostics and the parameter that bags keep."""
+    set_read_only_parameter(
+        node, 'policy_in_use', in_use.name, 'policy that chooses the next view')
+    diagnostics.set_value('Policy', in_use.name)
+    node.get_logger().info(f'policy {in_use.name}')
+    if in_use.warning:
+        diagnostics.raise_warning(_WARNING, in_use.warning)
+    else:
+        diagnostics.clear_warning(_WARNING)
