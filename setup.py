@@ -27,7 +27,7 @@ setup(
     python_requires='>=3.11',
     packages=find_packages(include=[NAME, f'{NAME}.*', 'msg_tools', 'msg_tools.*']),
     package_data={NAME: [
-        'weights/*.safetensors', 'weights/*.json', 'weights/*.md', 'objects/*',
+        'weights/*.safetensors', 'weights/*.onnx', 'weights/*.json', 'weights/*.md', 'objects/*',
         'nodes/runtime/*.xml', 'report/templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
@@ -49,6 +49,7 @@ setup(
         'mcap>=1.5,<2',
         'numpy>=1.26,<3',
         'opencv-python-headless>=4.9,<6',
+        'openvino>=2026.1,<2028',
         'PyYAML>=6,<7',
         'pillow>=10.1,<14',
         'plotly>=6,<8',
@@ -69,9 +70,12 @@ setup(
         'doc': [
             'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
             'sphinx-copybutton>=0.5.2'],
+        'export': ['onnx>=1.17,<2'],
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
+        'onnxruntime': ['onnxruntime>=1.20,<2'],
         'test': [
-            'mcap-ros2-support>=0.5.5', 'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',
+            'mcap-ros2-support>=0.5.5', 'onnx>=1.17,<2', 'onnxruntime>=1.20,<2',
+            'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',
             'pytest-xdist>=3.6', 'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

@@ -1,6 +1,6 @@
 """A policy and the state of one episode: the core of the view planner's node."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -24,6 +24,7 @@ from active_recon.policies.automatic import SWEEP
 from active_recon.policies.reasons import goal_reason, GoalReason
 from active_recon.policies.stopping import StoppingRule
 from active_recon.quality.quality import Quality
+from active_recon.runtimes import AUTO
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -106,11 +107,11 @@ class Planner:
              motion_weight: float = 0.0, elevation: float | None = None,
              distance: float = CANONICAL_DISTANCE, elevation_range: Sequence[float] = (),
              reachable_views: Sequence[float] = (), motion: TimedMotion | None = None,
-             threads: int | None = None, target_quality: float = 0.0,
-             min_gain: float = 0.0) -> 'Planner':
+             threads: int | None = None, target_quality: float = 0.0, min_gain: float = 0.0,
+             runtime: str = AUTO, precision: str = 'auto') -> 'Planner':
         """Build the planner of a policy's name; raises ConfigError and WeightsError."""
-        options = PolicyOptions(np.random.default_rng(seed), max_views, weights, device=device,
-                                threads=threads)
+        options = PolicyOptions(np.random.default_rng(seed), max_views, weights, runtime, device,
+                                threads, precision)
         return cls(load_policy(policy, options), max_views, entropy_tolerance, object_yaw, limits,
                    motion_weight, elevation, distance, elevation_range, reachable_views, motion,
                    target_quality, min_gain)
@@ -119,6 +120,12 @@ class Planner:
     def wants_volume(self) -> bool:
         """Whether the policy looks at the reconstruction, and not at its latent alone."""
         return self._policy.wants_volume
+
+    @property
+    def provenance(self) -> Mapping[str, str]:
+        """What diagnostics tell of what runs the policy; empty where it is not learned."""
+        provenance: Mapping[str, str] = getattr(self._policy, 'provenance', {})
+        return provenance
 
     def reset(self) -> None:
         """Forget the episode."""

@@ -14,7 +14,7 @@ from active_recon.quality.judge import Judge
 from active_recon.quality.quality import Quality
 from active_recon.quality.silhouettes import SeenView
 from active_recon.quality.tables import find_tables, QualityTables
-from active_recon.runtimes import load_runtime, Runtime
+from active_recon.runtimes import AUTO, load_runtime, Runtime
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -66,13 +66,14 @@ class Reconstructor:
     @classmethod
     def load(cls, weights: Path | None = None, device: str = 'cpu', object_size: float = 1.0,
              object_yaw: float = 0.0, threshold: float | None = None,
-             threads: int | None = None, runtime: str = 'torch') -> 'Reconstructor':
+             threads: int | None = None, runtime: str = AUTO,
+             precision: str = 'auto') -> 'Reconstructor':
         """
         Load weights (None: those that ship), and the quality tables beside them if there are any.
 
-        Raises WeightsError and ConfigError.
+        For `runtime` and `precision` see `load_runtime`. Raises WeightsError and ConfigError.
         """
-        loaded = load_runtime(weights, runtime, device, threads)
+        loaded = load_runtime(weights, runtime, device, threads, precision)
         tables, without = find_tables(
             weights or SHIPPED, loaded.provenance.get('weights_sha256', ''))
         reconstructor = cls(loaded, object_size, object_yaw, threshold, tables)

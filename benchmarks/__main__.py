@@ -11,12 +11,14 @@ from benchmarks.converters import converter_figures
 from benchmarks.core import reconstruct_and_plan, rendering, rendering_of_candidates
 from benchmarks.figures import Figure, reference_ms
 from benchmarks.loop import demo_figure, reconstructor_figures
+from benchmarks.runtimes import runtime_figures
 from benchmarks.stream import stream_figures
 from benchmarks.viewer import watching_figures
 
 RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'benchmarks.json'
 PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'view': lambda: [reconstruct_and_plan()],
+    'runtimes': runtime_figures,
     'rendering': lambda: [rendering(1, 400), rendering(2, 100)],
     'candidates': lambda: [rendering_of_candidates(32), rendering_of_candidates(64)],
     'reconstructor': reconstructor_figures,

@@ -1,6 +1,8 @@
 """Six small objects and a network that learns in seconds, for whatever tests the learned core."""
 
+import os
 from pathlib import Path
+import tempfile
 
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
@@ -12,6 +14,9 @@ import pytest
 import torch
 
 pytest_plugins = ['live_tests']
+# Nothing is left in the user's cache; what was compiled in one process serves the others
+os.environ.setdefault(
+    'ACTIVE_RECON_CACHE', str(Path(tempfile.gettempdir()) / f'active_recon-tests-{os.getuid()}'))
 
 
 @pytest.fixture(scope='session')

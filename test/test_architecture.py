@@ -17,7 +17,7 @@ ROWS: tuple[set[str], ...] = (
     {'volumes'},
     {'acquisition', 'calibration', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},
-    {'environment', 'policies', 'simulation'},
+    {'environment', 'exporting', 'policies', 'simulation'},
     {'parameters', 'planner', 'reconstructor'},
     {'evaluation', 'msg_tools'},
     {'bags', 'training'},

@@ -94,10 +94,16 @@ def test_all_replays_have_one_hash(run, loop, count):
 def test_another_processor_stays_within_tolerance(golden, variables, threads):
     ended = subprocess.run(
         [sys.executable, '-m', 'active_recon.cli.main', 'replay', golden, '--threads',
-         str(threads)], capture_output=True, text=True, timeout=600,
+         str(threads), '--runtime', 'torch'], capture_output=True, text=True, timeout=600,
         env={**os.environ, **variables, 'PYTHONPATH': str(ROOT)})
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert re.search(f'^({SAME_BITS}|{WITHIN_TOLERANCE}): recording', ended.stdout, re.M)
+
+
+def test_another_runtime_stays_within_tolerance(run):
+    settings = replace(recorded_setup(run), runtime='torch')
+    verified = verify(run, settings.load_reconstructor(), settings.load_planner())
+    assert verified.comparison.verdict in (SAME_BITS, WITHIN_TOLERANCE)
 
 
 def test_the_command_tells_the_verdict_and_the_hash(golden, run, loop, monkeypatch, capsys):

@@ -282,7 +282,7 @@ def test_goals_of_a_replay_stand_where_the_recorded_parameters_say(recorded, ele
 def test_a_replay_computes_with_the_threads_of_the_run_and_leaves_torch_as_it_was(monkeypatch):
     before, set_to = torch.get_num_threads(), []
     setup = recorded_setup(replace(run_of([]), parameters={
-        'reconstructor': {'threads': before + 1}}))
+        'reconstructor': {'threads': before + 1, 'runtime': 'torch'}}))
     reconstructor = setup.load_reconstructor()
     setting = torch.set_num_threads
     monkeypatch.setattr(torch, 'set_num_threads',
@@ -290,7 +290,7 @@ def test_a_replay_computes_with_the_threads_of_the_run_and_leaves_torch_as_it_wa
     reconstructor.add_view(image_at(1.0), orbit_camera(1.0))
     assert set_to == [before + 1, before]
     assert torch.get_num_threads() == before
-    assert f'{before + 1} threads' in reconstructor.provenance['runtime']
+    assert f'{before + 1} threads' in reconstructor.provenance['computed_by']
 
 
 def test_the_setup_is_that_of_the_bag_with_the_cores_defaults():

@@ -1,14 +1,8 @@
 """What a view scorer learns from: measured gains, losses of their order, a calibration."""
 
 from active_recon.errors import ConfigError, DataError
-from active_recon.models.view_scorer import (
-    CHANNELS,
-    FACTS,
-    GRID,
-    Looked,
-    MOST_VIEWS,
-    ScorerConfig,
-)
+from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID, MOST_VIEWS
+from active_recon.models.view_scorer import Looked, ScorerConfig
 from active_recon.training.looked import joined, looked_states, LookedStates, mirrored, spreads
 from active_recon.training.scorer import (
     calibrate,

@@ -5,10 +5,12 @@ import math
 
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
-from active_recon.models.scorer_weights import load_scorer, save_scorer, scorer_path
-from active_recon.models.sight import cells_in_sight, sampled_cells, upright_frames
-from active_recon.models.view_scorer import candidate_grids, look, ScorerConfig, ViewScorer
-from active_recon.models.weights_files import weights_hash
+from active_recon.models import candidate_looks
+from active_recon.models.candidate_looks import candidate_grids, look
+from active_recon.models.scorer_weights import load_scorer, save_scorer
+from active_recon.models.sight import cells_in_sight
+from active_recon.models.view_scorer import Looked, ScorerConfig, ViewScorer
+from active_recon.models.weights_files import scorer_path, weights_hash
 from active_recon.policies import Observation
 from active_recon.policies.candidate_rendering import (
     coarse_volume,
@@ -132,9 +134,9 @@ def test_the_roll_of_a_camera_makes_no_difference(scorer):
 def test_the_mean_score_is_the_level(scorer):
     scorer.calibration.copy_(torch.tensor([2.0, 3, 0.5]).expand_as(scorer.calibration))
     volume = coarse_volume(some_volume()[None])
-    given = [torch.from_numpy(each).float() for each in (
+    given = [torch.from_numpy(each) for each in look(
         volume.occupancy, volume.entropy, poses([0.4]), poses(AZIMUTHS))]
-    scores, level = scorer.scores(look(*given))
+    scores, level = scorer.scores(Looked(given[0], given[1], given[2].long()))
     assert_close(scores.mean(dim=1), torch.zeros(1), atol=1e-5, rtol=0)
     gain = scorer(*given, state={})[0].gain
     assert_close(gain, 2 * scores + 3 * level[:, None] + 0.5)
@@ -144,15 +146,13 @@ def test_sampled_sight_is_near_to_the_exact_one():
     exact_volume = coarse_volume(some_volume()[None])
     taken = poses([0.4])
     exact = in_sight(exact_volume, taken)[0].ravel()
-    frames = upright_frames(torch.from_numpy(taken[0]).float())
-    full = torch.cat([torch.from_numpy(exact_volume.occupancy[0].ravel()), torch.zeros(1)])
-    found = cells_in_sight(frames, full[sampled_cells(frames, SIDE, 24, 32)], SIDE)[0].numpy()
+    found = cells_in_sight(taken[0, 0], exact_volume.occupancy[0], 24, 32)
     assert np.corrcoef(exact, found)[0, 1] > 0.9
 
 
 def grids(volume, taken, candidates):
-    return candidate_grids(*(torch.from_numpy(each[0]).float() for each in (
-        volume.occupancy, volume.entropy, taken, candidates)))
+    return torch.from_numpy(candidate_grids(
+        volume.occupancy[0], volume.entropy[0], taken[0], candidates[0]))
 
 
 def test_an_empty_volume_shows_nothing_and_all_of_it_was_seen():
@@ -213,6 +213,19 @@ def test_a_scorer_of_other_weights_is_refused_with_what_to_do(scorer, tmp_path):
         load_scorer(weights)
 
 
+def test_lines_of_sight_that_were_kept_show_the_same():
+    volume, taken = coarse_volume(some_volume()[None]), poses([0.4, 2.0])
+    sets = [poses(AZIMUTHS), poses(AZIMUTHS + 0.1), poses(AZIMUTHS, 0.9)]
+    first = [grids(volume, taken, candidates) for candidates in sets]
+    for candidates, found in zip(sets, first, strict=True):
+        assert_close(grids(volume, taken, candidates), found, rtol=0, atol=0)
+    candidate_looks._means.cache_clear()
+    assert_close(grids(volume, taken, sets[1]), first[1], rtol=0, atol=0)
+    assert (first[0] - first[1]).abs().max() > 1e-3
+
+
 def test_sizes_that_make_no_network_are_refused():
     with pytest.raises(ConfigError, match='invalid sizes: expected 1 or more.*got 4, 0'):
         replace(ScorerConfig(), hidden=0)
+    with pytest.raises(ConfigError, match='invalid patches: expected a divisor of 8, got 3'):
+        replace(ScorerConfig(), patches=3)

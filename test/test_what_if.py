@@ -119,7 +119,7 @@ def test_a_run_with_overrides_says_so_and_replays_to_the_same_bits(
     assert other.provenance == {
         'object': 'chair', 'policy': 'attention', 'replay_of': 'walk', 'version': '0.1.0',
         'weights_sha256': weights_hash(weights[1]), 'config_sha256': config_hash(tiny),
-        'runtime': f'torch {torch.__version__}, float32, cpu, 1 threads', 'needs_front': 'true'}
+        'computed_by': f'torch {torch.__version__}, f32, cpu, 1 threads', 'needs_front': 'true'}
     setup = recorded_setup(other)
     assert setup.weights == weights[1]
     assert setup.planner['policy'] == 'attention'

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 import math
 from typing import Protocol
 
@@ -61,14 +61,24 @@ class Ring:
 
     def candidates(self, camera: Camera) -> list[OrbitCamera]:
         """Return the ring's candidates; see GoalPlaces."""
-        return [self.goal(azimuth, camera) for azimuth in self.azimuths]
+        return list(_ring(self.azimuths, self._height(camera), self.distance))
 
     def goal(self, azimuth: float, camera: Camera) -> OrbitCamera:
         """Return the goal of the ring at an azimuth; see GoalPlaces."""
-        elevation = self.elevation
-        if elevation is None:
-            elevation = min(max(camera.elevation, -_STEEPEST_OWN), _STEEPEST_OWN)
-        return orbit_camera(azimuth, elevation, self.distance)
+        return orbit_camera(azimuth, self._height(camera), self.distance)
+
+    def _height(self, camera: Camera) -> float:
+        """Return the elevation of the goals after a camera's view."""
+        if self.elevation is not None:
+            return self.elevation
+        return min(max(camera.elevation, -_STEEPEST_OWN), _STEEPEST_OWN)
+
+
+@lru_cache(maxsize=4)
+def _ring(azimuths: tuple[float, ...], elevation: float,
+          distance: float) -> tuple[OrbitCamera, ...]:
+    """Return the cameras of a ring, which a turntable asks for after every view."""
+    return tuple(orbit_camera(azimuth, elevation, distance) for azimuth in azimuths)
 
 
 @dataclass(frozen=True)

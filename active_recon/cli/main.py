@@ -10,6 +10,7 @@ from active_recon.cli.bag import bag
 from active_recon.cli.calibrate import calibrate
 from active_recon.cli.demo import demo
 from active_recon.cli.evaluate import evaluate
+from active_recon.cli.export import export
 from active_recon.cli.making import dataset, render
 from active_recon.cli.paper import paper
 from active_recon.cli.play import play
@@ -30,7 +31,7 @@ import typer
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 for command in (demo, up, calibrate, view, report, replay, play, record_sweep, render, train,
-                train_policy, evaluate, study, policies, paper, sheet):
+                train_policy, export, evaluate, study, policies, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

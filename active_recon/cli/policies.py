@@ -68,7 +68,7 @@ def policies(
     from active_recon.evaluation.next_view.study import Episodes
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.evaluation.posed.study import Extent
-    from active_recon.models.scorer_weights import scorer_path
+    from active_recon.models.weights_files import scorer_path
     import torch
 
     torch.set_num_threads(threads)

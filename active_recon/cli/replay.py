@@ -13,6 +13,7 @@ from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
 from active_recon.cli.shape_files import ShapeFiles
 from active_recon.errors import ConfigError
+from active_recon.runtimes import PRECISIONS, RUNTIME_CHOICES
 import typer
 
 if TYPE_CHECKING:
@@ -53,6 +54,11 @@ def replay(
              'probabilities; several episodes get numbered files.')] = None,
     threads: Annotated[int | None, typer.Option(
         min=1, help='CPU threads of the network; default: as recorded.')] = None,
+    runtime: Annotated[str | None, typer.Option(
+        help=f'Runtime of the network: {", ".join(RUNTIME_CHOICES)}; default: as '
+             'recorded.')] = None,
+    precision: Annotated[str | None, typer.Option(
+        help=f'Its numbers: {", ".join(PRECISIONS)}; default: as recorded.')] = None,
 ) -> None:
     """
     Replay a bag and compare it with the recording, or replay it with another model or policy.
@@ -84,7 +90,8 @@ def replay(
     reading_s = time.monotonic() - began
     setup = recorded_setup(run, overrides.weights or weights, overrides.weights is not None,
                            scene.parameters)
-    setup = replace(setup, threads=threads or setup.threads)
+    setup = replace(setup, threads=threads or setup.threads, runtime=runtime or setup.runtime,
+                    precision=precision or setup.precision)
     if overrides != Overrides():
         _write_with_overrides(run, setup, overrides, out, files)
         return

@@ -61,9 +61,9 @@ def train_policy(
       active-recon train-policy turn/train things/train --validation turn/val --out runs/policy
     """
     from active_recon.evaluation.posed.entrants import load_entrants
-    from active_recon.models.scorer_weights import save_scorer, scorer_path
+    from active_recon.models.scorer_weights import save_scorer
     from active_recon.models.view_scorer import ScorerConfig
-    from active_recon.models.weights_files import find_weights
+    from active_recon.models.weights_files import find_weights, scorer_path
     from active_recon.training.gain_files import Collecting
     from active_recon.training.looked import joined
     from active_recon.training.scorer import (

@@ -25,9 +25,8 @@ def projection(cameras: Cameras, image_size: int) -> Tensor:
     """Return K [R t] in units in which the image spans [-1, 1], (B, 3, 4) float32."""
     poses, lenses = cameras.poses.double(), cameras.intrinsics.double()
     rotation = poses[:, :3, :3].transpose(1, 2)
-    scale = torch.diag(torch.tensor([2 / image_size, 2 / image_size, 1.0],
-                                    dtype=torch.float64, device=poses.device))
-    scale[:2, 2] = -1
+    scale = torch.tensor([[2 / image_size, 0, -1], [0, 2 / image_size, -1], [0, 0, 1.0]],
+                         dtype=torch.float64, device=poses.device)
     with torch.autocast(poses.device.type, enabled=False):  # half precision is too coarse
         moved = -rotation @ poses[:, :3, 3:]
         return (scale @ lenses @ torch.cat([rotation, moved], dim=2)).float()
@@ -40,11 +39,25 @@ def projected(matrices: Tensor, side: int) -> tuple[Tensor, Tensor]:
     Returns image points (B, N, 2), in units in which the image spans [-1, 1], and depths (B, N).
     """
     along = (torch.arange(side, device=matrices.device) + 0.5) / side - 0.5
-    axes = matrices[:, :, :3, None] * along + matrices[:, :, 3:, None] / 3  # (B, 3, 3, side)
-    seen = (axes[:, :, 0, :, None] + axes[:, :, 1, None, :])[..., None] + axes[:, :, 2, None, None]
-    seen = seen.flatten(2)  # (B, 3, N)
-    depth = seen[:, 2]
-    return (seen[:, :2] / depth[:, None].clamp(min=_NEAREST)).transpose(1, 2), depth
+    x, y, z = (matrices[:, :, axis, None] * along for axis in range(3))  # (B, 3, side) each
+    planes = ((x + matrices[:, :, 3:])[..., None] + y[:, :, None]).flatten(2)  # (B, 3, side ** 2)
+    depth = (planes[:, 2, :, None] + z[:, 2, None]).flatten(1)
+    # Products of matrices put the two coordinates of a point beside each other: a transposition
+    # of as many points takes longer
+    one = torch.ones_like(z[:, :1])
+    both = torch.tensor([[1.0, 0], [0, 1]], device=matrices.device).repeat(1, side)
+    across = torch.cat([both.expand(len(z), -1, -1),
+                        z[:, :2].transpose(1, 2).reshape(len(z), 1, 2 * side)], dim=1)
+    behind = torch.cat([one, z[:, 2:]], dim=1).repeat_interleave(2, dim=2)
+    with torch.autocast(matrices.device.type, enabled=False):  # half precision is too coarse
+        found = _and_one(planes[:, :2]) @ across / (_and_one(planes[:, 2:]) @ behind).clamp(
+            min=_NEAREST)
+    return found.reshape(len(z), -1, 2), depth
+
+
+def _and_one(rows: Tensor) -> Tensor:
+    """Return rows (B, K, N) as columns, with one more that is 1, (B, N, K + 1)."""
+    return torch.cat([rows, torch.ones_like(rows[:, :1])], dim=1).transpose(1, 2)
 
 
 def sampled(maps: Tensor, where: Tensor) -> Tensor:
@@ -131,7 +144,10 @@ def aggregate(statistics: Mapping[str, Tensor], features: Tensor,
     Takes features (T, B, C, N) and weights (T, B, 1, N) of 0 or 1. A cell that a view does not
     see counts as 0 in the maximum and the minimum.
     """
-    new = (_Reduce.apply if features.requires_grad else _reduce)(features, weight)
+    if features.requires_grad:
+        new = _Reduce.apply(features, weight)  # type: ignore[no-untyped-call]
+    else:
+        new = (_reduce_one if len(features) == 1 else _reduce)(features, weight)
     total, squares, highest, lowest = (part.reshape(statistics['sum'].shape) for part in new)
     return {
         'count': statistics['count'] + weight.sum(dim=0).reshape(statistics['count'].shape),
@@ -145,6 +161,12 @@ def _reduce(features: Tensor, weight: Tensor) -> tuple[Tensor, Tensor, Tensor, T
     """Return sum, sum of squares, maximum and minimum of (T, B, C, N) over T views."""
     new = features * weight
     return new.sum(dim=0), (new * new).sum(dim=0), new.amax(dim=0), new.amin(dim=0)
+
+
+def _reduce_one(features: Tensor, weight: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return what `_reduce` returns, of one view, without passing over it for each of them."""
+    new = features[0] * weight[0]
+    return new, new * new, new, new
 
 
 class _Reduce(torch.autograd.Function):

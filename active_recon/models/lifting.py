@@ -164,7 +164,8 @@ class Lifting(ReconstructionNetwork):
             maps.coarse, functional.avg_pool2d(maps.seen, 2), cameras, matrices))
         fine = (each.unflatten(0, (-1, batch)) for each in self.fine(
             maps.fine, maps.seen, cameras, matrices))
-        features, logits = coarse.tensor_split((self._coarse_channels,), dim=2)
+        features = coarse[:, :, :self._coarse_channels]
+        logits = coarse[:, :, self._coarse_channels:]  # none without visibility
         at_16 = aggregate(_of('coarse', state), features, inside)
         mean = at_16['sum'] / at_16['count'].clamp(min=1)
         showing = inside.amax(dim=3).sum(dim=0)  # (B, 1)
@@ -173,7 +174,7 @@ class Lifting(ReconstructionNetwork):
                 **self._visible(state, features, logits, inside),
                 'hull': self._carved(maps.foreground, matrices, state['hull']),
                 'foreground': maps.shown()[-batch:] * inside[-1].amax(dim=2)[..., None, None],
-                'latent': functional.adaptive_avg_pool2d(mean.mean(dim=4), _LATENT_SIDE)}
+                'latent': functional.avg_pool2d(mean.mean(dim=4), _COARSE_SIDE // _LATENT_SIDE)}
 
     def decode(self, state: State) -> Tensor:
         """
@@ -182,20 +183,32 @@ class Lifting(ReconstructionNetwork):
         That is Platt scaling with a second input: scale * logit + weight * evidence + bias, where
         the evidence is the log of the lowest foreground probability over the views.
         """
-        count = (state['views'][:, 0].long() - 1).clamp(0, _COUNTS - 1)
+        return self.decode_summary(self.summarise(state))
+
+    def summarise(self, state: State) -> State:
+        """Return the statistics over views as the decoder takes them, `hull` and `views`."""
+        coarse = summarise(_of('coarse', state))
+        if self._visibility:
+            visible = visible_mean(state['visible_weight'], state['visible_sum'])
+            coarse = torch.cat([coarse, visible], dim=1)
+        return {'coarse': coarse, 'fine': summarise(_of('fine', state)), 'hull': state['hull'],
+                'views': state['views']}
+
+    def decode_summary(self, summary: State) -> Tensor:
+        """Return the calibrated logits by what `summarise` returned."""
+        count = (summary['views'][:, 0].long() - 1).clamp(0, _COUNTS - 1)
         scale, weight, bias = self.calibration[count].T[..., None, None, None]  # (B, 1, 1, 1)
-        found = self.logits(state)
+        found = self._decoded(summary)
         calibrated: Tensor = scale * found.logits + weight * found.evidence + bias
         return calibrated
 
     def logits(self, state: State) -> Decoded:
         """Return what the decoder gives, before calibration."""
-        coarse = summarise(_of('coarse', state))
-        if self._visibility:
-            visible = visible_mean(state['visible_weight'], state['visible_sum'])
-            coarse = torch.cat([coarse, visible], dim=1)
+        return self._decoded(self.summarise(state))
+
+    def _decoded(self, summary: State) -> Decoded:
         found: Decoded = self.decoder(
-            coarse, summarise(_of('fine', state)), state['hull'] + NO_EVIDENCE)
+            summary['coarse'], summary['fine'], summary['hull'] + NO_EVIDENCE)
         return found
 
     def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
@@ -223,7 +236,8 @@ class Lifting(ReconstructionNetwork):
         found = sampled(foreground.float().clamp(-NO_EVIDENCE, NO_EVIDENCE) - NO_EVIDENCE, where)
         found = torch.where(depth[:, None] > 0, found, 0)
         least, second = hull[:, :1], hull[:, 1:]
-        for new in found.reshape(-1, *least.shape):  # (B, 1, 64, 64, 64)
+        for each in torch.split(found, len(hull)):
+            new = each.reshape(least.shape)  # (B, 1, 64, 64, 64)
             least, second = torch.minimum(least, new), torch.minimum(
                 second, torch.maximum(least, new))
         return torch.cat([least, second], dim=1)

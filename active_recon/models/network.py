@@ -86,6 +86,8 @@ class ReconstructionNetwork(nn.Module, ABC):
     """R, cells a side of the occupancy."""
     needs_front: bool
     """Whether it predicts with the front at +x, from canonical cameras; else from any camera."""
+    runs_in_torch_alone: str = ''
+    """Why it cannot be exported as graphs, in words; '' where it can."""
 
     @property
     def spec(self) -> NetworkSpec:
@@ -117,6 +119,18 @@ class ReconstructionNetwork(nn.Module, ABC):
     @abstractmethod
     def decode(self, state: State) -> Tensor:
         """Return the occupancy's logits, (B, R, R, R), indexed [x, y, z]."""
+
+    def summarise(self, state: State) -> State:
+        """
+        Return what the decoder gets of a state: all of it, where a network does not say less.
+
+        An exported network computes this in float32, also where encoder and decoder are not.
+        """
+        return state
+
+    def decode_summary(self, summary: State) -> Tensor:
+        """Return the logits by what `summarise` returned, (B, R, R, R)."""
+        return self.decode(summary)
 
     def step(self, images: Tensor, cameras: Cameras, state: State) -> State:
         """Encode one view of each object, and return the updated state."""

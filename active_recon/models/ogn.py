@@ -121,6 +121,8 @@ class Ogn(MeanCodeNetwork):
     chosen to go with it; layers are normalised, as in the paper's network here.
     """
 
+    runs_in_torch_alone = 'how many cells it computes depends on the object'
+
     def __init__(self, encoder: ImageEncoder, code_channels: int,
                  level_channels: tuple[int, ...]) -> None:
         super().__init__(encoder)

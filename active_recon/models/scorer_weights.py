@@ -7,19 +7,13 @@ from typing import Any
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.models.weights import Bundle
-from active_recon.models.weights_files import SCORER, SHIPPED, weights_hash
+from active_recon.models.weights_files import scorer_path, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
 from safetensors.torch import save
 import torch
 from torch import nn
 
 _KIND = 'view-scorer'
-
-
-def scorer_path(weights: Path | None = None) -> Path:
-    """Return where the scorer of a network's weights lies; None: of those that ship."""
-    weights = weights or SHIPPED
-    return weights.with_name(f'{weights.stem}{SCORER}.safetensors')
 
 
 def save_scorer(path: Path, scorer: ViewScorer, config: ScorerConfig, network_sha256: str,

@@ -61,6 +61,7 @@ class ShapeBasis(ReconstructionNetwork):
     """
 
     image_size, resolution, needs_front = IMAGE_SIZE, 32, True
+    runs_in_torch_alone = 'it searches for the likeliest shape by gradients'
 
     def __init__(self, categories: tuple[str, ...], modes: int) -> None:
         super().__init__()

@@ -1,5 +1,5 @@
 """
-What cameras have in sight of volumes of probabilities, sampled along lines of sight, in torch.
+What cameras have in sight of volumes of probabilities, sampled along lines of sight.
 
 The rule is that of `policies.candidate_rendering`: cell i of a line is in sight with
 T_i = prod_(j < i) (1 - p_j), and is what the line hits with T_i p_i. Here a line is sampled at
@@ -7,16 +7,18 @@ even steps instead of cut at each cell's border, which takes less time.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 
-from active_recon.models.lifted import cell_centers
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
 
 RADIUS = math.sqrt(3) / 2
 """Of the sphere around the unit cube, sides of the grid."""
 _WIDEST = 2.0  # tangent of half the field of view of a camera that stands near the cube
 _UPRIGHT = 1e-3  # sine of the angle to the vertical below which a camera's own axes count
+
+Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,84 +30,103 @@ class Frames:
     - spread: (N,), tangent of half the angle under which the sphere around the cube is seen
     """
 
-    origin: Tensor
-    forward: Tensor
-    right: Tensor
-    down: Tensor
-    distance: Tensor
-    spread: Tensor
+    origin: Array
+    forward: Array
+    right: Array
+    down: Array
+    distance: Array
+    spread: Array
 
 
-def upright_frames(poses: Tensor) -> Frames:
+def upright_frames(poses: NDArray[np.floating]) -> Frames:
     """
     Return the frames of cameras at poses (N, 4, 4), whatever their roll and aim.
 
     A camera that stands straight above or below the centre keeps its own roll.
     """
-    origin = poses[:, :3, 3]
-    distance = origin.norm(dim=1)
+    origin = poses[:, :3, 3].astype(np.float64)
+    distance = np.linalg.norm(origin, axis=1)
     forward = -origin / distance[:, None]
-    level = torch.stack([forward[:, 1], -forward[:, 0], torch.zeros_like(distance)], dim=1)
-    own = poses[:, :3, 0]
-    own = own - (own * forward).sum(1, keepdim=True) * forward
-    right = torch.where(level.norm(dim=1, keepdim=True) > _UPRIGHT, level, own)
-    right = right / right.norm(dim=1, keepdim=True)
-    widest = (distance.square() - RADIUS ** 2).clamp(min=(RADIUS / _WIDEST) ** 2).sqrt()
-    return Frames(origin, forward, right, torch.linalg.cross(forward, right), distance,
-                  RADIUS / widest)
+    level = np.stack([forward[:, 1], -forward[:, 0], np.zeros_like(distance)], axis=1)
+    own = poses[:, :3, 0].astype(np.float64)
+    own = own - (own * forward).sum(axis=1, keepdims=True) * forward
+    right = np.where(np.linalg.norm(level, axis=1, keepdims=True) > _UPRIGHT, level, own)
+    right = right / np.linalg.norm(right, axis=1, keepdims=True)
+    widest = np.sqrt(np.maximum(distance ** 2 - RADIUS ** 2, (RADIUS / _WIDEST) ** 2))
+    return Frames(*(part.astype(np.float32) for part in (
+        origin, forward, right, np.cross(forward, right), distance, RADIUS / widest)))
 
 
-def sampled_cells(frames: Frames, side: int, rays: int, steps: int) -> Tensor:
+def sampled_cells(frames: Frames, side: int, rays: int, steps: int) -> NDArray[np.int32]:
     """
     Return the cells at the samples of cameras' lines of sight, (N, steps, rays, rays).
 
     They are places in the flat grid of side x side x side cells, nearest first, and side ** 3
     outside it. The samples of a line lie evenly within the sphere around the grid.
     """
-    device = frames.origin.device
-    across = step_depths(rays, device) * frames.spread[:, None]
+    across = step_depths(rays) * frames.spread[:, None]
     towards = (frames.forward[:, None, None]
                + across[:, None, :, None] * frames.right[:, None, None]
                + across[:, :, None, None] * frames.down[:, None, None])
-    towards = towards / towards.norm(dim=-1, keepdim=True)
-    along = frames.distance[:, None] + step_depths(steps, device) * RADIUS
-    points = (frames.origin[:, None, None, None]
-              + along.clamp(min=0)[:, :, None, None, None] * towards[:, None])
-    return _cells_at(points, side)
+    towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
+    along = np.maximum(frames.distance[:, None] + step_depths(steps) * np.float32(RADIUS), 0)
+    place = np.zeros((len(along), steps, rays, rays), np.int32)
+    inside = np.ones(place.shape, np.bool_)
+    for axis in range(3):
+        scaled = towards[..., axis] * np.float32(side)
+        # A side more keeps them above 0, where a cast rounds down
+        start = (frames.origin[:, axis] + np.float32(1.5)) * np.float32(side)
+        where = along[:, :, None, None] * scaled[:, None]
+        where += start[:, None, None, None]
+        cell = where.astype(np.int32)
+        cell -= side
+        inside &= cell.view(np.uint32) < side
+        place *= side
+        place += cell
+    place[~inside] = side ** 3
+    return place
 
 
-def step_depths(steps: int, device: torch.device | str = 'cpu') -> Tensor:
+def step_depths(steps: int) -> Array:
     """Return the middles of even steps from -1 (near) to 1 (far), (steps,)."""
-    return (torch.arange(steps, device=device) + 0.5) / steps * 2 - 1
+    return ((np.arange(steps, dtype=np.float32) + np.float32(0.5)) / np.float32(steps)
+            * np.float32(2) - np.float32(1))
 
 
-def passing(occupied: Tensor) -> Tensor:
-    """Return how likely nothing is before each sample, of occupancies (N, steps, ...)."""
-    free = (1 - occupied).cumprod(dim=1)
-    return torch.cat([torch.ones_like(free[:, :1]), free[:, :-1]], dim=1)
-
-
-def cells_in_sight(frames: Frames, occupied: Tensor, side: int) -> Tensor:
+def cells_in_sight(pose: NDArray[np.floating], occupancy: Array, rays: int,
+                   steps: int) -> Array:
     """
-    Return how likely each cell was in sight of each of N cameras, (N, side ** 3) in [0, 1].
+    Return how likely each cell of (S, S, S) was in sight of a camera, (S ** 3,) in [0, 1].
 
-    Takes occupancies at the cameras' own samples, (N, steps, rays, rays). What counts is what lies
-    a step or more before a cell: a cell does not hide itself.
+    The camera (4, 4) has rays x rays lines of sight of so many steps. What counts is what lies a
+    step or more before a cell: a cell does not hide itself.
     """
-    device, (steps, rays) = occupied.device, occupied.shape[1:3]
-    away = cell_centers(side, device) - frames.origin[:, None]  # (N, cells, 3)
-    depth = (away * frames.forward[:, None]).sum(-1).clamp(min=1e-6)
-    column, row = (((away * axis[:, None]).sum(-1) / depth / frames.spread[:, None] + 1) / 2 * rays
+    samples, seen_at = _own_samples(
+        np.ascontiguousarray(pose, np.float32).tobytes(), len(occupancy), rays, steps)
+    free = np.append(1 - occupancy.ravel(), np.float32(1))[samples]  # (steps, lines)
+    passing = np.empty_like(free)
+    passing[0] = 1
+    np.cumprod(free[:-1], axis=0, out=passing[1:])
+    return passing.ravel()[seen_at]
+
+
+@lru_cache(maxsize=64)
+def _own_samples(pose: bytes, side: int, rays: int,
+                 steps: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """
+    Return a camera's samples, and at which of them it sees each cell; kept from plan to plan.
+
+    Those are cells (steps, rays ** 2), and places (side ** 3,) among them.
+    """
+    frames = upright_frames(np.frombuffer(pose, np.float32).reshape(1, 4, 4))
+    samples = sampled_cells(frames, side, rays, steps).reshape(steps, -1)
+    along = (np.arange(side, dtype=np.float32) + np.float32(0.5)) / side - np.float32(0.5)
+    centers = np.stack(np.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
+    away = centers - frames.origin[0]
+    depth = np.maximum(away @ frames.forward[0], np.float32(1e-6))
+    column, row = (((away @ axis[0]) / depth / frames.spread[0] + 1) / 2 * rays
                    for axis in (frames.right, frames.down))
-    step = ((away.norm(dim=-1) - frames.distance[:, None]) / RADIUS + 1) / 2 * steps
-    column, row = (each.long().clamp(0, rays - 1) for each in (column, row))
-    place = (step.long().clamp(0, steps - 1) * rays + row) * rays + column
-    return passing(occupied).flatten(1).gather(1, place)
-
-
-def _cells_at(points: Tensor, side: int) -> Tensor:
-    """Return the cells that hold points (..., 3), by their places; side ** 3 beyond the grid."""
-    where = torch.floor((points + 0.5) * side).long()
-    inside = ((where >= 0) & (where < side)).all(dim=-1)
-    place = (where[..., 0] * side + where[..., 1]) * side + where[..., 2]
-    return torch.where(inside, place, side ** 3)
+    step = ((np.linalg.norm(away, axis=-1) - frames.distance[0]) / RADIUS + 1) / 2 * steps
+    column, row = (each.clip(0, rays - 1).astype(np.int32) for each in (column, row))
+    seen_at = (step.clip(0, steps - 1).astype(np.int32) * rays + row) * rays + column
+    return samples, seen_at

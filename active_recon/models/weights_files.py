@@ -64,6 +64,12 @@ def find_weights(model: str | Path | None = None) -> Path:
     return shipped
 
 
+def scorer_path(weights: Path | None = None) -> Path:
+    """Return where the scorer of a network's weights lies; None: of those that ship."""
+    weights = weights or SHIPPED
+    return weights.with_name(f'{weights.stem}{SCORER}.safetensors')
+
+
 def read_card(path: Path) -> dict[str, Any]:
     """Return the card beside weights, with current keys; empty where there is none."""
     beside = path.with_suffix('.json')

@@ -16,6 +16,7 @@ from active_recon.nodes.camera.monitor import CameraMonitor
 from active_recon.nodes.camera.pose_sources import check_pose_source, subscribe_poses
 from active_recon.nodes.camera.reference_capture import ReferenceCapture
 from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPublisher
+from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.deferred_work import DeferredWork
@@ -44,7 +45,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 FACTS = {'weights_sha256': 'SHA-256 of the weights',
-         'config_sha256': "SHA-256 of the network's config", 'runtime': "the network's runtime",
+         'config_sha256': "SHA-256 of the network's config",
+         'computed_by': 'what runs the network: library, version, precision, processor, threads',
          'needs_front': "whether the network needs the object's front"}
 """Read-only parameters that describe the network, with their descriptions."""
 TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'next_view',
@@ -85,8 +87,9 @@ class ReconstructorNode(ManagedNode):
             self.get_logger().info(self._reconstructor.no_quality)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED_QOS)
         self._diagnostics.measure_rates('images', 'poses', 'views')
-        for fact, name in (('weights_sha256', 'Weights SHA-256'), ('runtime', 'Runtime')):
-            self._diagnostics.set_value(name, self._reconstructor.provenance.get(fact, ''))
+        provenance = self._reconstructor.provenance
+        self._diagnostics.set_value('Weights SHA-256', provenance.get('weights_sha256', ''))
+        tell_of_runtime(self._diagnostics, provenance)
         self.create_service(Trigger, 'start_episode', self._on_start)
         self.create_service(Trigger, 'save_mesh', self._on_save)
 
@@ -118,7 +121,8 @@ class ReconstructorNode(ManagedNode):
         # One thread by default: more would wait for the slowest of the loop's busy cores
         reconstructor = Reconstructor.load(
             find_weights(params.weights or None), params.device, params.object_size,
-            params.object_yaw, _given(params.threshold), params.threads)
+            params.object_yaw, _given(params.threshold), params.threads, params.runtime,
+            params.precision)
         for fact, meaning in FACTS.items():
             set_read_only_parameter(self, fact, reconstructor.provenance.get(fact, ''), meaning)
         reconstructor.warm_up()

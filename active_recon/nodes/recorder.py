@@ -25,7 +25,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 PROVENANCE = {'weights_sha256': 'weights_sha256', 'config_sha256': 'config_sha256',
-              'runtime': 'runtime', 'needs_front': 'needs_front', 'policy': 'policy_in_use',
+              'computed_by': 'computed_by', 'needs_front': 'needs_front', 'policy': 'policy_in_use',
               'seed': 'seed', 'object': 'object'}
 """The bag's provenance: its names, and those of the parameters of the loop's nodes."""
 UPDATE_EVERY_S = 0.1

@@ -12,6 +12,7 @@ from active_recon.geometry.cameras import (
 )
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
 from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy
+from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.loop.view_synchronizer import ViewSynchronizer
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.clock import AHEAD_S, STEADY
@@ -57,6 +58,7 @@ class ViewPlannerNode(ManagedNode):
         self._planner = self._planner_of(params, self._loaded.policy)
         tell_policy(self, self._diagnostics, self._loaded.in_use)
         self.add_cleanup(self._free_policy)
+        tell_of_runtime(self._diagnostics, self._planner.provenance)
         self._goals = GoalPublisher(self, self._frame)
         self._done_pub = self.create_publisher(Header, 'done', LATCHED_QOS)
         self._diagnostics.measure_rates('views', 'goals')
@@ -103,6 +105,7 @@ class ViewPlannerNode(ManagedNode):
             if loaded.in_use != self._loaded.in_use:
                 tell_policy(self, self._diagnostics, loaded.in_use)
             self._loaded, self._planner = loaded, planner
+            tell_of_runtime(self._diagnostics, planner.provenance)
             if not self.is_active:
                 return
             if planner.wants_volume:

@@ -35,7 +35,7 @@ def main(root: str, category: str, name: str, weights: str, threads: str, views:
         from active_recon.volumes.binvox import write_binvox
         from active_recon.volumes.rendering import composite
         from active_recon.volumes.voxels import VoxelGrid, write_mesh
-        runtime = load_runtime(Path(weights), threads=int(threads))
+        runtime = load_runtime(Path(weights), 'torch', threads=int(threads))
     with timed('pre-processing data'):
         folder = ObjectFolder(Path(root), category, name)
         camera = folder.cameras()[0]

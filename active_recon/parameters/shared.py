@@ -5,6 +5,7 @@ import math
 
 from active_recon.geometry.cameras import OBJECT_FRAME
 from active_recon.parameters.declaration import parameter
+from active_recon.runtimes import AUTO, PRECISIONS, RUNTIME_CHOICES
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,11 @@ class NetworkParameters:
     weights: str = parameter(
         '', 'weights file, or a model whose weights ship; empty for the default model')
     threads: int = parameter(1, 'number of CPU threads of the network', low=1, high=256)
+    runtime: str = parameter(
+        AUTO, 'library that runs the network; auto is openvino where its weights are exported, '
+        'else torch', choices=RUNTIME_CHOICES)
+    precision: str = parameter(
+        'auto', 'numbers that the network computes with; auto is f32', choices=PRECISIONS)
 
 
 @dataclass(frozen=True)

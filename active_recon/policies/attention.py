@@ -25,6 +25,7 @@ class AttentionPolicy:
 
     def __init__(self, runtime: PolicyRuntime, sigma: float = 0.35) -> None:
         self._runtime = runtime
+        self.provenance = runtime.provenance
         self._sigma = sigma
         self._latent_shape = tuple(runtime.facts['latent_shape'])
         self._separation = float(runtime.facts['view_separation'])

@@ -18,7 +18,7 @@ from active_recon.policies.rendered import (
     visible_entropy,
 )
 from active_recon.policies.scoring import ScoringPolicy
-from active_recon.runtimes import load_policy_runtime, PolicyRuntime
+from active_recon.runtimes import AUTO, load_policy_runtime, PolicyRuntime
 import numpy as np
 
 
@@ -27,16 +27,17 @@ class PolicyOptions:
     """
     What policies are made of.
 
-    `views` of an episode; `weights` None: those that ship; `device` and `threads` of what runs a
-    learned policy, see `load_runtime`.
+    `views` of an episode; `weights` None: those that ship; `runtime`, `device`, `threads` and
+    `precision` of what runs a learned policy, see `load_runtime`.
     """
 
     rng: np.random.Generator = field(default_factory=np.random.default_rng)
     views: int = 5
     weights: Path | None = None
-    runtime: str = 'torch'
+    runtime: str = AUTO
     device: str = 'cpu'
     threads: int | None = None
+    precision: str = 'auto'
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def learned_policy(model: str, runtime: PolicyRuntime) -> Policy:
 def _attention(options: PolicyOptions) -> Policy:
     model = read_metadata(options.weights or SHIPPED).model
     return learned_policy(model, load_policy_runtime(
-        options.weights, options.runtime, options.device, options.threads))
+        options.weights, options.runtime, options.device, options.threads, options.precision))
 
 
 POLICIES: dict[str, PolicyEntry] = {

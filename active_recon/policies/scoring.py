@@ -2,6 +2,7 @@
 
 import math
 
+from active_recon.models.candidate_looks import look
 from active_recon.policies.base import Choice, distance_to_taken, Observation
 from active_recon.policies.candidate_rendering import coarse_volume
 from active_recon.runtimes import PolicyRuntime, State
@@ -25,6 +26,7 @@ class ScoringPolicy:
 
     def __init__(self, runtime: PolicyRuntime) -> None:
         self._runtime = runtime
+        self.provenance = runtime.provenance
 
     def initial_state(self, batch: int) -> State:
         """Return the model's state before any view."""
@@ -34,10 +36,8 @@ class ScoringPolicy:
         """Return expected gains of IoU as scores; see Policy."""
         assert seen.occupancy is not None
         volume = coarse_volume(seen.occupancy)
-        found, state = self._runtime.step(
-            {'occupancy': volume.occupancy, 'entropy': volume.entropy,
-             'taken': seen.taken.astype(np.float32),
-             'candidates': seen.candidates.astype(np.float32)}, state)
+        looks = look(volume.occupancy, volume.entropy, seen.taken, seen.candidates)
+        found, state = self._runtime.step(looks._asdict(), state)
         gains = found['gain']
         least = np.minimum(gains.min(axis=1, keepdims=True), 0)
         new = np.minimum(distance_to_taken(seen) / _SAME, 1)

@@ -1,12 +1,17 @@
 """What runs a network: one Protocol, and one module for each library that can."""
 
 from active_recon.runtimes.base import (
+    AUTO,
     load_policy_runtime,
     load_runtime,
     PolicyRuntime,
+    REMARK,
     Runtime,
+    RUNTIME_CHOICES,
     RUNTIMES,
     State,
 )
+from active_recon.runtimes.precision import PRECISIONS
 
-__all__ = ['PolicyRuntime', 'RUNTIMES', 'Runtime', 'State', 'load_policy_runtime', 'load_runtime']
+__all__ = ['AUTO', 'PRECISIONS', 'PolicyRuntime', 'REMARK', 'RUNTIMES', 'RUNTIME_CHOICES',
+           'Runtime', 'State', 'load_policy_runtime', 'load_runtime']

@@ -1,12 +1,14 @@
 """The seam between a network and what runs it: named arrays in, named arrays out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol, TYPE_CHECKING
 
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, WeightsError
 from active_recon.geometry.cameras import Camera
+from active_recon.runtimes.graph_files import is_exported, NETWORK_PARTS, POLICY_PART
+from active_recon.runtimes.precision import require_precision
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,10 +18,15 @@ if TYPE_CHECKING:  # it brings OpenCV, for which no list of policies need wait
 State = Mapping[str, NDArray[np.float32]]
 """What a network or a policy knows after some views: named arrays, batch first."""
 
-RUNTIMES: Mapping[str, str] = {'torch': 'active_recon.runtimes.torch'}
+RUNTIMES: Mapping[str, str] = {
+    name: f'active_recon.runtimes.{name}' for name in ('openvino', 'torch', 'onnxruntime')}
 """
 The module of each runtime, which offers `load_network` and `load_policy`; imported when asked for.
 """
+AUTO = 'auto'
+RUNTIME_CHOICES = (AUTO, *RUNTIMES)
+REMARK = 'remark'
+"""The key of what a runtime's provenance says to the user, where it is not the one wished for."""
 
 
 class Runtime(Protocol):
@@ -65,8 +72,12 @@ class PolicyRuntime(Protocol):
     """
     Runs the model of a learned view policy for B episodes at once.
 
-    `facts` are the model's constants that a policy needs, by name.
+    - facts: the model's constants that a policy needs, by name
+    - provenance: what diagnostics tell of it
     """
+
+    @property
+    def provenance(self) -> Mapping[str, str]: ...
 
     @property
     def facts(self) -> Mapping[str, Any]: ...
@@ -81,27 +92,51 @@ class PolicyRuntime(Protocol):
         ...
 
 
-def load_runtime(weights: Path | None = None, runtime: str = 'torch', device: str = 'cpu',
-                 threads: int | None = None) -> Runtime:
+def load_runtime(weights: Path | None = None, runtime: str = AUTO, device: str = 'cpu',
+                 threads: int | None = None, precision: str = 'auto') -> Runtime:
     """
     Return a runtime of the network in a weights file; None: those that ship.
 
-    `threads` is the number of CPU threads; None is the library's default. Raises WeightsError,
-    and ConfigError on a runtime or a device that is not available.
+    `auto` is openvino where these very weights are exported beside them, else torch; where an
+    export is there and cannot be used, the provenance's `remark` says why. `threads` is the number
+    of CPU threads; None is the library's default. `precision` is one of `precision.PRECISIONS`.
+    Raises WeightsError, and ConfigError on a runtime, a device or a precision that is not
+    available.
     """
-    loaded: Runtime = _module(runtime).load_network(weights, device, threads)
+    loaded: Runtime = _loaded('load_network', NETWORK_PARTS, weights, runtime, device, threads,
+                              precision)
     return loaded
 
 
-def load_policy_runtime(weights: Path | None = None, runtime: str = 'torch', device: str = 'cpu',
-                        threads: int | None = None) -> PolicyRuntime:
-    """Return a runtime of the learned policy in a weights file; raises as `load_runtime`."""
-    loaded: PolicyRuntime = _module(runtime).load_policy(weights, device, threads)
+def load_policy_runtime(weights: Path | None = None, runtime: str = AUTO, device: str = 'cpu',
+                        threads: int | None = None, precision: str = 'auto') -> PolicyRuntime:
+    """Return a runtime of the learned policy in a weights file; see `load_runtime`."""
+    loaded: PolicyRuntime = _loaded('load_policy', (POLICY_PART,), weights, runtime, device,
+                                    threads, precision)
     return loaded
 
 
-def _module(runtime: str) -> Any:
+def _loaded(what: str, parts: Sequence[str], weights: Path | None, runtime: str, device: str,
+            threads: int | None, precision: str) -> Any:
+    require_precision(precision)
+    if runtime == AUTO:
+        return _loaded_by_choice(what, parts, weights, device, threads, precision)
     if runtime not in RUNTIMES:
-        raise ConfigError(f'runtime: unknown value: expected one of {", ".join(RUNTIMES)}, '
+        raise ConfigError(f'runtime: unknown value: expected one of {", ".join(RUNTIME_CHOICES)}, '
                           f'got {runtime!r}')
-    return import_module(RUNTIMES[runtime])
+    return getattr(import_module(RUNTIMES[runtime]), what)(weights, device, threads, precision)
+
+
+def _loaded_by_choice(what: str, parts: Sequence[str], weights: Path | None, device: str,
+                      threads: int | None, precision: str) -> Any:
+    remark = ''
+    if device == 'cpu' and is_exported(weights, parts):
+        try:
+            return _loaded(what, parts, weights, 'openvino', device, threads, precision)
+        except (ConfigError, WeightsError) as error:
+            remark = f'the runtime torch instead of openvino: {error}'
+    loaded = _loaded(what, parts, weights, 'torch', device, threads,
+                     'f32' if remark else precision)
+    if remark:
+        loaded.provenance = {**loaded.provenance, REMARK: remark}
+    return loaded

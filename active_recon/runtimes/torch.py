@@ -14,6 +14,7 @@ from active_recon.models.scorer_weights import load_scorer
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import config_hash, read_metadata, SHIPPED, weights_hash
 from active_recon.runtimes.base import State
+from active_recon.runtimes.precision import require_f32
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -30,7 +31,8 @@ class TorchRuntime:
         self._threads = threads
         self.spec = network.spec
         self.threshold = threshold
-        self.provenance = {**(provenance or {}), **_provenance(network.device, threads)}
+        self.provenance: Mapping[str, str] = {
+            **(provenance or {}), **_provenance(network.device, threads)}
 
     @torch.inference_mode()
     def initial_state(self) -> State:
@@ -64,6 +66,7 @@ class TorchPolicyRuntime:
         self._threads = threads
         self._device = next(model.parameters()).device
         self.facts = cast(Mapping[str, Any], model.facts)
+        self.provenance: Mapping[str, str] = _provenance(self._device, threads)
 
     @torch.inference_mode()
     def initial_state(self, batch: int) -> State:
@@ -80,17 +83,19 @@ class TorchPolicyRuntime:
             return _arrays(outputs._asdict()), _arrays(known)
 
 
-def load_network(weights: Path | None, device: str, threads: int | None) -> TorchRuntime:
+def load_network(weights: Path | None, device: str, threads: int | None,
+                 precision: str) -> TorchRuntime:
     """Return the network of a weights file; see `load_runtime`."""
-    _require(device)
+    _require(device, precision)
     bundle = load_weights(weights, device)
     return TorchRuntime(bundle.reconstruction, bundle.threshold, threads, {
         'weights_sha256': weights_hash(weights), 'config_sha256': config_hash(bundle.config)})
 
 
-def load_policy(weights: Path | None, device: str, threads: int | None) -> TorchPolicyRuntime:
+def load_policy(weights: Path | None, device: str, threads: int | None,
+                precision: str) -> TorchPolicyRuntime:
     """Return the policy in a weights file, or beside it; raises WeightsError without one."""
-    _require(device)
+    _require(device, 'f32')  # whatever the network's
     if network_entry(read_metadata(weights or SHIPPED).model).policy is None:
         return TorchPolicyRuntime(load_scorer(weights, device), threads)
     model = load_weights(weights, device).attention
@@ -100,7 +105,8 @@ def load_policy(weights: Path | None, device: str, threads: int | None) -> Torch
     return TorchPolicyRuntime(model, threads)
 
 
-def _require(device: str) -> None:
+def _require(device: str, precision: str) -> None:
+    require_f32(precision, 'torch')
     if device == 'cuda' and not torch.cuda.is_available():
         raise ConfigError('parameter device: cuda not available: expected a device that torch can '
                           'use, but this torch finds no GPU; use cpu')
@@ -108,7 +114,7 @@ def _require(device: str) -> None:
 
 def _provenance(device: torch.device, threads: int | None) -> dict[str, str]:
     count = torch.get_num_threads() if threads is None else threads
-    return {'runtime': f'torch {torch.__version__}, float32, {device.type}, {count} threads'}
+    return {'computed_by': f'torch {torch.__version__}, f32, {device.type}, {count} threads'}
 
 
 def _tensors(arrays: State, device: torch.device) -> dict[str, Tensor]:

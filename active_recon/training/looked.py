@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from active_recon.models.view_scorer import look, Looked
+from active_recon.models.candidate_looks import look
+from active_recon.models.view_scorer import Looked
 from active_recon.policies.candidate_rendering import coarse_volume
 from active_recon.training.view_gains import ViewGains
 import numpy as np
@@ -33,7 +34,6 @@ class LookedStates:
         return LookedStates(Looked(*(part[index] for part in self.looked)), self.gains[index])
 
 
-@torch.inference_mode()
 def looked_states(measured: ViewGains) -> LookedStates:
     """Return the states of one object."""
     found = []
@@ -41,11 +41,10 @@ def looked_states(measured: ViewGains) -> LookedStates:
         seen = measured.observation(row)
         assert seen.occupancy is not None
         volume = coarse_volume(seen.occupancy)
-        found.append(look(torch.from_numpy(volume.occupancy), torch.from_numpy(volume.entropy),
-                          torch.from_numpy(seen.taken).float(),
-                          torch.from_numpy(seen.candidates).float()))
-    return LookedStates(Looked(*(torch.cat(parts) for parts in zip(*found, strict=True))),
-                        torch.from_numpy(measured.gains))
+        found.append(look(volume.occupancy, volume.entropy, seen.taken, seen.candidates))
+    grids, facts, views = (torch.from_numpy(np.concatenate(parts))
+                           for parts in zip(*found, strict=True))
+    return LookedStates(Looked(grids, facts, views.long()), torch.from_numpy(measured.gains))
 
 
 def joined(parts: Sequence[LookedStates]) -> list[LookedStates]:

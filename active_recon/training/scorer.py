@@ -7,7 +7,8 @@ import math
 from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.evaluation.rollouts import batches
-from active_recon.models.view_scorer import MOST_VIEWS, ScorerConfig, ViewScorer
+from active_recon.models.candidate_looks import MOST_VIEWS
+from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.training.looked import batches_of, LookedStates, mirrored, spreads
 from active_recon.training.scorer_losses import listwise_loss, ordinal_loss, standardised
 import numpy as np

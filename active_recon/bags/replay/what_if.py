@@ -57,7 +57,8 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
                   'replay_of': run.path.resolve().name}
     parameters = {'/reconstructor': {
         **node_parameters(run, 'reconstructor'), **made_by, 'threshold': math.nan,
-        'weights': str(setup.weights), **setup.reconstructor}}
+        'weights': str(setup.weights), 'runtime': setup.runtime, 'precision': setup.precision,
+        **setup.reconstructor}}
     if setup.planner is not None and (overrides.policy or not overrides.weights):
         planning = {**node_parameters(run, 'view_planner'), **setup.planner,
                     'policy_in_use': setup.planner['policy'],

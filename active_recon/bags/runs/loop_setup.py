@@ -16,6 +16,7 @@ from active_recon.geometry.cameras import CANONICAL_DISTANCE
 from active_recon.models.weights_files import find_weights, FOLDER, SHIPPED, weights_hash
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
+from active_recon.runtimes import AUTO, RUNTIME_CHOICES
 
 _OF_RECONSTRUCTOR = ('object_size', 'object_yaw', 'threshold')
 _OF_LIMITS = tuple(field.name for field in fields(MotionLimits))
@@ -46,13 +47,16 @@ class LoopSetup:
     """
     What the loop was started with; names missing in the mappings have the core's defaults.
 
-    `planner` is None if the bag does not say which policy chose the views.
+    `planner` is None if the bag does not say which policy chose the views. `threads`, `runtime`
+    and `precision` are those of the network, and of a learned policy.
     """
 
     weights: Path
     reconstructor: Mapping[str, Any]
     planner: Mapping[str, Any] | None
     threads: int = 1
+    runtime: str = AUTO
+    precision: str = 'auto'
 
     def with_overrides(self, overrides: Overrides) -> 'LoopSetup':
         """Return the setup with another model, policy or threshold."""
@@ -73,7 +77,8 @@ class LoopSetup:
 
     def load_reconstructor(self) -> Reconstructor:
         """Return the reconstructor; raises WeightsError or ConfigError."""
-        return Reconstructor.load(self.weights, threads=self.threads, **self.reconstructor)
+        return Reconstructor.load(self.weights, threads=self.threads, runtime=self.runtime,
+                                  precision=self.precision, **self.reconstructor)
 
     def load_planner(self) -> Planner | None:
         """Return the planner, None if the policy is unknown; raises WeightsError, ConfigError."""
@@ -82,9 +87,11 @@ class LoopSetup:
         limits = MotionLimits(**_own(self.planner, _OF_LIMITS))
         motion = TimedMotion(**_own(self.planner, _OF_MOTION))
         place = {'distance': CANONICAL_DISTANCE * self.reconstructor.get('object_size', 1.0)}
-        return Planner.load(limits=limits, motion=motion, threads=self.threads, **place | {
-            name: value for name, value in self.planner.items()
-            if name not in (*_OF_LIMITS, *_OF_MOTION)})
+        return Planner.load(
+            limits=limits, motion=motion, threads=self.threads, runtime=self.runtime,
+            precision=self.precision, **place | {
+                name: value for name, value in self.planner.items()
+                if name not in (*_OF_LIMITS, *_OF_MOTION)})
 
 
 def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: bool = False,
@@ -112,7 +119,14 @@ def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: b
         same = own == of_reconstructor.get('weights', '')
         planner['weights'] = found if same else find_weights(own or None)
     return LoopSetup(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
-                    of_reconstructor.get('threads', 1))
+                    of_reconstructor.get('threads', 1), _runtime(of_reconstructor),
+                    of_reconstructor.get('precision', 'auto'))
+
+
+def _runtime(parameters: Mapping[str, Any]) -> str:
+    """Return the runtime that was asked for; earlier bags have what it was, in words."""
+    asked = parameters.get('runtime')
+    return asked if asked in RUNTIME_CHOICES else AUTO
 
 
 def _given(parameters: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:

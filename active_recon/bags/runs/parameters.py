@@ -10,7 +10,7 @@ from active_recon.parameters.declaration import declared
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
 
 _NEEDED = frozenset((
-    'weights', 'threads', 'object_size', 'object_frame', 'object_yaw', 'threshold',
+    'weights', 'threads', 'precision', 'object_size', 'object_frame', 'object_yaw', 'threshold',
     'goal_tolerance', 'max_pose_gap', 'policy', 'seed', 'max_views', 'entropy_tolerance',
     'target_quality', 'min_gain',
     'azimuth_range', 'forbidden_sectors', 'reachable_azimuths', 'motion_weight', 'motion_cost',

@@ -42,8 +42,8 @@ def loaded_policy(params: ViewPlannerParameters, before: LoadedPolicy | None = N
             for name in POLICIES[in_use.name].parameters):
         return LoadedPolicy(before.policy, in_use, params)
     return LoadedPolicy(load_policy(in_use.name, PolicyOptions(
-        np.random.default_rng(params.seed), params.max_views, weights,
-        threads=params.threads)), in_use, params)
+        np.random.default_rng(params.seed), params.max_views, weights, params.runtime,
+        threads=params.threads, precision=params.precision)), in_use, params)
 
 
 def tell_policy(node: ManagedNode, diagnostics: Diagnostics, in_use: PolicyInUse) -> None:

@@ -1,0 +1,29 @@
+"""`active-recon export`: weights as ONNX files, for runtimes that are not torch."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def export(
+    weights: Annotated[str, typer.Argument(
+        help='Name of a model that ships, or a .safetensors file.')],
+    out: Annotated[Path | None, typer.Argument(
+        help='Folder of the files; default: that of the weights, where they are looked '
+             'for.')] = None,
+) -> None:
+    """
+    Write a network's encoder, update and decoder as ONNX, and the view policy that goes with it.
+
+    The runtimes openvino and onnxruntime run these files; without them, weights run in torch. Each
+    file says in its metadata which weights it was made of, and is refused beside others. An export
+    of one version of torch and onnx may differ from that of another in its bytes.
+
+    Example: active-recon export runs/new/weights.safetensors
+    """
+    from active_recon.exporting.export import export as written
+    from active_recon.models.weights_files import find_weights
+
+    for path in written(find_weights(weights), out):
+        typer.echo(f'wrote {path}')

@@ -1,0 +1,146 @@
+"""Weights to ONNX files with their metadata inside."""
+
+import io
+from pathlib import Path
+from typing import Any
+import warnings
+
+from active_recon.errors import ConfigError
+from active_recon.exporting.parts import network_parts, Part, policy_part
+from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID
+from active_recon.models.network import State
+from active_recon.models.scorer_weights import load_scorer
+from active_recon.models.weights import Bundle, load_weights
+from active_recon.models.weights_files import config_hash, scorer_path, weights_hash
+from active_recon.runtimes.graph_files import graph_path, GraphMetadata, KEY, POLICY_PART
+import numpy as np
+import torch
+
+_OPSET = 17
+_LARGE = 64  # numbers; fewer are not worth another node
+_MODEL_VERSION = 8  # of ONNX files, the one that goes with the opset
+
+
+def export(weights: Path, folder: Path | None = None) -> list[Path]:
+    """
+    Write the graphs of weights, and of the view policy in them or beside them; return the files.
+
+    They lie beside the weights, or in another folder. Raises WeightsError as `load_weights` does,
+    and ConfigError where the network runs in torch alone, where it has something that no graph
+    can have, or where onnx is not installed.
+    """
+    _require_onnx()
+    bundle = load_weights(weights)
+    network, digest = bundle.reconstruction, weights_hash(weights)
+    if network.runs_in_torch_alone:
+        raise ConfigError(f'{bundle.model}: not exported: {network.runs_in_torch_alone}; it runs '
+                          'with the runtime torch')
+    spec = network.spec
+    facts = {'model': bundle.model, 'threshold': bundle.threshold, 'image_size': spec.image_size,
+             'resolution': spec.resolution, 'needs_front': spec.needs_front,
+             'config_sha256': config_hash(bundle.config)}
+    state = _described(bundle.model, network.initial_state(1))
+    graphs = {name: _written(bundle.model, part, GraphMetadata(name, digest, state, facts))
+              for name, part in network_parts(network).items()}
+    graphs |= _policy_graph(weights, bundle, digest)
+    (folder or weights.parent).mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, data in graphs.items():
+        written.append(graph_path(weights, name, folder))
+        written[-1].write_bytes(data)
+    return written
+
+
+def _policy_graph(weights: Path, bundle: Bundle, digest: str) -> dict[str, bytes]:
+    """Return the graph of the view policy that goes with weights; {} where none does."""
+    model: Any
+    if bundle.attention is not None:
+        model = bundle.attention
+        latent = torch.zeros(2, *model.facts['latent_shape'])
+        inputs, axes = {'latent': latent, 'azimuth': torch.zeros(2)}, {}
+        own = digest
+    elif scorer_path(weights).is_file():
+        model, own = load_scorer(weights), weights_hash(scorer_path(weights))
+        count = 3
+        inputs = {'grids': torch.zeros(2, count, CHANNELS, GRID, GRID, GRID),
+                  'facts': torch.zeros(2, count, FACTS), 'views': torch.ones(2)}
+        axes = {name: {1: 'candidates'} for name in ('grids', 'facts', 'gain')}
+    else:
+        return {}
+    facts = {**model.facts, 'policy_sha256': own}
+    told = GraphMetadata(POLICY_PART, digest, _described(bundle.model, model.initial_state(1)),
+                         facts)
+    return {POLICY_PART: _written(bundle.model, policy_part(model, inputs, axes), told)}
+
+
+def _described(model: str, state: State) -> dict[str, tuple[tuple[int, ...], float]]:
+    """Return the shapes of a first state, without the axis of objects, and its values."""
+    described = {}
+    for name, part in state.items():
+        value = float(part.flatten()[0])
+        if not bool((part == value).all()):
+            raise ConfigError(f'{model}: not exported: expected a first state of one value in '
+                              f'each array, got several in {name}')
+        described[name] = (tuple(part.shape[1:]), value)
+    return described
+
+
+def _written(model: str, part: Part, told: GraphMetadata) -> bytes:
+    """Return the ONNX file of a part."""
+    import onnx
+
+    found = io.BytesIO()
+    with warnings.catch_warnings(), torch.no_grad():
+        # The exporter that needs no other package is called old; shapes are constant here
+        warnings.simplefilter('ignore')
+        try:
+            torch.onnx.export(
+                part.module, tuple(part.inputs.values()), found,  # type: ignore[arg-type]
+                input_names=list(part.inputs), output_names=list(part.outputs),
+                dynamic_axes=part.dynamic, opset_version=_OPSET, dynamo=False)
+        except (RuntimeError, torch.onnx.errors.OnnxExporterError) as error:
+            first = str(error).strip().splitlines()[0]
+            raise ConfigError(f'{model}: not exported: expected operations that ONNX has, got '
+                              f'{first}') from error
+    graph = onnx.load_from_string(found.getvalue())
+    _join(graph)
+    _halve(graph)
+    graph.metadata_props.add(key=KEY, value=told.to_json())
+    return bytes(graph.SerializeToString(deterministic=True))
+
+
+def _join(graph: Any) -> None:
+    """Leave out the second names of equal weights, which ONNX Runtime stumbles over."""
+    stored = {each.name for each in graph.graph.initializer}
+    second = {node.output[0]: node.input[0] for node in graph.graph.node
+              if node.op_type == 'Identity' and node.input[0] in stored}
+    nodes = [node for node in graph.graph.node if node.output[0] not in second]
+    for node in nodes:
+        for place, name in enumerate(node.input):
+            node.input[place] = second.get(name, name)
+    del graph.graph.node[:]
+    graph.graph.node.extend(nodes)
+
+
+def _halve(graph: Any) -> None:
+    """Store what half precision holds exactly in half precision, as weights files do."""
+    from onnx import helper, numpy_helper, TensorProto
+
+    for stored in graph.graph.initializer:
+        values = numpy_helper.to_array(stored)
+        half = values.astype(np.float16) if values.dtype == np.float32 else None
+        if half is None or values.size < _LARGE or not np.array_equal(
+                half.astype(np.float32), values):
+            continue
+        name = stored.name
+        stored.CopyFrom(numpy_helper.from_array(half, f'{name}.half'))
+        graph.graph.node.insert(0, helper.make_node(
+            'Cast', [f'{name}.half'], [name], to=TensorProto.FLOAT))
+
+
+def _require_onnx() -> None:
+    try:
+        import onnx  # noqa: F401
+    except ImportError as error:
+        raise ConfigError('export: onnx is not installed: expected it, as `pip install '
+                          "'active_recon[export]'` installs it") from error

@@ -1,0 +1,61 @@
+"""Compiled graphs in the user's cache, each checked by its hash before it is taken."""
+
+import hashlib
+import os
+from pathlib import Path
+import tempfile
+
+VARIABLE = 'ACTIVE_RECON_CACHE'
+"""Names another folder for what may be made anew at any time; empty for none."""
+_DIGEST = hashlib.sha256().digest_size
+
+
+def cache_folder() -> Path | None:
+    """Return the folder of what may be made anew, which need not exist; None for none."""
+    chosen = os.environ.get(VARIABLE)
+    if chosen is not None:
+        return Path(chosen) if chosen else None
+    return Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser() / 'active_recon'
+
+
+def compiled_path(exported: bytes, name: str, *made_by: str) -> Path | None:
+    """
+    Return where what was compiled of an exported file is kept; None where nothing is kept.
+
+    `made_by`: all else that it depends on, such as the library's version and the processor.
+    """
+    folder = cache_folder()
+    key = hashlib.sha256('\0'.join((hashlib.sha256(exported).hexdigest(), *made_by)).encode())
+    return folder and folder / 'compiled' / f'{name}-{key.hexdigest()[:24]}.bin'
+
+
+def read_compiled(path: Path | None) -> memoryview | None:
+    """Return what `write_compiled` wrote, None where there is nothing, or nothing whole."""
+    if path is None:
+        return None
+    try:
+        data = memoryview(path.read_bytes())
+    except OSError:
+        return None
+    compiled = data[_DIGEST:]
+    return compiled if hashlib.sha256(compiled).digest() == data[:_DIGEST] else None
+
+
+def write_compiled(path: Path | None, compiled: bytes) -> str:
+    """Write what was compiled, at once as a whole; return why it could not be, '' else."""
+    if path is None:
+        return ''
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            try:
+                file.write(hashlib.sha256(compiled).digest() + compiled)
+                file.close()
+                os.replace(file.name, path)
+            except OSError:
+                os.unlink(file.name)
+                raise
+    except OSError as error:
+        return (f'{path.parent}: compiled networks cannot be kept there: {error.strerror}; each '
+                f'start takes a second more: set {VARIABLE} to another folder, or to none')
+    return ''

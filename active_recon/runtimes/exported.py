@@ -1,0 +1,179 @@
+"""Exported networks and policies, whatever library runs their graphs."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from active_recon.errors import WeightsError
+from active_recon.geometry.cameras import Camera, orbit_camera
+from active_recon.geometry.canonical import network_image, NetworkSpec
+from active_recon.models.weights_files import scorer_path, SHIPPED, weights_hash
+from active_recon.runtimes.base import State
+from active_recon.runtimes.graph_files import (
+    graph_path,
+    GraphMetadata,
+    NETWORK_PARTS,
+    NEXT,
+    POLICY_PART,
+    read_graph_metadata,
+    require_shapes,
+)
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = Mapping[str, NDArray[np.float32]]
+
+
+class Graph(Protocol):
+    """
+    A graph that a library has read and can run.
+
+    - inputs: their shapes by name, None for an axis of any length; outputs: their names
+    - metadata: the text under `graph_files.KEY`, None where there is none
+    """
+
+    @property
+    def inputs(self) -> Mapping[str, Sequence[int | None]]: ...
+
+    @property
+    def outputs(self) -> Sequence[str]: ...
+
+    @property
+    def metadata(self) -> str | None: ...
+
+    def run(self, inputs: Arrays) -> dict[str, NDArray[np.float32]]:
+        """Return the outputs by name, in arrays of their own; other inputs are left out."""
+        ...
+
+
+OpenGraph = Callable[[Path, bool], Graph]
+"""Opens a file; whether half precision may be used in it. Raises WeightsError."""
+
+
+class ExportedRuntime:
+    """A reconstruction network in graphs; see Runtime."""
+
+    def __init__(self, graphs: Mapping[str, Graph], told: GraphMetadata) -> None:
+        self._encode, self._update, self._decode = (graphs[part] for part in NETWORK_PARTS)
+        facts = told.facts
+        self.spec = NetworkSpec(facts['image_size'], facts['resolution'], facts['needs_front'])
+        self.threshold = float(facts['threshold'])
+        self.provenance: Mapping[str, str] = {
+            'weights_sha256': told.weights_sha256, 'config_sha256': facts['config_sha256']}
+        self._state = told.state
+
+    def initial_state(self) -> State:
+        """Return the state before any view."""
+        return first_state(self._state, 1)
+
+    def step(self, image: NDArray[np.uint8], camera: Camera,
+             state: State) -> tuple[NDArray[np.float32], NDArray[np.float32], State]:
+        """Take in an image; see Runtime."""
+        seen_from = {'pose': camera.pose[None].astype(np.float32),
+                     'intrinsics': camera.intrinsics.matrix[None].astype(np.float32)}
+        encoded = self._encode.run({'image': self._channels(image), **seen_from})
+        found = self._update.run({**encoded, **seen_from, **state})
+        after = {name: found.pop(NEXT + name) for name in self._state}
+        occupancy = self._decode.run({**after, **found})['occupancy']
+        return occupancy[0], after['latent'][0], after
+
+    def warm_up(self) -> None:
+        """Run once, so that the first view is as fast as the others."""
+        camera = orbit_camera(0.0)
+        blank = np.zeros((camera.intrinsics.height, camera.intrinsics.width, 3), np.uint8)
+        self.step(*network_image(blank, camera, self.spec), self.initial_state())
+
+    def _channels(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return an image as the graph takes it: a missing mask of pixels seen is 1."""
+        wanted = self._encode.inputs['image'][1]
+        planes = np.ones((1, wanted, *image.shape[:2]), np.float32)
+        planes[0, :image.shape[2]] = image.transpose(2, 0, 1)
+        planes[0, :image.shape[2]] *= np.float32(1 / 255)
+        return planes
+
+
+class ExportedPolicyRuntime:
+    """The model of a learned view policy in a graph; see PolicyRuntime."""
+
+    def __init__(self, graph: Graph, told: GraphMetadata) -> None:
+        self._graph, self._state = graph, told.state
+        self.facts = told.facts
+        self.provenance: Mapping[str, str] = {}
+
+    def initial_state(self, batch: int) -> State:
+        """Return the state before any view."""
+        return first_state(self._state, batch)
+
+    def step(self, inputs: Arrays, state: State) -> tuple[Arrays, State]:
+        """Return the model's outputs after a view, and the next state."""
+        found = self._graph.run({**inputs, **state})
+        after = {name: found.pop(NEXT + name) for name in self._state}
+        return found, after
+
+
+def first_state(described: Mapping[str, tuple[Sequence[int], float]], batch: int) -> State:
+    """Return the state before any view of so many objects."""
+    return {name: np.full((batch, *shape), value, np.float32)
+            for name, (shape, value) in described.items()}
+
+
+def open_network(weights: Path | None, open_graph: OpenGraph) -> ExportedRuntime:
+    """Return the exported network beside weights; None: of those that ship. WeightsError."""
+    weights = weights or SHIPPED
+    digest = weights_hash(weights)
+    # The update adds up over views, which half precision is too coarse for
+    graphs, told = {}, {}
+    for part in NETWORK_PARTS:
+        graphs[part], told[part] = _opened(weights, part, digest, open_graph, part != 'update')
+    if any(each.facts != told['update'].facts for each in told.values()):
+        raise WeightsError(f'{graph_path(weights, "update")}: exported at another time than the '
+                           'parts beside it; export the weights anew')
+    _require_parts(weights, graphs, told['update'])
+    return ExportedRuntime(graphs, told['update'])
+
+
+def open_policy(weights: Path | None, open_graph: OpenGraph) -> ExportedPolicyRuntime:
+    """Return the exported policy beside weights; None: beside those that ship. WeightsError."""
+    weights = weights or SHIPPED
+    digest = weights_hash(weights)
+    graph, told = _opened(weights, POLICY_PART, digest, open_graph, False)
+    beside = scorer_path(weights)
+    own = weights_hash(beside) if beside.is_file() else digest
+    if told.facts.get('policy_sha256') != own:
+        raise WeightsError(f'{graph_path(weights, POLICY_PART)}: exported from another view '
+                           f'policy: expected that of {beside.name}, trained since; export the '
+                           'weights anew')
+    return ExportedPolicyRuntime(graph, told)
+
+
+def _opened(weights: Path, part: str, digest: str, open_graph: OpenGraph,
+            half: bool) -> tuple[Graph, GraphMetadata]:
+    path = graph_path(weights, part)
+    if not path.is_file():
+        raise WeightsError(f'{weights.name}: not exported: expected {path.name} beside it, which '
+                           '`active-recon export` makes; the runtime torch needs none')
+    graph = open_graph(path, half)
+    told = read_graph_metadata(path, graph.metadata, part, digest)
+    require_shapes(path, told, graph.inputs, graph.outputs, 1)
+    return graph, told
+
+
+def _require_parts(weights: Path, graphs: Mapping[str, Graph], told: GraphMetadata) -> None:
+    """Raise WeightsError where the parts of a network do not give what the next of them takes."""
+    camera = {'pose', 'intrinsics'}
+    size, resolution = told.facts['image_size'], told.facts['resolution']
+    given = {'encode': {'image', *camera}, 'update': {'encoded', *camera, *told.state},
+             'decode': {*told.state, *graphs['update'].outputs}}
+    gives = {'encode': ['encoded'], 'update': [], 'decode': ['occupancy']}
+    for part, graph in graphs.items():
+        path = graph_path(weights, part)
+        if wrong := set(graph.inputs) - given[part]:
+            raise WeightsError(f'{path}: contradicts its metadata: expected inputs among '
+                               f'{", ".join(sorted(given[part]))}, got {", ".join(sorted(wrong))}')
+        if not set(gives[part]) <= set(graph.outputs):
+            raise WeightsError(f'{path}: contradicts its metadata: expected the output '
+                               f'{gives[part][0]}, got {", ".join(graph.outputs)}')
+    image = tuple(graphs['encode'].inputs.get('image', ()))
+    if image[2:] != (size, size) or not resolution > 0:
+        raise WeightsError(f'{graph_path(weights, "encode")}: contradicts its metadata: expected '
+                           f'images of {size} pixels, got {image}')

@@ -1,0 +1,109 @@
+"""The default network in each runtime, with no ROS: a view, a plan, and the start of a process."""
+
+from collections.abc import Callable, Iterator, Mapping
+from copy import copy
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+from active_recon.geometry.cameras import AZIMUTHS, Camera, orbit_camera
+from active_recon.geometry.canonical import network_image
+from active_recon.planner import Planner
+from active_recon.reconstructor import Reconstructor
+from active_recon.runtimes import load_runtime
+from active_recon.runtimes.precision import has_bf16
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import PUBLISHED_FLOOR
+from benchmarks.figures import Figure
+import numpy as np
+
+_CHAIR = Path(__file__).parents[1] / 'active_recon' / 'objects' / 'chair.glb'
+_REPEATS, _STARTS = 40, 5
+_RUNTIMES = ('torch', 'openvino')
+_START = """
+import os, sys
+from active_recon.reconstructor import Reconstructor
+from benchmarks.memory import peak_mb
+Reconstructor.load(threads=1, runtime=sys.argv[1]).warm_up()
+print(peak_mb(os.getpid()))
+"""
+
+
+def runtime_figures() -> list[Figure]:
+    """Return the figures of torch, and of openvino in f32 and, where the CPU has it, bf16."""
+    return [*_views(1), *_views(2), *_plans(24, 1), *_plans(200, 20), *_starts()]
+
+
+def _views(threads: int) -> Iterator[Figure]:
+    """Encode, update and decode, from the network's image to the occupancy of 64 cells."""
+    ways = [('torch', 'f32'), ('openvino', 'f32')]
+    ways += [('openvino', 'bf16')] if has_bf16() else []
+    taken = _taken()
+    tasks = {}
+    for name, precision in ways:
+        runtime = load_runtime(None, name, threads=threads, precision=precision)
+        views = [network_image(*view, runtime.spec) for view in taken]
+        state = runtime.initial_state()
+        for view in views[:4]:
+            _, _, state = runtime.step(*view, state)
+        tasks[f'a view, {name} {precision}, threads: {threads}'] = (
+            lambda runtime=runtime, view=views[4], state=state: runtime.step(*view, state))
+    for name, samples in _interleaved(tasks).items():
+        yield Figure(name, 'ms', samples, 4)
+
+
+def _plans(count: int, goal: float) -> Iterator[Figure]:
+    """Plan after five views with the learned policy, of candidates that it has planned with."""
+    ring = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    places = [] if count == 24 else [
+        number for azimuth in ring for number in (azimuth, 0.4 + 0.3 * np.sin(7 * azimuth), 0.0)]
+    reconstructor = Reconstructor.load(threads=1)
+    views = _taken()[:5]
+    seen = [(reconstructor.add_view(*view), view[1]) for view in views]
+    given = [(known.latent, camera, known.grid.entropy(), known.grid.above(PUBLISHED_FLOOR))
+             for known, camera in seen]
+    tasks = {}
+    for name in _RUNTIMES:
+        before = Planner.load('attention', max_views=10_000, entropy_tolerance=0, threads=1,
+                              reachable_views=places, runtime=name)
+        for view in given[:4]:
+            before.add_view(*view)
+        tasks[f'a plan of {count} candidates, {name}'] = (
+            lambda before=before: copy(before).add_view(*given[4]))
+    for name, samples in _interleaved(tasks).items():
+        yield Figure(name, 'ms', samples, goal)
+
+
+def _starts() -> Iterator[Figure]:
+    """Start a process until its network has run once, and the most that it holds by then."""
+    for name in _RUNTIMES:
+        times, peaks = [], []
+        for _ in range(_STARTS + 1):  # the first compiles
+            start = time.perf_counter()
+            ended = subprocess.run([sys.executable, '-c', _START, name], cwd=_CHAIR.parents[2],
+                                   capture_output=True, text=True, check=True)
+            times.append(time.perf_counter() - start)
+            peaks.append(float(ended.stdout))
+        yield Figure(f'start to a network that has run, {name}', 's', times[1:], 0.5)
+        yield Figure(f'peak memory of that, {name}', 'MB', peaks[1:], 150)
+
+
+def _interleaved(tasks: Mapping[str, Callable[[], object]]) -> dict[str, list[float]]:
+    """Return how long each of some tasks took, milliseconds, in turns: they share what slows."""
+    samples: dict[str, list[float]] = {name: [] for name in tasks}
+    for turn in range(_REPEATS + 2):
+        for name, task in tasks.items():
+            start = time.perf_counter()
+            task()
+            if turn >= 2:
+                samples[name].append(1e3 * (time.perf_counter() - start))
+    return samples
+
+
+def _taken() -> list[tuple[np.ndarray, Camera]]:
+    """Return images of the chair all around it, and their cameras."""
+    renderer = Renderer(load_mesh(_CHAIR))
+    cameras = [orbit_camera(azimuth) for azimuth in AZIMUTHS[::3]]
+    return [(composite(renderer.render(camera), 255), camera) for camera in cameras]
