@@ -20,6 +20,7 @@ from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:
     from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
+    from active_recon.photos.reconstruct import reconstruct
     from active_recon.planner import Planner
     from active_recon.reconstructor import load, Reconstructor
     from active_recon.volumes.refinement import refined_mesh
@@ -27,12 +28,12 @@ if TYPE_CHECKING:
 
 __version__ = '0.1.0'
 __all__ = ['Camera', 'Intrinsics', 'Planner', 'Reconstructor', 'VoxelGrid', 'load', 'orbit_camera',
-           'refined_mesh']
+           'reconstruct', 'refined_mesh']
 _MODULES = {
     'Camera': 'geometry.cameras', 'Intrinsics': 'geometry.cameras',
     'orbit_camera': 'geometry.cameras', 'Planner': 'planner', 'Reconstructor': 'reconstructor',
     'load': 'reconstructor', 'VoxelGrid': 'volumes.voxels',
-    'refined_mesh': 'volumes.refinement'}
+    'reconstruct': 'photos.reconstruct', 'refined_mesh': 'volumes.refinement'}
 
 
 def __getattr__(name: str) -> Any:

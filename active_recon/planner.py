@@ -13,7 +13,7 @@ from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, OrbitCamera
 from active_recon.geometry.view_distance import view_distance
 from active_recon.policies import (
-    AUTO,
+    AUTO_POLICY,
     Choice,
     load_policy,
     Observation,
@@ -101,7 +101,7 @@ class Planner:
         self.reset()
 
     @classmethod
-    def load(cls, policy: str = AUTO, weights: Path | None = None, seed: int = 0,
+    def load(cls, policy: str = AUTO_POLICY, weights: Path | None = None, seed: int = 0,
              max_views: int = 5, entropy_tolerance: float = 0.01, object_yaw: float = 0.0,
              device: str = 'cpu', limits: MotionLimits | None = None,
              motion_weight: float = 0.0, elevation: float | None = None,

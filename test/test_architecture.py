@@ -19,7 +19,7 @@ ROWS: tuple[set[str], ...] = (
     {'datasets', 'runtimes'},
     {'environment', 'exporting', 'policies', 'simulation'},
     {'parameters', 'planner', 'reconstructor'},
-    {'evaluation', 'msg_tools'},
+    {'evaluation', 'msg_tools', 'photos'},
     {'bags', 'training'},
     {'paper', 'report', 'viewer'},
     {'nodes'},

@@ -8,7 +8,13 @@ import sys
 
 from active_recon.errors import WeightsError
 from active_recon.models.weights_files import find_weights, PAPER_MODEL, SHIPPED
-from active_recon.policies import AUTO, load_policy, policy_in_use, PolicyInUse, PolicyOptions
+from active_recon.policies import (
+    AUTO_POLICY,
+    load_policy,
+    policy_in_use,
+    PolicyInUse,
+    PolicyOptions,
+)
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -24,15 +30,16 @@ def weights(tmp_path):
 @pytest.mark.parametrize('model', [None, PAPER_MODEL])
 def test_it_is_the_learned_policy_where_the_weights_have_one(model):
     path = find_weights(model)
-    assert policy_in_use(AUTO, path) == PolicyInUse('attention')
+    assert policy_in_use(AUTO_POLICY, path) == PolicyInUse('attention')
     loaded, learned = (load_policy(name, PolicyOptions(weights=path))
-                       for name in (AUTO, 'attention'))
+                       for name in (AUTO_POLICY, 'attention'))
     assert type(loaded) is type(learned)
 
 
 def test_it_is_an_even_sweep_where_they_have_none(weights):
-    assert policy_in_use(AUTO, weights) == PolicyInUse('uniform')
-    assert type(load_policy(AUTO, PolicyOptions(weights=weights))) is type(load_policy('uniform'))
+    assert policy_in_use(AUTO_POLICY, weights) == PolicyInUse('uniform')
+    assert isinstance(load_policy(AUTO_POLICY, PolicyOptions(weights=weights)),
+                      type(load_policy('uniform')))
 
 
 def a_scorer_of_others(path):
@@ -48,7 +55,7 @@ def half_a_scorer(path):
     (half_a_scorer, 'no whole safetensors file')])
 def test_a_learned_policy_that_cannot_be_used_is_an_even_sweep_that_says_so(weights, make, said):
     make(weights.with_name('mine-scorer.safetensors'))
-    found = policy_in_use(AUTO, weights)
+    found = policy_in_use(AUTO_POLICY, weights)
     assert found.name == 'uniform'
     assert said in found.warning
     assert 'active-recon train-policy' in found.warning
@@ -62,7 +69,7 @@ def test_every_other_name_means_itself_whatever_the_weights(name, tmp_path):
 
 def test_weights_that_are_not_there_are_refused(tmp_path):
     with pytest.raises(WeightsError, match='no such file'):
-        policy_in_use(AUTO, tmp_path / 'none.safetensors')
+        policy_in_use(AUTO_POLICY, tmp_path / 'none.safetensors')
 
 
 def test_which_policy_it_is_is_known_without_torch():

@@ -19,8 +19,8 @@ MODULES = [
     *(f'active_recon.nodes.{node}' for node in (
         'reconstructor', 'view_planner', 'recorder', 'viewer', 'turntable_camera')),
     'active_recon.demo.run', 'active_recon.launching.up', 'active_recon.cli.main',
-    *(module for folder in ('active_recon/bags', 'active_recon/report', 'active_recon/viewer',
-                            'msg_tools') for module in modules_of(folder))]
+    *(module for folder in ('active_recon/bags', 'active_recon/photos', 'active_recon/report',
+                            'active_recon/viewer', 'msg_tools') for module in modules_of(folder))]
 
 
 IMPORTED = """

@@ -174,11 +174,7 @@ def _object(apart: NDArray[np.float32], threshold: float, image: NDArray[np.uint
             background: str) -> NDArray[np.bool_]:
     """Return the object's mask without noise and holes, at the image's size, from distances."""
     around = np.asarray(cv2.dilate(apart, np.ones((3, 3), np.uint8)))
-    found = (apart > threshold) & (apart > _EDGE * around)
-    labels, areas = _parts(found)
-    parts = (areas >= _SMALLEST_PART * areas.max(initial=0))[labels] & found
-    labels, areas = _parts(~parts)
-    parts |= (areas < _LARGEST_HOLE * parts.sum())[labels]
+    parts = without_specks((apart > threshold) & (apart > _EDGE * around))
     share = float(parts.mean())
     if share < _SMALLEST_OBJECT:
         raise ViewError('no object found: expected one that stands out, but nothing does from '
@@ -190,6 +186,14 @@ def _object(apart: NDArray[np.float32], threshold: float, image: NDArray[np.uint
         height, width = image.shape[:2]
         parts = np.asarray(cv2.resize(parts * np.uint8(255), (width, height)) > 127)
     return np.asarray(parts, np.bool_)
+
+
+def without_specks(found: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a mask, (H, W), without parts and holes that are small beside the object."""
+    labels, areas = _parts(found)
+    parts = (areas >= _SMALLEST_PART * areas.max(initial=0))[labels] & found
+    labels, areas = _parts(~parts)
+    return np.asarray(parts | (areas < _LARGEST_HOLE * parts.sum())[labels], np.bool_)
 
 
 def _parts(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -29,10 +29,11 @@ def image_paths(places: list[Path]) -> list[Path]:
     names = [path.name for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise DataError(f'images of the same name: expected different names, got {twice[0]} twice')
-    return sorted(paths, key=_in_order)
+    return sorted(paths, key=in_order)
 
 
-def _in_order(path: Path) -> list[tuple[int, str]]:
+def in_order(path: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts names with numbers as people do: 2 before 10."""
     return [(int(part), '') if part.isdigit() else (0, part)
             for part in re.split(r'(\d+)', path.name)]
 

@@ -2,10 +2,13 @@
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TYPE_CHECKING
 
 from active_recon.errors import ConfigError
 import typer
+
+if TYPE_CHECKING:
+    from active_recon.calibration.board import Board
 
 
 def calibrate(
@@ -63,17 +66,14 @@ def calibrate(
 
     Example: active-recon calibrate images/ --step-deg 15 --object-size 0.25
     """
-    from active_recon.calibration.board import Board
-
-    columns, rows = _squares(squares)
-    marker = 0.75 * square_mm if marker_mm is None else marker_mm
-    board = Board(columns, rows, square_mm / 1e3, marker / 1e3, dictionary)
+    board = printed_board(squares, square_mm, marker_mm, dictionary)
     if print_board is not None:
         board.save(print_board)
         width, height = board.printed_size()
         typer.echo(f'wrote {print_board}: print it at 100 %, not fitted to the page, and measure '
-                   f'it: {columns} x {rows} squares are {width * 1e3:.1f} x {height * 1e3:.1f} '
-                   'mm. If they are not, give the side of a square by --square-mm.')
+                   f'it: {board.columns} x {board.rows} squares are {width * 1e3:.1f} x '
+                   f'{height * 1e3:.1f} mm. If they are not, give the side of a square by '
+                   '--square-mm.')
         return
     if not images or object_size is None:
         raise ConfigError('no images of the board, or no --object-size: give both, or '
@@ -114,6 +114,16 @@ def calibrate(
         typer.echo(command)
     typer.echo(f'wrote {out / "calibration.yaml"}: ros2 run active_recon reconstructor '
                f'--ros-args --params-file {out / "calibration.yaml"}, and view_planner likewise')
+
+
+def printed_board(squares: str, square_mm: float, marker_mm: float | None,
+                  dictionary: str) -> 'Board':
+    """Return the board of the options; raises ConfigError where there is no such board."""
+    from active_recon.calibration.board import Board
+
+    columns, rows = _squares(squares)
+    marker = 0.75 * square_mm if marker_mm is None else marker_mm
+    return Board(columns, rows, square_mm / 1e3, marker / 1e3, dictionary)
 
 
 def _squares(words: str) -> tuple[int, int]:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from active_recon.cli.policy_option import policy_option
 from active_recon.interrupts import held_interrupts
-from active_recon.policies import AUTO
+from active_recon.policies import AUTO_POLICY
 import typer
 
 
@@ -15,7 +15,7 @@ def demo(
     views: Annotated[int, typer.Option(min=1, max=24, help='Number of views.')] = 5,
     policy: Annotated[str, policy_option(
         'Policy that chooses the next view; auto: attention where the model has it, else uniform.',
-        also=(AUTO,))] = AUTO,
+        also=(AUTO_POLICY,))] = AUTO_POLICY,
     model: Annotated[str | None, typer.Option(
         help='Name of a model that ships, or a weights file; the policy attention needs '
              'lifting or 2d3d-attention.')

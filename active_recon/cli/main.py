@@ -16,6 +16,7 @@ from active_recon.cli.paper import paper
 from active_recon.cli.play import play
 from active_recon.cli.policies import policies
 from active_recon.cli.quality import quality
+from active_recon.cli.reconstruct import reconstruct
 from active_recon.cli.record_sweep import record_sweep
 from active_recon.cli.replay import replay
 from active_recon.cli.report import report
@@ -30,8 +31,8 @@ import typer
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, up, calibrate, view, report, replay, play, record_sweep, render, train,
-                train_policy, export, evaluate, study, policies, paper, sheet):
+for command in (demo, up, reconstruct, calibrate, view, report, replay, play, record_sweep, render,
+                train, train_policy, export, evaluate, study, policies, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

@@ -11,7 +11,7 @@ The format: Seitz et al., "A comparison and evaluation of multi-view stereo reco
 algorithms", CVPR 2006, https://vision.middlebury.edu/mview/data/.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 import re
@@ -64,20 +64,17 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
     if len(files) != 1:
         raise DataError(f'{folder}: wrong number of camera files: expected one *_par.txt, found '
                         f'{len(files)}')
-    least, greatest = _box(folder, box)
+    least, greatest = read_box(folder, box)
     side = MARGIN * float((greatest - least).max())
     turn = upright(up, _FRONTS.get(up.lstrip('+-'), 'x'))
     names, images, masks, cameras = [], [], [], []
-    for number, line in enumerate(files[0].read_text().splitlines()[1:], start=2):
-        if not line.strip():
-            continue
-        name, numbers = _fields(files[0], number, line)
+    for number, (name, numbers) in camera_lines(files[0]):
         images.append(_image(folder / name))
         masks.append(_mask(folder / 'masks' / name, images[-1]))
         names.append(name)
         try:
             cameras.append(_camera(numbers, turn, (least + greatest) / 2, side,
-                                   images[-1].shape))
+                                   images[-1].shape[1::-1]))
         except ViewError as error:
             raise DataError(f'{files[0]}, line {number}: {error}') from error
     if not images:
@@ -85,8 +82,12 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
     return PosedPhotographs(folder, tuple(names), tuple(images), tuple(masks), tuple(cameras))
 
 
-def _box(folder: Path, box: Sequence[float] | None) -> NDArray[np.float64]:
-    """Return the minimum and the maximum corner, (2, 3)."""
+def read_box(folder: Path, box: Sequence[float] | None = None) -> NDArray[np.float64]:
+    """
+    Return the minimum and the maximum corner of the object, (2, 3), from README.txt or as given.
+
+    Raises DataError where there is none, ConfigError where the given one is invalid.
+    """
     if box is None:
         read = [found for path in sorted(folder.glob('README*'))
                 for found in _CORNER.findall(path.read_text(errors='replace'))]
@@ -102,6 +103,17 @@ def _box(folder: Path, box: Sequence[float] | None) -> NDArray[np.float64]:
     return corners.reshape(2, 3)
 
 
+def camera_lines(path: Path) -> Iterator[tuple[int, tuple[str, NDArray[np.float64]]]]:
+    """
+    Yield the line's number, and name and numbers (21,) of each camera: K, R and t.
+
+    Raises DataError where a line is no camera.
+    """
+    for number, line in enumerate(path.read_text(errors='replace').splitlines()[1:], start=2):
+        if line.strip():
+            yield number, _fields(path, number, line)
+
+
 def _fields(path: Path, number: int, line: str) -> tuple[str, NDArray[np.float64]]:
     name, *rest = line.split()
     try:
@@ -115,21 +127,35 @@ def _fields(path: Path, number: int, line: str) -> tuple[str, NDArray[np.float64
 
 
 def _camera(numbers: NDArray[np.float64], turn: NDArray[np.float64],
-            centre: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Camera:
-    lens, rotation, moved = numbers[:9].reshape(3, 3), numbers[9:18].reshape(3, 3), numbers[18:]
+            centre: NDArray[np.float64], side: float, size: tuple[int, int]) -> Camera:
+    lens = lens_of(numbers, size)
+    world = pose_of(numbers)
+    pose = np.eye(4)
+    pose[:3, :3] = turn @ world[:3, :3]
+    pose[:3, 3] = turn @ (world[:3, 3] - centre) / side
+    return Camera(pose, lens)
+
+
+def lens_of(numbers: NDArray[np.float64], size: tuple[int, int]) -> Intrinsics:
+    """Return the lens of a line (21,) for photos of (width, height); raises ViewError."""
+    lens = numbers[:9].reshape(3, 3)
     if abs(lens[0, 1]) > 1e-3 * lens[0, 0] or min(lens[0, 0], lens[1, 1]) <= 0:
         raise ViewError('invalid lens: expected focal lengths above 0 and no skew, got '
                         f'{lens.tolist()}')
+    return Intrinsics(lens[0, 0], lens[1, 1], lens[0, 2] + 0.5, lens[1, 2] + 0.5, *size)
+
+
+def pose_of(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the pose of a line (21,), world from optical frame, (4, 4); raises ViewError."""
+    rotation, moved = numbers[9:18].reshape(3, 3), numbers[18:]
     left, _, right = np.linalg.svd(rotation)
     if not np.allclose(left @ right, rotation, atol=1e-3):
         raise ViewError('invalid rotation: expected an orthogonal matrix, got '
                         f'{rotation.tolist()}')
-    rotation = left @ right  # the nearest rotation: files round theirs
     pose = np.eye(4)
-    pose[:3, :3] = turn @ rotation.T
-    pose[:3, 3] = turn @ (-rotation.T @ moved - centre) / side
-    return Camera(pose, Intrinsics(lens[0, 0], lens[1, 1], lens[0, 2] + 0.5, lens[1, 2] + 0.5,
-                                   shape[1], shape[0]))
+    pose[:3, :3] = (left @ right).T  # of the nearest rotation: files round theirs
+    pose[:3, 3] = -pose[:3, :3] @ moved
+    return pose
 
 
 def _image(path: Path) -> NDArray[np.uint8]:

@@ -16,7 +16,7 @@ from active_recon.interrupts import held_interrupts
 from active_recon.launching.demo_monitor import demo_monitor, DemoMonitor
 from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.models.weights_files import find_weights
-from active_recon.policies import AUTO, policy_in_use
+from active_recon.policies import AUTO_POLICY, policy_in_use
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.voxelisation import voxelise
@@ -42,7 +42,7 @@ class Demo:
 
     mesh: Path
     views: int = 5
-    policy: str = AUTO
+    policy: str = AUTO_POLICY
     seed: int = 0
     output_dir: Path = Path('bags')
     view: bool = False

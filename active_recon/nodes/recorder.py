@@ -25,8 +25,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 PROVENANCE = {'weights_sha256': 'weights_sha256', 'config_sha256': 'config_sha256',
-              'computed_by': 'computed_by', 'needs_front': 'needs_front', 'policy': 'policy_in_use',
-              'seed': 'seed', 'object': 'object'}
+              'computed_by': 'computed_by', 'needs_front': 'needs_front',
+              'policy': 'policy_in_use', 'seed': 'seed', 'object': 'object'}
 """The bag's provenance: its names, and those of the parameters of the loop's nodes."""
 UPDATE_EVERY_S = 0.1
 FLUSH_EVERY_S = 0.5  # so that a crash costs less than a second

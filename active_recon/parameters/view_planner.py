@@ -14,7 +14,7 @@ from active_recon.parameters.shared import (
     ManagedParameters,
     NetworkParameters,
 )
-from active_recon.policies import AUTO, POLICIES
+from active_recon.policies import AUTO_POLICY, POLICIES
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,10 @@ class ViewPlannerParameters(FrontParameters, CubeParameters, NetworkParameters, 
     """Parameters of the view planner."""
 
     policy: str = parameter(
-        AUTO, 'policy that chooses the next view; attention is learned and needs weights that '
-        'have one, such as those of lifting or 2d3d-attention; auto is attention where the '
-        'weights have it, else uniform, an even sweep', choices=(AUTO, *POLICIES), dynamic=True)
+        AUTO_POLICY, 'policy that chooses the next view; attention is learned and needs weights '
+        'that have one, such as those of lifting or 2d3d-attention; auto is attention where the '
+        'weights have it, else uniform, an even sweep', choices=(AUTO_POLICY, *POLICIES),
+        dynamic=True)
     seed: int = parameter(0, 'seed of the policy random', low=0, high=2**32 - 1, dynamic=True)
     max_views: int = parameter(
         5, 'number of views after which an episode is done', low=1, high=1000, dynamic=True)

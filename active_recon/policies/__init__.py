@@ -1,6 +1,6 @@
 """View policies behind one interface, and the one registry of them."""
 
-from active_recon.policies.automatic import AUTO, policy_in_use, PolicyInUse
+from active_recon.policies.automatic import AUTO_POLICY, policy_in_use, PolicyInUse
 from active_recon.policies.base import Choice, Observation, Policy
 from active_recon.policies.registry import (
     learned_policy,
@@ -10,5 +10,5 @@ from active_recon.policies.registry import (
     PolicyOptions,
 )
 
-__all__ = ['AUTO', 'Choice', 'Observation', 'POLICIES', 'Policy', 'PolicyEntry', 'PolicyInUse',
-           'PolicyOptions', 'learned_policy', 'load_policy', 'policy_in_use']
+__all__ = ['AUTO_POLICY', 'Choice', 'Observation', 'POLICIES', 'Policy', 'PolicyEntry',
+           'PolicyInUse', 'PolicyOptions', 'learned_policy', 'load_policy', 'policy_in_use']

@@ -7,7 +7,7 @@ from active_recon.errors import WeightsError
 from active_recon.models.weights_files import read_metadata, SCORER, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
 
-AUTO = 'auto'
+AUTO_POLICY = 'auto'
 LEARNED_POLICY, SWEEP = 'attention', 'uniform'
 _TRAINED_WITH_IT = 'attention.'
 """What the names of the tensors of a policy begin with that lies in its network's own file."""
@@ -29,7 +29,7 @@ def policy_in_use(policy: str, weights: Path | None = None) -> PolicyInUse:
     even sweep. Every other name means itself. Raises WeightsError where `auto` finds no whole
     weights.
     """
-    if policy != AUTO:
+    if policy != AUTO_POLICY:
         return PolicyInUse(policy)
     weights = weights or SHIPPED
     read_metadata(weights)

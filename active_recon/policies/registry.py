@@ -8,7 +8,7 @@ from active_recon.errors import ConfigError
 from active_recon.models.weights_files import read_metadata, SHIPPED
 from active_recon.plugins import installed, load_installed, POLICIES_GROUP
 from active_recon.policies.attention import AttentionPolicy
-from active_recon.policies.automatic import AUTO, policy_in_use
+from active_recon.policies.automatic import AUTO_POLICY, policy_in_use
 from active_recon.policies.base import Policy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 from active_recon.policies.rendered import (
@@ -112,7 +112,7 @@ POLICIES |= {name: PolicyEntry(_installed(name), ('seed', 'max_views'))
 def load_policy(name: str, options: PolicyOptions | None = None) -> Policy:
     """Return a policy by its name, or `auto`; raises ConfigError and WeightsError."""
     options = options or PolicyOptions()
-    if name not in (AUTO, *POLICIES):
+    if name not in (AUTO_POLICY, *POLICIES):
         raise ConfigError(f'no policy is called {name!r}: expected one of '
-                          f'{", ".join((AUTO, *POLICIES))}')
+                          f'{", ".join((AUTO_POLICY, *POLICIES))}')
     return POLICIES[policy_in_use(name, options.weights).name].make(options)

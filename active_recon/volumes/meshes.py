@@ -19,14 +19,18 @@ def upright(up: str, front: str) -> NDArray[np.float64]:
     Raises ConfigError where one is not an axis (x, y, z, with or without a sign) or both are the
     same.
     """
-    for option, axis in (('up', up), ('front', front)):
-        if axis not in _AXES:
-            raise ConfigError(f'{option}: not an axis: expected x, y or z, with or without a '
-                              f'sign, got {axis!r}')
-    z, x = _AXES[up], _AXES[front]
+    z, x = axis_direction(up), axis_direction(front, 'front')
     if z @ x:
         raise ConfigError(f'up and front: on the same axis: expected two, got {up} and {front}')
     return np.array([x, np.cross(z, x), z])
+
+
+def axis_direction(axis: str, option: str = 'up') -> NDArray[np.float64]:
+    """Return the unit vector of an axis by its name, (3,); raises ConfigError on other names."""
+    if axis not in _AXES:
+        raise ConfigError(f'{option}: not an axis: expected x, y or z, with or without a sign, '
+                          f'got {axis!r}')
+    return np.array(_AXES[axis], np.float64)
 
 
 def file_rotation(path: Path, up: str | None, front: str | None) -> NDArray[np.float64]:

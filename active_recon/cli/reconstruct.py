@@ -1,0 +1,158 @@
+"""`active-recon reconstruct`: an object from photos with known cameras, without ROS."""
+
+import math
+from pathlib import Path
+from typing import Annotated, TYPE_CHECKING
+
+from active_recon.cli.calibrate import printed_board
+from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError, RecordingError
+import typer
+
+if TYPE_CHECKING:
+    from active_recon.photos.shape import Shape
+    from active_recon.photos.sources import Source
+
+
+def reconstruct(
+    photos: Annotated[Path, typer.Argument(
+        help='Folder of photos.', show_default=False)],
+    out: Annotated[Path, typer.Option(
+        help='Folder for mesh, voxels, picture and shape.json.')] = Path('reconstruction'),
+    cameras: Annotated[Path | None, typer.Option(
+        help='Cameras: transforms.json (NeRF, instant-ngp, nerfstudio), the folder of a COLMAP '
+             'model, *_par.txt (Middlebury), or OpenCV YAML. Default: the one beside the photos.'),
+    ] = None,
+    axes: Annotated[str | None, typer.Option(
+        help='Camera axes of the file, opencv or opengl, instead of those of its format.')] = None,
+    board: Annotated[bool, typer.Option(
+        '--board', help='The board of `calibrate --print-board` is in the photos and gives their '
+                        'cameras.')] = False,
+    squares: Annotated[str, typer.Option(help='Squares of the board, COLUMNSxROWS.')] = '7x5',
+    square_mm: Annotated[float, typer.Option(
+        help='Side of a square, measured on the printed board.')] = 30.0,
+    marker_mm: Annotated[float | None, typer.Option(
+        help='Side of a marker; default: 3/4 of a square.')] = None,
+    dictionary: Annotated[str, typer.Option(help='ArUco dictionary of the markers.')] = '4x4_50',
+    camera_info: Annotated[Path | None, typer.Option(
+        help="With --board: lens in the YAML format of ROS's camera_calibration; default: "
+             'estimated from the photos.')] = None,
+    turntable_step_deg: Annotated[float | None, typer.Option(
+        help='The photos, sorted by name, show a turntable that turns by this angle between them, '
+             'counter-clockwise seen from above, before a fixed camera.')] = None,
+    elevation_deg: Annotated[float, typer.Option(
+        help="With a turntable: the camera's angle above the horizon.")] = 30.0,
+    distance: Annotated[float | None, typer.Option(
+        help='With a turntable: from the camera to the point on the axis that it looks at, '
+             'metres.', show_default=False)] = None,
+    fov_deg: Annotated[float | None, typer.Option(
+        help='With a turntable: horizontal field of view; default: by EXIF.')] = None,
+    box: Annotated[str | None, typer.Option(
+        help="The object's cube, x,y,z,side in units of the cameras; default: as the cameras' "
+             'file says, else found.')] = None,
+    unit: Annotated[float, typer.Option(help='Metres in a unit of the cameras.')] = 1.0,
+    size: Annotated[float | None, typer.Option(
+        help='Side of the cube in metres, where the unit is not known.')] = None,
+    up: Annotated[str | None, typer.Option(
+        help="Axis of the cameras' world that points up, e.g. z or -y. Default: by the "
+             'format.')] = None,
+    background: Annotated[str, typer.Option(
+        help='auto (masks, alpha, else the network), plain (by the colour of a plain '
+             'background), network, or grabcut.')] = 'auto',
+    masks: Annotated[Path | None, typer.Option(
+        help='Folder of masks named like the photos, bright on the object.')] = None,
+    views: Annotated[int | None, typer.Option(
+        min=1, help='Use so many photos at even steps; default: all.')] = None,
+    mesh_format: Annotated[str, typer.Option(help='ply, obj or stl.')] = 'ply',
+    bag: Annotated[bool, typer.Option(
+        '--bag', help='Also write the bag of the run, for replay, and its report.')] = False,
+    model: Annotated[str | None, typer.Option(
+        help='A model that ships, by its name, or a .safetensors file.')] = None,
+) -> None:
+    """
+    Reconstruct an object from a folder of photos with known cameras.
+
+    No ROS runs, nothing has to be cropped, and masks are not needed. The cameras come from a file,
+    from a printed board in the photos, or from the steps of a turntable. What is wrong with a
+    photo is said in one line, and the others are used.
+
+    Example: active-recon reconstruct photos/ --cameras transforms.json --out mug
+
+    Example: active-recon reconstruct photos/ --board --size 0.2
+    """
+    from active_recon.photos.reconstruct import from_files, Options
+    from active_recon.photos.saving import save_shape
+    from active_recon.volumes.voxels import MESH_FORMATS
+
+    if mesh_format not in MESH_FORMATS:
+        raise ConfigError(f'--mesh-format: unknown value: expected {", ".join(MESH_FORMATS)}, got '
+                          f'{mesh_format!r}')
+    if size is not None and unit != 1.0:
+        raise ConfigError('--size and --unit both set the scale: give one of them')
+    folder = out / 'bag'
+    if bag and folder.exists():
+        raise RecordingError(f'{folder}: already there: expected a new folder; give another --out',
+                             'bag_not_begun')
+    sources: list[Source] = []
+    if cameras is not None:
+        sources.append(cameras)
+    if board:
+        from active_recon.photos.sources import BoardCameras
+
+        sources.append(BoardCameras(
+            printed_board(squares, square_mm, marker_mm, dictionary), camera_info))
+    if turntable_step_deg is not None:
+        from active_recon.photos.sources import TurntableCameras
+
+        if distance is None:
+            raise ConfigError('--turntable-step-deg needs --distance: give it in metres')
+        sources.append(TurntableCameras(
+            math.radians(turntable_step_deg), math.radians(elevation_deg), distance,
+            None if fov_deg is None else math.radians(fov_deg)))
+    if len(sources) > 1:
+        raise ConfigError('several of --cameras, --board and --turntable-step-deg: give one of '
+                          'them')
+    shape = from_files(photos, sources[0] if sources else None, Options(
+        None if box is None else _numbers(box), unit, size, up, axes, background, masks, views,
+        model), progress_bar)
+    _print(shape)
+    for path in save_shape(shape, out, mesh_format):
+        typer.echo(f'wrote {path}')
+    if bag:
+        _write_bag(shape, folder, out / 'report.html')
+
+
+def _print(shape: 'Shape') -> None:
+    for reason in shape.left_out:
+        typer.echo(f'left out: {reason}', err=True)
+    for warning in shape.warnings:
+        typer.echo(f'warning: {warning}', err=True)
+    side = shape.cube
+    typer.echo(f'{len(shape.views)} photos; silhouettes: {shape.background}; cube of '
+               f'{shape.size:.4g} m about {", ".join(f"{value:.4g}" for value in side.centre)}')
+    if shape.quality is not None:
+        typer.echo(f'quality: {shape.quality.summary}')
+
+
+def _write_bag(shape: 'Shape', folder: Path, page: Path) -> None:
+    from active_recon.bags.runs.photo_run import photo_run
+    from active_recon.bags.runs.run_writing import write_run
+    from active_recon.report.page import report_page, write_page
+    from active_recon.report.subject import Subject
+
+    run = photo_run(shape, folder)
+    write_run(run, folder)
+    typer.echo(f'wrote {folder}')
+    write_page(report_page([Subject('A', run, run.episodes[0])]), page)
+    typer.echo(f'wrote {page}')
+
+
+def _numbers(box: str) -> list[float]:
+    try:
+        numbers = [float(each) for each in box.split(',')]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 4 or not all(map(math.isfinite, numbers)):
+        raise ConfigError('--box: invalid cube: expected x,y,z,side, four numbers separated by '
+                          f'commas, got {box!r}')
+    return numbers

@@ -1,0 +1,159 @@
+"""What a file of cameras says, in one form for all formats, and which photo each camera took."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from active_recon.calibration.board import Board
+from active_recon.errors import DataError, ViewError
+from active_recon.geometry.cameras import Intrinsics
+from active_recon.photos.files import PhotoFile
+import numpy as np
+from numpy.typing import NDArray
+
+Lens = Callable[[tuple[int, int]], Intrinsics]
+"""Gives the intrinsics by a photo's width and height; raises ViewError where these do not fit."""
+_SHAPE_OFF = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """
+    One camera of a file.
+
+    - name: of the photo, as the file has it, perhaps with folders or without a suffix
+    - pose: world from optical frame (z forward, x right, y down), (4, 4), in the file's units
+    """
+
+    name: str
+    pose: NDArray[np.float64]
+    lens: Lens
+
+
+@dataclass(frozen=True, eq=False)
+class CameraFile:
+    """
+    All cameras of a file.
+
+    - up: the world's direction that points up, (3,), or None where the format does not tell
+    - box: the object's corners, least and greatest, (2, 3), in the file's units, if it has them
+    - looks: 'opencv' or 'opengl', the camera axes that the file was read with
+    - metric: whether the units are metres for certain
+    - board: the printed board that lies in the world's plane z = 0, under or beside the object
+    """
+
+    source: str
+    entries: Sequence[Entry]
+    up: NDArray[np.float64] | None = None
+    box: NDArray[np.float64] | None = None
+    looks: str = 'opencv'
+    metric: bool = False
+    board: Board | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PosedPhoto:
+    """
+    A photo and its camera.
+
+    - pose: world from optical frame, (4, 4), in the file's units
+    - intrinsics: for the photo's own size, turned by EXIF if `upright`
+    """
+
+    photo: PhotoFile
+    pose: NDArray[np.float64]
+    intrinsics: Intrinsics
+    upright: bool = True
+
+
+def sized(lens: Intrinsics) -> Lens:
+    """Return the lens of photos of a known size; others of the same shape are scaled ones."""
+    def of_size(size: tuple[int, int]) -> Intrinsics:
+        width, height = size
+        if abs(width * lens.height / (height * lens.width) - 1) > _SHAPE_OFF:
+            raise ViewError(f'another size: expected {lens.width} x {lens.height} pixels, as its '
+                            f'camera says, or the same shape, got {width} x {height}',
+                            'image_size')
+        return lens if size == (lens.width, lens.height) else lens.resized(width, height)
+    return of_size
+
+
+def posed_photos(cameras: CameraFile, photos: Sequence[PhotoFile]
+                 ) -> tuple[list[PosedPhoto], list[str]]:
+    """
+    Return the photos that the file has cameras for, in their order, and why others are left out.
+
+    A name fits with or without folders and suffix, if it fits one photo only. Raises DataError
+    where no camera has a photo.
+    """
+    by_photo = _matched(cameras.entries, photos)
+    found, left_out = [], []
+    for photo in photos:
+        entry = by_photo.get(photo.path)
+        if entry is None:
+            left_out.append(f'{photo.name}: no camera in {cameras.source}')
+            continue
+        try:
+            found.append(_posed(entry, photo))
+        except ViewError as error:
+            left_out.append(f'{photo.name}: {error}')
+    if not by_photo:
+        some = ', '.join(entry.name for entry in cameras.entries[:3])
+        raise DataError(f'{cameras.source}: cameras of other photos: expected some of '
+                        f'{photos[0].name}, ..., got those of {some or "none"}', 'other_photos')
+    if not found:
+        raise DataError(f'no photo fits its camera: {"; ".join(left_out[:3])}', 'other_photos')
+    return found, left_out
+
+
+def _posed(entry: Entry, photo: PhotoFile) -> PosedPhoto:
+    """Return a photo turned by EXIF, or as stored where only that has its camera's size."""
+    try:
+        return PosedPhoto(photo, entry.pose, entry.lens(photo.upright_size))
+    except ViewError:
+        if photo.upright_size == photo.size:
+            raise
+        return PosedPhoto(photo, entry.pose, entry.lens(photo.size), upright=False)
+
+
+def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]) -> Mapping[Path, Entry]:
+    """Return the camera of each photo, by its path: names are compared, else their stems."""
+    tables: list[dict[str, list[Path]]] = []
+    for part in (_name, _stem):
+        tables.append({})
+        for photo in photos:
+            tables[-1].setdefault(part(photo.path.name), []).append(photo.path)
+    found: dict[Path, Entry] = {}
+    for entry in entries:
+        for part, table in zip((_name, _stem), tables, strict=True):
+            fitting = table.get(part(entry.name), [])
+            if len(fitting) == 1:
+                found.setdefault(fitting[0], entry)
+                break
+    return found
+
+
+def _name(path: str) -> str:
+    return PurePosixPath(path.replace('\\', '/')).name.lower()
+
+
+def _stem(path: str) -> str:
+    return PurePosixPath(_name(path)).stem
+
+
+def rigid(rotation: NDArray[np.float64], position: NDArray[np.float64],
+          where: str) -> NDArray[np.float64]:
+    """
+    Return a pose (4, 4) of a rotation (3, 3) and a position (3,), made exactly orthogonal.
+
+    Raises DataError where the matrix is far from a rotation; `where` begins its message.
+    """
+    pose = np.eye(4)
+    if np.isfinite(rotation).all() and np.isfinite(position).all():
+        left, _, right = np.linalg.svd(rotation)
+        nearest = left @ right
+        if np.allclose(nearest, rotation, atol=1e-2) and np.linalg.det(nearest) > 0:
+            pose[:3, :3], pose[:3, 3] = nearest, position
+            return pose
+    raise DataError(f'{where}: no rotation: expected a finite, orthogonal matrix, got '
+                    f'{np.round(rotation, 4).tolist()}')

@@ -1,0 +1,169 @@
+"""Photos as files: which there are, how large and how turned they are, and their pixels."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import hashlib
+import math
+from pathlib import Path
+import warnings
+
+from active_recon.calibration.files import in_order, SUFFIXES
+from active_recon.errors import DataError
+import numpy as np
+from numpy.typing import NDArray
+from PIL import ExifTags, Image
+
+ENDINGS = (*SUFFIXES, '.webp')
+LARGEST_SIDE = 2048
+"""Pixels a side to which larger photos are reduced: far more than any network's image has."""
+_MOST_PIXELS = 400_000_000
+_FILM_DIAGONAL = math.hypot(36, 24)  # millimetres, of the film that EXIF's equivalent refers to
+_TURNED = {2: Image.Transpose.FLIP_LEFT_RIGHT, 3: Image.Transpose.ROTATE_180,
+           4: Image.Transpose.FLIP_TOP_BOTTOM, 5: Image.Transpose.TRANSPOSE,
+           6: Image.Transpose.ROTATE_270, 7: Image.Transpose.TRANSVERSE,
+           8: Image.Transpose.ROTATE_90}
+_WITH_MEANS = {'L', 'RGB', 'RGBA', 'CMYK'}
+_UNREADABLE = (OSError, SyntaxError, ValueError, Image.DecompressionBombError)
+
+
+@dataclass(frozen=True)
+class PhotoFile:
+    """
+    A photo that can be opened.
+
+    - size: width and height as stored, pixels; orientation: EXIF's, 1 (as stored) to 8
+    - focal: focal length by EXIF, pixels of the photo as stored; None where it says nothing
+    """
+
+    path: Path
+    size: tuple[int, int]
+    orientation: int = 1
+    focal: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+        return self.path.name
+
+    @property
+    def upright_size(self) -> tuple[int, int]:
+        """Width and height once turned as EXIF says, pixels."""
+        return self.size[::-1] if self.orientation >= 5 else self.size
+
+
+def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
+    """
+    Return the photos of a folder in the order of their names, 2 before 10; a list stays as it is.
+
+    Raises DataError where the folder is missing or has none.
+    """
+    if not isinstance(place, Path):
+        return list(place)
+    if not place.is_dir():
+        raise DataError(f'{place}: no such folder: expected one with photos '
+                        f'({", ".join(ENDINGS)})', 'no_photos')
+    paths = sorted((path for path in place.iterdir() if path.suffix.lower() in ENDINGS),
+                   key=in_order)
+    if not paths:
+        raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none',
+                        'no_photos')
+    return paths
+
+
+def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
+    """
+    Return the photos among files, and why the others are left out.
+
+    A photo whose file has the same bytes as one before is left out. Raises DataError where none
+    is left.
+    """
+    photos: list[PhotoFile] = []
+    left_out: list[str] = []
+    known: dict[bytes, str] = {}
+    for path in paths:
+        try:
+            digest = hashlib.sha256(path.read_bytes()).digest()
+            photo = _opened(path)
+        except (DataError, *_UNREADABLE) as error:
+            left_out.append(f'{path.name}: not readable: expected a whole image, got: {error}')
+            continue
+        if digest in known:
+            left_out.append(f'{path.name}: the same photo as {known[digest]}')
+            continue
+        known[digest] = path.name
+        photos.append(photo)
+    if not photos:
+        raise DataError('no readable photo: expected at least one, got none'
+                        + ''.join(f'; {reason}' for reason in left_out[:3]), 'no_photos')
+    return photos, left_out
+
+
+def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
+    """
+    Return a photo's pixels, (H, W, 3) uint8 RGB, or (H, W, 4) with straight alpha.
+
+    It is turned as EXIF says, or as stored without `upright`; larger ones are reduced to
+    `LARGEST_SIDE` or less; 16 bits a channel become 8. Raises DataError where the file is damaged
+    or has a format without a meaning in colours.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore', Image.DecompressionBombWarning)
+            with Image.open(photo.path) as image:
+                if max(image.size) > LARGEST_SIDE:
+                    # A JPEG is then decoded at an eighth to a half of its size
+                    image.draft('RGB', (LARGEST_SIDE, LARGEST_SIDE))
+                image.load()
+                pixels = _reduced(_eight_bits(_reduced(image)))
+    except _UNREADABLE as error:
+        raise DataError(f'{photo.name}: not readable: expected a whole image, got: '
+                        f'{error}') from error
+    if upright and photo.orientation in _TURNED:
+        pixels = pixels.transpose(_TURNED[photo.orientation])
+    return np.asarray(pixels, np.uint8)
+
+
+def _opened(path: Path) -> PhotoFile:
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore', Image.DecompressionBombWarning)
+        with Image.open(path) as image:
+            if image.width * image.height > _MOST_PIXELS:
+                raise DataError(f'{image.width} x {image.height} pixels, more than '
+                                f'{_MOST_PIXELS / 1e6:.0f} million')
+            exif = Image.Image.getexif(image)  # that of PNG would decode the whole image
+            turned = exif.get(ExifTags.Base.Orientation, 1)
+            return PhotoFile(path, image.size, turned if turned in _TURNED else 1,
+                             _focal(exif, image.size))
+
+
+def _focal(exif: Image.Exif, size: tuple[int, int]) -> float | None:
+    """Return the focal length in pixels by EXIF's 35 mm equivalent, else by its sensor."""
+    found = exif.get_ifd(ExifTags.IFD.Exif)
+    try:
+        equivalent = float(found.get(ExifTags.Base.FocalLengthIn35mmFilm, 0))
+        if equivalent > 0:
+            return equivalent / _FILM_DIAGONAL * math.hypot(*size)
+        focal = float(found[ExifTags.Base.FocalLength])
+        per_unit = float(found[ExifTags.Base.FocalPlaneXResolution])
+        unit = {2: 25.4, 3: 10.0, 4: 1.0}[found.get(ExifTags.Base.FocalPlaneResolutionUnit, 2)]
+        pixels = focal * per_unit / unit
+        return pixels if 0 < pixels < math.inf else None
+    except (KeyError, TypeError, ValueError, ZeroDivisionError):
+        return None
+
+
+def _reduced(image: Image.Image) -> Image.Image:
+    """Return an image of at most LARGEST_SIDE; unchanged where its mode has no means."""
+    factor = math.ceil(max(image.size) / LARGEST_SIDE)
+    return image.reduce(factor) if factor > 1 and image.mode in _WITH_MEANS else image
+
+
+def _eight_bits(image: Image.Image) -> Image.Image:
+    """Return an image of RGB or RGBA with 8 bits a channel."""
+    if image.mode.startswith(('I', 'F')):  # grey of 16 bits, of 32, or of floats
+        values = np.asarray(image, np.float64)
+        if image.mode == 'F' or values.min() < 0 or values.max() > 65535:
+            raise DataError(f'its pixels are numbers of mode {image.mode}, not a photo')
+        image = Image.fromarray((values / 257).astype(np.uint8))
+    has_alpha = 'A' in image.mode or 'transparency' in image.info
+    return image.convert('RGBA' if has_alpha else 'RGB')

@@ -1,0 +1,115 @@
+"""Views of photos through the network; and the object's cube, found from what comes out."""
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from active_recon.errors import DataError, ViewError
+from active_recon.photos.backgrounds import shown_image
+from active_recon.photos.cube import Cube
+from active_recon.photos.hull import (
+    ceiling,
+    coverage,
+    depth_in_masks,
+    hull,
+    object_box,
+    seen_cells,
+)
+from active_recon.photos.shape import TakenView
+from active_recon.photos.views import PhotoView
+from active_recon.reconstructor import Reconstructor
+from active_recon.volumes.voxels import VoxelGrid
+import numpy as np
+
+COVERED = 0.95
+"""Share of every mask that the hull covers where masks do not contradict each other."""
+_COVERED_PLAIN = 0.995  # of masks by colour: they lack what has the background's colour
+T = TypeVar('T')
+Advance = Callable[[int, str], None]
+_SEARCHED_VIEWS = 8
+_ROUNDS = 4
+_HULL_CELLS = 48
+_SAME = 0.08  # relative change of the cube below which the search ends
+
+
+def integrate(views: Sequence[PhotoView], cube: Cube, size: float, reconstructor: Reconstructor,
+              background: str, advance: Advance = lambda steps, note: None
+              ) -> tuple[list[TakenView], list[str]]:
+    """
+    Return the views after each other in the reconstruction, and why others are left out.
+
+    `size` is the side of the cube, metres. Raises DataError where no view can be used, with the
+    first reason.
+    """
+    reconstructor.object_size = size
+    reconstructor.reset()
+    taken, left_out = [], []
+    for view in views:
+        camera = cube.camera(view.camera, size)
+        try:
+            image, source = shown_image(view, camera, size, background)
+            known = reconstructor.add_view(image, camera)
+            taken.append(TakenView(view.name, image, camera, source, known))
+        except ViewError as error:
+            left_out.append(f'{view.name}: {error}')
+        advance(1, view.name)
+    if not taken:
+        raise DataError(f'no photo shows the object: {left_out[0]}', 'no_object')
+    return taken, left_out
+
+
+def carved(grid: VoxelGrid, threshold: float, views: Sequence[PhotoView],
+           cube: Cube) -> tuple[VoxelGrid, float]:
+    """
+    Return the grid without the cells that a mask excludes, and the masks' `coverage`.
+
+    Where masks contradict each other, only their mistakes would be cut out: the grid stays. So
+    would those of what was told from a board, which lack what looks like the board.
+    """
+    views = [view for view in views if view.mask is not None and view.mask_source != 'board']
+    if not views:
+        return grid, 1.0
+    cameras = [cube.camera(view.camera, 1.0) for view in views]
+    depths = depth_in_masks(views, cameras, len(grid.occupancy))
+    covered = coverage(hull(depths), views, cameras)
+    plain = any(view.mask_source == 'plain' for view in views)
+    if covered < (_COVERED_PLAIN if plain else COVERED):
+        return grid, covered
+    return VoxelGrid(np.minimum(grid.occupancy, ceiling(depths, threshold)), grid.size), covered
+
+
+def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstructor,
+               background: str, grounded: bool = False) -> Cube:
+    """
+    Return the cube about the object, found in `start` and cut down to what is in it.
+
+    Where every view has a mask, their hull is in it, else the network's reconstruction; if
+    `grounded`, only above 0 of the world's `up`. Raises DataError where nothing is.
+    """
+    some = even_choice(views, _SEARCHED_VIEWS)
+    cube = start
+    for _ in range(_ROUNDS):
+        cameras = [cube.camera(view.camera, 1.0) for view in some]
+        if all(view.mask is not None for view in some):
+            cells = hull(depth_in_masks(some, cameras, _HULL_CELLS))
+            cells &= seen_cells(cameras, _HULL_CELLS)
+        else:
+            taken, _ = integrate(some, cube, 1.0, reconstructor, background)
+            cells = taken[-1].known.grid.occupied(reconstructor.threshold)
+        box = object_box(cells & cube.above_ground(len(cells)) if grounded else cells)
+        if box is None:
+            raise DataError('object not found: expected one where the photos look, found nothing '
+                            'there; give its place by --box, or masks by --masks', 'no_cube')
+        before, cube = cube, cube.part(box)
+        moved = float(np.linalg.norm(cube.centre - before.centre))
+        if max(moved, abs(cube.side - before.side)) < _SAME * before.side:
+            break
+    return cube
+
+
+def even_choice(views: Sequence[T], count: int) -> list[T]:
+    """Return so many views at even steps, in their order; all where there are no more."""
+    if count >= len(views):
+        return list(views)
+    return [views[step * len(views) // count] for step in range(count)]
+
+

@@ -1,0 +1,95 @@
+"""Files of cameras by what they look like: which reader each has, and where one is searched."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from active_recon.datasets.middlebury import camera_lines, lens_of, pose_of, read_box
+from active_recon.errors import ConfigError, DataError, ViewError
+from active_recon.photos.camera_file import CameraFile, Entry, Lens
+from active_recon.photos.colmap import read_colmap
+from active_recon.photos.files import PhotoFile
+from active_recon.photos.opencv_yaml import read_opencv
+from active_recon.photos.transforms_json import FLIP, read_transforms
+import numpy as np
+from numpy.typing import NDArray
+
+FORMATS = ('transforms.json (NeRF, instant-ngp, nerfstudio), the folder of a COLMAP model, '
+           '*_par.txt (Middlebury), or OpenCV YAML')
+LOOKS = ('opencv', 'opengl')
+"""Camera axes: x right, y down, z forward; or x right, y up, z backward."""
+_MODEL_FOLDERS = ('.', 'sparse', 'sparse/0', 'colmap/sparse/0')
+_YAML = {'.yml', '.yaml', '.xml'}
+
+
+def read_cameras(path: Path, photos: Sequence[PhotoFile], looks: str | None = None) -> CameraFile:
+    """
+    Read the cameras in a file, or in a folder that has one of the known formats.
+
+    `looks`, one of LOOKS, replaces the camera axes that the format has. Raises DataError where
+    there is no such file or it cannot be used, ConfigError on another value of `looks`.
+    """
+    found = path if path.is_file() else find_cameras([path])
+    if found is None:
+        raise DataError(f'{path}: no cameras: expected {FORMATS}', 'no_cameras')
+    read = _read(found, photos)
+    if looks not in (None, *LOOKS):
+        raise ConfigError(f'camera axes: unknown value: expected one of {", ".join(LOOKS)}, got '
+                          f'{looks!r}')
+    return read if looks in (None, read.looks) else with_other_axes(read)
+
+
+def with_other_axes(cameras: CameraFile) -> CameraFile:
+    """Return cameras as if the file had been read with the other one of LOOKS."""
+    entries = [Entry(each.name, each.pose @ FLIP, each.lens) for each in cameras.entries]
+    other = LOOKS[1 - LOOKS.index(cameras.looks)]
+    return replace(cameras, entries=entries, looks=other)
+
+
+def find_cameras(folders: Sequence[Path]) -> Path | None:
+    """Return the first file of cameras in folders, or the folder of a COLMAP model, or None."""
+    for folder in folders:
+        if not folder.is_dir():
+            continue
+        for pattern in ('transforms.json', 'transforms_train.json', '*_par.txt', 'cameras.y*ml'):
+            found = sorted(folder.glob(pattern))
+            if len(found) == 1:
+                return found[0]
+        for model in (folder / name for name in _MODEL_FOLDERS):
+            if (model / 'images.bin').is_file() or (model / 'images.txt').is_file():
+                return model
+    return None
+
+
+def _read(path: Path, photos: Sequence[PhotoFile]) -> CameraFile:
+    if path.is_dir():
+        return read_colmap(path)
+    if path.name.endswith('_par.txt'):
+        return _read_middlebury(path)
+    if path.suffix.lower() == '.json':
+        return read_transforms(path)
+    if path.suffix.lower() in _YAML:
+        return read_opencv(path, photos)
+    if path.stem in ('cameras', 'images') and path.suffix in ('.bin', '.txt'):
+        return read_colmap(path.parent)
+    raise DataError(f'{path}: no cameras: expected {FORMATS}', 'no_cameras')
+
+
+def _read_middlebury(path: Path) -> CameraFile:
+    """Read Middlebury's cameras; its world has y up."""
+    entries = []
+    for number, (name, numbers) in camera_lines(path):
+        try:
+            lens_of(numbers, (1, 1))
+            entries.append(Entry(name, pose_of(numbers), _lens(numbers)))
+        except ViewError as error:
+            raise DataError(f'{path}, line {number}: {error}') from error
+    try:
+        box = read_box(path.parent)
+    except DataError:
+        box = None
+    return CameraFile(str(path), entries, np.array([0.0, 1.0, 0.0]), box)
+
+
+def _lens(numbers: NDArray[np.float64]) -> Lens:
+    return lambda size: lens_of(numbers, size)

@@ -1,0 +1,202 @@
+"""From photos with known cameras to the shape of the object in them: the whole way in one call."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from active_recon.errors import ConfigError, DataError, ViewError
+from active_recon.geometry.cameras import Camera
+from active_recon.photos.backgrounds import BACKGROUNDS, named, separated
+from active_recon.photos.board_masks import board_views
+from active_recon.photos.camera_file import CameraFile
+from active_recon.photos.conventions import misreading
+from active_recon.photos.cube import Cube, first_cube, upward
+from active_recon.photos.doubts import doubts
+from active_recon.photos.files import open_photos, photo_paths
+from active_recon.photos.integrating import carved, even_choice, found_cube, integrate
+from active_recon.photos.shape import Shape
+from active_recon.photos.sources import posed_by, Source
+from active_recon.photos.views import load_views, PhotoView, view_of
+from active_recon.reconstructor import load
+from active_recon.reporting import Reporting, silent
+from active_recon.volumes.meshes import axis_direction
+from active_recon.volumes.voxels import VoxelGrid
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Options:
+    """
+    How photos are reconstructed.
+
+    - box: x, y, z of the centre and the side of the object's cube, in units of the camera file;
+      None: as the file says, else found
+    - unit: metres in a unit of the camera file; size: side of the cube in metres, which sets the
+      scale instead, or the cube's own side where the cameras are in metres for certain
+    - up: the axis of the file's world that points up (x, y, z, with or without a sign); None: as
+      the format says, else the mean of what is up in the photos
+    - axes: camera axes, one of LOOKS, instead of the format's
+    - background: one of BACKGROUNDS; masks: a folder of masks
+    - views: how many photos at even steps are used; None: all
+    - model: a model that ships by its name, or a weights file; threads: of the CPU
+
+    Raises ConfigError on values that contradict each other.
+    """
+
+    box: Sequence[float] | None = None
+    unit: float = 1.0
+    size: float | None = None
+    up: str | None = None
+    axes: str | None = None
+    background: str = 'auto'
+    masks: Path | None = None
+    views: int | None = None
+    model: str | Path | None = None
+    threads: int | None = 1
+
+    def __post_init__(self) -> None:
+        """Reject what cannot be, before any photo is read."""
+        if self.background not in BACKGROUNDS:
+            raise ConfigError('background: unknown value: expected one of '
+                              f'{", ".join(BACKGROUNDS)}, got {self.background!r}')
+        for name, value in (('unit', self.unit), ('size', self.size)):
+            if value is not None and not 0 < value < np.inf:
+                raise ConfigError(f'{name}: out of range: expected metres above 0, got {value}')
+        if self.box is not None and len(self.box) != 4:
+            raise ConfigError('box: expected four numbers, the centre x, y, z and the side, got '
+                              f'{len(self.box)}')
+        if self.views is not None and self.views < 1:
+            raise ConfigError(f'views: out of range: expected 1 or more, got {self.views}')
+
+
+_DEFAULTS = Options()
+
+
+def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
+                cameras: Source | str | Sequence[Camera] | None = None, size: float | None = None,
+                *, background: str = 'auto', masks: Path | str | None = None,
+                box: Sequence[float] | None = None, unit: float = 1.0, up: str | None = None,
+                views: int | None = None, model: str | Path | None = None,
+                threads: int | None = 1) -> Shape:
+    """
+    Reconstruct an object from photos of known cameras.
+
+    `images` is a folder, a list of files, or of pixels, (H, W, 3 or 4) uint8 RGB(A). `cameras` is
+    a file in one of the known formats (None: the one beside the photos), another `Source`, or a
+    camera for each image in the object frame, whose origin is the centre of the object's cube.
+    `size` is the side of that cube in metres. With a camera file it only sets the scale, and the
+    cube is found unless `box` (x, y, z, side, in the file's units) or the file tells it. The rest
+    is as in `Options`. Raises ActiveReconError where no photo can be used.
+    """
+    options = Options(box, unit, size, up, None, background, None if masks is None else
+                      Path(masks), views, model, threads)
+    if isinstance(cameras, str):
+        cameras = Path(cameras)
+    if cameras is not None and not isinstance(cameras, Source):
+        if isinstance(images, Path | str):
+            raise ConfigError('images: expected pixels for a list of cameras, got the path '
+                              f'{images}')
+        return _of_cameras(images, cameras, options)
+    if isinstance(images, Path | str):
+        place: Path | list[Path] = Path(images)
+    else:
+        place = [Path(image) for image in images if isinstance(image, Path | str)]
+        if len(place) != len(images):
+            raise ConfigError('cameras: expected a camera for each image, since pixels have no '
+                              'names to find them by in a file')
+    return from_files(place, cameras, options)
+
+
+def from_files(place: Path | Sequence[Path], source: Source | None, options: Options = _DEFAULTS,
+               reporting: Reporting = silent) -> Shape:
+    """
+    Reconstruct from photos, a folder or files, whose cameras are found as in `posed_by`.
+
+    Raises ActiveReconError where no photo can be used.
+    """
+    photos, left_out = open_photos(photo_paths(place))
+    file, posed, unposed = posed_by(source, photos, options.axes, reporting)
+    chosen = even_choice(posed, options.views or len(posed))
+    with reporting('reading the photos', len(chosen)) as advance:
+        views, unread = load_views(chosen, options.masks, advance)
+    return from_views(views, file, options, [*left_out, *unposed, *unread], reporting)
+
+
+def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = _DEFAULTS,
+               left_out: Sequence[str] = (), reporting: Reporting = silent) -> Shape:
+    """Reconstruct from photos in memory, whose cameras are of `file`'s world."""
+    reconstructor = load(options.model, threads=options.threads)
+    poses = [view.camera for view in views]
+    up = axis_direction(options.up) if options.up else file.up
+    cube = _told_cube(options, file, upward(poses) if up is None else up)
+    wrong = misreading(poses, None if cube is None else cube.centre)
+    if wrong:
+        raise DataError(f'{file.source}: {wrong}', 'convention')
+    views, empty, cube = _separated(views, file, cube, options.background)
+    if cube is None:
+        with reporting('finding the object', 1) as advance:
+            cube = found_cube(views, first_cube(poses, up), reconstructor, options.background,
+                              file.board is not None)
+            advance(1, '')
+    if options.size and file.metric and options.box is None:
+        cube = cube.of_side(options.size, file.board is not None)
+    size = options.size or cube.side * options.unit
+    with reporting('reconstructing', len(views)) as advance:
+        taken, unseen = integrate(views, cube, size, reconstructor, options.background, advance)
+    grid, covered = carved(taken[-1].known.grid, reconstructor.threshold, views, cube)
+    if file.board is not None:
+        occupancy = np.where(cube.above_ground(len(grid.occupancy)), grid.occupancy, np.float32(0))
+        grid = VoxelGrid(occupancy, grid.size)
+    return Shape(grid, reconstructor.threshold, taken, cube,
+                 named([view.background for view in taken]), [*left_out, *empty, *unseen],
+                 doubts(taken, views, cube, reconstructor, options.background, covered),
+                 dict(reconstructor.provenance))
+
+
+def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Options) -> Shape:
+    if options.size is None:
+        raise ConfigError("size: missing: expected the side of the object's cube in metres, "
+                          'about the origin of the frame that the cameras are in')
+    if len(images) != len(cameras) or not images:
+        raise ConfigError(f'cameras: expected one for each of {len(images)} images, got '
+                          f'{len(cameras)}')
+    views = []
+    for number, (image, camera) in enumerate(zip(images, cameras, strict=True), 1):
+        if not isinstance(image, np.ndarray):
+            raise ConfigError(f'image {number}: expected pixels, (H, W, 3) uint8 RGB, for a '
+                              f'camera of its own, got {image!r}')
+        views.append(view_of(f'image {number}', image, camera))
+    file = CameraFile('cameras', (), np.array([0.0, 0.0, 1.0]))
+    box = options.box or (0.0, 0.0, 0.0, options.size)
+    return from_views(even_choice(views, options.views or len(views)), file,
+                      replace(options, box=box))
+
+
+def _separated(views: Sequence[PhotoView], file: CameraFile, cube: Cube | None, background: str
+               ) -> tuple[list[PhotoView], list[str], Cube | None]:
+    """
+    Return the views that are not empty with their masks, why others are left out, and the cube.
+
+    Without a cube, what stands on a board is searched above and around it, and found with it.
+    """
+    if file.board is not None and background == 'auto' and all(
+            view.mask is None for view in views):
+        return board_views(views, file.board, cube)
+    found, left_out = [], []
+    for view in views:
+        try:
+            found.append(separated(view, background))
+        except ViewError as error:
+            left_out.append(f'{view.name}: {error}')
+    if not found:
+        raise DataError(f'object not found: {left_out[0]}', 'no_object')
+    return found, left_out, cube
+
+
+def _told_cube(options: Options, file: CameraFile, up: NDArray[np.float64]) -> Cube | None:
+    """Return the cube of the options or the file, None where neither has one."""
+    if options.box is not None:
+        *centre, side = options.box
+        return Cube(np.array(centre, np.float64), side, up)
+    return None if file.box is None else Cube.around(file.box, up)

@@ -1,0 +1,55 @@
+"""A shape as files: mesh, voxels, a picture, and a description of how it was made."""
+
+from dataclasses import asdict
+import json
+from pathlib import Path
+
+from active_recon import __version__
+from active_recon.errors import DataError
+from active_recon.photos.picture import shape_picture
+from active_recon.photos.shape import Shape
+from active_recon.volumes.binvox import write_binvox
+from active_recon.volumes.voxels import write_mesh
+import cv2
+import numpy as np
+
+
+def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply') -> list[Path]:
+    """
+    Write mesh, voxels.npz, voxels.binvox, picture.png and shape.json; return their paths.
+
+    Mesh and voxels are in the object frame in metres; shape.json has the similarity that carries
+    them into the world of the camera file. Raises DataError where no cell is occupied or a file
+    cannot be written, ConfigError on an unknown format.
+    """
+    paths = [folder / name for name in (
+        f'mesh.{mesh_format}', 'voxels.npz', 'voxels.binvox', 'picture.png', 'shape.json')]
+    mesh, voxels, binvox, picture, description = paths
+    write_mesh(shape.mesh(), mesh)
+    try:
+        np.savez_compressed(voxels, occupancy=shape.occupancy, size=shape.size,
+                            threshold=shape.threshold)
+        write_binvox(shape.grid, binvox, shape.threshold)
+        _, drawn = cv2.imencode('.png', shape_picture(shape)[..., ::-1])
+        picture.write_bytes(drawn.tobytes())
+        description.write_text(json.dumps(described(shape), indent=1) + '\n')
+    except OSError as error:
+        raise DataError(f'{folder}: not written: expected a folder with room, got: '
+                        f'{error}') from error
+    return paths
+
+
+def described(shape: Shape) -> dict[str, object]:
+    """Return all about a shape but its cells, ready for JSON."""
+    return {
+        'version': __version__, 'size_m': shape.size, 'threshold': shape.threshold,
+        'world_from_object': shape.world_from_object.tolist(),
+        'cube': {'centre': shape.cube.centre.tolist(), 'side': shape.cube.side,
+                 'up': shape.cube.up.tolist()},
+        'background': shape.background,
+        'views': [{'photo': view.name, 'background': view.background,
+                   'azimuth_rad': view.camera.azimuth, 'elevation_rad': view.camera.elevation,
+                   'distance_m': view.camera.distance} for view in shape.views],
+        'quality': None if shape.quality is None else asdict(shape.quality),
+        'warnings': list(shape.warnings), 'left_out': list(shape.left_out),
+        'network': shape.provenance}

@@ -1,0 +1,63 @@
+"""Where the cameras of photos come from: a file, a board in the photos, or a turntable's steps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from active_recon.calibration.board import Board
+from active_recon.errors import DataError
+from active_recon.photos.board_photos import board_photos
+from active_recon.photos.camera_file import CameraFile, posed_photos, PosedPhoto
+from active_recon.photos.files import PhotoFile
+from active_recon.photos.readers import find_cameras, FORMATS, read_cameras
+from active_recon.photos.turntable_photos import turntable_photos
+from active_recon.reporting import Reporting, silent
+
+
+@dataclass(frozen=True)
+class BoardCameras:
+    """A printed board in the photos; the lens is read from a file or estimated from them."""
+
+    board: Board
+    lens_file: Path | None = None
+
+
+@dataclass(frozen=True)
+class TurntableCameras:
+    """
+    Steps of a turntable before a fixed camera, in the order of the photos' names.
+
+    See `turntable_photos`: radians and metres.
+    """
+
+    step: float
+    elevation: float
+    distance: float
+    field_of_view: float | None = None
+
+
+Source = Path | BoardCameras | TurntableCameras
+
+
+def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | None = None,
+             reporting: Reporting = silent) -> tuple[CameraFile, list[PosedPhoto], list[str]]:
+    """
+    Return the cameras, the photos that have one, and why others have none.
+
+    `source` None is the file of cameras beside the photos, or in the folder above; `axes` is for
+    files, see `read_cameras`. Raises DataError where no photo has a camera.
+    """
+    if isinstance(source, BoardCameras):
+        with reporting('searching the board', len(photos)) as advance:
+            return board_photos(photos, source.board, source.lens_file, advance)
+    if isinstance(source, TurntableCameras):
+        file, posed = turntable_photos(photos, source.step, source.elevation, source.distance,
+                                       source.field_of_view)
+        return file, posed, []
+    folder = photos[0].path.parent
+    path = source or find_cameras([folder, folder.parent])
+    if path is None:
+        raise DataError(f'{folder}: no cameras beside the photos: expected {FORMATS}; name the '
+                        'file by --cameras', 'no_cameras')
+    file = read_cameras(path, photos, axes)
+    return file, *posed_photos(file, photos)

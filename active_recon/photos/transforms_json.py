@@ -1,0 +1,100 @@
+"""
+Cameras in `transforms.json`, as NeRF, instant-ngp and nerfstudio write it.
+
+`transform_matrix` is world from camera with OpenGL's camera axes (x right, y up, z backward) and
+z up in the world. Intrinsics stand in the file or in a frame: `fl_x`, `fl_y`, `cx`, `cy`, `w`,
+`h` in pixels, where (0.5, 0.5) is the centre of the first, or `camera_angle_x` alone, the
+horizontal field of view in radians. Distortion: `k1`, `k2`, `k3`, `p1`, `p2` of OpenCV's model, or
+`k1` to `k4` of its fisheye model.
+
+The format: https://docs.nerf.studio/quickstart/data_conventions.html
+"""
+
+from collections.abc import Mapping
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from active_recon.errors import DataError, ViewError
+from active_recon.geometry.cameras import Intrinsics
+from active_recon.geometry.lenses import Distortion
+from active_recon.photos.camera_file import CameraFile, Entry, Lens, rigid, sized
+import numpy as np
+
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+"""OpenGL's camera axes in those of OpenCV, and the other way round, (4, 4)."""
+_STRAIGHT = {'PINHOLE', 'SIMPLE_PINHOLE', 'OPENCV', 'PERSPECTIVE'}
+_FISHEYE = {'OPENCV_FISHEYE', 'FISHEYE'}
+
+
+def read_transforms(path: Path) -> CameraFile:
+    """Read the file; raises DataError that names the frame and the key that are wrong."""
+    try:
+        content = json.loads(path.read_text())
+        frames = content['frames']
+        if not isinstance(frames, list) or not frames:
+            raise ValueError('no frames')
+    except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f'{path}: no cameras: expected JSON with a list `frames`, got: '
+                        f'{error!r}') from error
+    entries = []
+    for number, frame in enumerate(frames):
+        where = f'{path}, frame {number}'
+        try:
+            matrix = np.array(frame['transform_matrix'], np.float64)
+            name = str(frame['file_path'])
+            if matrix.shape not in ((4, 4), (3, 4)):
+                raise ValueError(f'transform_matrix of the shape {matrix.shape}')
+            lens = _lens({**content, **frame})
+        except (KeyError, TypeError, ValueError, ViewError) as error:
+            raise DataError(f'{where}: no camera: expected file_path, transform_matrix and '
+                            f'intrinsics, got: {error}') from error
+        pose = rigid(matrix[:3, :3], matrix[:3, 3], where) @ FLIP
+        entries.append(Entry(name, pose, lens))
+    return CameraFile(str(path), entries, up=np.array([0.0, 0.0, 1.0]), looks='opengl')
+
+
+def _lens(values: Mapping[str, Any]) -> Lens:
+    distortion = _distortion(values)
+    if 'fl_x' not in values and 'camera_angle_x' not in values:
+        raise ValueError('neither fl_x nor camera_angle_x')
+    if 'fl_x' in values and {'w', 'h'} <= values.keys():
+        width, height = int(values['w']), int(values['h'])
+        across = _positive(values, 'fl_x')
+        return sized(Intrinsics(
+            across, _positive({'fl_y': across, **values}, 'fl_y'),
+            float(values.get('cx', width / 2)), float(values.get('cy', height / 2)), width,
+            height, distortion))
+
+    def of_size(size: tuple[int, int]) -> Intrinsics:
+        width, height = size
+        across = (_positive(values, 'fl_x') if 'fl_x' in values
+                  else width / 2 / math.tan(_positive(values, 'camera_angle_x') / 2))
+        down = (_positive(values, 'fl_y') if 'fl_y' in values
+                else height / 2 / math.tan(_positive(values, 'camera_angle_y') / 2)
+                if 'camera_angle_y' in values else across)
+        return Intrinsics(across, down, float(values.get('cx', width / 2)),
+                          float(values.get('cy', height / 2)), width, height, distortion)
+    return of_size
+
+
+def _distortion(values: Mapping[str, Any]) -> Distortion | None:
+    model = str(values.get('camera_model', 'OPENCV')).upper()
+    if model not in _STRAIGHT | _FISHEYE:
+        raise ValueError(f'camera_model {model}: expected one of '
+                         f'{", ".join(sorted(_STRAIGHT | _FISHEYE))}')
+    k1, k2, k3, k4, p1, p2 = (float(values.get(name, 0)) for name in (
+        'k1', 'k2', 'k3', 'k4', 'p1', 'p2'))
+    if model in _FISHEYE or values.get('is_fisheye'):
+        return Distortion('equidistant', (k1, k2, k3, k4))
+    if k4:
+        raise ValueError('k4 of a lens that is no fisheye: expected 0')
+    return Distortion('plumb_bob', (k1, k2, p1, p2, k3)) if any((k1, k2, k3, p1, p2)) else None
+
+
+def _positive(values: Mapping[str, Any], name: str) -> float:
+    value = float(values[name])
+    if not 0 < value < math.inf:
+        raise ValueError(f'{name} of {value}: expected a number above 0')
+    return value

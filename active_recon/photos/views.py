@@ -1,0 +1,123 @@
+"""Photos in memory: pixels, mask and camera of each, in the world of the camera file."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from active_recon.errors import DataError
+from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.photos.camera_file import PosedPhoto
+from active_recon.photos.files import ENDINGS, read_photo
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+_SEE_THROUGH = 250  # alpha below which a photo has an alpha channel worth the name
+_EMPTY_SHARE = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoView:
+    """
+    A photo and its camera.
+
+    - image: (H, W, 3) uint8 RGB; mask: (H, W) bool, true on the object, or None
+    - mask_source: 'masks' (files), 'alpha', or '' without a mask
+    - camera: pose world from optical frame, in the units of the camera file
+    """
+
+    name: str
+    image: NDArray[np.uint8]
+    camera: Camera
+    mask: NDArray[np.bool_] | None = None
+    mask_source: str = ''
+
+
+def load_views(posed: Sequence[PosedPhoto], masks: Path | None = None,
+               advance: Callable[[int, str], None] = lambda steps, note: None
+               ) -> tuple[list[PhotoView], list[str]]:
+    """
+    Read photos with their masks, and return why others are left out.
+
+    `masks` is a folder with a mask for each photo, of the same name or stem, bright on the
+    object. Raises DataError where no photo is left, or the folder has no mask for any.
+    """
+    known = _masks_by_stem(masks)
+    views, left_out = [], []
+    for each in posed:
+        try:
+            views.append(_view(each, known))
+        except DataError as error:
+            left_out.append(str(error))
+        advance(1, each.photo.name)
+    if not views:
+        raise DataError(f'no photo can be used: {"; ".join(left_out[:3])}', 'no_photos')
+    if masks is not None and not any(view.mask_source == 'masks' for view in views):
+        raise DataError(f'{masks}: masks of other photos: expected some named like '
+                        f'{views[0].name}, found none of {len(known)}', 'no_masks')
+    return views, left_out
+
+
+def view_of(name: str, image: NDArray[np.uint8], camera: Camera) -> PhotoView:
+    """
+    Return the view of pixels in memory: (H, W, 3) uint8 RGB, or (H, W, 4) with straight alpha.
+
+    Raises DataError on other pixels, and where they are not of the camera's size.
+    """
+    lens = camera.intrinsics
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] not in (3, 4) or (
+            image.shape[:2] != (lens.height, lens.width)):
+        raise DataError(f'{name}: wrong image: expected {lens.height} x {lens.width} x 3 or 4 '
+                        f'uint8, as the camera says, got {image.shape} {image.dtype}')
+    alpha = image[..., 3] if image.shape[2] == 4 else None
+    image = np.ascontiguousarray(image[..., :3])
+    if alpha is None or (alpha < _SEE_THROUGH).mean() < _EMPTY_SHARE:
+        return PhotoView(name, image, camera)
+    if not (alpha > 127).any():
+        raise DataError(f'{name}: empty: expected an object in its alpha channel, got none')
+    return PhotoView(name, image, camera, alpha > 127, 'alpha')
+
+
+def _view(posed: PosedPhoto, masks: dict[str, Path]) -> PhotoView:
+    pixels = read_photo(posed.photo, posed.upright)
+    height, width = pixels.shape[:2]
+    camera = Camera(posed.pose, _reduced(posed.intrinsics, width, height))
+    name = posed.photo.name
+    view = view_of(name, pixels, camera)
+    path = masks.get(Path(name).stem.lower())
+    if path is None:
+        return view
+    return PhotoView(name, view.image, camera, _mask(path, width, height), 'masks')
+
+
+def _reduced(lens: Intrinsics, width: int, height: int) -> Intrinsics:
+    return lens if (lens.width, lens.height) == (width, height) else lens.resized(width, height)
+
+
+def _masks_by_stem(folder: Path | None) -> dict[str, Path]:
+    if folder is None:
+        return {}
+    if not folder.is_dir():
+        raise DataError(f'{folder}: no such folder: expected one with masks', 'no_masks')
+    # nerfstudio and COLMAP name the mask of a.jpg a.jpg.png
+    return {Path(path.stem).stem.lower() if Path(path.stem).suffix.lower() in ENDINGS
+            else path.stem.lower(): path
+            for path in sorted(folder.iterdir()) if path.suffix.lower() in ENDINGS}
+
+
+def _mask(path: Path, width: int, height: int) -> NDArray[np.bool_]:
+    try:
+        with Image.open(path) as image:
+            channel = 'A' if image.mode in ('RGBA', 'LA') else None
+            grey = np.asarray(image.getchannel(channel) if channel else image.convert('L'))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
+    if abs(grey.shape[1] * height - width * grey.shape[0]) > 0.01 * width * grey.shape[0]:
+        raise DataError(f'{path}: no mask of the right size: expected {width} x {height} pixels '
+                        f'or the same shape, got {grey.shape[1]} x {grey.shape[0]}')
+    sized = cv2.resize(np.asarray(grey, np.uint8), (width, height), interpolation=cv2.INTER_AREA)
+    found = np.asarray(sized > (127 if sized.max() > 1 else 0))
+    if not found.any():
+        raise DataError(f'{path}: empty mask: expected an object in it, got only background')
+    return found

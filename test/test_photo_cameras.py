@@ -1,0 +1,166 @@
+"""Every format of cameras says the same of the same cameras, and what is no camera is refused."""
+
+import json
+from pathlib import Path
+import struct
+
+from active_recon.errors import ConfigError, DataError, ViewError
+from active_recon.photos.camera_file import CameraFile, Entry, posed_photos, sized
+from active_recon.photos.colmap import read_colmap
+from active_recon.photos.files import open_photos, photo_paths
+from active_recon.photos.readers import find_cameras, read_cameras
+from active_recon.photos.transforms_json import read_transforms
+import numpy as np
+from photo_rigs import (
+    blank_photos,
+    LENS,
+    names,
+    PINHOLE,
+    rig,
+    transforms,
+    write_middlebury,
+    write_opencv,
+    write_transforms,
+)
+import pytest
+
+COLMAP = Path(__file__).parent / 'colmap'
+
+
+@pytest.fixture(scope='module')
+def photos(tmp_path_factory):
+    return open_photos(photo_paths(blank_photos(tmp_path_factory.mktemp('photos'), rig())))[0]
+
+
+def assert_same(path, photos, cameras, axes=None):
+    posed, left_out = posed_photos(read_cameras(path, photos, axes), photos)
+    assert not left_out and [each.photo.name for each in posed] == names(cameras)
+    for own, true in zip(posed, cameras, strict=True):
+        np.testing.assert_allclose(own.pose, true.pose, atol=1e-9)
+        lens, expected = own.intrinsics, true.intrinsics
+        np.testing.assert_allclose(lens.matrix, expected.matrix, atol=1e-9)
+        assert (lens.width, lens.height) == (expected.width, expected.height)
+        if expected.distortion is None:
+            assert lens.distortion is None
+        else:
+            points = np.array([[0.3, -0.2], [-0.4, 0.3]])
+            np.testing.assert_allclose(lens.distortion.distort(points),
+                                       expected.distortion.distort(points), atol=1e-12)
+
+
+@pytest.mark.parametrize('kind', ['text', 'binary'])
+def test_a_colmap_model_has_the_cameras_it_was_written_from(kind, photos):
+    assert_same(COLMAP / kind, photos, rig())
+    up = read_colmap(COLMAP / kind).up
+    assert up[2] > 0.9  # what is up in the photos: the model itself does not tell
+
+
+@pytest.mark.parametrize('shared', [True, False])
+@pytest.mark.parametrize('suffix', [True, False])
+def test_transforms_have_the_cameras_they_were_written_from(shared, suffix, photos, tmp_path):
+    path = write_transforms(tmp_path / 'transforms.json', rig(), shared=shared, suffix=suffix)
+    assert_same(path, photos, rig())
+    assert_same(tmp_path, photos, rig())  # found in its folder
+
+
+@pytest.mark.parametrize('named', [True, False])
+@pytest.mark.parametrize('suffix', ['yml', 'xml', 'yaml'])
+def test_what_opencv_writes_has_the_cameras_it_was_written_from(named, suffix, photos, tmp_path):
+    assert_same(write_opencv(tmp_path / f'cameras.{suffix}', rig(), named), photos, rig())
+
+
+def test_middlebury_s_file_has_the_cameras_it_was_written_from(photos, tmp_path):
+    assert_same(write_middlebury(tmp_path / 'it_par.txt', rig(PINHOLE)), photos, rig(PINHOLE))
+
+
+def test_a_field_of_view_is_a_focal_length(photos, tmp_path):
+    path = tmp_path / 'transforms.json'
+    content = transforms(rig(PINHOLE))
+    angle = 2 * np.arctan(PINHOLE.width / 2 / PINHOLE.fx)
+    path.write_text(json.dumps({'camera_angle_x': angle, 'frames': content['frames']}))
+    assert_same(path, photos, rig(PINHOLE))
+
+
+def test_a_scaled_photo_has_a_scaled_lens_and_another_shape_none(tmp_path):
+    lens = sized(LENS)
+    assert lens((640, 480)).fx == 2 * LENS.fx
+    with pytest.raises(ViewError, match='another size: expected 320 x 240 pixels'):
+        lens((240, 320))
+
+
+def test_other_axes_are_a_half_turn_about_x(photos, tmp_path):
+    path = write_transforms(tmp_path / 'transforms.json', rig())
+    assert_same(path, photos, rig(), axes='opengl')
+    own, other = read_cameras(path, photos), read_cameras(path, photos, 'opencv')
+    np.testing.assert_allclose(other.entries[0].pose[:3, :3],
+                               own.entries[0].pose[:3, :3] * [1, -1, -1])
+    with pytest.raises(ConfigError, match='expected one of opencv, opengl'):
+        read_cameras(path, photos, 'directx')
+
+
+def test_photos_without_a_camera_are_named_and_the_others_used(photos, tmp_path):
+    content = rig()[:2]
+    posed, left_out = posed_photos(
+        read_cameras(write_transforms(tmp_path / 'transforms.json', content), photos), photos)
+    assert len(posed) == 2
+    assert left_out[0].startswith('photo2.png: no camera in ') and len(left_out) == 2
+
+
+def test_cameras_of_other_photos_are_refused(photos):
+    entries = [Entry('other/cat.jpg', np.eye(4), sized(LENS))]
+    with pytest.raises(DataError, match=r'cameras of other photos: expected some of photo0.png, '
+                                        r'\.\.\., got those of other/cat.jpg'):
+        posed_photos(CameraFile('file', entries), photos)
+
+
+def test_cameras_are_found_beside_the_photos(tmp_path):
+    assert find_cameras([tmp_path, tmp_path / 'none']) is None
+    (tmp_path / 'sparse/0').mkdir(parents=True)
+    (tmp_path / 'sparse/0/images.bin').touch()
+    assert find_cameras([tmp_path]) == tmp_path / 'sparse/0'
+    (tmp_path / 'transforms.json').touch()
+    assert find_cameras([tmp_path]) == tmp_path / 'transforms.json'
+
+
+@pytest.mark.parametrize(('change', 'expected'), [
+    ({'frames': []}, 'expected JSON with a list `frames`'),
+    ({'camera_model': 'EQUIRECTANGULAR'}, 'camera_model EQUIRECTANGULAR: expected one of'),
+    ({'fl_x': -3}, 'frame 0: no camera: .*fl_x of -3.0: expected a number above 0'),
+    ({'k4': 0.1}, 'k4 of a lens that is no fisheye'),
+    ({'frames': [{'file_path': 'a.png'}]}, 'frame 0: no camera: .*transform_matrix'),
+    ({'frames': [{'file_path': 'a.png', 'transform_matrix': np.ones((4, 4)).tolist()}]},
+     'frame 0: no rotation')])
+def test_transforms_that_cannot_be_used_are_refused_by_what_is_wrong(change, expected, tmp_path):
+    path = tmp_path / 'transforms.json'
+    path.write_text(json.dumps({**transforms(rig()), **change}))
+    with pytest.raises(DataError, match=expected):
+        read_transforms(path)
+
+
+def test_a_colmap_model_that_is_cut_off_is_refused(tmp_path):
+    for name in ('cameras.bin', 'images.bin'):
+        (tmp_path / name).write_bytes((COLMAP / 'binary' / name).read_bytes())
+    (tmp_path / 'images.bin').write_bytes((COLMAP / 'binary/images.bin').read_bytes()[:-20])
+    with pytest.raises(DataError, match='no COLMAP model: expected cameras and images'):
+        read_colmap(tmp_path)
+    (tmp_path / 'images.bin').write_bytes((COLMAP / 'binary/images.bin').read_bytes())
+    (tmp_path / 'cameras.bin').write_bytes(
+        struct.pack('<QiiQQ5d', 1, 7, 7, 10, 10, 9, 9, 5, 5, 0.1))
+    with pytest.raises(DataError, match='FOV: run `colmap image_undistorter` first'):
+        read_colmap(tmp_path)
+
+
+@pytest.mark.parametrize(('name', 'content', 'expected'), [
+    ('cameras.yml', '%YAML:1.0\n---\na: 1\n', 'no lens: expected camera_matrix'),
+    ('cameras.txt', 'nothing', 'no COLMAP model'),
+    ('cameras.csv', 'nothing', r'no cameras: expected transforms.json')])
+def test_a_file_without_cameras_is_refused(name, content, expected, photos, tmp_path):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(DataError, match=expected):
+        read_cameras(tmp_path / name, photos)
+
+
+def test_poses_that_do_not_match_the_photos_are_refused(photos, tmp_path):
+    path = write_opencv(tmp_path / 'cameras.yml', rig(count=3), named=False)
+    with pytest.raises(DataError, match='expected .* six numbers for each of 4 photos, got 3'):
+        read_cameras(path, photos)

@@ -1,0 +1,158 @@
+"""Photos are read upright, in 8 bits, and no larger than needed; what is no photo is left out."""
+
+from active_recon.errors import DataError
+from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.photos.camera_file import PosedPhoto
+from active_recon.photos.files import LARGEST_SIDE, open_photos, photo_paths, read_photo
+from active_recon.photos.views import load_views, view_of
+import numpy as np
+from PIL import ExifTags, Image, ImageOps
+import pytest
+
+
+def drawn(width=40, height=30):
+    """Return an image no two corners of which are alike, (H, W, 3) uint8."""
+    image = np.zeros((height, width, 3), np.uint8)
+    image[..., 0] = np.linspace(0, 255, width)
+    image[..., 1] = np.linspace(0, 255, height)[:, None]
+    image[:5, :5, 2] = 255
+    return image
+
+
+def opened(path):
+    return open_photos([path])[0][0]
+
+
+@pytest.mark.parametrize('orientation', range(1, 9))
+def test_a_photo_is_turned_as_exif_says(orientation, tmp_path):
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = orientation
+    path = tmp_path / 'photo.png'
+    Image.fromarray(drawn()).save(path, exif=exif)
+    with Image.open(path) as image:
+        expected = np.asarray(ImageOps.exif_transpose(image))
+    photo = opened(path)
+    np.testing.assert_array_equal(read_photo(photo), expected)
+    assert photo.upright_size == expected.shape[1::-1]
+    np.testing.assert_array_equal(read_photo(photo, upright=False), drawn())
+
+
+def test_the_lens_decides_whether_a_photo_is_taken_as_stored(tmp_path):
+    from active_recon.photos.camera_file import CameraFile, Entry, posed_photos, sized
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 6
+    Image.fromarray(drawn()).save(tmp_path / 'photo.png', exif=exif)
+    photo = opened(tmp_path / 'photo.png')
+    for width, height, upright in ((30, 40, True), (40, 30, False)):
+        lens = sized(Intrinsics(50, 50, width / 2, height / 2, width, height))
+        posed, _ = posed_photos(CameraFile('it', [Entry('photo', np.eye(4), lens)]), [photo])
+        assert posed[0].upright is upright
+        assert load_views(posed)[0][0].image.shape == (height, width, 3)
+
+
+def test_sixteen_bits_become_eight(tmp_path):
+    grey = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
+    Image.fromarray(grey).save(tmp_path / 'grey.png')
+    read = read_photo(opened(tmp_path / 'grey.png'))
+    np.testing.assert_allclose(read, np.repeat(grey[..., None] / 257, 3, axis=2), atol=1)
+
+
+@pytest.mark.parametrize('mode', ['L', 'P', 'CMYK', '1', 'LA'])
+def test_a_photo_of_any_mode_becomes_rgb(mode, tmp_path):
+    path = tmp_path / ('photo.tif' if mode == 'CMYK' else 'photo.png')
+    Image.fromarray(drawn()).convert(mode).save(path)
+    assert read_photo(opened(path)).shape == (30, 40, 4 if mode == 'LA' else 3)
+
+
+def test_a_hundred_megapixels_are_reduced_and_their_lens_with_them(tmp_path):
+    path = tmp_path / 'huge.png'
+    Image.new('L', (10_000, 10_000), 77).save(path, compress_level=1)
+    photo = opened(path)
+    lens = Intrinsics(9000, 9000, 5000, 5000, 10_000, 10_000)
+    views, left_out = load_views([PosedPhoto(photo, orbit_camera(0).pose, lens)])
+    assert not left_out
+    side = views[0].image.shape[0]
+    assert side <= LARGEST_SIDE and (views[0].image == 77).all()
+    assert views[0].camera.intrinsics.fx == pytest.approx(0.9 * side)
+
+
+def test_the_same_photo_twice_is_used_once(tmp_path):
+    for name in ('a.png', 'b.png'):
+        Image.fromarray(drawn()).save(tmp_path / name)
+    (tmp_path / 'c.jpg').write_bytes(b'no photo')
+    photos, left_out = open_photos(photo_paths(tmp_path))
+    assert [photo.name for photo in photos] == ['a.png']
+    assert left_out[0] == 'b.png: the same photo as a.png'
+    assert left_out[1].startswith('c.jpg: not readable: expected a whole image')
+
+
+def test_photos_are_in_the_order_of_their_numbers(tmp_path):
+    for name in ('img10.png', 'img2.png', 'notes.txt'):
+        (tmp_path / name).touch()
+    assert [path.name for path in photo_paths(tmp_path)] == ['img2.png', 'img10.png']
+
+
+def test_a_folder_without_a_photo_is_refused(tmp_path):
+    with pytest.raises(DataError, match='no photos: expected files of'):
+        photo_paths(tmp_path)
+    with pytest.raises(DataError, match='no such folder'):
+        photo_paths(tmp_path / 'none')
+    (tmp_path / 'broken.png').write_bytes(b'\x89PNG')
+    with pytest.raises(DataError, match='no readable photo: expected at least one, got none; '
+                                        'broken.png'):
+        open_photos(photo_paths(tmp_path))
+
+
+def test_a_truncated_photo_is_left_out_by_its_name(tmp_path):
+    path = tmp_path / 'cut.png'
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (90, 90, 3), np.uint8)).save(path)
+    path.write_bytes(path.read_bytes()[:9000])
+    lens = Intrinsics(90, 90, 45, 45, 90, 90)
+    with pytest.raises(DataError, match='no photo can be used: cut.png: not readable'):
+        load_views([PosedPhoto(opened(path), orbit_camera(0).pose, lens)])
+
+
+@pytest.mark.parametrize(('tag', 'value', 'expected'), [
+    (ExifTags.Base.FocalLengthIn35mmFilm, 50, 50 / 43.2666 * 50), (None, None, None)])
+def test_exif_gives_a_first_focal_length(tag, value, expected, tmp_path):
+    exif = Image.Exif()
+    if tag:
+        exif.get_ifd(ExifTags.IFD.Exif)[tag] = value
+    Image.fromarray(drawn()).save(tmp_path / 'photo.jpg', exif=exif)
+    found = opened(tmp_path / 'photo.jpg').focal
+    assert found == (None if expected is None else pytest.approx(expected, rel=1e-4))
+
+
+def test_alpha_is_a_mask_only_where_something_is_see_through():
+    lens = Intrinsics(50, 50, 20, 15, 40, 30)
+    camera = Camera(orbit_camera(0).pose, lens)
+    opaque = np.dstack([drawn(), np.full((30, 40), 255, np.uint8)])
+    assert view_of('opaque', opaque, camera).mask is None
+    half = opaque.copy()
+    half[:, :20, 3] = 0
+    np.testing.assert_array_equal(view_of('half', half, camera).mask, half[..., 3] > 0)
+    with pytest.raises(DataError, match='empty: expected an object in its alpha channel'):
+        view_of('none', opaque * np.uint8([1, 1, 1, 0]), camera)
+    with pytest.raises(DataError, match='wrong image: expected 30 x 40 x 3 or 4 uint8'):
+        view_of('small', opaque[:20], camera)
+
+
+def test_masks_are_found_by_the_photo_s_name_and_scaled(tmp_path):
+    Image.fromarray(drawn()).save(tmp_path / 'a.jpg')
+    posed = [PosedPhoto(opened(tmp_path / 'a.jpg'), orbit_camera(0).pose,
+                        Intrinsics(50, 50, 20, 15, 40, 30))]
+    mask = np.zeros((60, 80), np.uint8)
+    mask[20:40, 20:60] = 255
+    for number, name in enumerate(('a.png', 'a.jpg.png', 'A.PNG')):
+        folder = tmp_path / f'masks{number}'
+        folder.mkdir()
+        Image.fromarray(mask).save(folder / name)
+        view = load_views(posed, folder)[0][0]
+        assert view.mask_source == 'masks'
+        np.testing.assert_array_equal(view.mask, mask[::2, ::2] > 0)
+    Image.fromarray(mask[:, :30]).save(tmp_path / 'masks0/a.png')
+    with pytest.raises(DataError, match='no mask of the right size: expected 40 x 30'):
+        load_views(posed, tmp_path / 'masks0')
+    (tmp_path / 'none').mkdir()
+    with pytest.raises(DataError, match='masks of other photos: expected some named like a.jpg'):
+        load_views(posed, tmp_path / 'none')

@@ -1,0 +1,86 @@
+"""Photos that find their cameras by a board, and those of a turntable."""
+
+import math
+
+from active_recon.errors import ConfigError, DataError
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.photos.files import open_photos, photo_paths
+from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
+import numpy as np
+from photo_rigs import blank_photos, PINHOLE, rig
+from PIL import ExifTags, Image
+import pytest
+from rendered_boards import BOARD, LENS, render
+
+
+@pytest.fixture(scope='module')
+def board_poses():
+    """Return the poses of cameras around the board, world from optical, at various tilts."""
+    middle = np.array([BOARD.columns, -BOARD.rows, 0]) * BOARD.square / 2
+    found = []
+    for number in range(5):
+        pose = orbit_camera(number * 1.3, 0.7 + 0.12 * (number % 4), 0.5).pose.copy()
+        pose[:3, 3] += middle
+        found.append(pose)
+    return found
+
+
+@pytest.fixture(scope='module')
+def photos(board_poses, tmp_path_factory):
+    folder = tmp_path_factory.mktemp('board')
+    face_up = np.diag([1.0, -1, -1, 1])
+    for number, pose in enumerate(board_poses):
+        image = render(LENS, np.linalg.inv(pose) @ face_up)
+        Image.fromarray(image).save(folder / f'{number}.png')
+    Image.fromarray(np.full((480, 640, 3), 99, np.uint8)).save(folder / '9.png')
+    return open_photos(photo_paths(folder))[0]
+
+
+def test_each_photo_finds_its_camera_by_the_board(photos, board_poses):
+    file, posed, left_out = posed_by(BoardCameras(BOARD), photos)
+    assert left_out == ['9.png: no board seen in it']
+    for own, true in zip(posed, board_poses, strict=True):
+        assert np.linalg.norm(own.pose[:3, 3] - true[:3, 3]) < 0.004
+        turn = own.pose[:3, :3].T @ true[:3, :3]
+        assert math.acos(min(1, (np.trace(turn) - 1) / 2)) < math.radians(0.7)
+        assert own.intrinsics.fx == pytest.approx(LENS.fx, rel=0.01)
+    assert file.up is not None and file.up[2] == 1
+
+
+def test_a_board_that_is_hardly_seen_is_refused(photos):
+    with pytest.raises(DataError, match='board: seen in 2 of 3 photos: expected it in 3 or more'):
+        posed_by(BoardCameras(BOARD), [*photos[:2], photos[-1]])
+
+
+def test_a_turntable_s_steps_are_azimuths_the_other_way_round(tmp_path):
+    photos = open_photos(photo_paths(blank_photos(tmp_path, rig(PINHOLE))))[0]
+    source = TurntableCameras(math.radians(15), math.radians(20), 0.6, math.radians(50))
+    _, posed, _ = posed_by(source, photos)
+    for number, each in enumerate(posed):
+        position = each.pose[:3, 3]
+        assert math.atan2(position[1], position[0]) == pytest.approx(math.radians(-15 * number))
+        assert np.linalg.norm(position) == pytest.approx(0.6)
+        assert each.intrinsics.fx == pytest.approx(160 / math.tan(math.radians(25)))
+    with pytest.raises(DataError, match='photo0.png: no focal length: .* --fov-deg'):
+        posed_by(TurntableCameras(0.2, 0.3, 0.6), photos)
+    for step, view in ((0, 1), (0.2, 4)):
+        with pytest.raises(ConfigError, match='expected'):
+            posed_by(TurntableCameras(step, 0.3, 0.6, view), photos)
+
+
+def test_a_turntable_s_photos_have_their_focal_length_by_exif(tmp_path):
+    exif = Image.Exif()
+    exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.FocalLengthIn35mmFilm] = 28
+    for number in range(2):
+        image = Image.new('RGB', (300, 200), (90 * number, 0, 0))
+        image.save(tmp_path / f'{number}.jpg', exif=exif)
+    photos = open_photos(photo_paths(tmp_path))[0]
+    _, posed, _ = posed_by(TurntableCameras(0.2, 0.3, 0.6), photos)
+    expected = 28 / math.hypot(36, 24) * math.hypot(300, 200)
+    assert posed[1].intrinsics.fx == pytest.approx(expected)
+
+
+def test_photos_without_cameras_beside_them_are_refused_with_the_formats(tmp_path):
+    photos = open_photos(photo_paths(blank_photos(tmp_path / 'a' / 'b', rig(PINHOLE))))[0]
+    with pytest.raises(DataError, match=r'no cameras beside the photos: expected transforms.json'):
+        posed_by(None, photos)

@@ -1,0 +1,258 @@
+"""An object is reconstructed from photos as they are, wherever it stands in the cameras' world."""
+
+import json
+import os
+from pathlib import Path
+import shutil
+
+import active_recon
+from active_recon.bags.replay.verification import verify
+from active_recon.bags.runs.loop_setup import recorded_setup
+from active_recon.bags.runs.photo_run import photo_run
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.run_writing import write_run
+from active_recon.cli.main import app
+from active_recon.errors import ConfigError, DataError
+from active_recon.geometry.cameras import Camera
+from active_recon.photos.picture import shape_picture
+from active_recon.photos.reconstruct import from_files, Options
+from active_recon.volumes.binvox import read_binvox
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import iou
+import numpy as np
+from photo_scene import cameras, CENTRE, on_plain, rendered, SIDE, thing, write_photos
+from PIL import Image
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+DINO = Path(os.environ.get('ACTIVE_RECON_DINO')
+            or Path(__file__).parents[2] / 'shared/data/photos/dino_sparse_ring')
+BOX = (*CENTRE, 1.1 * SIDE)
+COUNT = 5
+
+
+@pytest.fixture(scope='module')
+def views():
+    return cameras(COUNT)
+
+
+@pytest.fixture(scope='module')
+def rgba(views):
+    return rendered(views)
+
+
+@pytest.fixture(scope='module')
+def plain(views, rgba, tmp_path_factory):
+    """Return a folder of photos before a plain background, with their cameras."""
+    return write_photos(tmp_path_factory.mktemp('plain'), views, map(on_plain, rgba))
+
+
+@pytest.fixture(scope='module')
+def shape(plain):
+    return active_recon.reconstruct(plain)
+
+
+def truth(shape):
+    """Return the true cells, in the shape's own cube."""
+    mesh = thing()
+    mesh.apply_transform(np.linalg.inv(shape.world_from_object))
+    mesh.apply_scale(1 / shape.size)
+    return voxelise(mesh, len(shape.occupancy)).occupied(0.5)
+
+
+def test_the_object_and_its_cube_are_found(shape):
+    assert len(shape.views) == COUNT and not shape.left_out
+    np.testing.assert_allclose(shape.cube.centre, CENTRE, atol=0.1 * SIDE)
+    assert SIDE < shape.cube.side < 1.35 * SIDE
+    assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.6
+    assert 0 < shape.quality.lower_bound < shape.quality.expected_iou < 1
+    assert "plain background's colour" in shape.background
+
+
+def test_the_mesh_stands_in_the_world_of_the_cameras(shape):
+    mesh = shape.mesh()
+    mesh.apply_transform(shape.world_from_object)
+    np.testing.assert_allclose(mesh.bounds, thing().bounds, atol=0.15 * SIDE)
+
+
+def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, views, rgba):
+    placed = [Camera(np.block([[each.pose[:3, :3], (each.position - CENTRE)[:, None]],
+                               [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views]
+    own = active_recon.reconstruct([on_plain(image) for image in rgba], placed, BOX[3], views=3)
+    read = active_recon.reconstruct(plain, box=BOX, views=3)
+    np.testing.assert_allclose(own.occupancy, read.occupancy, atol=1e-4)
+    assert own.size == read.size == BOX[3]
+
+
+def test_masks_of_files_and_an_alpha_channel_say_the_same(views, rgba, tmp_path):
+    with_alpha = write_photos(tmp_path / 'alpha', views, rgba)
+    without = write_photos(tmp_path / 'rgb', views, [image[..., :3] for image in rgba])
+    (tmp_path / 'masks').mkdir()
+    for number, image in enumerate(rgba):
+        Image.fromarray(np.where(image[..., 3] > 127, 255, 0).astype(np.uint8)).save(
+            tmp_path / 'masks' / f'photo{number}.png')
+    alpha = active_recon.reconstruct(with_alpha, box=BOX, views=2)
+    files = active_recon.reconstruct(without, box=BOX, views=2, masks=tmp_path / 'masks')
+    assert alpha.background == 'alpha channels' and files.background == 'masks from files'
+    np.testing.assert_array_equal(alpha.occupancy, files.occupancy)
+
+
+def test_the_size_sets_the_scale_alone(plain, shape):
+    twice = active_recon.reconstruct(plain, size=2 * shape.size)
+    np.testing.assert_allclose(twice.occupancy, shape.occupancy, atol=1e-4)
+    np.testing.assert_allclose(twice.mesh().extents, 2 * shape.mesh().extents, rtol=1e-2)
+    box = Options(box=BOX, unit=1000.0, views=1)
+    assert from_files(plain, None, box).size == pytest.approx(1000 * BOX[3])
+
+
+def test_an_object_that_fills_its_photos_is_not_refused(tmp_path):
+    near = cameras(COUNT, distance=0.55)
+    folder = write_photos(tmp_path / 'near', near, map(on_plain, rendered(near)))
+    shape = active_recon.reconstruct(folder)
+    assert len(shape.views) == COUNT and not shape.left_out
+    assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.5
+
+
+def changed(plain, folder, change):
+    """Return a copy of the cameras' file with each matrix changed."""
+    content = json.loads((plain / 'transforms.json').read_text())
+    for frame in content['frames']:
+        frame['transform_matrix'] = change(np.array(frame['transform_matrix'])).tolist()
+    path = folder / 'transforms.json'
+    path.write_text(json.dumps(content))
+    return path
+
+
+@pytest.mark.parametrize(('change', 'expected'), [
+    (lambda pose: pose @ np.diag([1.0, -1, -1, 1]), 'the other camera axes .* would fit'),
+    (np.linalg.inv, 'camera from world would fit.*: invert')])
+def test_poses_of_another_convention_are_refused_with_the_one_that_fits(
+        change, expected, plain, tmp_path):
+    path = changed(plain, tmp_path, change)
+    with pytest.raises(DataError, match=f'the cameras do not look at one object: {expected}'):
+        active_recon.reconstruct(plain, path)
+
+
+def test_the_axes_that_fit_can_be_given(plain, tmp_path, shape):
+    path = changed(plain, tmp_path, lambda pose: pose @ np.diag([1.0, -1, -1, 1]))
+    other = from_files(plain, path, Options(axes='opencv'))
+    np.testing.assert_allclose(other.occupancy, shape.occupancy, atol=1e-6)
+
+
+def test_photos_that_are_upside_down_are_noticed(views, rgba, tmp_path, shape):
+    turned = [np.ascontiguousarray(image[::-1, ::-1]) for image in rgba]
+    folder = write_photos(tmp_path / 'turned', views, turned)
+    found = active_recon.reconstruct(folder, box=BOX).warnings
+    assert any('photos turned by 180 degrees would fit' in warning for warning in found)
+    assert not shape.warnings
+
+
+def test_what_is_wrong_with_photos_is_one_line_each_and_the_others_are_used(plain, tmp_path):
+    folder = shutil.copytree(plain, tmp_path / 'some')
+    (folder / 'broken.jpg').write_bytes(b'no photo')
+    shutil.copy(folder / 'photo1.png', folder / 'photo9.png')
+    Image.new('RGB', (30, 20)).save(folder / 'other.png')
+    shape = active_recon.reconstruct(folder, box=BOX)
+    assert [view.name for view in shape.views] == [f'photo{number}.png'
+                                                   for number in range(COUNT)]
+    said = sorted(shape.left_out)
+    assert len(said) == 3 and not any('\n' in reason for reason in said)
+    assert 'broken.jpg: not readable' in said[0]
+    assert 'other.png: no camera in' in said[1]
+    assert said[2] == 'photo9.png: the same photo as photo1.png'
+
+
+def test_a_single_photo_needs_the_place_of_the_object(plain, views):
+    with pytest.raises(DataError, match='object not found: .* give its place by --box'):
+        active_recon.reconstruct(plain, views=1)
+    assert active_recon.reconstruct(plain, views=1, box=BOX).occupancy.any()
+
+
+def test_a_place_without_an_object_is_refused(plain, rgba, views, tmp_path):
+    empty = [np.zeros_like(image[..., :3]) + np.uint8([200, 200, 200]) for image in rgba]
+    for number, image in enumerate(empty):
+        image[0, 0] = number  # else they are the same photo
+    folder = write_photos(tmp_path / 'empty', views, empty)
+    with pytest.raises(DataError, match='object not found'):
+        active_recon.reconstruct(folder)
+
+
+@pytest.mark.parametrize(('how', 'expected'), [
+    ({'background': 'green'}, 'background: unknown value'), ({'size': -1}, 'size: out of range'),
+    ({'box': (0, 0, 1)}, 'box: expected four numbers'), ({'views': 0}, 'views: out of range'),
+    ({'up': 'w'}, 'up: not an axis')])
+def test_options_that_cannot_be_are_refused(how, expected, plain):
+    with pytest.raises(ConfigError, match=expected):
+        active_recon.reconstruct(plain, **how)
+
+
+def test_pixels_without_cameras_are_refused(rgba, views):
+    with pytest.raises(ConfigError, match='expected a camera for each image'):
+        active_recon.reconstruct([rgba[0]])
+    with pytest.raises(ConfigError, match='size: missing'):
+        active_recon.reconstruct([rgba[0]], views[:1])
+    with pytest.raises(ConfigError, match='expected one for each of 2 images, got 1'):
+        active_recon.reconstruct(rgba[:2], views[:1], 0.3)
+
+
+def test_the_bag_of_the_photos_replays_bit_by_bit(shape, tmp_path):
+    write_run(photo_run(shape, tmp_path / 'bag'), tmp_path / 'bag')
+    run = read_run(tmp_path / 'bag')
+    setup = recorded_setup(run)
+    found = verify(run, setup.load_reconstructor(), setup.load_planner())
+    assert found.view_count == COUNT
+    assert {each.verdict for each in found.comparison.deviations.values()
+            if each.compared} == {'same bits'}
+
+
+def test_the_picture_shows_each_photo_over_the_shape(shape):
+    picture = shape_picture(shape)
+    assert picture.dtype == np.uint8 and picture.shape[1] > 4 * picture.shape[0] / 2
+    assert (np.abs(picture - [217.0, 95, 2]).max(axis=2) < 60).any()  # the outline
+
+
+def test_the_command_writes_all_files(plain, tmp_path):
+    out = tmp_path / 'out'
+    result = CliRunner().invoke(app, [
+        'reconstruct', str(plain), '--out', str(out), '--views', '3', '--bag',
+        '--box', ','.join(map(str, BOX)), '--mesh-format', 'obj'])
+    assert result.exit_code == 0, result.output
+    assert '3 photos; silhouettes: the network' in result.output
+    assert 'quality: expected IoU' in result.output
+    assert {path.name for path in out.iterdir()} == {
+        'mesh.obj', 'voxels.npz', 'voxels.binvox', 'picture.png', 'shape.json', 'bag',
+        'report.html'}
+    said = json.loads((out / 'shape.json').read_text())
+    assert said['size_m'] == pytest.approx(BOX[3]) and len(said['views']) == 3
+    cells = read_binvox(out / 'voxels.binvox')
+    with np.load(out / 'voxels.npz') as voxels:
+        np.testing.assert_array_equal(cells.occupied(0.5),
+                                      voxels['occupancy'] > voxels['threshold'])
+    assert trimesh.load(out / 'mesh.obj').extents.max() < BOX[3]
+
+
+@pytest.mark.parametrize(('arguments', 'expected'), [
+    (['--box', '1,2'], '--box: invalid cube'), (['--board', '--cameras', 'x'], 'several of'),
+    (['--turntable-step-deg', '10'], 'needs --distance'),
+    (['--size', '1', '--unit', '2'], '--size and --unit'),
+    (['--mesh-format', 'doc'], '--mesh-format: unknown value')])
+def test_options_of_the_command_that_contradict_each_other_are_refused(
+        arguments, expected, plain, tmp_path):
+    result = CliRunner().invoke(app, ['reconstruct', str(plain), '--out', str(tmp_path / 'out'),
+                                      *arguments])
+    assert isinstance(result.exception, ConfigError) and expected in str(result.exception)
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.skipif(not DINO.is_dir(), reason='needs dinoSparseRing of Middlebury: name it by '
+                                             'ACTIVE_RECON_DINO')
+@pytest.mark.parametrize(('background', 'least'), [('auto', 0.77), ('plain', 0.79)])
+def test_five_photos_of_the_dinosaur_are_near_the_hull_of_all(background, least):
+    from active_recon.datasets.middlebury import read_photographs
+    from active_recon.evaluation.posed.photographs import averaged, hull
+    shape = active_recon.reconstruct(DINO, views=5, background=background)
+    dino = read_photographs(DINO)
+    assert shape.size == pytest.approx(0.0949, abs=1e-3)  # by README.txt
+    cells = averaged(shape.occupancy, 32) > shape.threshold
+    assert iou(cells, hull(dino, range(16))) > least
