@@ -67,6 +67,7 @@ setup(
         *ROS_WHEELS,
     ],
     extras_require={
+        'coacd': ['coacd>=1.0.5,<2'],
         'doc': [
             'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
             'sphinx-copybutton>=0.5.2'],
@@ -74,8 +75,8 @@ setup(
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'onnxruntime': ['onnxruntime>=1.20,<2'],
         'test': [
-            'mcap-ros2-support>=0.5.5', 'onnx>=1.17,<2', 'onnxruntime>=1.20,<2',
-            'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',
+            'coacd>=1.0.5,<2', 'mcap-ros2-support>=0.5.5', 'mujoco>=3.2,<4', 'onnx>=1.17,<2',
+            'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',
             'pytest-xdist>=3.6', 'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

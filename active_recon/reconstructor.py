@@ -14,7 +14,7 @@ from active_recon.quality.judge import Judge
 from active_recon.quality.quality import Quality
 from active_recon.quality.silhouettes import SeenView
 from active_recon.quality.tables import find_tables, QualityTables
-from active_recon.runtimes import AUTO, load_runtime, Runtime
+from active_recon.runtimes import AUTO, load_runtime, Runtime, State
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,15 @@ class Reconstruction:
     latent: NDArray[np.float32]
     image: NDArray[np.uint8] | None = None
     quality: Quality | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """What a reconstructor knows of an episode: the state, and what was seen of its views."""
+
+    state: State
+    view_count: int
+    seen: tuple[SeenView, ...]
 
 
 class Reconstructor:
@@ -118,6 +127,26 @@ class Reconstructor:
         self._state = self._runtime.initial_state()
         self._view_count = 0
         self._seen: deque[SeenView] = deque(maxlen=_COMPARED_VIEWS)
+
+    @property
+    def object_yaw(self) -> float:
+        """Azimuth of the object's front in the object frame, radians; 0 where it is not used."""
+        return self._yaw
+
+    def initial_state(self) -> State:
+        """Return the network's state before any view."""
+        return self._runtime.initial_state()
+
+    @property
+    def progress(self) -> Progress:
+        """What is known of the episode, to go on from later."""
+        return Progress(self._state, self._view_count, tuple(self._seen))
+
+    def go_on_from(self, progress: Progress) -> None:
+        """Take up an episode of a reconstructor with the same weights, size and yaw."""
+        self.reset()
+        self._state, self._view_count = progress.state, progress.view_count
+        self._seen.extend(progress.seen)
 
     def add_view(self, image: NDArray[np.uint8], camera: Camera) -> Reconstruction:
         """

@@ -52,7 +52,8 @@ def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
         LOOP: {'recorder': {'output_dir': folder}, 'turntable_camera': {'mesh': MESH},
                'reconstructor': {'output_dir': folder}, 'view_planner': {}, 'viewer': {'port': 0}},
         '/policies_1': {'reconstructor': {
-            'output_dir': folder, 'background': 'mask', 'pose_source': 'turntable_joint',
+            'output_dir': folder, 'background': 'mask', 'publish_mesh': True,
+            'pose_source': 'turntable_joint',
             'camera_position': [position.x, position.y, position.z],
             'camera_orientation': [turn.x, turn.y, turn.z, turn.w]},
             'turntable_camera': {'mesh': MESH, 'follows': 'view'}},

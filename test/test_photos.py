@@ -76,6 +76,14 @@ def test_the_mesh_stands_in_the_world_of_the_cameras(shape):
     np.testing.assert_allclose(mesh.bounds, thing().bounds, atol=0.15 * SIDE)
 
 
+def test_the_mesh_is_closed_and_has_the_colours_of_the_photos(shape, rgba):
+    mesh = shape.mesh()
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    photographed = np.concatenate([image[image[..., 3] > 127][:, :3] for image in rgba])
+    np.testing.assert_allclose(np.median(mesh.visual.vertex_colors[:, :3], axis=0),
+                               np.median(photographed, axis=0), atol=40)
+
+
 def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, views, rgba):
     placed = [Camera(np.block([[each.pose[:3, :3], (each.position - CENTRE)[:, None]],
                                [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views]

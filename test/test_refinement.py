@@ -1,10 +1,12 @@
 """A grid in narrower cells: where its surface goes, and what of the grid it keeps."""
 
 from active_recon.errors import DataError
+from active_recon.volumes.bodies import whole_bodies
 from active_recon.volumes.refinement import refined, refined_mesh
 from active_recon.volumes.voxels import iou, VoxelGrid
 import numpy as np
 import pytest
+from scipy.ndimage import label
 from scipy.special import expit
 
 RANDOM = VoxelGrid(np.random.default_rng(0).random((6, 6, 6), np.float32))
@@ -92,9 +94,43 @@ def test_an_empty_grid_has_no_surface_either():
         refined_mesh(VoxelGrid(np.full((4, 4, 4), 0.5, np.float32)), 0.5)
 
 
-def test_what_is_too_thin_for_narrow_cells_keeps_the_surface_of_its_own():
+def test_what_is_too_thin_for_narrow_cells_keeps_its_own():
     needle = np.full((8, 8, 8), 0.05, np.float32)
     needle[3, 4] = 0.6
     grid = VoxelGrid(needle)
     assert not refined(grid).occupied(0.5).any()
-    np.testing.assert_array_equal(refined_mesh(grid, 0.5).vertices, grid.mesh(0.5).vertices)
+    narrow = whole_bodies(grid, refined(grid), 0.5)
+    np.testing.assert_array_equal(narrow.occupied(0.5), grid.occupied(0.5).repeat(2, 0).repeat(
+        2, 1).repeat(2, 2))
+
+
+def test_a_thin_part_stays_on_the_thick_one_that_it_hangs_on():
+    cells = np.zeros((16, 16, 16), np.float32)
+    cells[2:8, 5:11, 5:11] = 1
+    cells[8:14, 8, 8] = 1  # a handle of one cell
+    grid = VoxelGrid(cells)
+    mesh = refined_mesh(grid, 0.5)
+    assert mesh.body_count == 1
+    assert mesh.bounds[1, 0] > 13.5 / 16 - 0.5
+    thick = np.where(np.arange(16)[:, None, None] < 6, refined(grid).occupied(0.5)[::2, ::2, ::2],
+                     False)
+    whole = whole_bodies(grid, refined(grid), 0.5).occupied(0.5)[::2, ::2, ::2]
+    np.testing.assert_array_equal(whole[:6], thick[:6])  # away from the handle nothing changes
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_grid_has_no_more_bodies_in_narrow_cells_than_in_its_own(seed):
+    cells = np.random.default_rng(seed).random((12, 12, 12)).astype(np.float32) ** 2
+    bodies = label(cells > 0.5, np.ones((3, 3, 3)))[1]
+    mesh = refined_mesh(VoxelGrid(cells), 0.5)
+    assert 1 <= mesh.body_count <= bodies
+    assert mesh.is_watertight
+
+
+def test_a_speck_beside_the_object_is_left_out_and_a_smaller_object_stays():
+    cells = np.zeros((32, 32, 32), np.float32)
+    cells[4:20, 4:20, 4:20] = 1
+    cells[28, 28, 28] = 1
+    assert refined_mesh(VoxelGrid(cells), 0.5).body_count == 1
+    cells[26:30, 26:30, 26:30] = 1
+    assert refined_mesh(VoxelGrid(cells), 0.5).body_count == 2

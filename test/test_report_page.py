@@ -212,6 +212,28 @@ def test_page_of_recorded_shapes_does_not_wait_for_torch():
     assert subprocess.run([sys.executable, '-c', code], check=False).returncode == 0
 
 
+def test_the_surface_on_the_page_is_the_last_one_in_its_colours(run, page):
+    surface = drawn_in(page)['panels'][0]['surface']
+    corners, faces, colors = (
+        np.frombuffer(b64decode(surface[name]), kind).reshape(-1, 3)
+        for name, kind in (('corners', '<u2'), ('faces', '<u4'), ('colors', 'u1')))
+    subject = Subject('A', run, run.episodes[0])
+    grid = run.episodes[0].views[-1].reconstruction
+    mesh = grid.mesh(subject.threshold)
+    np.testing.assert_allclose(2 * (corners / 65535 - 0.5) * grid.size, mesh.vertices, atol=1e-4)
+    np.testing.assert_array_equal(faces, mesh.faces)
+    assert len(colors) == len(corners)
+    assert colors.std(axis=0).max() > 1
+    assert 'value="colors"' in page
+
+
+def test_a_page_without_a_surface_offers_no_colours(run):
+    views = [replace(view, reconstruction=None, occupied=None) for view in run.episodes[0].views]
+    bare = page_of(changed(run, views=views))
+    assert drawn_in(bare)['panels'][0]['surface'] is None
+    assert 'value="colors"' not in bare
+
+
 def test_every_occupancy_on_the_page_keeps_to_its_side_of_the_threshold():
     threshold = 0.4179
     near = np.float32(threshold) + np.arange(-40, 41, dtype=np.float32) * np.float32(3e-8)

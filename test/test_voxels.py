@@ -2,18 +2,16 @@
 
 import math
 
-from active_recon.errors import ConfigError, DataError
+from active_recon.errors import DataError
 from active_recon.volumes.binvox import read_binvox, write_binvox
 from active_recon.volumes.point_grids import grid_from_points
 from active_recon.volumes.voxels import (
     entropy,
     iou,
-    MESH_FORMATS,
     paper_entropy,
     PUBLISHED_FLOOR,
     turned,
     VoxelGrid,
-    write_mesh,
 )
 import numpy as np
 import pytest
@@ -211,23 +209,6 @@ def test_a_mesh_stands_where_its_cells_are():
 def test_where_no_cell_is_above_the_threshold_there_is_no_mesh():
     with pytest.raises(DataError, match='no cell is above the threshold 0.5'):
         VoxelGrid(np.full((4, 4, 4), 0.5, np.float32)).mesh(0.5)
-
-
-@pytest.mark.parametrize('suffix', MESH_FORMATS)
-def test_a_written_mesh_is_read_by_other_software(suffix, tmp_path):
-    mesh = ball(0.3).mesh(0.5)
-    path = tmp_path / 'new' / f'ball.{suffix}'
-    write_mesh(mesh, path)
-    read = trimesh.load_mesh(path)
-    assert read.is_watertight
-    assert len(read.faces) == len(mesh.faces)
-    assert read.volume == pytest.approx(mesh.volume, rel=1e-4)
-    np.testing.assert_allclose(read.bounds, mesh.bounds, atol=1e-6)
-
-
-def test_a_mesh_of_another_format_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match='no mesh has that suffix: expected ply, obj, stl'):
-        write_mesh(ball(0.3).mesh(0.5), tmp_path / 'ball.docx')
 
 
 @pytest.mark.parametrize('occupancy', [

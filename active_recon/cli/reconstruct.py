@@ -63,7 +63,8 @@ def reconstruct(
         help='Folder of masks named like the photos, bright on the object.')] = None,
     views: Annotated[int | None, typer.Option(
         min=1, help='Use so many photos at even steps; default: all.')] = None,
-    mesh_format: Annotated[str, typer.Option(help='ply, obj or stl.')] = 'ply',
+    mesh_format: Annotated[str, typer.Option(
+        help='ply, obj, stl, glb, or urdf: a robot description.')] = 'ply',
     bag: Annotated[bool, typer.Option(
         '--bag', help='Also write the bag of the run, for replay, and its report.')] = False,
     model: Annotated[str | None, typer.Option(
@@ -81,11 +82,10 @@ def reconstruct(
     Example: active-recon reconstruct photos/ --board --size 0.2
     """
     from active_recon.photos.reconstruct import from_files, Options
-    from active_recon.photos.saving import save_shape
-    from active_recon.volumes.voxels import MESH_FORMATS
+    from active_recon.photos.saving import FORMATS, save_shape
 
-    if mesh_format not in MESH_FORMATS:
-        raise ConfigError(f'--mesh-format: unknown value: expected {", ".join(MESH_FORMATS)}, got '
+    if mesh_format not in FORMATS:
+        raise ConfigError(f'--mesh-format: unknown value: expected {", ".join(FORMATS)}, got '
                           f'{mesh_format!r}')
     if size is not None and unit != 1.0:
         raise ConfigError('--size and --unit both set the scale: give one of them')

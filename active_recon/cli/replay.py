@@ -47,8 +47,11 @@ def replay(
         help='The weights file that BAG was recorded with, if those weights do not ship.',
     )] = None,
     mesh: Annotated[Path | None, typer.Option(
-        help='Write the mesh after the last view to a PLY, OBJ or STL file, in metres; several '
+        help='Write the mesh after the last view, with the colours of the views, to a PLY, OBJ, '
+             'STL or GLB file, in metres, or as a robot description to a URDF file; several '
              'episodes get numbered files.')] = None,
+    density: Annotated[float | None, typer.Option(
+        help='Density of the object in kg/m^3, for --mesh NAME.urdf; default: 500.')] = None,
     voxels: Annotated[Path | None, typer.Option(
         help='Write the voxels after the last view to a binvox file, or to an npz file with '
              'probabilities; several episodes get numbered files.')] = None,
@@ -84,7 +87,7 @@ def replay(
     if out and overrides == Overrides():
         raise ConfigError('--out: no bag to write: expected it with --model, --policy or '
                           '--threshold, got none of them')
-    files = ShapeFiles(mesh, voxels)
+    files = ShapeFiles(mesh, voxels, density)
     began = time.monotonic()
     run = read_run(path, topics, scene, bag_progress(path))
     reading_s = time.monotonic() - began
@@ -100,8 +103,9 @@ def replay(
     with _bar('replaying', run) as advance:
         verified = verify(run, reconstructor, planner, lambda: advance(1, ''))
     took_s = reading_s + time.monotonic() - began
-    files.write([episode.steps[-1].reconstruction.grid for episode in verified.episodes
-                 if episode.steps], reconstructor.threshold)
+    files.write([(episode.steps[-1].reconstruction.grid,
+                  [step.recorded for step in episode.steps])
+                 for episode in verified.episodes if episode.steps], reconstructor.threshold)
     if verified.comparison.verdict == NOTHING_RECORDED:
         _print_reconstruction(verified, run, reconstructor)
     else:
@@ -168,9 +172,10 @@ def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Ov
         other = run_with_overrides(run, setup, overrides, lambda: advance(1, ''))
     folder = out or default_folder(run.path, overrides)
     write_run(other, folder)
-    grids = [episode.views[-1].reconstruction for episode in other.episodes if episode.views]
+    shapes = [(episode.views[-1].reconstruction, episode.views)
+              for episode in other.episodes if episode.views]
     threshold = setup.with_overrides(overrides).load_reconstructor().threshold
-    files.write([grid for grid in grids if grid is not None], threshold)
+    files.write([(grid, views) for grid, views in shapes if grid is not None], threshold)
     for episode in other.episodes:
         entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)
         azimuths = ', '.join(

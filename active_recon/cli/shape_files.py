@@ -1,4 +1,4 @@
-"""Reconstructed shapes as files: meshes, and voxels with or without their probabilities."""
+"""Reconstructed shapes as files: coloured meshes, robot descriptions, and voxels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.bags.runs.run import RecordedView
     from active_recon.volumes.voxels import VoxelGrid
 
 VOXEL_FORMATS = ('binvox', 'npz')
@@ -19,37 +20,43 @@ class ShapeFiles:
     """
     The files for shapes; None: no file. Of several shapes, each file name gets a number.
 
-    A binvox file has the cells above the threshold; an npz file has `occupancy` (X, Y, Z) in
-    [0, 1], the cube's side `size` in metres, and the `threshold`. Raises ConfigError on any other
-    suffix.
+    A mesh has the colours of the views; as `urdf` it is a robot description, of a solid of
+    `density` kg/m^3. A binvox file has the cells above the threshold; an npz file has `occupancy`
+    (X, Y, Z) in [0, 1], the cube's side `size` in metres, and the `threshold`. Raises ConfigError
+    on any other suffix.
     """
 
     mesh: Path | None
     voxels: Path | None
+    density: float | None = None
 
     def __post_init__(self) -> None:
         """Reject unknown suffixes, before any work is done."""
-        from active_recon.volumes.voxels import MESH_FORMATS
+        from active_recon.meshes.files import MESH_FORMATS
 
-        for option, path, formats in (('--mesh', self.mesh, MESH_FORMATS),
+        if self.density is not None and not (self.mesh and self.mesh.suffix.lower() == '.urdf'):
+            raise ConfigError('--density: nothing to weigh: expected it with --mesh NAME.urdf, '
+                              f'got {self.mesh or "no --mesh"}')
+        for option, path, formats in (('--mesh', self.mesh, (*MESH_FORMATS, 'urdf')),
                                       ('--voxels', self.voxels, VOXEL_FORMATS)):
             if path is not None and path.suffix.lower().lstrip('.') not in formats:
                 raise ConfigError(f'{option}: unknown suffix: expected {", ".join(formats)}, got '
                                   f'{path}')
 
-    def write(self, grids: Sequence['VoxelGrid'], threshold: float) -> None:
-        """Write the shapes and print the paths; raises DataError where there is no surface."""
+    def write(self, shapes: Sequence[tuple['VoxelGrid', Sequence['RecordedView']]],
+              threshold: float) -> None:
+        """
+        Write shapes, each with the views that it was made from, and print the paths.
+
+        Raises DataError where there is no surface.
+        """
         from active_recon.volumes.binvox import write_binvox
-        from active_recon.volumes.refinement import refined_mesh
-        from active_recon.volumes.voxels import write_mesh
         import numpy as np
 
-        for number, grid in enumerate(grids, 1):
-            of_several = number if len(grids) > 1 else None
+        for number, (grid, views) in enumerate(shapes, 1):
+            of_several = number if len(shapes) > 1 else None
             if self.mesh is not None:
-                path = _numbered(self.mesh, of_several)
-                write_mesh(refined_mesh(grid, threshold), path)
-                typer.echo(f'wrote {path}')
+                self._write_mesh(_numbered(self.mesh, of_several), grid, views, threshold)
             if self.voxels is not None:
                 path = _numbered(self.voxels, of_several)
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -59,6 +66,25 @@ class ShapeFiles:
                     np.savez_compressed(path, occupancy=grid.occupancy, size=grid.size,
                                         threshold=threshold)
                 typer.echo(f'wrote {path}')
+
+    def _write_mesh(self, path: Path, grid: 'VoxelGrid', views: Sequence['RecordedView'],
+                    threshold: float) -> None:
+        from active_recon.meshes.coloring import colored
+        from active_recon.meshes.files import write_mesh
+        from active_recon.meshes.photos import album_of
+        from active_recon.meshes.urdf import DENSITY, write_urdf
+        from active_recon.volumes.refinement import refined_mesh
+
+        photos = album_of([(view.image, view.camera) for view in views], grid.size).photos
+        mesh = colored(refined_mesh(grid, threshold), photos)
+        missing = ''
+        if path.suffix.lower() == '.urdf':
+            missing = write_urdf(mesh, path, DENSITY if self.density is None else self.density)
+        else:
+            write_mesh(mesh, path)
+        typer.echo(f'wrote {path}')
+        if missing:
+            typer.echo(missing)
 
 
 def _numbered(path: Path, number: int | None) -> Path:

@@ -15,21 +15,20 @@ from active_recon.nodes.camera.images import CameraImages
 from active_recon.nodes.camera.monitor import CameraMonitor
 from active_recon.nodes.camera.pose_sources import check_pose_source, subscribe_poses
 from active_recon.nodes.camera.reference_capture import ReferenceCapture
+from active_recon.nodes.loop.products import Products
 from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPublisher
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.deferred_work import DeferredWork
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
-from active_recon.nodes.runtime.output import output_path
 from active_recon.nodes.runtime.parameters import Commit, Parameters, set_read_only_parameter
 from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
 from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
 from active_recon.reconstructor import Reconstruction, Reconstructor
-from active_recon.volumes.refinement import refined_mesh
-from active_recon.volumes.voxels import write_mesh
+from active_recon.saved_states import read_state
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
@@ -51,7 +50,7 @@ FACTS = {'weights_sha256': 'SHA-256 of the weights',
 """Read-only parameters that describe the network, with their descriptions."""
 TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'next_view',
           'view', 'view_image', 'network_image', 'occupancy', 'probabilities', 'latent', 'entropy',
-          'quality', 'episode')
+          'quality', 'episode', 'mesh')
 """Topics that the node subscribes to and publishes."""
 
 
@@ -79,7 +78,8 @@ class ReconstructorNode(ManagedNode):
         self._monitor = CameraMonitor(
             self._diagnostics, params.goal_tolerance, params.stall_timeout)
         self._object_frame = params.object_frame
-        self._reconstruction: Reconstruction | None = None
+        self._products = Products(self, self._reconstructor, self._object_frame,
+                                  params.publish_mesh)
         self.add_cleanup(self._free_network)
         self._publisher = ReconstructionPublisher(
             self, self._object_frame, self._reconstructor.judges_quality)
@@ -92,6 +92,8 @@ class ReconstructorNode(ManagedNode):
         tell_of_runtime(self._diagnostics, provenance)
         self.create_service(Trigger, 'start_episode', self._on_start)
         self.create_service(Trigger, 'save_mesh', self._on_save)
+        self.create_service(Trigger, 'save_state', self._on_save_state)
+        self.create_service(Trigger, 'load_state', self._on_load_state)
 
     def activate(self) -> None:
         """Begin an episode, and subscribe to the camera."""
@@ -114,7 +116,7 @@ class ReconstructorNode(ManagedNode):
         self.add_cleanup(self._monitor.reset)
 
     def _free_network(self) -> None:
-        del self._reconstructor, self._reconstruction, self._joiner
+        del self._reconstructor, self._products, self._joiner
 
     def _load(self, params: ReconstructorParameters) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
@@ -150,7 +152,6 @@ class ReconstructorNode(ManagedNode):
         self._pending: View | None = None
         self._reconstructor.reset()
         self._gate.reset()
-        self._reconstruction = None
         self._episode = Episode(uuid.uuid4().hex[:12], self.get_clock().now().nanoseconds)
         self._joiner.clear(self._episode.begin)
         self._diagnostics.clear_warning('unusual_views', log=False)
@@ -158,6 +159,7 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.set_value('Episode', self._episode.id)
         self._diagnostics.set_value('Views of the episode', '0')
         self._episode_pub.publish(episode_to_msg(self._episode))
+        self._products.begin_episode(self._episode)
 
     def clock_went_back(self, how: str) -> None:
         """Begin an episode: earlier views have stamps in the future."""
@@ -239,7 +241,6 @@ class ReconstructorNode(ManagedNode):
         reconstruction = self._reconstructor.add_view(image, view.camera)
         self._gate.took(view.camera)
         self._check_elevation(view.camera)
-        self._reconstruction = reconstruction
         self._diagnostics.count('views')
         self._publisher.publish_occupancy(
             view.stamp, reconstruction, self._reconstructor.threshold)
@@ -248,6 +249,7 @@ class ReconstructorNode(ManagedNode):
                                     at_once=False)
         self._publisher.publish_view(
             view.stamp, view.camera.pose, reconstruction, None if image is view.image else image)
+        self._products.add_view(view.stamp, image, view.camera, reconstruction)
         self._check_quality(reconstruction)
         self._check_background(image)  # last: it is for the user, and nothing waits for it
 
@@ -289,20 +291,35 @@ class ReconstructorNode(ManagedNode):
 
     def _on_save(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the path of the mesh."""
-        if self._reconstruction is None:
-            response.message = 'no view in this episode yet: expected one before a mesh'
-            return response
         params = self._params.values
-        name = f'{self._episode.id}-{self._reconstructor.view_count}.{params.mesh_format}'
-        path = output_path(Path(params.output_dir), name)
+        return self._products.save_mesh(Path(params.output_dir), params.mesh_format, response)
+
+    def _on_save_state(self, _request: Trigger.Request,
+                       response: Trigger.Response) -> Trigger.Response:
+        """Answer with the path of the episode's state."""
+        return self._products.save_state(Path(self._params.values.output_dir), response)
+
+    def _on_load_state(self, _request: Trigger.Request,
+                       response: Trigger.Response) -> Trigger.Response:
+        """Begin an episode that goes on from the file of the parameter; answer with its id."""
+        params = self._params.values
+        if not self.is_active or not params.state_file:
+            response.message = ('no state to load: expected an active node and its parameter '
+                                f'state_file, got {params.state_file!r}')
+            return response
         try:
-            write_mesh(refined_mesh(self._reconstruction.grid, self._reconstructor.threshold),
-                       path)
-        except (DataError, OSError) as error:
-            response.message = f'{path} was not written: {one_line(error)}'
-        else:
-            response.success = True
-            response.message = str(path)
+            saved = read_state(Path(params.output_dir) / params.state_file, self._reconstructor)
+        except DataError as error:
+            response.message = one_line(error)
+            return response
+        self._begin_episode()
+        self._reconstructor.go_on_from(saved.progress)
+        self._gate.took(saved.last_camera)
+        self._products.take_up(saved)
+        self._publisher.publish_occupancy(self._episode.begin, saved.reconstruction,
+                                          self._reconstructor.threshold)
+        self._check_quality(saved.reconstruction)
+        response.success, response.message = True, self._episode.id
         return response
 
 

@@ -22,7 +22,7 @@ BUTTONS = {'next_object': ('Next object', 'Show the camera the next object, in a
            'start_episode': ('New episode', 'Discard the reconstruction and begin an episode.'),
            'save_mesh': ('Save mesh', 'Save the object as a mesh, where the reconstructor runs.')}
 TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'view', 'occupancy',
-          'probabilities', 'quality', 'network_image', 'next_view', 'azimuth_scores',
+          'probabilities', 'quality', 'mesh', 'network_image', 'next_view', 'azimuth_scores',
           'goal_reason', 'done', 'episode')
 _DRAW_EVERY_S = 1 / 36
 _STATUS_EVERY_S = 0.5

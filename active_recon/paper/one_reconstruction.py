@@ -31,10 +31,11 @@ def main(root: str, category: str, name: str, weights: str, threads: str, views:
     with timed('loading models'):
         from active_recon.datasets.layout import ObjectFolder
         from active_recon.geometry.canonical import network_image
+        from active_recon.meshes.files import write_mesh
         from active_recon.runtimes import load_runtime
         from active_recon.volumes.binvox import write_binvox
         from active_recon.volumes.rendering import composite
-        from active_recon.volumes.voxels import VoxelGrid, write_mesh
+        from active_recon.volumes.voxels import VoxelGrid
         runtime = load_runtime(Path(weights), 'torch', threads=int(threads))
     with timed('pre-processing data'):
         folder = ObjectFolder(Path(root), category, name)

@@ -5,6 +5,7 @@ import math
 
 from active_recon.acquisition.stillness import STILL_TIME
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE, TAKE_VIEWS
+from active_recon.meshes.files import MESH_FORMATS
 from active_recon.parameters.background import BackgroundParameters
 from active_recon.parameters.camera_pose import CameraPoseParameters
 from active_recon.parameters.declaration import parameter
@@ -14,7 +15,6 @@ from active_recon.parameters.shared import (
     ManagedParameters,
     NetworkParameters,
 )
-from active_recon.volumes.voxels import MESH_FORMATS
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,10 @@ class ReconstructorParameters(BackgroundParameters, CameraPoseParameters, FrontP
     stall_timeout: float = parameter(
         1.0, 'time that the camera may rest away from its goal before a warning that it has '
         'stalled, s', low=0.1, high=3600.0, dynamic=True)
-    output_dir: str = parameter('.', 'folder of saved meshes')
+    output_dir: str = parameter('.', 'folder of saved meshes and states')
     mesh_format: str = parameter(
         'ply', 'format of saved meshes', choices=MESH_FORMATS, dynamic=True)
+    publish_mesh: bool = parameter(
+        False, 'whether the coloured surface is published as a Marker, at most once a second')
+    state_file: str = parameter(
+        '', 'file that load_state goes on from, relative to output_dir', dynamic=True)

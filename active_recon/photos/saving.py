@@ -6,12 +6,16 @@ from pathlib import Path
 
 from active_recon import __version__
 from active_recon.errors import DataError
+from active_recon.meshes.files import MESH_FORMATS, write_mesh
+from active_recon.meshes.urdf import write_urdf
 from active_recon.photos.picture import shape_picture
 from active_recon.photos.shape import Shape
 from active_recon.volumes.binvox import write_binvox
-from active_recon.volumes.voxels import write_mesh
 import cv2
 import numpy as np
+
+FORMATS = (*MESH_FORMATS, 'urdf')
+"""Of the mesh; `urdf` is a robot description, see `write_urdf`."""
 
 
 def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply') -> list[Path]:
@@ -25,7 +29,11 @@ def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply') -> list[Pat
     paths = [folder / name for name in (
         f'mesh.{mesh_format}', 'voxels.npz', 'voxels.binvox', 'picture.png', 'shape.json')]
     mesh, voxels, binvox, picture, description = paths
-    write_mesh(shape.mesh(), mesh)
+    if mesh_format == 'urdf':
+        folder.mkdir(parents=True, exist_ok=True)
+        write_urdf(shape.mesh(), mesh)
+    else:
+        write_mesh(shape.mesh(), mesh)
     try:
         np.savez_compressed(voxels, occupancy=shape.occupancy, size=shape.size,
                             threshold=shape.threshold)

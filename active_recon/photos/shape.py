@@ -6,6 +6,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from active_recon.geometry.cameras import Camera
+from active_recon.meshes.coloring import colored
+from active_recon.meshes.photos import album_of
 from active_recon.photos.cube import Cube
 from active_recon.quality.quality import Quality
 from active_recon.reconstructor import Reconstruction
@@ -77,9 +79,14 @@ class Shape:
         return self.cube.world_from_object(self.size)
 
     def mesh(self) -> 'trimesh.Trimesh':
-        """Return the surface, metres; raises DataError where no cell is occupied."""
+        """
+        Return the closed surface, metres, in the colours of the photos.
+
+        Raises DataError where no cell is occupied.
+        """
         return self._surface.copy()
 
     @cached_property
     def _surface(self) -> 'trimesh.Trimesh':
-        return refined_mesh(self.grid, self.threshold)
+        album = album_of([(view.image, view.camera) for view in self.views], self.size)
+        return colored(refined_mesh(self.grid, self.threshold), album.photos)

@@ -16,6 +16,7 @@ from active_recon.report.images import data_uri
 from active_recon.report.scene import scene
 from active_recon.report.stages import median, STAGES, timings
 from active_recon.report.subject import degrees, elevation_degrees, Subject
+from active_recon.report.surface import colored_surface
 from active_recon.report.turntable_map import turntable_map
 from active_recon.report.words import key_words
 from active_recon.whole_files import whole_file
@@ -43,9 +44,13 @@ def report_page(subjects: Sequence[Subject]) -> str:
     several = len(subjects) > 1
     known_truth = any(subject.truth is not None for subject in subjects)
     shared = {'entropy': entropy_chart(subjects), 'iou': iou_chart(subjects)}
+    surfaces = [colored_surface(subject) for subject in subjects]
+    for panel, surface in zip(panels, surfaces, strict=True):
+        panel['colored'] = surface is not None
     drawn = {'shared': shared, 'panels': [
-        {'scene': scene(subject), 'map': turntable_map(subject),
-         'stages': stage_chart(timings(subject.episode))} for subject in subjects]}
+        {'scene': scene(subject), 'surface': surface, 'map': turntable_map(subject),
+         'stages': stage_chart(timings(subject.episode))}
+        for subject, surface in zip(subjects, surfaces, strict=True)]}
     environment = Environment(
         loader=PackageLoader('active_recon.report', 'templates'), autoescape=True,
         trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)

@@ -82,6 +82,9 @@ class Page:
             self._threshold: Any = gui.add_slider(
                 'Threshold', _LOWEST, _HIGHEST, 0.01, _FALLBACK_THRESHOLD,
                 hint='Cells with a higher probability of occupancy are shown.')
+            self._in_colors: Any = gui.add_checkbox(
+                'In colours', False, visible=False,
+                hint='Show the surface in the colours of the views.')
         # On a phone this panel is collapsed at first and leaves the space to the object
         panel = gui.add_panel()
         panel.dock_below(gui.main_panel)
@@ -132,8 +135,20 @@ class Page:
             first, *rest = lines
             self._text.content = '\n\n'.join([f'**{first}**', *rest])
 
+    @property
+    def in_colors(self) -> bool:
+        """Whether the surface in colours is asked for."""
+        return bool(self._in_colors.value)
+
+    def offer_colors(self) -> None:
+        """Let the surface in colours be asked for."""
+        if not self._in_colors.visible:
+            self._in_colors.visible = True
+
     def draw(self, state: LoopState) -> None:
         """Show a state; only what has changed since the last is sent."""
+        if state.surface is not None:
+            self.offer_colors()
         if not self._server.get_clients():  # a later client is shown the state of its time
             return
         if state.threshold is not None and self._threshold.value == self._own_threshold:
@@ -141,7 +156,7 @@ class Page:
             self._own_threshold = min(max(state.threshold, _LOWEST), _HIGHEST)
             self._threshold.value = self._own_threshold
         with self._server.atomic():
-            self._scene.draw(state, self._threshold.value)
+            self._scene.draw(state, self._threshold.value, self._in_colors.value)
         if state.views is not self._shown_views:
             self._shown_views = state.views
             numbers, entropies = entropy_lines(state.views)

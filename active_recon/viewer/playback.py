@@ -1,9 +1,16 @@
 """A recorded run on the page: step through its views, or play them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun
+from active_recon.bags.runs.run import (
+    RecordedEpisode,
+    RecordedGoal,
+    RecordedRun,
+    RecordedView,
+)
 from active_recon.errors import DataError
+from active_recon.meshes.photos import album_of
 from active_recon.viewer.link import goal_lines, quality_lines
 from active_recon.viewer.page import Page
 from active_recon.viewer.state import (
@@ -12,7 +19,7 @@ from active_recon.viewer.state import (
     Scores,
     thumbnail,
 )
-from active_recon.viewer.view_result import ViewResult
+from active_recon.viewer.view_result import Surface, ViewResult
 
 PLAY = 'Play'
 _STEP_S = 1.0  # seconds for each view
@@ -49,6 +56,19 @@ def _set_goal(observer: Observer, goal: RecordedGoal) -> None:
         observer.set_goal_reason(goal.stamp, goal.reason)
 
 
+def colored_surface(state: LoopState, views: Sequence[RecordedView]) -> Surface | None:
+    """Return the surface of a state in the colours of the views; None where it has none."""
+    from active_recon.meshes.coloring import surface_colors  # only who asks for it waits
+
+    grid, threshold = state.grid, state.threshold
+    if grid is None or threshold is None or not grid.occupied(threshold).any():
+        return None
+    mesh = grid.mesh(threshold)
+    found = surface_colors(mesh, album_of(
+        [(view.image, view.camera) for view in views], grid.size).photos)
+    return None if found is None else Surface(mesh.triangles, found.colors[mesh.faces])
+
+
 class Playback:
     """
     A page on which a run is stepped through or played; call `draw` repeatedly.
@@ -58,10 +78,14 @@ class Playback:
 
     def __init__(self, run: RecordedRun, port: int = 0) -> None:
         self._states = recorded_states(run)
+        self._views = [episode.views[:count] for episode in run.episodes
+                       for count in range(1, len(episode.views) + 1)]
+        self._colored: set[int] = set()
         if not self._states:
             raise DataError(f'{run.path}: no view: expected one or more, the run has none')
         grid = self._states[-1].grid
         self.page = Page(run.path.name, grid.size if grid is not None else 1.0, port)
+        self.page.offer_colors()
         self._step = self.page.add_steps(len(self._states), 'View')
         self.page.add_button(PLAY, 'Play the views from here, or from the first.')
         self._stepped_at: float | None = None
@@ -82,9 +106,19 @@ class Playback:
             self._stepped_at = now if self._step.value < len(self._states) else None
             self._step.value = min(self._step.value + 1, len(self._states))
         state = self._states[self._step.value - 1]
+        if self.page.in_colors:
+            state = self._with_surface(self._step.value - 1)
         self.shown_text = self._text(state)
         self.page.set_text(self.shown_text)
         self.page.draw(state)
+
+    def _with_surface(self, step: int) -> LoopState:
+        """Return the state of a step with its surface, made when it is first asked for."""
+        if step not in self._colored:
+            self._colored.add(step)
+            self._states[step] = replace(self._states[step], surface=colored_surface(
+                self._states[step], self._views[step]))
+        return self._states[step]
 
     def _text(self, state: LoopState) -> list[str]:
         episodes = list(dict.fromkeys(known.episode for known in self._states))

@@ -8,7 +8,7 @@ from active_recon.geometry.view_distance import at_one_elevation, directions_of,
 from active_recon.policies.reasons import GoalReason
 from active_recon.view_colors import Color, view_color
 from active_recon.viewer.state import LoopState, Scores
-from active_recon.viewer.view_result import ViewResult
+from active_recon.viewer.view_result import Surface, ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
@@ -41,6 +41,7 @@ class Scene:
         self._size = object_size
         self._shown = LoopState()
         self._threshold = math.nan
+        self._surface: Surface | None = None
         self._views: list[Any] = []
         # Updating an object costs a fraction of creating it anew
         self._objects: dict[str, Any] = {}
@@ -61,12 +62,17 @@ class Scene:
         self._remove('/camera')
         self._size = object_size
 
-    def draw(self, state: LoopState, threshold: float) -> None:
-        """Draw a state, with the cells above the threshold."""
+    def draw(self, state: LoopState, threshold: float, in_colors: bool = False) -> None:
+        """Draw a state: the cells above the threshold, or the surface in colours if known."""
         before, self._shown = self._shown, state
+        surface = state.surface if in_colors else None
+        if surface is not self._surface:
+            self._surface = surface
+            self._draw_surface(surface)
+            self._threshold = math.nan
         if state.grid is not before.grid or threshold != self._threshold:
             self._threshold = threshold
-            self._draw_grid(state.grid, threshold)
+            self._draw_grid(None if surface is not None else state.grid, threshold)
         if state.views is not before.views:
             self._draw_views(before.views, state.views)
         if state.goal is not before.goal or state.goal_reason is not before.goal_reason:
@@ -87,6 +93,14 @@ class Scene:
             self._cell_side = side
             self._remove('/occupancy')
         self._boxes('/occupancy', side, cells[:, :3], certainty_colors(cells[:, 3]))
+
+    def _draw_surface(self, surface: Surface | None) -> None:
+        self._remove('/surface')
+        if surface is not None:
+            corners = surface.triangles.reshape(-1, 3) / self._size
+            self._objects['/surface'] = self._scene.add_mesh_trimesh('/surface', trimesh.Trimesh(
+                corners, np.arange(len(corners)).reshape(-1, 3), process=False,
+                vertex_colors=surface.colors.reshape(-1, 3)))
 
     def _draw_scores(self, scores: Scores | None) -> None:
         if scores is None:

@@ -7,7 +7,7 @@ import math
 from active_recon.geometry.cameras import Camera
 from active_recon.policies.reasons import GoalReason
 from active_recon.quality.quality import Quality
-from active_recon.viewer.view_result import ViewResult
+from active_recon.viewer.view_result import Surface, ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import cv2
 import numpy as np
@@ -35,6 +35,7 @@ class LoopState:
     - camera: where the camera is now; picture: its last image, (H, W, 3) uint8 RGB
     - goal: the camera of the next view; goal_reason: why it is worth taking
     - done: the reason why the episode ended, '' before
+    - surface: the last one in colours
     """
 
     episode: str = ''
@@ -48,6 +49,7 @@ class LoopState:
     scores: Scores | None = None
     done: str = ''
     goal_reason: GoalReason | None = None
+    surface: Surface | None = None
 
 
 class Observer:
@@ -89,6 +91,11 @@ class Observer:
         self.state = replace(
             self.state, camera=self.state.camera if camera is None else camera,
             picture=self.state.picture if picture is None else picture)
+
+    def set_surface(self, stamp: int, surface: Surface | None) -> None:
+        """Set the surface after the view with a stamp in nanoseconds; None: there is none."""
+        if stamp >= self._begin:
+            self.state = replace(self.state, surface=surface)
 
     def add_view(self, view: ViewResult, grid: VoxelGrid | None,
                  occupied: VoxelGrid | None) -> None:

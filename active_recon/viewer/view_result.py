@@ -30,3 +30,15 @@ class ViewResult:
     occupied: VoxelGrid | None = None
     iou: float | None = None
     quality: Quality | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """
+    The object's surface in colours.
+
+    - triangles: (F, 3, 3), metres; colors: of their corners, (F, 3, 3) uint8 RGB
+    """
+
+    triangles: NDArray[np.floating]
+    colors: NDArray[np.uint8]

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from active_recon.volumes.bodies import whole_bodies
+from active_recon.volumes.isosurface import without_voids
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +17,16 @@ _SURE = 1e-6  # of float32: nothing is nearer to 0 or 1 that has a finite logit 
 
 def refined_mesh(grid: VoxelGrid, threshold: float) -> 'trimesh.Trimesh':
     """
-    Return the surface at the threshold in cells half as wide, metres, closed at the border.
+    Return the surface at the threshold in cells half as wide, metres; see `isosurface`.
 
-    An object so thin that nothing is left of it there has that of the grid's own cells. Raises
-    DataError where none of these is above the threshold.
+    Voids inside are filled, see `without_voids`, and every body of the grid is one, see
+    `whole_bodies`: what is so thin that nothing would be left of it keeps the grid's own cells.
+    Raises DataError where no cell of the grid is above the threshold.
     """
-    narrow = refined(grid)
-    return (narrow if narrow.occupied(threshold).any() else grid).mesh(threshold)
+    if not grid.occupied(threshold).any():
+        return grid.mesh(threshold)
+    whole = whole_bodies(grid, refined(grid), threshold)
+    return VoxelGrid(without_voids(whole.occupancy, threshold), grid.size).mesh(threshold)
 
 
 def refined(grid: VoxelGrid) -> VoxelGrid:

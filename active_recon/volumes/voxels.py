@@ -1,10 +1,9 @@
 """The voxel grid: a cube of occupancy probabilities, its measures, and its mesh."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
-from active_recon.errors import ConfigError, DataError
+from active_recon.errors import DataError
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +12,6 @@ if TYPE_CHECKING:
 
 RESOLUTION = 32
 FINE_RESOLUTION = 64
-MESH_FORMATS = ('ply', 'obj', 'stl')
 PUBLISHED_FLOOR = 0.02
 """Cells up to this occupancy are left out of the published probabilities and their entropy."""
 
@@ -114,34 +112,15 @@ class VoxelGrid:
 
     def mesh(self, threshold: float) -> 'trimesh.Trimesh':
         """
-        Return the isosurface at the threshold by marching cubes, in metres, closed at the border.
+        Return the surface at the threshold, in metres; see `isosurface`.
 
         Raises DataError where no cell is above the threshold.
         """
-        from skimage.measure import marching_cubes  # slow to import, and only meshes need them
-        import trimesh
+        from active_recon.volumes.isosurface import isosurface
 
         if not self.occupied(threshold).any():
             raise DataError(f'no cell is above the threshold {threshold}: there is no surface yet')
-        # A margin of empty cells closes the surface of an object that touches the border.
-        padded = np.pad(self.occupancy, 1)
-        vertices, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
-            padded, threshold)
-        # Sample (i, j, k) of the padded array is the centre of cell (i - 1, j - 1, k - 1).
-        placed = (vertices - 0.5) * self.cell_size - self.size / 2
-        mesh = trimesh.Trimesh(placed, faces, process=False)
-        if mesh.volume < 0:
-            mesh.invert()
-        return mesh
-
-
-def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
-    """Write a mesh as PLY, OBJ or STL, by the file's suffix; raises ConfigError on others."""
-    suffix = path.suffix.lower().lstrip('.')
-    if suffix not in MESH_FORMATS:
-        raise ConfigError(f'{path}: no mesh has that suffix: expected {", ".join(MESH_FORMATS)}')
-    path.parent.mkdir(parents=True, exist_ok=True)
-    mesh.export(path)
+        return isosurface(self.occupancy, threshold, self.size)
 
 
 def turned(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:

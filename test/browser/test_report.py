@@ -86,8 +86,8 @@ def test_no_figure_of_the_timing_table_is_cut_off_on_a_phone(opened, name):
 def test_another_view_shows_another_shape_and_what_was_thought_then(opened, changed_share):
     page = opened()
     seen = []
-    for index in (4, 0, 5):  # the last view, the first, and the truth
-        page.run('document.querySelectorAll(".after input")[arguments[0]].click()', index)
+    for chosen in ('4', '0', 'truth'):  # the last view, the first, and the truth
+        page.run('document.querySelector(`.after input[value="${arguments[0]}"]`).click()', chosen)
         goal = page.run('return document.querySelector(".map").data.find((trace) => '
                         'trace.meta && trace.marker?.symbol === "diamond-open").hovertemplate')
         seen.append((shape(page), cells(page), goal))
@@ -147,6 +147,17 @@ def test_object_turns_until_it_is_paused(opened, changed_share):
     assert button(page) == 'Pause'
     page.until(lambda: changed_share(before, shape(page)) > 0.02, 'the object to turn')
     assert page.errors() == []
+
+
+def test_the_surface_in_its_colours_is_drawn(opened, changed_share):
+    page = opened()
+    before = shape(page)
+    page.run('document.querySelector(".after input[value=colors]").click()')
+    page.until(lambda: 'in the colours' in page.run(
+        'return document.querySelector(".count").textContent'), 'the coloured surface')
+    assert changed_share(before, shape(page)) > 0.01
+    page.run('document.querySelector(".after input").click()')
+    assert cells(page) > 0
 
 
 def test_object_stands_still_for_who_prefers_less_motion(opened, changed_share):

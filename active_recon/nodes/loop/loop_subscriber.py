@@ -15,7 +15,7 @@ from active_recon.nodes.runtime.qos import LATCHED_POLLED_QOS, SENSOR_QOS
 from active_recon.nodes.runtime.transport_selector import TransportSelector
 from active_recon.viewer.link import TopicLink
 from active_recon.viewer.state import Observer, Scores, thumbnail
-from active_recon.viewer.view_result import ViewResult
+from active_recon.viewer.view_result import Surface, ViewResult
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import pixels_from_msg
@@ -24,6 +24,7 @@ from msg_tools.episodes import done_from_msg, episode_from_msg
 from msg_tools.goals import scores_from_msg
 from msg_tools.images import image_from_msg
 from msg_tools.joins import StampJoiner
+from msg_tools.markers import surface_from_msg
 from msg_tools.quality import quality_from_msg
 from msg_tools.reasons import goal_reason_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
@@ -34,6 +35,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
+from visualization_msgs.msg import Marker
 
 _ROLES = {'image': IMAGE_TOPIC, 'view': 'view', 'occupancy': 'occupancy', 'goal': 'next_view'}
 _IMAGES_KEPT = 64
@@ -72,6 +74,7 @@ class LoopSubscriber:
                 (PointCloud2, 'occupancy', self._on_occupancy),
                 (PointCloud2, 'probabilities', self._on_probabilities),
                 (DiagnosticArray, 'quality', self._on_quality),
+                (Marker, 'mesh', self._on_mesh),
                 (Image, 'network_image', self._on_network_image),
                 (PoseStamped, 'next_view', self._on_goal),
                 (PointCloud2, 'azimuth_scores', self._on_scores),
@@ -159,6 +162,13 @@ class LoopSubscriber:
 
     def _on_quality(self, msg: DiagnosticArray) -> None:
         self.observer.set_quality(nanoseconds_from_stamp(msg.header.stamp), quality_from_msg(msg))
+
+    def _on_mesh(self, msg: Marker) -> None:
+        surface = None
+        if msg.action == Marker.ADD:
+            triangles, colors = surface_from_msg(msg)
+            surface = None if colors is None else Surface(triangles, colors)
+        self.observer.set_surface(nanoseconds_from_stamp(msg.header.stamp), surface)
 
     def _join(self, name: str, header: Header, part: object) -> None:
         stamp = nanoseconds_from_stamp(header.stamp)

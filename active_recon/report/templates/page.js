@@ -32,7 +32,7 @@
   }), config);
 
   const panels = [...document.querySelectorAll('.panel')].map((panel) => {
-    const { scene, map, stages } = drawn.panels[panel.dataset.panel];
+    const { scene, surface: painted, map, stages } = drawn.panels[panel.dataset.panel];
     const [grids, truth] = [scene.grids.map(unpacked), unpacked(scene.truth)];
     const place = panel.querySelector('.scene');
     const turn = panel.querySelector('.turn');
@@ -40,7 +40,16 @@
     const self = { place, turning: !still.matches, visible: false, angle: 0.6, at: grids.length - 1 };
 
     const chosen = () => panel.querySelector('.after input:checked').value;
+    const drawMesh = (mesh) => draw(place, {
+      data: sceneTraces(mesh, scene.cameras, self.at), layout: { ...SCENE_LAYOUT,
+        scene: { ...SCENE_LAYOUT.scene, camera: { eye: eyeAt(self.angle),
+          center: { x: 0, y: 0, z: -0.08 } } } } });
     self.drawScene = () => {
+      if (chosen() === 'colors') {
+        panel.querySelector('.count').textContent = 'the surface after the last view, in the colours of the views';
+        drawMesh(coloredMesh(painted));
+        return;
+      }
       const cells = chosen() === 'truth' ? truth : grids[self.at];
       const threshold = Number(slider.value) === Number(slider.defaultValue)
         ? scene.threshold : Number(slider.value);
@@ -51,9 +60,7 @@
       panel.querySelector('.count').textContent = cells
         ? `${mesh.count} cells${chosen() === 'truth' ? ' of the true shape' : ''}${fit}`
         : 'no shape was recorded after this view';
-      draw(place, { data: sceneTraces(mesh, scene.cameras, self.at), layout: { ...SCENE_LAYOUT,
-        scene: { ...SCENE_LAYOUT.scene, camera: { eye: eyeAt(self.angle),
-          center: { x: 0, y: 0, z: -0.08 } } } } });
+      drawMesh(mesh);
     };
     self.drawRest = () => {
       const shown = map.data.filter((trace) => !trace.meta || trace.meta.of === self.at);
@@ -66,7 +73,8 @@
       turn.setAttribute('aria-pressed', on);
     };
     const choose = () => {
-      if (chosen() !== 'truth') self.at = Number(chosen());
+      if (chosen() === 'colors') self.at = grids.length - 1;
+      else if (chosen() !== 'truth') self.at = Number(chosen());
       panel.querySelectorAll('.film li').forEach((item, i) => item.classList.toggle('chosen', i === self.at));
       self.drawScene();
       self.drawRest();

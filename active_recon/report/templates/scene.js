@@ -47,6 +47,22 @@ function surface(cells, side, threshold) {
   return mesh;
 }
 
+/** Return a packed surface as a mesh with a colour for each corner. */
+function coloredMesh({ corners, faces, colors }) {
+  const bytes = (packed) => Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+  const numbers = (packed, size, read) => {
+    const view = new DataView(bytes(packed).buffer);
+    return Array.from({ length: view.byteLength / size }, (_, i) => view[read](size * i, true));
+  };
+  const third = (values, first) => values.filter((_, i) => i % 3 === first);
+  const places = numbers(corners, 2, 'getUint16').map((step) => 2 * (step / STEPS - 0.5));
+  const joined = numbers(faces, 4, 'getUint32');
+  const shades = numbers(colors, 1, 'getUint8');
+  return { x: third(places, 0), y: third(places, 1), z: third(places, 2), i: third(joined, 0),
+    j: third(joined, 1), k: third(joined, 2), vertexcolor: third(shades, 0).map(
+      (red, i) => `rgb(${red},${shades[3 * i + 1]},${shades[3 * i + 2]})`) };
+}
+
 /** Return intersection over union of what is above the threshold with the true cells. */
 function overlap(cells, truth, threshold) {
   let both = 0, either = 0;
@@ -64,10 +80,10 @@ function sceneTraces(mesh, cameras, upTo) {
   const seen = cameras.slice(0, upTo + 1);
   const { count, ...faces } = mesh;
   return [
-    { type: 'mesh3d', ...faces, intensitymode: 'cell', flatshading: true, hoverinfo: 'skip',
-      cmin: 0, cmax: 1, showscale: false,
+    { type: 'mesh3d', ...faces, intensitymode: 'cell', flatshading: !faces.vertexcolor,
+      hoverinfo: 'skip', cmin: 0, cmax: 1, showscale: false,
       colorscale: [[0, '--unsure'], [0.5, '--half-sure'], [1, '--sure']],
-      lighting: { ambient: 0.62, diffuse: 0.75, specular: 0.06, roughness: 0.9, fresnel: 0,
+      lighting: faces.vertexcolor ? { ambient: 0.9, diffuse: 0.2 } : { ambient: 0.62, diffuse: 0.75, specular: 0.06, roughness: 0.9, fresnel: 0,
         facenormalsepsilon: 0, vertexnormalsepsilon: 0 },
       lightposition: { x: 800, y: -1200, z: 2400 } },
     { type: 'scatter3d', mode: 'lines', hoverinfo: 'skip', x: around.map((a) => RING * Math.cos(a)),

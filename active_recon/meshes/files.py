@@ -1,0 +1,41 @@
+"""Mesh files: metres, the origin of the object frame; z up, in GLB y up as its standard says."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from active_recon.errors import ConfigError
+import numpy as np
+
+if TYPE_CHECKING:
+    import trimesh
+
+MESH_FORMATS = ('ply', 'obj', 'stl', 'glb')
+"""Suffixes of mesh files; STL has no colours."""
+_GLTF_FROM_OBJECT = np.array([[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], np.float64)
+
+
+def mesh_suffix(path: Path, formats: tuple[str, ...] = MESH_FORMATS) -> str:
+    """Return a file's suffix in small letters, without the dot; ConfigError if no format's."""
+    suffix = path.suffix.lower().lstrip('.')
+    if suffix not in formats:
+        raise ConfigError(f'{path}: no mesh has that suffix: expected {", ".join(formats)}')
+    return suffix
+
+
+def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
+    """
+    Write a mesh of the object frame as PLY, OBJ, STL or GLB, by the file's suffix.
+
+    Vertex colours, sRGB, go with it, but for STL. In GLB y is up and the front is +z, as glTF
+    says; what else reads and writes meshes here does the same. Raises ConfigError on other
+    suffixes.
+    """
+    suffix = mesh_suffix(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    (_y_up(mesh) if suffix == 'glb' else mesh).export(path)
+
+
+def _y_up(mesh: 'trimesh.Trimesh') -> 'trimesh.Trimesh':
+    turned = mesh.copy()
+    turned.apply_transform(_GLTF_FROM_OBJECT)
+    return turned

@@ -1,0 +1,59 @@
+"""Mesh files: what other software reads is what was written, in metres, where it stands."""
+
+from active_recon.errors import ConfigError
+from active_recon.meshes.files import MESH_FORMATS, write_mesh
+from active_recon.volumes.meshes import read_mesh
+import numpy as np
+import pytest
+import trimesh
+
+COLORED = tuple(suffix for suffix in MESH_FORMATS if suffix != 'stl')
+
+
+@pytest.fixture(scope='module')
+def mesh():
+    """Return a closed surface that no turn and no shift leaves as it is, each corner coloured."""
+    made = trimesh.creation.icosphere(2, 0.04)
+    made.apply_scale([1, 2, 3])
+    made.apply_translation([0.01, -0.02, 0.03])
+    colors = np.random.default_rng(0).integers(0, 256, (len(made.vertices), 3), np.uint8)
+    return trimesh.Trimesh(made.vertices, made.faces, vertex_colors=colors, process=False)
+
+
+@pytest.mark.parametrize('suffix', MESH_FORMATS)
+def test_a_written_mesh_is_read_as_closed_and_upright_where_it_was(suffix, mesh, tmp_path):
+    path = tmp_path / 'new' / f'ball.{suffix}'
+    write_mesh(mesh, path)
+    read = read_mesh(path)
+    read.merge_vertices()
+    assert read.is_watertight
+    assert read.is_winding_consistent
+    assert len(read.faces) == len(mesh.faces)
+    assert read.volume == pytest.approx(mesh.volume, rel=1e-4)
+    np.testing.assert_allclose(read.bounds, mesh.bounds, atol=1e-6)
+
+
+@pytest.mark.parametrize('suffix', COLORED)
+def test_colors_come_back_at_their_corners(suffix, mesh, tmp_path):
+    path = tmp_path / f'ball.{suffix}'
+    write_mesh(mesh, path)
+    read = trimesh.load(path, force='mesh', process=False)
+    np.testing.assert_array_equal(read.visual.vertex_colors, mesh.visual.vertex_colors)
+
+
+def test_glb_is_y_up_with_the_front_at_z(mesh, tmp_path):
+    write_mesh(mesh, tmp_path / 'ball.glb')
+    read = trimesh.load(tmp_path / 'ball.glb', force='mesh', process=False)
+    np.testing.assert_allclose(read.vertices, mesh.vertices[:, [1, 2, 0]], atol=1e-6)
+
+
+def test_writing_leaves_the_mesh_as_it_was(mesh, tmp_path):
+    before = mesh.vertices.copy(), mesh.visual.vertex_colors.copy()
+    write_mesh(mesh, tmp_path / 'ball.glb')
+    np.testing.assert_array_equal(mesh.vertices, before[0])
+    np.testing.assert_array_equal(mesh.visual.vertex_colors, before[1])
+
+
+def test_a_mesh_of_another_format_is_refused(mesh, tmp_path):
+    with pytest.raises(ConfigError, match='no mesh has that suffix: expected ply, obj, stl, glb'):
+        write_mesh(mesh, tmp_path / 'ball.docx')
