@@ -11,7 +11,7 @@ from active_recon.geometry.cameras import (
     orbit_camera,
 )
 from active_recon.geometry.framing import cube_corners, require_in_image
-from active_recon.geometry.resampling import pixels_within, SAMPLE_EVERY, seen_by, turn_between
+from active_recon.geometry.resampling import SAMPLE_EVERY, seen_by, seen_within, turn_between
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,7 @@ def framed_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 
     _require_size(image, camera)
     require_in_image(camera, object_size, _MOST_MISSING)
     target = framing_camera(camera, object_size, image_size)
-    framed, seen = seen_by(target, image, camera), pixels_within(camera, target, image_size)
+    framed, seen = seen_within(target, image, camera)
     if seen.all():
         return framed, target
     framed[~seen] = 0
@@ -106,8 +106,7 @@ def framed_layers(
                                               flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
                           for each in (layers, whole))
         return np.asarray(carried, np.uint8), np.asarray(there > 127), target
-    return (seen_by(target, layers, camera, cv2.BORDER_CONSTANT),
-            pixels_within(camera, target, image_size), target)
+    return *seen_within(target, layers, camera, cv2.BORDER_CONSTANT), target
 
 
 def framing_camera(camera: Camera, object_size: float = 1.0, image_size: int = 64) -> Camera:
