@@ -1,8 +1,9 @@
 """A network and the state of one episode: the core of the reconstructor's node."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property, partial
 import math
 from pathlib import Path
 
@@ -29,13 +30,18 @@ class Reconstruction:
     The reconstruction after a view: the grid in the object frame, and the latent (C, h, w).
 
     `image` is the network's input, (S, S, 3 or 4) uint8; the fourth channel is 255 where the
-    camera saw the pixel. `quality` is None where the weights have no quality tables.
+    camera saw the pixel. `judge` computes the quality, which does not delay what needs none.
     """
 
     grid: VoxelGrid
     latent: NDArray[np.float32]
     image: NDArray[np.uint8] | None = None
-    quality: Quality | None = None
+    judge: Callable[[], Quality | None] = lambda: None
+
+    @cached_property
+    def quality(self) -> Quality | None:
+        """The quality, judged when it is first asked for; None without quality tables."""
+        return self.judge()
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,16 +166,17 @@ class Reconstructor:
         occupancy, latent, self._state = self._runtime.step(shown, placed, self._state)
         self._view_count += 1
         grid = VoxelGrid(turned(occupancy, self._yaw), self.object_size)
-        return Reconstruction(grid, latent, shown, self._quality(occupancy, latent, placed))
+        return Reconstruction(grid, latent, shown, self._judgement(occupancy, latent, placed))
 
-    def _quality(self, occupancy: NDArray[np.float32], latent: NDArray[np.float32],
-                 camera: Camera) -> Quality | None:
-        """Judge the state after a view, from the network's frame."""
+    def _judgement(self, occupancy: NDArray[np.float32], latent: NDArray[np.float32],
+                   camera: Camera) -> Callable[[], Quality | None]:
+        """Return what judges the state after a view, from the network's frame."""
         if self._judge is None or 'foreground' not in self._state:
-            return None
+            return lambda: None
         foreground, seen = self._state['foreground'][0]
         self._seen.append(SeenView(camera, foreground.copy(), seen.copy()))
-        return self._judge.judge(occupancy, self.threshold, latent, self._seen, self._view_count)
+        return partial(self._judge.judge, occupancy, self.threshold, latent, tuple(self._seen),
+                       self._view_count)
 
 
 def load(model: str | Path | None = None, object_size: float = 1.0,
