@@ -113,6 +113,11 @@ class ViewJoiner:
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
         del self._poses[:-_MAX_POSES]
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether an image waits for the other messages of its stamp."""
+        return bool(self._images)
+
     def joined(self, now: float) -> Iterator[View | MessageError]:
         """Yield new views, and errors of rejected images, in the order of the images."""
         while self._images:
