@@ -9,7 +9,7 @@ from pathlib import Path
 
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera
-from active_recon.geometry.canonical import network_image, NetworkSpec
+from active_recon.geometry.canonical import network_image, NetworkSpec, useful_reduction
 from active_recon.models.weights_files import find_weights, SHIPPED
 from active_recon.quality.judge import Judge
 from active_recon.quality.quality import Quality
@@ -20,6 +20,7 @@ from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
+_COLORING_SIDE = 128  # an image twice as fine as that serves for photographs of 256 pixels
 _COMPARED_VIEWS = 24
 """Views, the last ones, whose silhouettes are compared: a stream of views must not get slower."""
 
@@ -153,6 +154,14 @@ class Reconstructor:
         self.reset()
         self._state, self._view_count = progress.state, progress.view_count
         self._seen.extend(progress.seen)
+
+    def reduction(self, camera: Camera) -> int:
+        """
+        Return by how much an image of a camera may be reduced before `add_view`: 8, 4, 2 or 1.
+
+        The reconstruction is then nearly the same, and photographs for its colours as sharp.
+        """
+        return useful_reduction(camera, self.spec, self.object_size, _COLORING_SIDE)
 
     def add_view(self, image: NDArray[np.uint8], camera: Camera) -> Reconstruction:
         """

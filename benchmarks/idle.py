@@ -1,11 +1,9 @@
 """What a loop costs while nothing happens: the processor time of its nodes without images."""
 
-import os
-from pathlib import Path
 import time
 
 from benchmarks.figures import Figure
-from benchmarks.goal import LOOP, loop_processes
+from benchmarks.goal import cpu_seconds, LOOP, loop_processes
 
 _SETTLE_S, _SPAN_S, _SPANS = 6.0, 5.0, 4
 
@@ -22,11 +20,3 @@ def idle_figure() -> Figure:
             samples.append(100 * (cpu_seconds(pids) - before) / (time.monotonic() - start))
     return Figure('processor time of an idle loop, of one core', '%', samples, 3)
 
-
-def cpu_seconds(pids: list[int]) -> float:
-    """Return the processor time that processes have used so far, together."""
-    ticks = 0
-    for pid in pids:
-        fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
-        ticks += int(fields[11]) + int(fields[12])  # utime and stime
-    return ticks / os.sysconf('SC_CLK_TCK')

@@ -12,11 +12,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+_FEW = 16  # pixels a side that tell the scale of an image
 _FINEST = 2
 """An image at least this many times as fine as needed is downsampled first."""
 _MOST_SAMPLES = 3
 SAMPLE_EVERY = 1.5
 """Largest distance of two samples in pixels: stripes of a pixel are not skipped."""
+REDUCTIONS = (8, 4, 2, 1)
+"""By how much a JPEG image can be reduced while it is decoded."""
 _Places = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Coordinates across and down an image, (S, S) each."""
 
@@ -51,6 +54,16 @@ def seen_within(target: Camera, image: NDArray[np.uint8], camera: Camera,
                                        (width, height), strict=True)),
         cv2.INTER_LINEAR, borderMode=beyond)
     return _shrunk(np.asarray(sampled, np.uint8), size, size), within
+
+
+def reduction(target: Camera, camera: Camera) -> int:
+    """
+    Return by how much a camera's image may be reduced before it is seen by the target.
+
+    It is one of REDUCTIONS: the image is then still as fine as `seen_by` makes use of.
+    """
+    apart = _apart(_seen(camera, target, _FEW)) * _FEW / target.intrinsics.width
+    return next((by for by in REDUCTIONS if apart >= _FINEST * by), 1)
 
 
 def _places(seen: NDArray[np.float64], first: int, scale: float, count: int
@@ -111,10 +124,14 @@ def _few_pixels(count: int, size: int) -> int:
 
 def _samples(seen: _Places) -> int:
     """Return the number of samples along each side of a target pixel that avoids aliasing."""
+    return min(max(1, math.ceil(_apart(seen) / SAMPLE_EVERY)), _MOST_SAMPLES)
+
+
+def _apart(seen: _Places) -> float:
+    """Return the usual distance of neighbours in the camera's image, in its pixels."""
     steps = np.concatenate([np.hypot(*(np.diff(each, axis=axis) for each in seen)).ravel()
                             for axis in (0, 1)])
-    apart = float(np.median(steps, overwrite_input=True))
-    return min(max(1, math.ceil(apart / SAMPLE_EVERY)), _MOST_SAMPLES)
+    return float(np.median(steps, overwrite_input=True))
 
 
 def _shrunk(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:

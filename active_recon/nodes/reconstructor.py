@@ -240,9 +240,8 @@ class ReconstructorNode(ManagedNode):
                 self._add_view(view)
 
     def _add_view(self, view: View) -> None:
-        mask = None if view.mask is None else mask_from_msg(view.mask)
-        image = self._background.cleared(view.image, mask, self._capture.reference)
-        reconstruction = self._reconstructor.add_view(image, view.camera)
+        image, camera, is_cleared = self._prepared(view)
+        reconstruction = self._reconstructor.add_view(image, camera)
         self._gate.took(view.camera)
         self._check_elevation(view.camera)
         self._diagnostics.count('views')
@@ -252,10 +251,18 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.set_value('Views of the episode', str(self._reconstructor.view_count),
                                     at_once=False)
         self._publisher.publish_view(
-            view.stamp, view.camera.pose, reconstruction, None if image is view.image else image)
-        self._products.add_view(view.stamp, image, view.camera, reconstruction)
+            view.stamp, view.camera.pose, reconstruction, image if is_cleared else None)
+        self._products.add_view(view.stamp, image, camera, reconstruction)
         self._check_quality(reconstruction)
         self._check_background(image)  # last: it is for the user, and nothing waits for it
+
+    def _prepared(self, view: View) -> tuple[NDArray[np.uint8], Camera, bool]:
+        """Return what is reconstructed with, its camera, and whether a background is removed."""
+        if self._background.how == 'as_is':  # then nothing needs more pixels than the network
+            return *view.reduced(self._reconstructor.reduction(view.camera)), False
+        mask = None if view.mask is None else mask_from_msg(view.mask)
+        image = self._background.cleared(view.image, mask, self._capture.reference)
+        return image, view.camera, True
 
     def _check_quality(self, reconstruction: Reconstruction) -> None:
         quality = reconstruction.quality
