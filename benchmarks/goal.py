@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import json
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,12 +11,13 @@ import time
 from active_recon.geometry.cameras import Camera
 from active_recon.launching.processes import NodeProcesses, private_environment
 from benchmarks.figures import Figure
+from benchmarks.memory import peak_mb
 from benchmarks.stream import views_of_size
 
 _EPISODES, _VIEWS = 12, 8  # of each episode
 _PERIOD_S = 0.15
 _BEGIN_S = 0.5
-_BUDGET_S = 30.0
+_BUDGET_S = 90.0
 LOOP = {
     'reconstructor': {'take_views': 'all'},
     'view_planner': {'max_views': 1000, 'entropy_tolerance': 0.0}}
@@ -25,7 +27,21 @@ LOOP = {
 def goal_figures() -> list[Figure]:
     """Send raw images of 640 x 480 pixels; time the occupancy and the goal of each."""
     with loop_processes() as nodes, _camera() as send:
-        return _measured(send, [nodes.pid(node) for node in LOOP], '')
+        pids = [nodes.pid(node) for node in LOOP]
+        return [*_measured(send, pids, ''), memory_figure(pids, '')]
+
+
+def single_process_figures() -> list[Figure]:
+    """Measure the same with both nodes in one process."""
+    with loop_processes(single=True) as nodes, _camera() as send:
+        pids, where = [nodes.pid('composed')], ', one process'
+        return [*_measured(send, pids, where), memory_figure(pids, where)]
+
+
+def memory_figure(pids: list[int], where: str) -> Figure:
+    """Return the most that processes have held in memory, together."""
+    return Figure(f'memory of reconstructor and planner, peak{where}', 'MB',
+                  [sum(map(peak_mb, pids))], 500)
 
 
 def _measured(send: Callable[[int], dict[str, list[float]]], pids: list[int],
@@ -52,15 +68,22 @@ def cpu_seconds(pids: list[int]) -> float:
 
 
 @contextmanager
-def loop_processes() -> Iterator[NodeProcesses]:
-    """Start reconstructor and planner as processes in a domain of their own."""
+def loop_processes(single: bool = False) -> Iterator[NodeProcesses]:
+    """Start reconstructor and planner, each in a process or in one, in a domain of their own."""
     environment = private_environment()
     os.environ.update(environment)
     with TemporaryDirectory() as logs, NodeProcesses(Path(logs), environment) as nodes:
-        for node, parameters in LOOP.items():
-            nodes.start(node, parameters)
+        if single:
+            file = Path(logs, 'loop.yaml')
+            file.write_text(json.dumps({f'/**/{node}': {'ros__parameters': parameters}
+                                        for node, parameters in LOOP.items()}))
+            nodes.start('composed', {}, arguments=['--params-file', str(file)])
+        else:
+            for node, parameters in LOOP.items():
+                nodes.start(node, parameters)
         deadline = time.monotonic() + _BUDGET_S
-        while any(']: ready' not in Path(logs, f'{node}.txt').read_text() for node in LOOP):
+        while ''.join(log.read_text() for log in Path(logs).glob('*.txt')).count(
+                ']: ready') < len(LOOP):
             nodes.check()
             if time.monotonic() > deadline:
                 raise TimeoutError(f'the nodes were not ready in {_BUDGET_S} s')

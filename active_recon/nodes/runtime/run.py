@@ -1,6 +1,6 @@
 """Start, spin and stop a node: shared by every executable."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import faulthandler
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +12,7 @@ import threading
 from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.nodes.runtime.shared_memory import make_room
 from active_recon.nodes.runtime.usage import is_help_wanted, usage
-from active_recon.parameters.params_file import check_yaml
+from active_recon.parameters.yaml_files import read_yaml
 import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -33,14 +33,21 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
     if is_help_wanted(sys.argv[1:] if args is None else args):
         sys.stdout.write(usage(Path(sys.argv[0]).stem) + '\n')
         return
+    run_nodes(lambda: [make_node], args)
+
+
+def run_nodes(makers: Callable[[], Iterable[Callable[[], Node]]],
+              args: list[str] | None = None) -> None:
+    """Spin the nodes that `makers` returns functions to make, all in one executor; as above."""
     stop = _StopRequests()
     make_room()
-    node = None
+    nodes: list[Node] = []
     try:
         _init(args)
-        node = make_node()
         executor = SingleThreadedExecutor()
-        executor.add_node(node)
+        for make_node in makers():
+            nodes.append(make_node())
+            executor.add_node(nodes[-1])
         stop.wakes(executor)
         while not stop.requested:
             executor.spin_once()
@@ -51,7 +58,7 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
         # A middleware that does not shut down must not block the process for ever: after the
         # timeout it prints the stack of each thread and exits with code 1.
         faulthandler.dump_traceback_later(_CLOSE_TIMEOUT_S, exit=True)
-        if node is not None:
+        for node in reversed(nodes):
             node.destroy_node()
         rclpy.try_shutdown()
 
@@ -96,7 +103,7 @@ def _init(args: list[str] | None) -> None:
     given = sys.argv[1:] if args is None else args
     for option, file in pairwise(given):
         if option == '--params-file':
-            check_yaml(Path(file))
+            read_yaml(Path(file))
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
