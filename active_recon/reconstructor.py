@@ -1,14 +1,15 @@
 """A network and the state of one episode: the core of the reconstructor's node."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property, partial
 import math
 from pathlib import Path
 
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera
-from active_recon.geometry.canonical import network_image, NetworkSpec
+from active_recon.geometry.canonical import network_image, NetworkSpec, useful_reduction
 from active_recon.models.weights_files import find_weights, SHIPPED
 from active_recon.quality.judge import Judge
 from active_recon.quality.quality import Quality
@@ -19,6 +20,7 @@ from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
+_COLORING_SIDE = 128  # an image twice as fine as that serves for photographs of 256 pixels
 _COMPARED_VIEWS = 24
 """Views, the last ones, whose silhouettes are compared: a stream of views must not get slower."""
 
@@ -29,13 +31,18 @@ class Reconstruction:
     The reconstruction after a view: the grid in the object frame, and the latent (C, h, w).
 
     `image` is the network's input, (S, S, 3 or 4) uint8; the fourth channel is 255 where the
-    camera saw the pixel. `quality` is None where the weights have no quality tables.
+    camera saw the pixel. `judge` computes the quality, which does not delay what needs none.
     """
 
     grid: VoxelGrid
     latent: NDArray[np.float32]
     image: NDArray[np.uint8] | None = None
-    quality: Quality | None = None
+    judge: Callable[[], Quality | None] = lambda: None
+
+    @cached_property
+    def quality(self) -> Quality | None:
+        """The quality, judged when it is first asked for; None without quality tables."""
+        return self.judge()
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +155,14 @@ class Reconstructor:
         self._state, self._view_count = progress.state, progress.view_count
         self._seen.extend(progress.seen)
 
+    def reduction(self, camera: Camera) -> int:
+        """
+        Return by how much an image of a camera may be reduced before `add_view`: 8, 4, 2 or 1.
+
+        The reconstruction is then nearly the same, and photographs for its colours as sharp.
+        """
+        return useful_reduction(camera, self.spec, self.object_size, _COLORING_SIDE)
+
     def add_view(self, image: NDArray[np.uint8], camera: Camera) -> Reconstruction:
         """
         Update the reconstruction by one view.
@@ -160,16 +175,17 @@ class Reconstructor:
         occupancy, latent, self._state = self._runtime.step(shown, placed, self._state)
         self._view_count += 1
         grid = VoxelGrid(turned(occupancy, self._yaw), self.object_size)
-        return Reconstruction(grid, latent, shown, self._quality(occupancy, latent, placed))
+        return Reconstruction(grid, latent, shown, self._judgement(occupancy, latent, placed))
 
-    def _quality(self, occupancy: NDArray[np.float32], latent: NDArray[np.float32],
-                 camera: Camera) -> Quality | None:
-        """Judge the state after a view, from the network's frame."""
+    def _judgement(self, occupancy: NDArray[np.float32], latent: NDArray[np.float32],
+                   camera: Camera) -> Callable[[], Quality | None]:
+        """Return what judges the state after a view, from the network's frame."""
         if self._judge is None or 'foreground' not in self._state:
-            return None
+            return lambda: None
         foreground, seen = self._state['foreground'][0]
         self._seen.append(SeenView(camera, foreground.copy(), seen.copy()))
-        return self._judge.judge(occupancy, self.threshold, latent, self._seen, self._view_count)
+        return partial(self._judge.judge, occupancy, self.threshold, latent, tuple(self._seen),
+                       self._view_count)
 
 
 def load(model: str | Path | None = None, object_size: float = 1.0,

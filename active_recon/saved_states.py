@@ -115,7 +115,8 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
         lens = photo.camera.intrinsics
         if photo.image.dtype != np.uint8 or photo.image.shape[:2] != (lens.height, lens.width):
             raise ValueError(f'an image of {photo.image.shape} {photo.image.dtype}')
-    quality = json.loads(facts['quality'])
+    told = json.loads(facts['quality'])
+    quality = Quality(**told) if told else None
     occupancy = arrays['occupancy']
     if occupancy.shape != (reconstructor.spec.resolution,) * 3 or not (
             (occupancy >= 0) & (occupancy <= 1)).all():
@@ -123,7 +124,7 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
     return SavedState(
         Progress(state, int(facts['views']), tuple(seen)),
         Reconstruction(VoxelGrid(occupancy, reconstructor.object_size), arrays['latent'], None,
-                       quality and Quality(**quality)),
+                       lambda: quality),
         photos, Camera(arrays['last_pose']))
 
 

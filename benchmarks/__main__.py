@@ -10,6 +10,8 @@ from benchmarks.bags import replay_figure, report_figure
 from benchmarks.converters import converter_figures
 from benchmarks.core import reconstruct_and_plan, rendering, rendering_of_candidates
 from benchmarks.figures import Figure, reference_ms
+from benchmarks.goal import goal_figures, single_process_figures
+from benchmarks.idle import idle_figure
 from benchmarks.loop import demo_figure, reconstructor_figures
 from benchmarks.runtimes import runtime_figures
 from benchmarks.stream import stream_figures
@@ -22,6 +24,9 @@ PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'rendering': lambda: [rendering(1, 400), rendering(2, 100)],
     'candidates': lambda: [rendering_of_candidates(32), rendering_of_candidates(64)],
     'reconstructor': reconstructor_figures,
+    'goal': goal_figures,
+    'single-process': single_process_figures,
+    'idle': lambda: [idle_figure()],
     'viewer': watching_figures,
     'converters': converter_figures,
     'stream': stream_figures,

@@ -61,7 +61,7 @@ def _camera() -> Iterator[Callable[[str, tuple[int, int], int], list[float]]]:
                 executor.spin_once(timeout_sec=left)
 
         def send(form: str, size: tuple[int, int], count: int) -> list[float]:
-            views = _views(size)
+            views = views_of_size(size)
             messages = [_packed(CompressedImage, image) if form == 'jpeg'
                         else image_to_msg(image, Header()) for image, _ in views]
             sent: dict[int, float] = {}
@@ -86,7 +86,7 @@ def _camera() -> Iterator[Callable[[str, tuple[int, int], int], list[float]]]:
         yield send
 
 
-def _views(size: tuple[int, int]) -> Sequence[tuple[Any, Any]]:
+def views_of_size(size: tuple[int, int]) -> Sequence[tuple[Any, Any]]:
     """Return images of that size, and their cameras, which see the object as the canonical one."""
     renderer = Renderer(load_mesh(OBJECTS / 'chair.glb'))
     shorter = min(size)

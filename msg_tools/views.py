@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from active_recon.errors import MessageError
 from active_recon.geometry.cameras import Camera, Intrinsics
-from msg_tools.camera_images import pixels_from_msg, size_from_msg
+from msg_tools.camera_images import pixels_from_msg, reduced_from_msg, size_from_msg
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
@@ -40,6 +40,18 @@ class View:
     def image(self) -> NDArray[np.uint8]:
         """The image, (H, W, 3) uint8 RGB; raises MessageError if it cannot be decoded."""
         return pixels_from_msg(self.image_msg)
+
+    def reduced(self, by: int) -> tuple[NDArray[np.uint8], Camera]:
+        """
+        Return the image reduced by 1, 2, 4 or 8 where that saves decoding it, and its camera.
+
+        Raises MessageError as `image` does.
+        """
+        image = reduced_from_msg(self.image_msg, by)
+        lens = self.camera.intrinsics
+        if by == 1 or image.shape[:2] == (lens.height, lens.width):
+            return image, self.camera
+        return image, Camera(self.camera.pose, lens.reduced(by))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +124,11 @@ class ViewJoiner:
             return
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
         del self._poses[:-_MAX_POSES]
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether an image waits for the other messages of its stamp."""
+        return bool(self._images)
 
     def joined(self, now: float) -> Iterator[View | MessageError]:
         """Yield new views, and errors of rejected images, in the order of the images."""

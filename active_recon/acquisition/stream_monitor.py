@@ -41,6 +41,11 @@ class StreamMonitor:
     def __init__(self) -> None:
         self.clear()
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether a message of any stream was added."""
+        return bool(self._quiet)
+
     def clear(self) -> None:
         """Forget all messages."""
         self._quiet: dict[str, float] = {}

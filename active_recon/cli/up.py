@@ -27,6 +27,9 @@ def up(
     )] = None,
     log_level: Annotated[LogLevel, typer.Option(
         help='Lowest severity that the nodes log.')] = LogLevel.info,
+    single_process: Annotated[bool, typer.Option(
+        '--single-process', help='Run reconstructor, planner and simulated camera in one process: '
+        'less memory, less time for their messages.')] = False,
 ) -> None:
     """
     Start the nodes of a parameters file, and stop them on Ctrl-C.
@@ -38,4 +41,5 @@ def up(
     """
     from active_recon.launching.up import run_up, Start
 
-    run_up(Start(params, namespace, remap or (), log_level.value), typer.echo)
+    run_up(Start(params, namespace, remap or (), log_level.value, single_process),
+           typer.echo)

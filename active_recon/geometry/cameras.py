@@ -72,6 +72,19 @@ class Intrinsics:
                           width, height, self.distortion)
 
 
+    def reduced(self, by: int) -> 'Intrinsics':
+        """
+        Return the intrinsics of an image in which `by` x `by` pixels are one.
+
+        What is left over at the right and at the bottom fills pixels of its own, as in a JPEG
+        image that is decoded smaller.
+        """
+        if by == 1:
+            return self
+        return Intrinsics(self.fx / by, self.fy / by, self.cx / by, self.cy / by,
+                          -(-self.width // by), -(-self.height // by), self.distortion)
+
+
 _EYE = np.eye(3)
 _FOCAL = 35 / 32 * 137  # R2N2's lens and sensor, verified by reprojection
 CANONICAL_INTRINSICS = Intrinsics(_FOCAL, _FOCAL, 68.5, 68.5, 137, 137)

@@ -11,7 +11,13 @@ from active_recon.geometry.cameras import (
     orbit_camera,
 )
 from active_recon.geometry.framing import cube_corners, require_in_image
-from active_recon.geometry.resampling import pixels_within, SAMPLE_EVERY, seen_by, turn_between
+from active_recon.geometry.resampling import (
+    reduction,
+    SAMPLE_EVERY,
+    seen_by,
+    seen_within,
+    turn_between,
+)
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +53,23 @@ def network_image(image: NDArray[np.uint8], camera: Camera, spec: NetworkSpec,
     return converted(image, camera, object_size, spec.image_size)
 
 
+def useful_reduction(camera: Camera, spec: NetworkSpec, object_size: float = 1.0,
+                     least: int = 0) -> int:
+    """
+    Return by how much a camera's image may be reduced for a network: 8, 4, 2 or 1.
+
+    `network_image` is then nearly the same: the reduced image still has more than a pixel for
+    each of its pixels, and for each of `least` pixels across the object's cube. It is 1 for a
+    camera that does not look at the cube.
+    """
+    size = max(spec.image_size, least)
+    _, depth = camera.project(cube_corners() * object_size)
+    if depth.min() <= 0:
+        return 1
+    return reduction((_canonical_camera if spec.needs_front else framing_camera)(
+        camera, object_size, size), camera)
+
+
 def canonical_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 1.0,
                     image_size: int = 64) -> tuple[NDArray[np.uint8], Camera]:
     """
@@ -60,8 +83,7 @@ def canonical_image(image: NDArray[np.uint8], camera: Camera, object_size: float
     """
     _require_size(image, camera)
     require_in_image(camera, object_size)
-    target = orbit_camera(camera.azimuth, camera.elevation, CANONICAL_DISTANCE * object_size,
-                          CANONICAL_INTRINSICS.resized(image_size, image_size))
+    target = _canonical_camera(camera, object_size, image_size)
     return seen_by(target, image, camera), target
 
 
@@ -80,7 +102,7 @@ def framed_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 
     _require_size(image, camera)
     require_in_image(camera, object_size, _MOST_MISSING)
     target = framing_camera(camera, object_size, image_size)
-    framed, seen = seen_by(target, image, camera), pixels_within(camera, target, image_size)
+    framed, seen = seen_within(target, image, camera)
     if seen.all():
         return framed, target
     framed[~seen] = 0
@@ -106,8 +128,12 @@ def framed_layers(
                                               flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
                           for each in (layers, whole))
         return np.asarray(carried, np.uint8), np.asarray(there > 127), target
-    return (seen_by(target, layers, camera, cv2.BORDER_CONSTANT),
-            pixels_within(camera, target, image_size), target)
+    return *seen_within(target, layers, camera, cv2.BORDER_CONSTANT), target
+
+
+def _canonical_camera(camera: Camera, object_size: float, image_size: int) -> Camera:
+    return orbit_camera(camera.azimuth, camera.elevation, CANONICAL_DISTANCE * object_size,
+                        CANONICAL_INTRINSICS.resized(image_size, image_size))
 
 
 def framing_camera(camera: Camera, object_size: float = 1.0, image_size: int = 64) -> Camera:

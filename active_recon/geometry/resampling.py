@@ -12,11 +12,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+_FEW = 16  # pixels a side that tell the scale of an image
 _FINEST = 2
 """An image at least this many times as fine as needed is downsampled first."""
 _MOST_SAMPLES = 3
 SAMPLE_EVERY = 1.5
 """Largest distance of two samples in pixels: stripes of a pixel are not skipped."""
+REDUCTIONS = (8, 4, 2, 1)
+"""By how much a JPEG image can be reduced while it is decoded."""
+_Places = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Coordinates across and down an image, (S, S) each."""
 
 
 def seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
@@ -26,36 +31,64 @@ def seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
 
     `beyond` is OpenCV's border mode for pixels outside of the image.
     """
-    size = target.intrinsics.width
-    seen = _seen(camera, target, size)
+    return seen_within(target, image, camera, beyond)[0]
+
+
+def seen_within(target: Camera, image: NDArray[np.uint8], camera: Camera,
+                beyond: int = cv2.BORDER_REPLICATE
+                ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Return what `seen_by` does, and which of its pixels lie in the camera's image, (S, S)."""
+    size, lens = target.intrinsics.width, camera.intrinsics
+    x, y = seen = _seen(camera, target, size)
+    within = (x >= 0) & (x <= lens.width) & (y >= 0) & (y <= lens.height)
     if _is_whole_image(seen, camera, size):
-        return _shrunk(image, size, size)
+        return _shrunk(image, size, size), within
     left, top, right, bottom = _window(seen, camera, size)
     width, height = (_few_pixels(count, size) for count in (right - left, bottom - top))
     window = _shrunk(image[top:bottom, left:right], width, height)
-    scale = np.array([width / (right - left), height / (bottom - top)])
-    fine = size * _samples(seen * scale)
+    across, down = width / (right - left), height / (bottom - top)
+    fine = size * _samples((x * across, y * down))
     # OpenCV's (0, 0) is the centre of the first pixel, ours its corner
-    where = (_seen(camera, target, fine) - [left, top]) * scale - 0.5
-    where = np.clip(where, -1, [width, height]).astype(np.float32)
-    sampled = cv2.remap(window, where[..., 0], where[..., 1], cv2.INTER_LINEAR,
-                        borderMode=beyond)
-    return _shrunk(np.asarray(sampled, np.uint8), size, size)
+    sampled = cv2.remap(window, *(
+        _places(*each) for each in zip(_seen(camera, target, fine), (left, top), (across, down),
+                                       (width, height), strict=True)),
+        cv2.INTER_LINEAR, borderMode=beyond)
+    return _shrunk(np.asarray(sampled, np.uint8), size, size), within
 
 
-def _seen(camera: Camera, target: Camera, size: int) -> NDArray[np.float64]:
-    """Return the camera's pixel coordinates of size x size target pixels, (size, size, 2)."""
+def reduction(target: Camera, camera: Camera) -> int:
+    """
+    Return by how much a camera's image may be reduced before it is seen by the target.
+
+    It is one of REDUCTIONS: the image is then still as fine as `seen_by` makes use of.
+    """
+    apart = _apart(_seen(camera, target, _FEW)) * _FEW / target.intrinsics.width
+    return next((by for by in REDUCTIONS if apart >= _FINEST * by), 1)
+
+
+def _places(seen: NDArray[np.float64], first: int, scale: float, count: int
+            ) -> NDArray[np.float32]:
+    """Return coordinates as OpenCV counts them in a window, scaled and kept beside its pixels."""
+    places = seen - first
+    places *= scale
+    places -= 0.5
+    return np.asarray(places.clip(-1, count, out=places), np.float32)
+
+
+def _seen(camera: Camera, target: Camera, size: int) -> _Places:
+    """Return the camera's pixel coordinates of size x size target pixels."""
     if camera.intrinsics.distortion is None and np.array_equal(camera.position, target.position):
         fine = Camera(target.pose, target.intrinsics.resized(size, size))  # fifty times as fast
         across = np.arange(size) + 0.5
         x, y, depth = (row[0] * across + (row[1] * across + row[2])[:, None]
                        for row in turn_between(camera, fine))
-        depth = np.where(depth > 0, depth, -1e-9)
-        return np.stack([x / depth, y / depth], axis=-1)
+        np.copyto(depth, -1e-9, where=depth <= 0)
+        return np.divide(x, depth, out=x), np.divide(y, depth, out=y)
     rays = Camera(target.pose, target.intrinsics.resized(size, size)).ray_directions()
     pixels, depth = camera.project((target.position + target.distance * rays).reshape(-1, 3))
     pixels[depth <= 0] = -1e9  # nowhere in the image
-    return np.nan_to_num(pixels, nan=-1e9).reshape(size, size, 2)
+    x, y = np.ascontiguousarray(np.nan_to_num(pixels, nan=-1e9).T)
+    return x.reshape(size, size), y.reshape(size, size)
 
 
 def turn_between(camera: Camera, target: Camera) -> NDArray[np.float64]:
@@ -64,25 +97,21 @@ def turn_between(camera: Camera, target: Camera) -> NDArray[np.float64]:
                       @ np.linalg.inv(target.intrinsics.matrix))
 
 
-def pixels_within(camera: Camera, target: Camera, size: int) -> NDArray[np.bool_]:
-    """Return which of the target's pixels lie in the camera's image, (size, size)."""
-    where, lens = _seen(camera, target, size), camera.intrinsics
-    return np.asarray(np.all((where >= 0) & (where <= [lens.width, lens.height]), axis=-1))
-
-
-def _is_whole_image(seen: NDArray[np.float64], camera: Camera, size: int) -> bool:
+def _is_whole_image(seen: _Places, camera: Camera, size: int) -> bool:
     """Return whether the target's image is the camera's, resized."""
-    column, row = np.meshgrid(*[np.arange(size) + 0.5] * 2)
-    lens = camera.intrinsics
-    whole = np.stack([column * lens.width, row * lens.height], axis=-1) / size
-    return lens.distortion is None and np.allclose(seen, whole, rtol=0, atol=0.01)
+    lens, (x, y) = camera.intrinsics, seen
+    middles = (np.arange(size) + 0.5) / size
+    return lens.distortion is None and bool(
+        np.abs(x[0] - middles * lens.width).max() <= 0.01
+        and np.abs(x - middles * lens.width).max() <= 0.01
+        and np.abs(y - (middles * lens.height)[:, None]).max() <= 0.01)
 
 
-def _window(seen: NDArray[np.float64], camera: Camera, size: int) -> tuple[int, int, int, int]:
+def _window(seen: _Places, camera: Camera, size: int) -> tuple[int, int, int, int]:
     """Return left, top, right, bottom of the required part of the camera's image, in pixels."""
     whole = np.array([camera.intrinsics.width, camera.intrinsics.height])
-    first, last = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
-    first, last = np.clip(first, 0, whole), np.clip(last, 0, whole)
+    first, last = (np.clip([extreme(each) for each in seen], 0, whole)
+                   for extreme in (np.min, np.max))
     margin = (last - first) / size + 1
     left, top = np.maximum(np.floor(first - margin), 0).astype(int)
     right, bottom = np.minimum(np.ceil(last + margin), whole).astype(int)
@@ -93,12 +122,16 @@ def _few_pixels(count: int, size: int) -> int:
     return math.ceil(count / max(count // (_FINEST * size), 1))
 
 
-def _samples(seen: NDArray[np.float64]) -> int:
+def _samples(seen: _Places) -> int:
     """Return the number of samples along each side of a target pixel that avoids aliasing."""
-    steps = np.concatenate([np.diff(seen, axis=0).reshape(-1, 2),
-                            np.diff(seen, axis=1).reshape(-1, 2)])
-    apart = float(np.median(np.linalg.norm(steps, axis=1)))
-    return min(max(1, math.ceil(apart / SAMPLE_EVERY)), _MOST_SAMPLES)
+    return min(max(1, math.ceil(_apart(seen) / SAMPLE_EVERY)), _MOST_SAMPLES)
+
+
+def _apart(seen: _Places) -> float:
+    """Return the usual distance of neighbours in the camera's image, in its pixels."""
+    steps = np.concatenate([np.hypot(*(np.diff(each, axis=axis) for each in seen)).ravel()
+                            for axis in (0, 1)])
+    return float(np.median(steps, overwrite_input=True))
 
 
 def _shrunk(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:

@@ -8,6 +8,7 @@ import time
 
 from active_recon.interrupts import held_interrupts
 from active_recon.launching.processes import NodeProcesses
+from active_recon.nodes.composed import COMPOSABLE
 from active_recon.parameters.params_file import read_params_file
 
 _CHECK_EVERY_S = 0.1
@@ -18,13 +19,14 @@ class Start:
     """
     The nodes to start: a parameters file that names them, and options that hold for all.
 
-    `remaps` are of the form `from:=to`.
+    `remaps` are of the form `from:=to`. With `single_process`, those that can share a process do.
     """
 
     params_file: Path
     namespace: str = ''
     remaps: Sequence[str] = ()
     log_level: str = 'info'
+    single_process: bool = False
 
     def arguments(self) -> list[str]:
         """Return the command-line arguments of every node."""
@@ -40,10 +42,12 @@ def run_up(start: Start, say: Callable[[str], None]) -> None:
     """
     namespace = f'/{start.namespace.strip("/")}' if start.namespace else ''
     names = list(read_params_file(start.params_file))
+    together = [name for name in names if name in COMPOSABLE] if start.single_process else []
     say(f'starting {", ".join(names)}; Ctrl-C stops them')
     with (suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked,
           NodeProcesses() as nodes):
-        for name in names:
+        for name in [*(['composed'] if together else []),
+                     *(name for name in names if name not in together)]:
             nodes.start(name, {}, namespace, start.arguments())
         while True:
             raise_if_asked()

@@ -19,11 +19,11 @@ from active_recon.nodes.loop.products import Products
 from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPublisher
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
-from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.deferred_work import DeferredWork
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.runtime.parameters import Commit, Parameters, set_read_only_parameter
 from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
+from active_recon.nodes.runtime.resting_timer import RestingTimer
 from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
@@ -111,8 +111,10 @@ class ReconstructorNode(ManagedNode):
         # Last: a publisher that discovers this subscription has discovered the others
         CameraImages(self, self._diagnostics, inputs, self._on_image, self._monitor.add_lost)
         # Images without a pose or camera info are rejected after a time
-        self.create_timer(0.1, self._process_joined, clock=STEADY)
-        self.create_timer(0.1, self._monitor.update, clock=STEADY)
+        self._image_timer = RestingTimer(
+            self, 0.1, self._process_joined, lambda: self._joiner.is_waiting)
+        self._camera_timer = RestingTimer(
+            self, 0.1, self._monitor.update, lambda: self._monitor.sees)
         self.add_cleanup(self._monitor.reset)
 
     def _free_network(self) -> None:
@@ -214,6 +216,8 @@ class ReconstructorNode(ManagedNode):
         """Process the camera's messages after one has arrived."""
         self._deferred.note_message()
         self._process_joined()
+        self._image_timer.wake()
+        self._camera_timer.wake()
 
     def _process_joined(self) -> None:
         """Select the newest joined image that is to be a view."""
@@ -236,9 +240,8 @@ class ReconstructorNode(ManagedNode):
                 self._add_view(view)
 
     def _add_view(self, view: View) -> None:
-        mask = None if view.mask is None else mask_from_msg(view.mask)
-        image = self._background.cleared(view.image, mask, self._capture.reference)
-        reconstruction = self._reconstructor.add_view(image, view.camera)
+        image, camera, is_cleared = self._prepared(view)
+        reconstruction = self._reconstructor.add_view(image, camera)
         self._gate.took(view.camera)
         self._check_elevation(view.camera)
         self._diagnostics.count('views')
@@ -248,10 +251,18 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.set_value('Views of the episode', str(self._reconstructor.view_count),
                                     at_once=False)
         self._publisher.publish_view(
-            view.stamp, view.camera.pose, reconstruction, None if image is view.image else image)
-        self._products.add_view(view.stamp, image, view.camera, reconstruction)
+            view.stamp, view.camera.pose, reconstruction, image if is_cleared else None)
+        self._products.add_view(view.stamp, image, camera, reconstruction)
         self._check_quality(reconstruction)
         self._check_background(image)  # last: it is for the user, and nothing waits for it
+
+    def _prepared(self, view: View) -> tuple[NDArray[np.uint8], Camera, bool]:
+        """Return what is reconstructed with, its camera, and whether a background is removed."""
+        if self._background.how == 'as_is':  # then nothing needs more pixels than the network
+            return *view.reduced(self._reconstructor.reduction(view.camera)), False
+        mask = None if view.mask is None else mask_from_msg(view.mask)
+        image = self._background.cleared(view.image, mask, self._capture.reference)
+        return image, view.camera, True
 
     def _check_quality(self, reconstruction: Reconstruction) -> None:
         quality = reconstruction.quality

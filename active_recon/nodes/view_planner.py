@@ -19,6 +19,7 @@ from active_recon.nodes.runtime.clock import AHEAD_S, STEADY
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.runtime.parameters import Commit, Parameters
 from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
+from active_recon.nodes.runtime.resting_timer import RestingTimer
 from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.view_planner import ViewPlannerParameters
@@ -79,8 +80,10 @@ class ViewPlannerNode(ManagedNode):
         if self._planner.wants_volume:
             self._views.subscribe_volume(self._params.values.object_size)
         inputs.subscribe(Header, 'episode', self._on_episode, LATCHED_QOS)
-        self.create_timer(0.1, self._publish_first_goal, clock=STEADY)
-        self.create_timer(0.1, self._give_up_timed_out, clock=STEADY)
+        self._first_goal_timer = RestingTimer(
+            self, 0.1, self._publish_first_goal, self._first_goal_is_due)
+        self._timeout_timer = RestingTimer(self, 0.1, self._give_up_timed_out, lambda: (
+            self._params.values.goal_timeout > 0 and self._goals.camera is not None))
         self.create_timer(REPEAT_S, self._goals.repeat, clock=STEADY)
 
     def _free_policy(self) -> None:
@@ -108,6 +111,7 @@ class ViewPlannerNode(ManagedNode):
             tell_of_runtime(self._diagnostics, planner.provenance)
             if not self.is_active:
                 return
+            self._timeout_timer.wake()
             if planner.wants_volume:
                 self._views.subscribe_volume(params.object_size)
             goal = self._goals.camera
@@ -138,6 +142,7 @@ class ViewPlannerNode(ManagedNode):
             self._publish_done(episode.begin, '')
             if self._views.last is not None:
                 self._decide(*self._views.last)
+            self._first_goal_timer.wake()
 
     def clock_went_back(self, how: str) -> None:
         """Wait for an episode of the new time, unless it has already arrived."""
@@ -160,6 +165,12 @@ class ViewPlannerNode(ManagedNode):
             if self._episode and nanoseconds_from_stamp(msg.header.stamp) >= self._episode.begin:
                 self._camera = camera
         self._publish_first_goal()
+        self._first_goal_timer.wake()
+
+    def _first_goal_is_due(self) -> bool:
+        """Whether the first goal waits for nothing but time."""
+        return self._episode is not None and not self._started and not (
+            self._camera is None and math.isnan(self._params.values.start_azimuth))
 
     def _publish_first_goal(self) -> None:
         """Publish the goal of the first view, once the camera's pose or the parameter gives it."""
@@ -226,6 +237,7 @@ class ViewPlannerNode(ManagedNode):
     def _publish_goal(self, goal: Goal) -> None:
         self._goals.publish(goal)
         self._started = True
+        self._timeout_timer.wake()
         self._diagnostics.count('goals')
 
     def _give_up_timed_out(self) -> None:

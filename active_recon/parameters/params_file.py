@@ -7,7 +7,7 @@ from typing import Any
 from active_recon.errors import ConfigError
 from active_recon.parameters.declaration import declared, nearest
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
-import yaml
+from active_recon.parameters.yaml_files import read_yaml
 
 _OF_ROS = {'use_sim_time'}
 """Parameters that every ROS node declares."""
@@ -24,7 +24,7 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
     """
     given: dict[str, dict[str, Any]] = {}
     shared: dict[str, Any] = {}
-    for key, entry in _mapping(path, path.name, _parsed(path)).items():
+    for key, entry in _mapping(path, path.name, read_yaml(path)).items():
         name = str(key).rpartition('/')[2]
         values = _mapping(path, str(key), entry)
         if list(values) != ['ros__parameters']:
@@ -52,19 +52,6 @@ def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
                     for parameters in (NODE_PARAMETERS[node], *NODE_PARAMETERS.values()))
     return {name: value for name, value in shared.items()
             if name in own or name not in set().union(*others)}
-
-
-def check_yaml(path: Path) -> None:
-    """Raise ConfigError, with line and reason, where a file is no YAML or cannot be read."""
-    _parsed(path)
-
-
-def _parsed(path: Path) -> object:
-    try:
-        return yaml.safe_load(path.read_text())
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        raise ConfigError(f'{path}: no ROS parameters file in YAML: '
-                          f'{" ".join(str(error).split())}') from error
 
 
 def _mapping(path: Path, where: str, value: object) -> Mapping[Any, Any]:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from active_recon.quality.silhouettes import agreement, eroded, SeenView
 from active_recon.volumes.occupancy_threshold import expected_iou
+from active_recon.volumes.voxels import places
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +36,7 @@ def features(occupancy: NDArray[np.floating], threshold: float,
     some = max(count, 1)
     below = eroded(kept)
     shell = kept & ~below
-    points = (np.argwhere(shell) + 0.5) / len(kept) - 0.5
+    points = (places(shell) + 0.5) / len(kept) - 0.5
     deep = eroded(eroded(below))
     box = np.ptp(points, axis=0).max() + 1 / len(kept) if count else 0.0
     inner = np.count_nonzero(kept[1:-1, 1:-1, 1:-1])

@@ -80,13 +80,12 @@ def silhouette(points: NDArray[np.float64], camera: Camera) -> Mask:
     a pixel apart, as 64 cells a side are in an image of 64 pixels that holds the whole cube.
     """
     lens = camera.intrinsics
-    mask = np.zeros((lens.height, lens.width), np.bool_)
+    mask = np.zeros(lens.height * lens.width, np.bool_)
     pixels, depth = camera.project(points)
-    place = np.floor(pixels[depth > 0])
-    inside = ((place >= 0) & (place < [lens.width, lens.height])).all(axis=1)
-    across, down = place[inside].astype(np.intp).T
-    mask[down, across] = True
-    return mask
+    x, y = pixels.T
+    inside = (depth > 0) & (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
+    mask[y[inside].astype(np.intp) * lens.width + x[inside].astype(np.intp)] = True
+    return mask.reshape(lens.height, lens.width)
 
 
 def cube_outline(camera: Camera) -> Mask:

@@ -21,7 +21,8 @@ class RecordedObject:
     def step(self, view: RecordedView) -> Reconstruction:
         """Reconstruct with one more view; raises ViewError with a hint on the options."""
         try:
-            return self._reconstructor.add_view(view.image, view.camera)
+            return self._reconstructor.add_view(
+                *view.for_network(self._reconstructor.reduction(view.camera)))
         except ViewError as error:
             raise with_option_hint(error) from error
 

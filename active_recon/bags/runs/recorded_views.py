@@ -155,6 +155,8 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
     image = part('view_image')  # with the background removed, as the network saw it
     if image is None:
         image = scene.cleared(view.image)
+    whole = image is view.image
     return RecordedView(view.stamp, image, view.camera,
                         part('probabilities'), part('occupancy'), part('latent'), part('entropy'),
-                        goal, received, (part('done') or (0, ''))[1], part('quality'))
+                        goal, received, (part('done') or (0, ''))[1], part('quality'),
+                        view.reduced if whole else None)

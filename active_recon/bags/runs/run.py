@@ -1,6 +1,6 @@
 """A recorded run as plain data, for replay and reports."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,6 +92,7 @@ class RecordedView:
       `plan` was called then
     - received: receive times of the view's messages, nanoseconds, by topic name in the loop:
       'camera/image_raw', 'view', 'occupancy', 'probabilities', 'entropy', ...
+    - reduced: returns a smaller image and its camera; None where the image was worked on
     """
 
     stamp: int
@@ -105,6 +106,11 @@ class RecordedView:
     received: Mapping[str, int]
     done: str = ''
     quality: Quality | None = None
+    reduced: Callable[[int], tuple[NDArray[np.uint8], Camera]] | None = None
+
+    def for_network(self, reduction: int) -> tuple[NDArray[np.uint8], Camera]:
+        """Return the image and its camera as the loop decoded it, reduced by that much."""
+        return (self.image, self.camera) if self.reduced is None else self.reduced(reduction)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,11 @@ class CameraMonitor:
         self._motion.goal_tolerance = goal_tolerance
         self._motion.stall_timeout = stall_timeout
 
+    @property
+    def sees(self) -> bool:
+        """Whether the camera has sent anything that could now be missing."""
+        return self._streams.has_begun
+
     def add_message(self, stream: str, stamp: int) -> None:
         """Note a message of a stream of `StreamMonitor`, whether or not it can be used."""
         self._streams.add(stream, stamp, time.monotonic())

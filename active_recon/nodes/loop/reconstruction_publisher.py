@@ -52,17 +52,18 @@ class ReconstructionPublisher:
         - cleared_image: (H, W, 3) uint8 RGB, the image without its background; None: unchanged
         """
         header = self._header(stamp)
-        if self._quality_pub is not None and reconstruction.quality is not None:
-            self._quality_pub.publish(quality_to_msg(reconstruction.quality, header))
         self._latent_pub.publish(latent_to_msg(reconstruction.latent, header))
-        if cleared_image is not None:
-            self._view_image_pub.publish(image_to_msg(cleared_image, header))
-        if reconstruction.image is not None:
-            self._network_image_pub.publish(image_to_msg(reconstruction.image[..., :3], header))
         self._view_pub.publish(pose_to_msg(pose, header))
         grid = reconstruction.grid
         self._probabilities_pub.publish(voxel_grid_to_msg(grid, PUBLISHED_FLOOR, header))
         self._entropy_pub.publish(entropy_to_msg(grid.entropy(), header))
+        # While this judges, the planner reads what came before; then come images, for people
+        if self._quality_pub is not None and reconstruction.quality is not None:
+            self._quality_pub.publish(quality_to_msg(reconstruction.quality, header))
+        if cleared_image is not None:
+            self._view_image_pub.publish(image_to_msg(cleared_image, header))
+        if reconstruction.image is not None:
+            self._network_image_pub.publish(image_to_msg(reconstruction.image[..., :3], header))
 
     def _header(self, stamp: int) -> Header:
         return Header(stamp=stamp_from_nanoseconds(stamp), frame_id=self._frame)

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Mapping
 from difflib import SequenceMatcher
 from typing import Any
 
-from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.qos import endpoint_node, profile_words
+from active_recon.nodes.runtime.resting_timer import RestingTimer
 from msg_tools.serialization import type_name
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -15,6 +15,7 @@ from rclpy.subscription import Subscription
 AWAITED_S = 4.0
 CHECK_EVERY_S = 0.4
 _CHECKS = round(AWAITED_S / CHECK_EVERY_S)  # a busy node checks less often, and waits longer
+_LOOK_EVERY = 5  # checks: the remedies need all of the graph
 _MAX_CANDIDATES = 3
 
 
@@ -31,7 +32,7 @@ class AwaitedInputs:
         self._diagnostics = diagnostics
         self._awaited: dict[str, Mapping[str, str]] = {}
         self._checks = 0
-        node.create_timer(CHECK_EVERY_S, self._check, clock=STEADY)
+        self._timer = RestingTimer(node, CHECK_EVERY_S, self._check, lambda: bool(self._awaited))
 
     def subscribe(self, kind: type, name: str, callback: Callable[[Any], None],
                   qos: QoSProfile) -> Subscription:
@@ -46,6 +47,7 @@ class AwaitedInputs:
     def expect(self, name: str, suffixes: Mapping[type, str]) -> None:
         """Expect messages of an input, of any of several types, each with its topic's suffix."""
         self._awaited[name] = {type_name(kind()): suffix for kind, suffix in suffixes.items()}
+        self._timer.wake()
 
     def received(self, name: str) -> None:
         """Note that a message of an input has arrived, whether or not it can be used."""
@@ -60,7 +62,7 @@ class AwaitedInputs:
 
     def _check(self) -> None:
         self._checks += 1
-        if self._checks >= _CHECKS:
+        if self._checks >= _CHECKS and (self._checks - _CHECKS) % _LOOK_EVERY == 0:
             for name, suffixes in self._awaited.items():
                 self._diagnostics.raise_warning(_warning(name), self._message(name, suffixes))
 

@@ -9,6 +9,7 @@ import time
 
 from active_recon.errors import ActiveReconError
 from active_recon.nodes.runtime.rates import Durations, Rate
+from active_recon.nodes.runtime.resting_timer import RestingTimer
 from active_recon.nodes.runtime.run import one_line
 from diagnostic_msgs.msg import DiagnosticArray
 from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
@@ -40,13 +41,13 @@ class Diagnostics:
         self._warnings: dict[str, str] = {}
         self._logged_warnings: set[str] = set()
         self._failure = ''
-        self._changed = True
-        self._published_at = -math.inf
         self._host = socket.gethostname()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         # A steady clock: diagnostics are published while simulation time is paused, too.
-        node.create_timer(CHANGES_WITHIN_S, self._publish_if_due,
+        node.create_timer(PUBLISH_EVERY_S, self._publish_regularly,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._changed = True
+        self._changes = RestingTimer(node, CHANGES_WITHIN_S, self._publish, lambda: self._changed)
 
     def count(self, what: str, by: int = 1) -> None:
         """Increase a counter, for example that of views."""
@@ -70,8 +71,10 @@ class Diagnostics:
 
     def set_value(self, key: str, value: str, at_once: bool = True) -> None:
         """Set a value of the node's state; its key begins with a capital letter."""
-        self._changed = self._changed or (at_once and self._values.get(key) != value)
+        before = self._values.get(key)
         self._values[key] = value
+        if at_once and before != value:
+            self._note_change()
 
     def reject(self, error: ActiveReconError) -> None:
         """Count a rejected input by the error's kind and log the reason in one line."""
@@ -100,7 +103,7 @@ class Diagnostics:
         message = self._warnings.pop(kind, None)
         if message is None:
             return
-        self._changed = True
+        self._note_change()
         if kind in self._logged_warnings:
             self._logged_warnings.discard(kind)
             if log:  # what was to be done about it is no longer of interest
@@ -112,13 +115,14 @@ class Diagnostics:
         """Log an error, the node's state until `clear_error`."""
         self._counts[f'refused/{kind}'] += 1
         self._failure = message
-        self._changed = True
+        self._note_change()
         self._node.get_logger().error(message)
 
     def clear_error(self) -> None:
         """Clear the error: the node works again."""
-        self._changed = self._changed or self._failure != ''
-        self._failure = ''
+        if self._failure:
+            self._failure = ''
+            self._note_change()
 
     @contextmanager
     def rejecting(self) -> Iterator[None]:
@@ -136,7 +140,7 @@ class Diagnostics:
     def _notice(self, key: str, message: str) -> None:
         self._counts[key] += 1
         self._last_problem = message
-        self._changed = True
+        self._note_change()
 
     def _log(self, key: str, message: str) -> bool:
         """Log a message unless one of its kind was just logged; return whether it was logged."""
@@ -149,20 +153,21 @@ class Diagnostics:
         self._node.get_logger().warning(f'{message}{more}')
         return True
 
-    def _publish_if_due(self) -> None:
-        """Publish changes, and in any case once a second."""
-        now = time.monotonic()
-        regular = now - self._published_at >= PUBLISH_EVERY_S
-        if not regular and not self._changed:
-            return
-        status = self._status(now)
+    def _note_change(self) -> None:
+        """Publish what has changed soon, together with what else changes until then."""
+        self._changed = True
+        self._changes.wake()
+
+    def _publish_regularly(self) -> None:
+        self._publish()
+        # A problem is published for up to a second, so that slow subscribers see it.
+        self._last_problem = ''
+
+    def _publish(self) -> None:
+        status = self._status(time.monotonic())
         self._publisher.publish(diagnostics_to_msg(
             status, stamp_from_nanoseconds(self._node.get_clock().now().nanoseconds)))
         self._changed = False
-        if regular:
-            # A problem is published for up to a second, so that slow subscribers see it.
-            self._last_problem = ''
-            self._published_at = now
 
     def _status(self, now: float) -> NodeStatus:
         values = dict(self._values)

@@ -190,12 +190,11 @@ class ManagedNode(QosWarnings, LifecycleNode, ABC):
         super().destroy_node()
 
 
-def run_managed_node(make_node: Callable[[], ManagedNode],
-                     args: list[str] | None = None) -> None:
+def managed(make_node: Callable[[], ManagedNode]) -> Callable[[], ManagedNode]:
     """
-    Run a lifecycle node with `run_node`; with `autostart` it configures and activates itself.
+    Return what makes a lifecycle node, which with `autostart` configures and activates itself.
 
-    An autostart that fails ends the process; a transition that is requested and fails does not.
+    An autostart that fails raises; a transition that is requested and fails does not.
     """
     def started() -> ManagedNode:
         node = make_node()
@@ -209,4 +208,10 @@ def run_managed_node(make_node: Callable[[], ManagedNode],
             raise
         return node
 
-    run_node(started, args)
+    return started
+
+
+def run_managed_node(make_node: Callable[[], ManagedNode],
+                     args: list[str] | None = None) -> None:
+    """Run a lifecycle node with `run_node`, made by `managed`."""
+    run_node(managed(make_node), args)

@@ -1,7 +1,7 @@
 """A node that warns of endpoints on its topics with incompatible QoS."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import product
 from typing import Any
 
@@ -16,6 +16,7 @@ from rclpy.qos import qos_check_compatible, QoSCompatibility, QoSProfile
 from rclpy.subscription import Subscription
 
 CHECK_EVERY_S = 0.4
+_LOOK_EVERY = 5  # checks: endpoints are looked at if their numbers are the same as before
 _UNKNOWN = 'an unknown node'
 
 
@@ -35,6 +36,8 @@ class QosWarnings(Node):
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self._mismatched: set[str] = set()
+        self._numbers: list[tuple[int, int]] = []
+        self._rounds = 0
         self.create_timer(CHECK_EVERY_S, self._check_endpoints,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -52,8 +55,15 @@ class QosWarnings(Node):
 
     def _check_endpoints(self) -> None:
         """Raise a warning for each topic with a mismatch, clear those that have none any more."""
+        topics = self._own_topics()
+        numbers = [(self.count_publishers(topic), self.count_subscribers(topic))
+                   for topic in topics]
+        self._rounds += 1
+        if numbers == self._numbers and not self._mismatched and self._rounds % _LOOK_EVERY:
+            return
+        self._numbers = numbers
         found: defaultdict[str, list[str]] = defaultdict(list)
-        for topic, mismatch in self._mismatches():
+        for topic, mismatch in self._mismatches(topics):
             found[topic].append(mismatch)
         # Two checks must agree: an endpoint is discovered before its node, and lost after it
         for topic in found.keys() & self._mismatched:
@@ -67,11 +77,14 @@ class QosWarnings(Node):
         inside = self.get_namespace().rstrip('/') + '/'
         return f'qos/{topic.removeprefix(inside).lstrip("/")}'
 
-    def _mismatches(self) -> Iterator[tuple[str, str]]:
+    def _own_topics(self) -> list[str]:
+        return sorted({own.topic_name for own in self.publishers}
+                      | {own.topic_name for own in self.subscriptions})
+
+    def _mismatches(self, topics: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Yield topics and a description of each mismatch there."""
         me = self.get_fully_qualified_name()
-        topics = {own.topic_name for own in self.publishers}
-        for topic in topics | {own.topic_name for own in self.subscriptions}:
+        for topic in topics:
             for offered, requested in product(self.get_publishers_info_by_topic(topic),
                                               self.get_subscriptions_info_by_topic(topic)):
                 names = endpoint_node(offered) or _UNKNOWN, endpoint_node(requested) or _UNKNOWN

@@ -1,23 +1,24 @@
 """Start, spin and stop a node: shared by every executable."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import faulthandler
 from itertools import pairwise
 from pathlib import Path
 import signal
+import socket
 import sys
+import threading
 
 from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.nodes.runtime.shared_memory import make_room
 from active_recon.nodes.runtime.usage import is_help_wanted, usage
-from active_recon.parameters.params_file import check_yaml
+from active_recon.parameters.yaml_files import read_yaml
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-_STOP_CHECK_S = 0.1
 _CLOSE_TIMEOUT_S = 15.0
 
 
@@ -32,20 +33,24 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
     if is_help_wanted(sys.argv[1:] if args is None else args):
         sys.stdout.write(usage(Path(sys.argv[0]).stem) + '\n')
         return
-    # rclpy's own handlers shut its context down at any time: while a node starts or closes its
-    # files that ends in a traceback, or the signal is lost.
-    stop_requests: list[int] = []
-    for request in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(request, lambda number, _frame: stop_requests.append(number))
+    run_nodes(lambda: [make_node], args)
+
+
+def run_nodes(makers: Callable[[], Iterable[Callable[[], Node]]],
+              args: list[str] | None = None) -> None:
+    """Spin the nodes that `makers` returns functions to make, all in one executor; as above."""
+    stop = _StopRequests()
     make_room()
-    node = None
+    nodes: list[Node] = []
     try:
         _init(args)
-        node = make_node()
         executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while not stop_requests:
-            executor.spin_once(timeout_sec=_STOP_CHECK_S)
+        for make_node in makers():
+            nodes.append(make_node())
+            executor.add_node(nodes[-1])
+        stop.wakes(executor)
+        while not stop.requested:
+            executor.spin_once()
     except ActiveReconError as error:
         get_logger('active_recon').fatal(one_line(error))
         raise SystemExit(1) from None
@@ -53,9 +58,44 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
         # A middleware that does not shut down must not block the process for ever: after the
         # timeout it prints the stack of each thread and exits with code 1.
         faulthandler.dump_traceback_later(_CLOSE_TIMEOUT_S, exit=True)
-        if node is not None:
+        for node in reversed(nodes):
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+class _StopRequests:
+    """
+    Notes SIGINT and SIGTERM from now on; `requested` is whether one came.
+
+    rclpy's own handlers shut its context down at any time: while a node starts or closes its
+    files that ends in a traceback, or the signal is lost.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+        for request in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(request, self._note)
+
+    def wakes(self, executor: Executor) -> None:
+        """
+        Let each request end the executor's wait, from now on.
+
+        Python handles a signal only between its own instructions, so a thread waits for its byte:
+        an executor that looked several times a second would use more than all else when idle.
+        """
+        received, written = socket.socketpair()
+        written.setblocking(False)
+        signal.set_wakeup_fd(written.fileno(), warn_on_full_buffer=False)
+
+        def wake_at_each() -> None:
+            with written:  # which lives as long as the thread
+                while received.recv(1):
+                    executor.create_task(lambda: None)  # a wait ends for work only
+
+        threading.Thread(target=wake_at_each, daemon=True).start()
+
+    def _note(self, _number: int, _frame: object) -> None:
+        self.requested = True
 
 
 def _init(args: list[str] | None) -> None:
@@ -63,7 +103,7 @@ def _init(args: list[str] | None) -> None:
     given = sys.argv[1:] if args is None else args
     for option, file in pairwise(given):
         if option == '--params-file':
-            check_yaml(Path(file))
+            read_yaml(Path(file))
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:

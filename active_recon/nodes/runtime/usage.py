@@ -5,7 +5,6 @@ from importlib import import_module
 import textwrap
 
 from active_recon.parameters.declaration import Declared, declared
-from active_recon.parameters.node_parameters import NODE_PARAMETERS
 
 _WIDTH, _INDENT = 79, ' ' * 6
 
@@ -18,6 +17,9 @@ def is_help_wanted(arguments: Sequence[str]) -> bool:
 
 def usage(node: str) -> str:
     """Return what a node does and its parameters, in lines of 79 characters at most."""
+    # All nodes' parameters, and all policies with them: only who asks waits for them
+    from active_recon.parameters.node_parameters import NODE_PARAMETERS
+
     about = (import_module(f'active_recon.nodes.{node}').__doc__ or '').partition('\n')[0]
     lines = [
         f'usage: {node} [--ros-args [-p NAME:=VALUE] [-r OLD:=NEW] ...]',

@@ -1,0 +1,15 @@
+"""YAML files, read with an error in one line."""
+
+from pathlib import Path
+
+from active_recon.errors import ConfigError
+import yaml
+
+
+def read_yaml(path: Path) -> object:
+    """Return what a file holds; ConfigError, with line and reason, where it is no YAML."""
+    try:
+        return yaml.safe_load(path.read_text())
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise ConfigError(f'{path}: no ROS parameters file in YAML: '
+                          f'{" ".join(str(error).split())}') from error
