@@ -1,0 +1,145 @@
+"""Work on the machines of a Ray cluster."""
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from importlib import import_module
+import os
+from pathlib import Path
+import sys
+import time
+from typing import Any
+
+from active_recon import __version__
+from active_recon.cluster.bundles import attempt_all, Bundle, Bundles, Done
+from active_recon.cluster.results import ATTEMPTS, DIED, Outcome, Result
+from active_recon.cluster.shared_folder import SharedFolder
+from active_recon.errors import ConfigError, WorkError
+
+_AHEAD = 3
+"""Bundles given out for each CPU: enough that none waits for the driver, few enough to hold."""
+_LOOK_EVERY = 5.0  # seconds
+
+
+def connect(address: str, workers: int | None) -> tuple[Any, str]:
+    """
+    Return Ray's module, connected to a cluster or to one begun here, and its dashboard's address.
+
+    Raises ConfigError where Ray is not installed or there is no such cluster.
+    """
+    os.environ.setdefault('RAY_USAGE_STATS_ENABLED', '0')
+    try:
+        ray = import_module('ray')
+    except ImportError as error:
+        raise ConfigError('--cluster: no Ray here: expected it installed: pip install '
+                          f'active_recon[cluster] ({error})') from error
+    # Nothing outside this machine is to reach what is begun here
+    own = {'num_cpus': workers, 'dashboard_host': '127.0.0.1',
+           '_node_ip_address': '127.0.0.1'} if address == 'local' else {}
+    try:
+        context = ray.init(address, logging_level='ERROR', log_to_driver=False, **own)
+    except (ConnectionError, TimeoutError, RuntimeError, ValueError, ImportError) as error:
+        reason = (str(error).splitlines() or [''])[0]
+        raise ConfigError(f'--cluster: no cluster at {address}: expected a Ray that runs there '
+                          f'(`ray start --head`), got: {reason}') from error
+    shown = context.dashboard_url
+    return ray, f'http://{shown}' if shown else ''
+
+
+class RayCrew:
+    """
+    The CPUs of a Ray cluster, each with one item at a time.
+
+    - dashboard: the address of Ray's dashboard, '' where it has none
+    """
+
+    def __init__(self, address: str, workers: int | None) -> None:
+        self._ray, self.dashboard = connect(address, workers)
+        self._most = workers
+
+    @property
+    def workers(self) -> int:
+        """The CPUs that take items: those of the cluster now, or fewer where that was asked."""
+        return min(self._cpus(), self._most or sys.maxsize)
+
+    def map(self, function: Callable[[Any], Any], items: Iterable[Any],
+            shared: Path | None = None) -> Iterator[Result]:
+        """Yield the results in the order of their completion; see `crew.Crew`."""
+        ray = self._ray
+        if shared is not None:
+            function = partial(_in_shared, SharedFolder.of(shared), function)
+        held = [ray.put(function)]
+        task = ray.remote(_work)
+        bundles = Bundles(items)
+        pending: dict[Any, Bundle] = {}
+        at_once, looked = self._at_once(), time.monotonic()
+        try:
+            while True:
+                if time.monotonic() - looked > _LOOK_EVERY:  # machines come and go
+                    at_once, looked = self._at_once(), time.monotonic()
+                while len(pending) < at_once and (bundle := bundles.draw()):
+                    retries = ATTEMPTS - 1 if len(bundle) == 1 else 0
+                    spread = task.options(num_cpus=1, max_retries=retries,
+                                          scheduling_strategy='SPREAD')
+                    pending[spread.remote(held, __version__, [item for _, item in bundle])
+                            ] = bundle
+                if not pending:
+                    return
+                ready, _ = ray.wait(list(pending), num_returns=1)
+                for ref in ready:
+                    done, bundle = self._done(ref), pending.pop(ref)
+                    if done is not None:
+                        bundles.learn(done)
+                        for (index, _), outcome in zip(bundle, done.outcomes, strict=True):
+                            yield outcome.result(index)
+                    elif len(bundle) > 1:
+                        bundles.separate(bundle)
+                    else:
+                        yield DIED.result(bundle[0][0])
+        finally:
+            for ref in pending:
+                ray.cancel(ref, force=True)
+
+    def close(self) -> None:
+        """Leave the cluster; one that was started here ends."""
+        self._ray.shutdown()
+
+    def _cpus(self) -> int:
+        return int(self._ray.cluster_resources().get('CPU', 0))
+
+    def _at_once(self) -> int:
+        """Return how many items may be given out; one that has to wait brings a worker."""
+        cpus = self._cpus()
+        return self._most if self._most and self._most < cpus else max(cpus, 1) * _AHEAD
+
+    def _done(self, ref: Any) -> Done | None:
+        """Return what became of a bundle; None: its worker died as often as it was begun."""
+        errors = self._ray.exceptions
+        try:
+            done: Done = self._ray.get(ref)
+        except (errors.WorkerCrashedError, errors.OutOfMemoryError, errors.NodeDiedError,
+                errors.LocalRayletDiedError, errors.ObjectLostError):
+            return None
+        except errors.RayError as error:
+            raise WorkError(f'--cluster: {(str(error).splitlines() or [""])[0]}') from error
+        return done
+
+
+_functions: dict[str, Callable[[Any], Any]] = {}
+
+
+def _work(held: list[Any], version: str, items: list[Any]) -> Done:
+    """Do a bundle in a worker, which keeps the function for the next."""
+    if version != __version__:
+        other = Outcome(refusal=f'{os.uname().nodename}: another active_recon: expected {version} '
+                                f'as in the driver, got {__version__}', kind='version', stop=True)
+        return Done([other] * len(items), 0.0)
+    key = held[0].hex()
+    if key not in _functions:
+        _functions.clear()
+        _functions[key] = import_module('ray').get(held[0])
+    return attempt_all(_functions[key], items)
+
+
+def _in_shared(folder: SharedFolder, function: Callable[[Any], Any], item: Any) -> Any:
+    folder.require()
+    return function(item)

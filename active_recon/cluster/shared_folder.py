@@ -1,0 +1,50 @@
+"""A folder that all machines of a cluster must see."""
+
+from dataclasses import dataclass
+from functools import cache
+import os
+from pathlib import Path
+import uuid
+
+from active_recon.errors import WorkError
+from active_recon.whole_files import whole_file
+
+_MARK = '.shared_folder'
+
+
+@dataclass(frozen=True)
+class SharedFolder:
+    """
+    A folder and what its mark says.
+
+    A folder of the same path on a worker's own disk has another mark or none: without it, results
+    would be written where nobody looks for them.
+    """
+
+    path: Path
+    mark: str
+
+    @classmethod
+    def of(cls, path: Path) -> 'SharedFolder':
+        """Return the folder, made and marked; a mark that is there already is kept."""
+        path = path.resolve()
+        path.mkdir(parents=True, exist_ok=True)
+        mark = path / _MARK
+        if not mark.is_file():
+            with whole_file(mark) as unfinished:
+                unfinished.write_text(f'{uuid.uuid4().hex}\n')
+        return cls(path, mark.read_text())
+
+    def require(self) -> None:
+        """Raise WorkError where this machine does not see the folder."""
+        if not _sees(self):
+            raise WorkError(f'{self.path}: not seen by {os.uname().nodename}: expected a folder '
+                            'on storage that all machines of the cluster share', 'not_seen')
+
+
+@cache
+def _sees(folder: SharedFolder) -> bool:
+    try:
+        return (folder.path / _MARK).read_text() == folder.mark
+    except OSError:
+        return False
