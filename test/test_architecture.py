@@ -14,7 +14,7 @@ ROWS: tuple[set[str], ...] = (
     {'errors'},
     {'config', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting', 'view_colors',
      'whole_files'},
-    {'volumes'},
+    {'cluster', 'volumes'},
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},
     {'environment', 'exporting', 'policies', 'simulation'},

@@ -1,6 +1,6 @@
 """The seam: one function for many items, here or on a cluster."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 import os
 from pathlib import Path
@@ -30,7 +30,7 @@ class Crew(Protocol):
     def dashboard(self) -> str: ...
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any],
-            shared: Path | None = None) -> Iterator[Result]:
+            shared: Path | None = None, reads: Sequence[Path] = ()) -> Iterator[Result]:
         """
         Yield the result of the function for each item, in the order of their completion.
 
@@ -38,7 +38,8 @@ class Crew(Protocol):
         workers have room, so that memory does not grow with their number. What the function raises
         refuses the item, and a worker's death begins it again, up to three times. Raises WorkError
         where no item can succeed any more: a disk without room, or a machine of the cluster that
-        does not see the folder `shared`.
+        does not see `shared`, the folder that is written to, or a path in `reads`. All paths that
+        function and items hold must be absolute, since workers begin in folders of their own.
         """
         ...
 
@@ -70,7 +71,8 @@ def crew_of(cluster: str | None = None, workers: int | None = None) -> Iterator[
 
 
 def map_items(function: Callable[[Any], Any], items: Iterable[Any], cluster: str | None = None,
-              workers: int | None = None, shared: Path | None = None) -> Iterator[Result]:
+              workers: int | None = None, shared: Path | None = None,
+              reads: Sequence[Path] = ()) -> Iterator[Result]:
     """Yield the results of a function for many items, as `Crew.map` of `crew_of` does."""
     with crew_of(cluster, workers) as crew:
-        yield from crew.map(function, items, shared)
+        yield from crew.map(function, items, shared, reads)

@@ -1,6 +1,6 @@
 """Work in processes of this machine."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
@@ -30,7 +30,7 @@ class LocalCrew:
         self.workers = workers
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any],
-            shared: Path | None = None) -> Iterator[Result]:
+            shared: Path | None = None, reads: Sequence[Path] = ()) -> Iterator[Result]:
         """Yield the results in the order of their completion; see `crew.Crew`."""
         if self.workers == 1:
             for index, item in enumerate(items):

@@ -1,6 +1,6 @@
 """Work on the machines of a Ray cluster."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
 import os
@@ -12,7 +12,7 @@ from typing import Any
 from active_recon import __version__
 from active_recon.cluster.bundles import attempt_all, Bundle, Bundles, Done
 from active_recon.cluster.results import ATTEMPTS, DIED, Outcome, Result
-from active_recon.cluster.shared_folder import SharedFolder
+from active_recon.cluster.storage import SharedFolder, Storage
 from active_recon.errors import ConfigError, WorkError
 
 _AHEAD = 3
@@ -62,11 +62,12 @@ class RayCrew:
         return min(self._cpus(), self._most or sys.maxsize)
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any],
-            shared: Path | None = None) -> Iterator[Result]:
+            shared: Path | None = None, reads: Sequence[Path] = ()) -> Iterator[Result]:
         """Yield the results in the order of their completion; see `crew.Crew`."""
         ray = self._ray
-        if shared is not None:
-            function = partial(_in_shared, SharedFolder.of(shared), function)
+        folder = None if shared is None else SharedFolder.of(shared)
+        storage = Storage(folder, tuple(path.absolute() for path in reads))
+        function = partial(_seeing, storage, function)
         held = [ray.put(function)]
         task = ray.remote(_work)
         bundles = Bundles(items)
@@ -98,6 +99,8 @@ class RayCrew:
         finally:
             for ref in pending:
                 ray.cancel(ref, force=True)
+            if folder is not None:
+                folder.forget()
 
     def close(self) -> None:
         """Leave the cluster; one that was started here ends."""
@@ -140,6 +143,6 @@ def _work(held: list[Any], version: str, items: list[Any]) -> Done:
     return attempt_all(_functions[key], items)
 
 
-def _in_shared(folder: SharedFolder, function: Callable[[Any], Any], item: Any) -> Any:
-    folder.require()
+def _seeing(storage: Storage, function: Callable[[Any], Any], item: Any) -> Any:
+    storage.require()
     return function(item)

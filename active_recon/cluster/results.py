@@ -10,6 +10,7 @@ from active_recon.errors import ActiveReconError, WorkError
 ATTEMPTS = 3
 """How often an item is begun whose worker dies; then it is refused."""
 WORKER_DIED = 'worker_died'
+FILE = 'file'
 UNEXPECTED = 'unexpected'
 _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
@@ -61,21 +62,21 @@ def attempt(function: Callable[[Any], Any], item: Any) -> Outcome:
     except WorkError as error:
         return Outcome(refusal=str(error), kind=error.kind, stop=True)
     except ActiveReconError as error:
-        return Outcome(refusal=str(error), kind=error.kind)
+        return _no_room(error) if is_no_room(error) else Outcome(
+            refusal=str(error), kind=error.kind)
     except OSError as error:
-        if error.errno in _NO_ROOM:
-            return Outcome(refusal=no_room(error), kind='no_room', stop=True)
-        return Outcome(refusal=f'cannot be read or written: {error}', kind='file')
+        return _no_room(error) if is_no_room(error) else Outcome(
+            refusal=f'cannot be read or written: {error}', kind=FILE)
     except Exception as error:  # an archive outlives a fault that only one of its items shows
         return Outcome(refusal=f'{type(error).__name__}: {error}', kind=UNEXPECTED)
 
 
-def is_no_room(error: Exception) -> bool:
-    """Return whether an error says that nothing can be written any more."""
-    return isinstance(error, OSError) and error.errno in _NO_ROOM
+def is_no_room(error: BaseException | None) -> bool:
+    """Return whether an error, or what caused it, says that nothing can be written any more."""
+    return error is not None and (
+        isinstance(error, OSError) and error.errno in _NO_ROOM or is_no_room(error.__cause__))
 
 
-def no_room(error: OSError) -> str:
-    """Return the error of a disk without room, as it is told."""
-    return (f'{error.filename or "disk"}: cannot be written: {error.strerror}; what is finished '
-            'is kept: start again once there is room')
+def _no_room(error: Exception) -> Outcome:
+    return Outcome(refusal=f'no room to write: {error}; what is finished is kept: start again '
+                           'once there is room', kind='no_room', stop=True)

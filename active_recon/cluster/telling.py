@@ -2,21 +2,17 @@
 
 from collections.abc import Callable, Iterable, Iterator
 import time
+from typing import TypeVar
 
 from active_recon.cluster.crew import Crew
-from active_recon.cluster.results import Result
 from active_recon.reporting import Advance
 
+Found = TypeVar('Found')
 _COUNT_EVERY = 2.0  # seconds between two looks at the number of workers
 
 
-def was_refused(result: Result) -> bool:
-    """Return whether an item has no value."""
-    return bool(result.refusal)
-
-
-def told(results: Iterable[Result], crew: Crew, advance: Advance,
-         refused: Callable[[Result], bool] = was_refused) -> Iterator[Result]:
+def told(results: Iterable[Found], crew: Crew, advance: Advance,
+         refused: Callable[[Found], bool]) -> Iterator[Found]:
     """Pass results on, and report each with the rate, the workers and the refused items so far."""
     begun = time.monotonic()
     counted, workers = -_COUNT_EVERY, 0

@@ -1,4 +1,4 @@
-"""A folder that all machines of a cluster must see."""
+"""Paths that all machines of a cluster must see."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -35,11 +35,14 @@ class SharedFolder:
                 unfinished.write_text(f'{uuid.uuid4().hex}\n')
         return cls(path, mark.read_text())
 
+    def forget(self) -> None:
+        """Remove the mark."""
+        (self.path / _MARK).unlink(missing_ok=True)
+
     def require(self) -> None:
         """Raise WorkError where this machine does not see the folder."""
         if not _sees(self):
-            raise WorkError(f'{self.path}: not seen by {os.uname().nodename}: expected a folder '
-                            'on storage that all machines of the cluster share', 'not_seen')
+            raise WorkError(_not_seen(self.path), 'not_seen')
 
 
 @cache
@@ -48,3 +51,24 @@ def _sees(folder: SharedFolder) -> bool:
         return (folder.path / _MARK).read_text() == folder.mark
     except OSError:
         return False
+
+
+@dataclass(frozen=True)
+class Storage:
+    """What workers must see: the folder that they write to, and what they read."""
+
+    shared: SharedFolder | None
+    reads: tuple[Path, ...]
+
+    def require(self) -> None:
+        """Raise WorkError where this machine does not see one of them."""
+        if self.shared is not None:
+            self.shared.require()
+        for path in self.reads:
+            if not path.exists():
+                raise WorkError(_not_seen(path), 'not_seen')
+
+
+def _not_seen(path: Path) -> str:
+    return (f'{path}: not seen by {os.uname().nodename}: expected it on storage that all machines '
+            'of the cluster share')
