@@ -41,16 +41,12 @@ class SharedFolder:
 
     def require(self) -> None:
         """Raise WorkError where this machine does not see the folder."""
-        if not _sees(self):
+        try:
+            seen = (self.path / _MARK).read_text() == self.mark
+        except OSError:
+            seen = False
+        if not seen:
             raise WorkError(_not_seen(self.path), 'not_seen')
-
-
-@cache
-def _sees(folder: SharedFolder) -> bool:
-    try:
-        return (folder.path / _MARK).read_text() == folder.mark
-    except OSError:
-        return False
 
 
 @dataclass(frozen=True)
@@ -62,11 +58,16 @@ class Storage:
 
     def require(self) -> None:
         """Raise WorkError where this machine does not see one of them."""
-        if self.shared is not None:
-            self.shared.require()
-        for path in self.reads:
-            if not path.exists():
-                raise WorkError(_not_seen(path), 'not_seen')
+        _require(self)
+
+
+@cache  # a worker that sees them is not asked again; one that does not stops the work
+def _require(storage: Storage) -> None:
+    if storage.shared is not None:
+        storage.shared.require()
+    for path in storage.reads:
+        if not path.exists():
+            raise WorkError(_not_seen(path), 'not_seen')
 
 
 def _not_seen(path: Path) -> str:

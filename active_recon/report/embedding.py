@@ -1,6 +1,7 @@
 """What a page contains instead of fetching it."""
 
 from base64 import b64encode
+from functools import cache
 import gzip
 from pathlib import Path
 
@@ -14,6 +15,7 @@ def compressed(raw: bytes) -> str:
     return b64encode(gzip.compress(raw, 9, mtime=0)).decode()
 
 
+@cache
 def plotly_script() -> str:
     """Return Plotly as `compressed` does."""
     return compressed(_PLOTLY.read_bytes())
