@@ -5,6 +5,7 @@ from functools import partial
 from importlib import import_module
 import os
 from pathlib import Path
+import socket
 import sys
 import time
 from typing import Any
@@ -18,6 +19,7 @@ from active_recon.errors import ConfigError, WorkError
 _AHEAD = 3
 """Bundles given out for each CPU: enough that none waits for the driver, few enough to hold."""
 _LOOK_EVERY = 5.0  # seconds
+_ANSWERS_WITHIN = 10.0  # seconds
 
 
 def connect(address: str, workers: int | None) -> tuple[Any, str]:
@@ -35,14 +37,30 @@ def connect(address: str, workers: int | None) -> tuple[Any, str]:
     # Nothing outside this machine is to reach what is begun here
     own = {'num_cpus': workers, 'dashboard_host': '127.0.0.1',
            '_node_ip_address': '127.0.0.1'} if address == 'local' else {}
+    _require_listener(address)
     try:
         context = ray.init(address, logging_level='ERROR', log_to_driver=False, **own)
     except (ConnectionError, TimeoutError, RuntimeError, ValueError, ImportError) as error:
         reason = (str(error).splitlines() or [''])[0]
-        raise ConfigError(f'--cluster: no cluster at {address}: expected a Ray that runs there '
-                          f'(`ray start --head`), got: {reason}') from error
+        raise ConfigError(_nobody(address, reason)) from error
     shown = context.dashboard_url
     return ray, f'http://{shown}' if shown else ''
+
+
+def _require_listener(address: str) -> None:
+    """Raise ConfigError where nothing listens at HOST:PORT, for which Ray would look minutes."""
+    host, _, port = address.removeprefix('ray://').rpartition(':')
+    if not port.isdecimal():
+        return
+    try:
+        socket.create_connection((host, int(port)), _ANSWERS_WITHIN).close()
+    except (OSError, OverflowError) as error:
+        raise ConfigError(_nobody(address, str(error))) from error
+
+
+def _nobody(address: str, reason: str) -> str:
+    return (f'--cluster: no cluster at {address}: expected a Ray that runs there (`ray start '
+            f'--head`), got: {reason}')
 
 
 class RayCrew:
