@@ -20,6 +20,7 @@ _AHEAD = 3
 """Bundles given out for each CPU: enough that none waits for the driver, few enough to hold."""
 _LOOK_EVERY = 5.0  # seconds
 _ANSWERS_WITHIN = 10.0  # seconds
+_LOOPBACK = '127.0.0.1'
 
 
 def connect(address: str, workers: int | None) -> tuple[Any, str]:
@@ -34,10 +35,14 @@ def connect(address: str, workers: int | None) -> tuple[Any, str]:
     except ImportError as error:
         raise ConfigError('--cluster: no Ray here: expected it installed: pip install '
                           f'active_recon[cluster] ({error})') from error
-    # Nothing outside this machine is to reach what is begun here
-    own = {'num_cpus': workers, 'dashboard_host': '127.0.0.1',
-           '_node_ip_address': '127.0.0.1'} if address == 'local' else {}
     _require_listener(address)
+    own: dict[str, Any] = {}
+    if address == 'local':
+        own = {'num_cpus': workers, 'dashboard_host': _LOOPBACK, '_node_ip_address': _LOOPBACK}
+    elif address.startswith('127.') and not address.startswith(_LOOPBACK):
+        # Ray reads 127.0.0.1 as this machine's address to others; the other loopback addresses
+        # keep a cluster on this machine
+        own['_node_ip_address'] = address.partition(':')[0]
     try:
         context = ray.init(address, logging_level='ERROR', log_to_driver=False, **own)
     except (ConnectionError, TimeoutError, RuntimeError, ValueError, ImportError) as error:
