@@ -28,7 +28,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*', 'msg_tools', 'msg_tools.*']),
     package_data={NAME: [
         'weights/*.safetensors', 'weights/*.onnx', 'weights/*.json', 'weights/*.md', 'objects/*',
-        'nodes/runtime/*.xml', 'report/templates/*']},
+        'nodes/runtime/*.xml', 'report/templates/*', 'batch/templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -67,6 +67,8 @@ setup(
         *ROS_WHEELS,
     ],
     extras_require={
+        'batch': ['pyarrow>=18,<28'],
+        'cluster': ['pyarrow>=18,<28', 'ray>=2.44,<3'],
         'coacd': ['coacd>=1.0.5,<2'],
         'doc': [
             'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
@@ -76,7 +78,7 @@ setup(
         'onnxruntime': ['onnxruntime>=1.20,<2'],
         'test': [
             'coacd>=1.0.5,<2', 'mcap-ros2-support>=0.5.5', 'mujoco>=3.2,<4', 'onnx>=1.17,<2',
-            'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pymcap-cli>=0.30', 'pytest>=8',
-            'pytest-xdist>=3.6', 'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
+            'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pyarrow>=18,<28', 'pymcap-cli>=0.30',
+            'pytest>=8', 'pytest-xdist>=3.6', 'ray>=2.44,<3', 'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

@@ -8,7 +8,8 @@ The one error tree: everything the package refuses, it refuses with one of these
     │   └── WeightsError  a weights file that is missing, truncated or of another model
     ├── ViewError         an image, camera or azimuth that cannot become a view
     │   └── MessageError  the same, found while reading a ROS message
-    └── RecordingError    a recording that cannot be begun or continued
+    ├── RecordingError    a recording that cannot be begun or continued
+    └── WorkError         work on many items that must stop as a whole: a full disk
 
 A message begins with what is wrong, then says what was expected and, where it helps, what to do.
 `kind` is a short stable word, under which the nodes count refusals in their diagnostics.
@@ -49,3 +50,7 @@ class MessageError(ViewError):
 
 class RecordingError(ActiveReconError):
     """A recording that cannot be begun or continued."""
+
+
+class WorkError(ActiveReconError):
+    """Work on many items that must stop as a whole: a folder that is not seen, a full disk."""

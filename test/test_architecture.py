@@ -14,7 +14,7 @@ ROWS: tuple[set[str], ...] = (
     {'errors'},
     {'config', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting', 'view_colors',
      'whole_files'},
-    {'volumes'},
+    {'cluster', 'volumes'},
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},
     {'environment', 'exporting', 'policies', 'simulation'},
@@ -22,7 +22,7 @@ ROWS: tuple[set[str], ...] = (
     {'evaluation', 'msg_tools', 'photos', 'saved_states'},
     {'bags', 'training'},
     {'paper', 'report', 'viewer'},
-    {'nodes'},
+    {'batch', 'nodes'},
     {'launching'},
     {'demo'},
     {'cli'},
@@ -30,7 +30,7 @@ ROWS: tuple[set[str], ...] = (
 ROW_OF = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
 # What runs on a robot needs nothing of what only researchers need, and the other way round
 RESEARCH = {'evaluation', 'training', 'paper'}
-ROBOT = {'msg_tools', 'bags', 'report', 'viewer', 'nodes', 'launching', 'demo'}
+ROBOT = {'msg_tools', 'bags', 'batch', 'report', 'viewer', 'nodes', 'launching', 'demo'}
 KNOW_ROS = {'nodes', 'msg_tools', 'launching'}
 IMPORTED_BY = {'msg_tools': {'bags', 'nodes', 'launching'}, 'nodes': {'launching'},
                'launching': {'demo', 'cli'}}

@@ -1,20 +1,24 @@
 """`active-recon evaluate`: the IoU of a model under view policies, on held-out objects."""
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 import json
 from pathlib import Path
 import sys
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.cluster_option import Cluster, reachable, workers_of
 from active_recon.cli.evaluate_studies import print_baselines, print_latent_swap, print_yaw
 from active_recon.cli.intervals import difference, line, spread
 from active_recon.cli.progress import progress_bar
-from active_recon.cli.reading import read_objects, Split
+from active_recon.cli.reading import Split
 from active_recon.errors import ConfigError
 from active_recon.policies import POLICIES
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.cluster import Crew
     from active_recon.evaluation.policy_study import Runs
     from active_recon.evaluation.trial import Trial
     from active_recon.models.weights import Bundle
@@ -64,7 +68,11 @@ def evaluate(
     bf16: Annotated[bool, typer.Option(
         help='Mixed precision, bfloat16: half the time; means differ by less than '
              '0.0001.')] = True,
-    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
+    cluster: Cluster = None,
+    workers: Annotated[int | None, typer.Option(
+        min=1, help='With --cluster: episodes are measured by so many workers; default: one for '
+                    'each of its cores.')] = None,
 ) -> None:
     """
     Measure the IoU of a model after each view, for each policy, with 95 % intervals.
@@ -77,16 +85,16 @@ def evaluate(
     Example: active-recon evaluate data/test --model runs/new/weights.safetensors
     --against runs/old/weights.safetensors --policy farthest --rows both.csv
     """
-    from active_recon.evaluation.contenders import contender_names, contenders
+    from active_recon.cli.evaluation_plan import EvaluationPlan, run_blocks
     from active_recon.evaluation.paired import paired as between
     from active_recon.evaluation.paired import require_same_episodes, write_rows
     from active_recon.evaluation.policy_study import compare, run_all
-    from active_recon.evaluation.trial import Trial
-    from active_recon.models.scorer_weights import policy_module
-    from active_recon.models.weights import load_weights
     from active_recon.models.weights_files import find_weights, weights_hash
     import torch
 
+    if workers and not cluster:
+        raise ConfigError('--workers: no cluster: expected --cluster too, got --workers '
+                          f'{workers} alone')
     if training and validation is None:
         raise ConfigError('--training: no validation objects: expected --validation too, on which '
                           'the threshold of the mean shape is chosen, got none')
@@ -95,25 +103,21 @@ def evaluate(
         raise ConfigError('--paired: wrong number of policies: expected two in --policy, got '
                           f'{len(named)}')
     torch.set_num_threads(threads)
+    plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
+                          split_file, bf16, threads)
 
-    def measure(weights: Path) -> _Measured:
-        bundle = load_weights(weights)
-        learned = policy_module(weights, bundle)
-        attentions = [learned] if learned else []
-        held_out = read_objects([data], 'objects', bundle.reconstruction.spec, split_file, 'test')
-        shown = held_out.azimuths.shape[1]
-        if max(views, starts) > shown:
-            typer.echo(f'views per object: {shown}; measured views: {min(views, shown)}; starts: '
-                       f'{min(starts, shown)}', err=True)
-        count = min(views, shown)
-        every = contenders(named or contender_names(bool(attentions), oracle=False), attentions,
-                           count, seeds, seed, bundle.model)
-        trial = Trial(bundle.reconstruction, bundle.threshold, held_out, min(starts, shown),
-                      count, seed, bf16, cache)
+    def measure(weights: Path, folder: Path | None, crew: 'Crew | None') -> _Measured:
+        bundle, trial, every = plan.prepared(weights, folder, tell=True)
+        if crew is not None:
+            run_blocks(plan, weights, trial, every, crew)
         return _Measured(weights, bundle, trial, run_all(trial, every, progress_bar))
 
-    own = measure(find_weights(model))
-    other = measure(find_weights(against)) if against else None
+    with ExitStack() as stack:
+        crew = stack.enter_context(workers_of(cluster, workers)) if cluster else None
+        folder = cache if cache or not cluster else Path(
+            stack.enter_context(TemporaryDirectory()))
+        own = measure(find_weights(model), folder, crew)
+        other = measure(find_weights(against), folder, crew) if against else None
     trial = own.trial
     result: dict[str, Any] = {
         'command': ' '.join(['active-recon', *sys.argv[1:]]),

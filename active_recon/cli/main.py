@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from active_recon import __version__
 from active_recon.cli.bag import bag
+from active_recon.cli.batch import batch
 from active_recon.cli.calibrate import calibrate
 from active_recon.cli.demo import demo
 from active_recon.cli.evaluate import evaluate
@@ -36,6 +37,7 @@ for command in (demo, up, reconstruct, calibrate, view, report, replay, play, re
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')
+app.add_typer(batch, name='batch')
 app.add_typer(quality, name='quality')
 
 

@@ -1,9 +1,10 @@
 """`active-recon render` and `active-recon dataset build`: make datasets of meshes or shapes."""
 
-import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.cluster_option import Cluster, reachable, Workers, workers_of
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError, DataError
 import typer
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from active_recon.datasets.drawn_cameras import Viewing
     from active_recon.datasets.making import Job
 
-Workers = Annotated[int, typer.Option(min=1, help='Processes; default: one for each core.')]
 Samples = Annotated[int, typer.Option(
     min=1, max=4, help='N x N rays per pixel: 1 is fastest, 2 smooths the edges.')]
 
@@ -30,7 +30,6 @@ Turned = Annotated[bool, typer.Option(
 dataset = typer.Typer(help='Datasets of parametric shapes, made without any download.',
                       no_args_is_help=True)
 
-_CORES = os.cpu_count() or 1
 _SEEDS = 1_000_000  # for each split
 _SPLIT_SEEDS = {'train': 0, 'val': _SEEDS, 'test': 2 * _SEEDS, 'unseen': 3 * _SEEDS}
 
@@ -55,7 +54,8 @@ def render(
     cameras: Cameras = 'turntable',
     views: Views = 12,
     turned: Turned = False,
-    workers: Workers = _CORES,
+    workers: Workers = None,
+    cluster: Cluster = None,
 ) -> None:
     """
     Render and voxelise meshes, as a dataset in R2N2's layout.
@@ -68,6 +68,7 @@ def render(
     from active_recon.datasets.manifest import manifest_jobs, read_manifest
 
     viewing = Viewing(cameras, views, turned)
+    meshes, out = reachable(meshes, cluster), reachable(out, cluster)
     if meshes.suffix == '.csv':
         if up or front:
             raise ConfigError('--up or --front with a manifest: expected neither, since the '
@@ -81,7 +82,7 @@ def render(
                           f'--explicit-licence, got {meshes}')
     else:
         jobs = mesh_jobs(meshes, out, up, front)
-    _make('rendering', jobs, samples, workers, fine, viewing)
+    _make('rendering', jobs, samples, fine, viewing, workers, cluster, [meshes])
 
 
 @dataset.command()
@@ -102,7 +103,8 @@ def build(
     cameras: Cameras = 'turntable',
     views: Views = 12,
     turned: Turned = False,
-    workers: Workers = _CORES,
+    workers: Workers = None,
+    cluster: Cluster = None,
 ) -> None:
     """
     Make a dataset of parametric shapes.
@@ -116,6 +118,7 @@ def build(
     from active_recon.datasets.making import shape_jobs
     from active_recon.shapes import ALL_CATEGORIES, generators_hash, UNSEEN_CATEGORIES
 
+    out = reachable(out, cluster)
     counts = {'train': train, 'val': val, 'test': test, 'unseen': unseen}
     jobs = [job for name in dict.fromkeys(category or ALL_CATEGORIES)
             for split, count in counts.items()
@@ -128,21 +131,23 @@ def build(
                         f'({code[:12]}), got another hash in {made_by}; choose another folder')
     out.mkdir(parents=True, exist_ok=True)
     made_by.write_text(code + '\n')
-    _make('making', jobs, samples, workers, fine, Viewing(cameras, views, turned))
+    _make('making', jobs, samples, fine, Viewing(cameras, views, turned), workers, cluster)
 
 
-def _make(title: str, jobs: 'list[Job]', samples: int, workers: int, fine: bool,
-          viewing: 'Viewing') -> None:
+def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Viewing',
+          workers: int | None, cluster: str | None, reads: Sequence[Path] = ()) -> None:
+    from active_recon.cluster.telling import told
     from active_recon.datasets.making import make_dataset
 
     if not jobs:
         raise DataError('no objects to make: expected at least one, got none with these options')
     rejected = []
-    with progress_bar(title, len(jobs)) as advance:
-        for outcome in make_dataset(jobs, samples, workers, fine, viewing):
+    with workers_of(cluster, workers) as crew, progress_bar(title, len(jobs)) as advance:
+        outcomes = make_dataset(jobs, samples, 1, fine, viewing, crew, reads)
+        for outcome in told(outcomes, crew, advance, lambda outcome: bool(outcome.refusal)):
             if outcome.refusal:
                 rejected.append(outcome)
-            advance(1, f'{len(rejected)} rejected' if rejected else '')
+    rejected.sort(key=lambda outcome: (outcome.folder.category, outcome.folder.name))
     typer.echo(f'{len(jobs) - len(rejected)} of {len(jobs)} objects made')
     for outcome in rejected:
         typer.echo(f'rejected: {outcome.folder.category}/{outcome.folder.name}: '

@@ -4,12 +4,14 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.cluster_option import Cluster, reachable, workers_of
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.cluster import Crew
     from active_recon.evaluation.posed.entrants import Entrant
     from active_recon.models.view_scorer import ViewScorer
     from active_recon.training.gain_files import Collecting
@@ -45,7 +47,10 @@ def train_policy(
     seed: Annotated[int, typer.Option(help='Seed of the weights and batches.')] = 0,
     bf16: Annotated[bool, typer.Option(
         help='Half precision of the network where it is safe.')] = True,
-    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
+    workers: Annotated[int, typer.Option(
+        min=1, help='Processes that measure gains; with --cluster so many of its cores.')] = 1,
+    cluster: Cluster = None,
 ) -> None:
     """
     Train a view policy for a frozen network: which view adds most IoU.
@@ -79,7 +84,8 @@ def train_policy(
     if others or entrant.network.needs_front:
         raise ConfigError('--model: no such network: expected one that takes any cameras, such as '
                           f'lifting, got {model!r}')
-    source = _Source(entrant, Collecting(objects, candidates, starts, views, bf16), out)
+    collecting = Collecting(objects, candidates, starts, views, bf16)
+    counts: dict[str, int] = {}
     config = ScorerConfig()
     training = ScorerTraining(epochs, batch_size, learning_rate, seed=seed)
     learned: list[LookedStates] = []
@@ -87,8 +93,10 @@ def train_policy(
     scorer = None
     told: list[dict[str, Any]] = []
     for number in range(1, rounds + 1):
-        learned += source.states(data, number, scorer)
-        held_out += source.states(validation, number, scorer)
+        with workers_of(cluster, workers) as crew:
+            source = _Source(entrant, collecting, reachable(out, cluster), crew, counts)
+            learned += source.states(data, number, scorer)
+            held_out += source.states(validation, number, scorer)
         train, test = joined(learned), joined(held_out)
         with progress_bar(f'training, round {number}', epochs) as advance:
             scorer = train_scorer(train, config, training, partial(advance, 1))
@@ -102,18 +110,19 @@ def train_policy(
     path = out / scorer_path(find_weights(model)).name
     save_scorer(path, scorer, config, entrant.weights, {
         'command': command_line(), 'network': entrant.name,
-        'training': training.to_dict(), 'collecting': source.collecting.to_dict(),
-        'data': {str(folder): count for folder, count in source.counts.items()},
+        'training': training.to_dict(), 'collecting': collecting.to_dict(),
+        'data': {str(folder): count for folder, count in counts.items()},
         'rounds': told, 'calibration': scorer.calibration.tolist()})
     typer.echo(f'wrote {path}')
 
 
 class _Source:
-    """Where states come from; `counts` tells the objects of each folder and round."""
+    """Where states come from; `counts` gets the number of objects of each folder and round."""
 
-    def __init__(self, entrant: 'Entrant', collecting: 'Collecting', out: Path) -> None:
-        self._entrant, self.collecting, self._out = entrant, collecting, out
-        self.counts: dict[str, int] = {}
+    def __init__(self, entrant: 'Entrant', collecting: 'Collecting', out: Path, crew: 'Crew',
+                 counts: dict[str, int]) -> None:
+        self._entrant, self._collecting, self._out = entrant, collecting, out
+        self._crew, self._counts = crew, counts
 
     def states(self, folders: list[Path], number: int,
                scorer: 'ViewScorer | None') -> list['LookedStates']:
@@ -128,10 +137,10 @@ class _Source:
         found = []
         for folder in folders:
             kept = self._out / f'gains-{number}' / '-'.join(folder.parts).strip('/-')
-            drawn = drawn_objects(folder, self.collecting.objects, number)
+            drawn = drawn_objects(folder.absolute(), self._collecting.objects, number)
             with progress_bar(f'gains of {folder}, round {number}', len(drawn)) as advance:
-                files = collect_gains(drawn, self._entrant, self.collecting, kept, policy,
-                                      partial(advance, 1))
-            self.counts[f'{folder}, round {number}'] = len(files)
+                files = collect_gains(drawn, self._entrant, self._collecting, kept, policy,
+                                      advance, self._crew)
+            self._counts[f'{folder}, round {number}'] = len(files)
             found += [looked_states(ViewGains.load(file)) for file in files]
         return found

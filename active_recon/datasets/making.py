@@ -1,14 +1,16 @@
 """Make a dataset from meshes: render and voxelise every object, in parallel."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import as_completed, ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 import math
-import multiprocessing
+import os
 from pathlib import Path
 
+from active_recon.cluster import Crew
+from active_recon.cluster.local import LocalCrew
+from active_recon.cluster.results import is_no_room
 from active_recon.datasets.drawn_cameras import TURNTABLE, Viewing
 from active_recon.datasets.layout import ObjectFolder, write_object, write_voxels
 from active_recon.errors import ActiveReconError, DataError
@@ -101,7 +103,7 @@ def make_object(job: Job, samples: int, fine: bool = False,
     Render and voxelise one object at 32 cells a side, with `fine` also at 64.
 
     Each image pixel averages `samples` x `samples` rays. Existing files are kept. Errors become
-    the outcome's `refusal`.
+    the outcome's `refusal`; raises OSError where there is no room to write.
     """
     lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
     if job.folder.complete and not lacks_fine:
@@ -116,6 +118,8 @@ def make_object(job: Job, samples: int, fine: bool = False,
         if lacks_fine:
             write_voxels(job.folder, voxelise(mesh, FINE_RESOLUTION))
     except (ActiveReconError, OSError) as error:
+        if is_no_room(error):
+            raise
         return Outcome(job.folder, str(error))
     return Outcome(job.folder)
 
@@ -135,22 +139,22 @@ def _name(folder: ObjectFolder) -> str:
 
 
 def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool = False,
-                 viewing: Viewing = TURNTABLE) -> Iterator[Outcome]:
+                 viewing: Viewing = TURNTABLE, crew: Crew | None = None,
+                 reads: Sequence[Path] = ()) -> Iterator[Outcome]:
     """
     Make all objects in `workers` processes; yield each one's outcome as it is finished.
 
-    Raises DataError where two jobs would write the same object.
+    `crew` makes them instead, where it is given; its machines must see the paths in `reads`.
+    Raises DataError where two jobs would write the same object, WorkError where nothing can be
+    written.
     """
     for folder, count in Counter(job.folder for job in jobs).most_common(1):
         if count > 1:
             raise DataError('several meshes of one name: expected each object once, got '
                             f'{count} meshes for {folder.category}/{folder.name}; rename their '
                             'files')
-    if workers == 1:
-        yield from (make_object(job, samples, fine, viewing) for job in jobs)
-        return
-    # spawn, because a fork of a process that has threads (torch, embree, ROS) may hang
-    with ProcessPoolExecutor(workers, multiprocessing.get_context('spawn')) as pool:
-        futures = [pool.submit(make_object, job, samples, fine, viewing) for job in jobs]
-        for future in as_completed(futures):
-            yield future.result()
+    out = Path(os.path.commonpath([job.folder.root for job in jobs])) if jobs else None
+    make = partial(make_object, samples=samples, fine=fine, viewing=viewing)
+    for result in (crew or LocalCrew(workers)).map(make, jobs, out, reads):
+        outcome: Outcome | None = result.value
+        yield outcome or Outcome(jobs[result.index].folder, result.refusal)

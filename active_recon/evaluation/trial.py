@@ -61,24 +61,35 @@ class Trial:
             'starts': starts, 'views': count, 'seed': seed, 'bfloat16': bfloat16}
         self.folder = cache and _folder(cache, self.identity)
 
+    @property
+    def blocks(self) -> int:
+        """The number of blocks that episodes are cached in."""
+        return len(self._parts())
+
     def run(self, contender: Contender,
             progress: Callable[[int], None] = lambda done: None) -> Episodes:
         """Run a contender's episodes, or read them from the cache; raises DataError if damaged."""
         parts = []
-        for block, part in enumerate(batches(len(self.objects), _BLOCK)):
-            path = self.folder and self.folder / f'{contender.key}-{block:03d}.npz'
+        for block, part in enumerate(self._parts()):
+            path = self.cached(contender, block)
             if path and path.is_file():
                 parts.append(Episodes(**read_arrays(path, {each.name
                                                            for each in fields(Episodes)})))
                 progress(len(part))
                 continue
-            parts.append(self._run(contender, part, block, progress))
+            parts.append(self.run_block(contender, block, progress))
             if path:
                 write_arrays(path, **vars(parts[-1]))
         return joined(parts)
 
-    def _run(self, contender: Contender, part: Tensor, block: int,
-             progress: Callable[[int], None]) -> Episodes:
+    def cached(self, contender: Contender, block: int) -> Path | None:
+        """Return the path of a block's episodes in the cache; None where there is no cache."""
+        return self.folder and self.folder / f'{contender.key}-{block:03d}.npz'
+
+    def run_block(self, contender: Contender, block: int,
+                  progress: Callable[[int], None] = lambda done: None) -> Episodes:
+        """Run the episodes of one block; they do not depend on other blocks."""
+        part = self._parts()[block]
         objects, starts = self.objects[part], self.starts[part]
         if contender.make is None:
             return run_oracle(self.network, self.views, objects, starts, self.threshold,
@@ -87,6 +98,9 @@ class Trial:
         policy = contender.make(np.random.default_rng([*contender.key.encode(), block]))
         return run_policy(self.network, policy, self.views, objects, starts, self.threshold,
                           self.count, None, self.bfloat16, progress)
+
+    def _parts(self) -> list[Tensor]:
+        return [*batches(len(self.objects), _BLOCK)]
 
 
 def data_hash(views: ViewSet) -> str:

@@ -1,9 +1,7 @@
 """The page: one HTML file that contains its styles, scripts and Plotly."""
 
-from base64 import b64encode
 from collections.abc import Sequence
 from datetime import datetime, UTC
-import gzip
 import json
 import math
 from pathlib import Path
@@ -11,6 +9,7 @@ from typing import Any
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.report.charts import entropy_chart, iou_chart, stage_chart
+from active_recon.report.embedding import compressed, plotly_script
 from active_recon.report.findings import findings, stopped
 from active_recon.report.images import data_uri
 from active_recon.report.scene import scene
@@ -21,12 +20,10 @@ from active_recon.report.turntable_map import turntable_map
 from active_recon.report.words import key_words
 from active_recon.whole_files import whole_file
 from jinja2 import Environment, PackageLoader, StrictUndefined
-import plotly
 
 MAX_SUBJECTS = 12
 """Each is drawn in 3D, and browsers limit the number of such drawings on a page."""
 _IMAGE_SIDE = 320
-_PLOTLY = Path(plotly.__file__).parent / 'package_data' / 'plotly.min.js'
 
 
 def report_page(subjects: Sequence[Subject]) -> str:
@@ -58,8 +55,8 @@ def report_page(subjects: Sequence[Subject]) -> str:
                             'words': key_words}
     return environment.get_template('page.html').render(
         panels=panels, several=several, known_truth=known_truth, stages=STAGES,
-        drawn=_compressed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
-        plotly=_compressed(_PLOTLY.read_bytes()))
+        drawn=compressed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
+        plotly=plotly_script())
 
 
 def write_page(page: str, path: Path) -> None:
@@ -78,7 +75,7 @@ def _panel(subject: Subject) -> dict[str, Any]:
     recorded = datetime.fromtimestamp(run.begin / 1e9, UTC)
     return {
         'subject': subject,
-        'object': _object_name(run.provenance.get('object', '')),
+        'object': object_name(run.provenance.get('object', '')),
         'policy': run.provenance.get('policy', ''),
         'recorded': f'{recorded:%Y-%m-%d %H:%M} UTC' if run.begin > 0 else '',
         'duration_s': (run.end - run.begin) / 1e9,
@@ -96,7 +93,7 @@ def _panel(subject: Subject) -> dict[str, Any]:
     }
 
 
-def _object_name(provenance: str) -> str:
+def object_name(provenance: str) -> str:
     """Return the object's name; of a mesh file its stem."""
     path = Path(provenance)
     return path.stem if path.suffix else provenance
@@ -105,8 +102,3 @@ def _object_name(provenance: str) -> str:
 def _number(value: float | None, places: int = 0) -> str:
     """Return a number as text, a dash if it is unknown."""
     return '–' if value is None else f'{value:,.{places}f}'.replace(',', '\u202f')
-
-
-def _compressed(raw: bytes) -> str:
-    """Return bytes as base64 of gzip, without gzip's time stamp."""
-    return b64encode(gzip.compress(raw, 9, mtime=0)).decode()

@@ -1,18 +1,23 @@
 """Gains of a dataset's objects, measured once and kept in files."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 import hashlib
 from pathlib import Path
 
+from active_recon.cluster import Crew
+from active_recon.cluster.local import LocalCrew
+from active_recon.cluster.telling import told
 from active_recon.config import Config
 from active_recon.datasets.layout import list_objects, ObjectFolder
-from active_recon.errors import ConfigError, DataError
+from active_recon.errors import ConfigError, DataError, WorkError
 from active_recon.evaluation.next_view.renderings import another_rendering
 from active_recon.evaluation.next_view.watching import WatchedObject
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import read_scene
 from active_recon.policies import load_policy, Policy, PolicyOptions
+from active_recon.reporting import Advance
 from active_recon.training.view_gains import (
     by_gain,
     by_policy,
@@ -23,8 +28,10 @@ from active_recon.training.view_gains import (
     ViewGains,
 )
 import numpy as np
+import torch
 
 _MIXED = ('random', 'farthest', 'uniform')
+_LEFT_OUT = {'data', 'mesh'}  # kinds of errors of objects that cannot be read
 _BY_GAIN = 0.4  # share of the episodes in which the best view is taken, where no policy is given
 
 
@@ -66,31 +73,40 @@ def drawn_objects(data: Path, most: int, number: int = 1) -> list[ObjectFolder]:
 
 def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting: Collecting,
                   out: Path, policy: Policy | None = None,
-                  advance: Callable[[str], None] = lambda note: None) -> list[Path]:
+                  advance: Advance = lambda steps, note: None,
+                  crew: Crew | None = None) -> list[Path]:
     """
     Measure the gains of objects into files, one an object; return the files.
 
     Files that are there already are kept. Views are chosen by the policy, or by a mixture of
     random, farthest, an even sweep and the greatest gain. Each object is shown under a light,
     noise and pose errors of its own. Objects that cannot be read are left out; raises DataError
-    where none is left.
+    where none is left. `crew` does the work; None: this process.
     """
-    files = []
-    for folder in folders:
-        path = out / f'{folder.category}__{folder.name}.npz'
-        note = ''
-        if not path.is_file():
-            try:
-                _measured(folder, entrant, collecting, policy).save(path)
-            except DataError as error:
-                note = str(error).splitlines()[0]
-        if path.is_file():
-            files.append(path)
-        advance(note)
+    keep = partial(_keep, entrant, collecting, out, policy, torch.get_num_threads())
+    workers = crew or LocalCrew(1)
+    results = workers.map(keep, folders, out, sorted({folder.root for folder in folders}))
+    for result in told(results, workers, advance, lambda result: bool(result.refusal)):
+        if result.refusal and result.kind not in _LEFT_OUT:
+            raise WorkError(f'{folders[result.index].name}: {result.refusal}', result.kind)
+    files = [path for folder in folders if (path := _file(out, folder)).is_file()]
     if not files:
         raise DataError(f'{out}: no object whose gains can be measured: expected one or more '
                         'with images and voxels, got none')
     return files
+
+
+def _file(out: Path, folder: ObjectFolder) -> Path:
+    return out / f'{folder.category}__{folder.name}.npz'
+
+
+def _keep(entrant: Entrant, collecting: Collecting, out: Path, policy: Policy | None,
+          threads: int, folder: ObjectFolder) -> None:
+    """Measure the gains of an object into its file, unless they are there; raises DataError."""
+    path = _file(out, folder)
+    if not path.is_file():
+        torch.set_num_threads(threads)
+        _measured(folder, entrant, collecting, policy).save(path)
 
 
 def _measured(folder: ObjectFolder, entrant: Entrant, collecting: Collecting,

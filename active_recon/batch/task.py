@@ -1,0 +1,104 @@
+"""What is asked of every bag, and of which files its result is."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from active_recon import __version__
+from active_recon.bags.runs.loop_setup import Overrides
+from active_recon.bags.runs.run import RecordedRun
+from active_recon.bags.runs.scene import Scene
+from active_recon.bags.runs.topics import Topics
+from active_recon.errors import DataError
+from active_recon.models.weights_files import weights_hash
+from active_recon.report.page import object_name
+from active_recon.report.truth import known_truth, Truth, TruthFile
+
+KINDS = ('replay', 'report', 'measure')
+_SHAPES = ('.binvox', '.glb', '.gltf', '.obj', '.ply', '.stl', '.off')
+
+
+@dataclass(frozen=True)
+class TruthSource:
+    """
+    A true shape for all bags, or a folder with one for each object, by its name.
+
+    `fit`, `up` and `front` as in `TruthFile`.
+    """
+
+    path: Path
+    fit: bool = False
+    up: str | None = None
+    front: str | None = None
+
+    def read(self, run: RecordedRun, object_size: float | None) -> Truth | None:
+        """Return a run's true shape; None where a folder has none, and none is known."""
+        path = self.path
+        if path.is_dir():
+            name = object_name(run.provenance.get('object', ''))
+            own = [file for suffix in _SHAPES if (file := path / f'{name}{suffix}').is_file()]
+            if not own:
+                return known_truth(run)
+            path = own[0]
+        return TruthFile(path, self.fit, self.up, self.front).read(run, object_size)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What results depend on."""
+        return {**asdict(self), 'path': str(self.path), 'files': files_of(self.path)}
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """
+    What is done with each bag: replayed, reported or measured, and with which options.
+
+    `out` is the folder of the results, an absolute path.
+    """
+
+    kind: str
+    out: Path
+    topics: Topics
+    scene: Scene
+    overrides: Overrides = Overrides()
+    truth: TruthSource | None = None
+
+    @property
+    def identity(self) -> str:
+        """A hash of all options that rows depend on."""
+        weights, empty = self.overrides.weights, self.scene.empty_scene
+        text = json.dumps({
+            'version': __version__, 'kind': self.kind, 'topics': repr(self.topics),
+            'scene': repr([self.scene.parameters, self.scene.elevation,
+                           self.scene.camera_position, self.scene.camera_orientation,
+                           self.scene.background]),
+            'empty_scene': None if empty is None else hashlib.sha256(
+                empty.tobytes()).hexdigest(),
+            'weights': None if weights is None else weights_hash(weights),
+            'policy': self.overrides.policy, 'threshold': self.overrides.threshold,
+            'truth': None if self.truth is None else self.truth.identity}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def state_of(bag: Path, identity: str) -> str:
+    """
+    Return a hash of the names, sizes and times of a bag's files, and of a task's identity.
+
+    Raises DataError where there is no bag.
+    """
+    if not bag.exists():
+        raise DataError(f'{bag}: no bag there: no such file or folder on {os.uname().nodename}',
+                        'not_seen')
+    text = json.dumps([identity, str(bag), files_of(bag)])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def files_of(path: Path) -> Mapping[str, tuple[int, int]]:
+    """Return size, bytes, and time of change, nanoseconds, of a file or of a folder's files."""
+    files = sorted(each for each in path.iterdir() if each.is_file()) if path.is_dir() else [
+        path] if path.exists() else []
+    return {file.name: (file.stat().st_size, file.stat().st_mtime_ns) for file in files}

@@ -1,0 +1,148 @@
+"""One bag to its rows, in a worker."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+import math
+from pathlib import Path
+from typing import Any
+
+from active_recon.bags.replay.replay import ReplayedEpisode
+from active_recon.bags.replay.verification import verify
+from active_recon.bags.replay.what_if import run_with_overrides
+from active_recon.bags.runs.loop_setup import LoopSetup, Overrides, recorded_setup
+from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.rebuilt import lacks_reconstruction, with_reconstruction
+from active_recon.bags.runs.run import RecordedEpisode, RecordedRun
+from active_recon.batch.results import BagResult, name_of
+from active_recon.batch.rows import episode_row, refusal_row, refused_row, Row
+from active_recon.batch.task import state_of, Task
+from active_recon.cluster.results import is_no_room, UNEXPECTED
+from active_recon.errors import ActiveReconError, DataError
+from active_recon.reconstructor import Reconstructor
+from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
+from active_recon.report.subject import letters, Subject
+from active_recon.report.truth import known_truth
+
+PASSING = {'file', 'not_seen', 'worker_died'}
+"""Kinds of refusals that may be over at a second start, which tries again."""
+
+
+@dataclass(frozen=True)
+class BagDone:
+    """What the driver is told of a bag; `kept`: its result was there already."""
+
+    refused: bool
+    kept: bool
+
+
+def do_bag(task: Task, identity: str, bag: Path) -> BagDone:
+    """
+    Write the result of one bag, unless it is there; what refuses the bag becomes its row.
+
+    Raises OSError, or an error that has it as its cause, where there is no room to write.
+    """
+    state = ''
+    try:
+        state = state_of(bag, identity)
+        kept = BagResult.read(task.out, bag)
+        if kept is not None and kept.state == state:
+            return BagDone(kept.refused, True)
+        result = BagResult(state, rows_of(task, bag))
+    except ActiveReconError as error:
+        if is_no_room(error):
+            raise
+        result = BagResult('' if error.kind in PASSING else state,
+                           [refused_row(str(bag), error)])
+    except OSError as error:
+        if is_no_room(error):
+            raise
+        result = BagResult('', [refusal_row(str(bag), f'{bag}: cannot be read: {error}', 'file')])
+    except Exception as error:  # a fault that one bag in a million shows is that bag's
+        result = BagResult(state, [refusal_row(
+            str(bag), f'{bag}: {type(error).__name__}: {error}', UNEXPECTED)])
+    result.write(task.out, bag)
+    return BagDone(result.refused, False)
+
+
+def rows_of(task: Task, bag: Path) -> list[Row]:
+    """Return a row for each episode of a bag; raises ActiveReconError where it is refused."""
+    run = read_run(bag, task.topics, task.scene)
+    run, computed, verdict = _considered(task, run)
+    if not run.episodes:
+        raise DataError(f'{bag}: no episode: expected one or more, got none', 'no_episode')
+    true = (known_truth(run) if task.truth is None
+            else task.truth.read(run, task.scene.object_size))
+    cells, placed = (true.cells, true.placed) if true else (None, '')
+    subjects = [Subject(letter, run, episode, cells, computed, placed)
+                for letter, episode in zip(letters(), run.episodes, strict=False)]
+    pages = _write_pages(task, bag, [each for each in subjects if each.views])
+    return [episode_row(str(bag), number, subject, verdict, pages.get(subject.letter, ''))
+            for number, subject in enumerate(subjects, 1)]
+
+
+def _considered(task: Task, run: RecordedRun) -> tuple[RecordedRun, str, str]:
+    """Return the run that the rows are of, what computed its shapes, and a replay's verdict."""
+    computes = (task.kind == 'replay' or task.overrides != Overrides()
+                or lacks_reconstruction(run))
+    if not computes:
+        return run, '', ''
+    setup = _KeptSetup.of(recorded_setup(run, task.overrides.weights,
+                                         task.overrides.weights is not None,
+                                         task.scene.parameters))
+    made_by = f'the weights {setup.load_reconstructor().provenance["weights_sha256"][:12]}'
+    if task.overrides != Overrides():
+        other = run_with_overrides(run, setup, task.overrides)
+        shown = {name: values for name, values in run.parameters.items()
+                 if name.rpartition('/')[2] == 'turntable_camera'}  # says which object it was
+        return replace(other, parameters={**shown, **other.parameters}), '', ''
+    reconstructor = setup.load_reconstructor()
+    if task.kind != 'replay':
+        return with_reconstruction(run, reconstructor), made_by, ''
+    verified = verify(run, reconstructor, setup.load_planner())
+    return replace(run, provenance={**run.provenance, **reconstructor.provenance},
+                   episodes=[_replayed(each, reconstructor.threshold)
+                             for each in verified.episodes]), '', verified.comparison.verdict
+
+
+def _replayed(episode: ReplayedEpisode, threshold: float) -> RecordedEpisode:
+    """Return an episode with the reconstructions of its replay."""
+    views = []
+    for step in episode.steps:
+        grid, quality = step.reconstruction.grid, step.reconstruction.quality
+        views.append(replace(step.recorded, reconstruction=grid, entropy=grid.entropy(),
+                             occupied=grid.above(threshold), quality=quality))
+    return replace(episode.recorded, views=views)
+
+
+def _write_pages(task: Task, bag: Path, subjects: list[Subject]) -> Mapping[str, str]:
+    """Write the pages of a bag where they are asked for; return the page of each letter."""
+    if task.kind != 'report':
+        return {}
+    pages: dict[str, str] = {}
+    for number in range(math.ceil(len(subjects) / MAX_SUBJECTS)):
+        shown = subjects[number * MAX_SUBJECTS:(number + 1) * MAX_SUBJECTS]
+        page = f'reports/{name_of(bag)}{f"-{number + 1}" if number else ""}.html'
+        write_page(report_page(shown), task.out / page)
+        pages |= dict.fromkeys((each.letter for each in shown), page)
+    return pages
+
+
+@dataclass(frozen=True)
+class _KeptSetup(LoopSetup):
+    """A setup whose network a worker keeps from bag to bag."""
+
+    @classmethod
+    def of(cls, setup: LoopSetup) -> '_KeptSetup':
+        return cls(**{each.name: getattr(setup, each.name) for each in fields(setup)})
+
+    def load_reconstructor(self) -> Reconstructor:
+        return _kept_reconstructor(self.weights, self.threads, self.runtime, self.precision,
+                                   tuple(sorted(self.reconstructor.items())))
+
+
+@lru_cache(maxsize=2)
+def _kept_reconstructor(weights: Path, threads: int, runtime: str, precision: str,
+                        parameters: tuple[tuple[str, Any], ...]) -> Reconstructor:
+    return Reconstructor.load(weights, threads=threads, runtime=runtime, precision=precision,
+                              **dict(parameters))

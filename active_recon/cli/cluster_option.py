@@ -1,0 +1,31 @@
+"""The options for the workers of a command: processes of this machine, or a Ray cluster."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+from active_recon.cluster import Crew, crew_of
+import typer
+
+Cluster = Annotated[str | None, typer.Option(
+    metavar='ADDRESS', help="Ray cluster that does the work: 'auto' (the Ray that runs on this "
+                            "machine), 'ray://HOST:PORT', or 'local' (starts a Ray here). Paths "
+                            'must be on storage that its machines share. Default: processes of '
+                            'this machine.')]
+Workers = Annotated[int | None, typer.Option(
+    min=1, help='Processes; default: one for each core, of this machine or of the cluster.')]
+
+
+@contextmanager
+def workers_of(cluster: str | None, workers: int | None) -> Iterator[Crew]:
+    """Yield the workers, and print the address of their dashboard where they have one."""
+    with crew_of(cluster, workers) as crew:
+        if crew.dashboard:
+            typer.echo(f'dashboard of Ray: {crew.dashboard}', err=True)
+        yield crew
+
+
+def reachable(path: Path, cluster: str | None) -> Path:
+    """Return a path as workers take it: absolute for those of a cluster, which begin elsewhere."""
+    return path if cluster is None else path.absolute()

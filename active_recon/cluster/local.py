@@ -1,0 +1,129 @@
+"""Work in processes of this machine."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
+from dataclasses import dataclass
+import multiprocessing
+import os
+from pathlib import Path
+import signal
+import threading
+from typing import Any
+
+from active_recon.cluster.bundles import attempt_all, Bundle, Bundles, Done
+from active_recon.cluster.results import attempt, ATTEMPTS, DIED, Result
+
+
+class LocalCrew:
+    """
+    A number of processes, each with one bundle of items at a time.
+
+    A single one is this process itself. Each is a pool of its own, so that it is known which
+    items a dying process had.
+    """
+
+    dashboard = ''
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+
+    def map(self, function: Callable[[Any], Any], items: Iterable[Any],
+            shared: Path | None = None, reads: Sequence[Path] = ()) -> Iterator[Result]:
+        """Yield the results in the order of their completion; see `crew.Crew`."""
+        if self.workers == 1:
+            for index, item in enumerate(items):
+                yield attempt(function, item).result(index)
+            return
+        bundles = Bundles(items)
+        with ExitStack() as stack:
+            idle: list[_Hand] = []
+            busy: dict[Future[Done], _Errand] = {}
+            while True:
+                while len(busy) < self.workers and (bundle := bundles.draw()):
+                    hand = idle.pop() if idle else _Hand(function, stack)
+                    errand = _Errand(hand, bundle)
+                    busy[errand.begin()] = errand
+                if not busy:
+                    return
+                finished, _ = wait(busy, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    errand = busy.pop(future)
+                    done = errand.done(future)
+                    if done is not None:
+                        bundles.learn(done)
+                        for (index, _), outcome in zip(errand.bundle, done.outcomes, strict=True):
+                            yield outcome.result(index)
+                    elif len(errand.bundle) > 1:
+                        bundles.separate(errand.bundle)
+                    elif errand.begun < ATTEMPTS:
+                        busy[errand.begin()] = errand
+                        continue
+                    else:
+                        yield DIED.result(errand.bundle[0][0])
+                    idle.append(errand.hand)
+
+
+class _Hand:
+    """One process; a new one takes the place of one that died."""
+
+    def __init__(self, function: Callable[[Any], Any], stack: ExitStack) -> None:
+        self._function, self._stack = function, stack
+        self.renew()
+
+    def renew(self) -> None:
+        # spawn, because a fork of a process that has threads (torch, embree, ROS) may hang
+        self._pool = self._stack.enter_context(ProcessPoolExecutor(
+            1, multiprocessing.get_context('spawn'), _begin, (self._function,)))
+
+    def submit(self, items: list[Any]) -> 'Future[Done]':
+        try:
+            return self._pool.submit(_work, items)
+        except BrokenProcessPool:  # it died between two items
+            self.renew()
+            return self._pool.submit(_work, items)
+
+
+@dataclass
+class _Errand:
+    """A bundle in a process's hands."""
+
+    hand: _Hand
+    bundle: Bundle
+    begun: int = 0
+
+    def begin(self) -> 'Future[Done]':
+        self.begun += 1
+        return self.hand.submit([item for _, item in self.bundle])
+
+    def done(self, future: 'Future[Done]') -> Done | None:
+        """Return what became of it; None: its process died."""
+        try:
+            return future.result()
+        except BrokenProcessPool:
+            self.hand.renew()
+            return None
+
+
+_function: Callable[[Any], Any] | None = None
+
+
+def _begin(function: Callable[[Any], Any]) -> None:
+    """Prepare a worker: Ctrl-C is the driver's, and no worker outlives it."""
+    global _function
+    _function = function
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+def _work(items: list[Any]) -> Done:
+    assert _function is not None
+    return attempt_all(_function, items)

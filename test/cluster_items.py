@@ -1,0 +1,44 @@
+"""What workers do in the tests of clusters: functions that their processes import."""
+
+import os
+from pathlib import Path
+import time
+
+from active_recon.errors import DataError, WorkError
+
+
+def halved(number):
+    """Return half of an even number; refuse 3, fail at 5."""
+    if number == 3:
+        raise DataError('3: odd: expected an even number')
+    if number == 5:
+        raise ZeroDivisionError('5 is a fault of the program')
+    return number / 2
+
+
+def dying(folder, number):
+    """Tell in a folder that an item was begun; die at the first try of 2, and at each of 5."""
+    begun = len(list(Path(folder).glob(f'{number}-*')))
+    (Path(folder) / f'{number}-{begun}').touch()
+    if number == 5 or (number == 2 and not begun):
+        os.kill(os.getpid(), 9)
+    return number
+
+
+def slowly(folder, number):
+    """Take a tenth of a second, and tell in a folder that the item was done by which process."""
+    time.sleep(0.1)
+    (Path(folder) / f'{number}-{os.getpid()}').touch()
+    return os.getpid()
+
+
+def without_room(number):
+    """Fail as on a full disk."""
+    raise OSError(28, 'No space left on device', f'/full/{number}')
+
+
+def that_stops(number):
+    """Stop all work at 2."""
+    if number == 2:
+        raise WorkError('2: not seen', 'not_seen')
+    return number

@@ -1,0 +1,33 @@
+"""A Ray cluster on the loopback: a head without CPUs, and workers of one CPU each."""
+
+from contextlib import contextmanager
+import os
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+_LOOPBACK = '127.0.0.2'  # Ray reads 127.0.0.1 as the machine's address to others
+_STORE = 80 * 2 ** 20  # bytes of memory shared by the processes of a node
+
+
+@contextmanager
+def ray_cluster(workers=2):
+    """Yield a cluster whose head and workers are processes of their own, and its address."""
+    path = os.environ.get('PYTHONPATH')
+    os.environ['RAY_USAGE_STATS_ENABLED'] = '0'
+    os.environ['PYTHONPATH'] = os.pathsep.join(
+        [str(ROOT), str(ROOT / 'test'), *filter(None, [path])])
+    from ray.cluster_utils import Cluster
+
+    place = {'node_ip_address': _LOOPBACK, 'object_store_memory': _STORE}
+    cluster = Cluster(initialize_head=True, head_node_args={
+        **place, 'num_cpus': 0, 'include_dashboard': False})
+    try:
+        for _ in range(workers):
+            cluster.add_node(num_cpus=1, **place)
+        yield cluster
+    finally:
+        cluster.shutdown()
+        if path is None:
+            del os.environ['PYTHONPATH']
+        else:
+            os.environ['PYTHONPATH'] = path

@@ -1,0 +1,157 @@
+"""An archive of bags becomes one table and one page, whatever single bags do."""
+
+import errno
+import os
+from pathlib import Path
+import re
+import shutil
+
+from active_recon.batch import work
+from active_recon.batch.finding import bags_below, find_roots
+from active_recon.batch.results import BagResult
+from active_recon.batch.rows import COLUMNS, refusal_row
+from active_recon.batch.summary import MOST_SHOWN, Summary
+from active_recon.batch.table import read_table, write_table
+from active_recon.errors import ConfigError, DataError
+from command_line import command, refusal
+import pytest
+
+PAPER = Path(__file__).parents[1] / 'bags' / 'golden' / 'paper'
+
+
+@pytest.fixture
+def archive(tmp_path):
+    """Return a folder of three bags and a file that is none."""
+    for name in ('a', 'b/deep', 'c'):
+        shutil.copytree(PAPER, tmp_path / 'archive' / name)
+    (tmp_path / 'archive' / 'b' / 'broken.mcap').write_bytes(b'no bag')
+    return tmp_path / 'archive'
+
+
+def batch(monkeypatch, kind, archive, out, *more):
+    assert command(monkeypatch, 'batch', kind, archive, '--out', out, '--workers', 1, *more) == 0
+    return list(read_table(out / 'table.parquet'))
+
+
+def bags_of(rows):
+    return [Path(row['bag']).name for row in rows]
+
+
+def row_of(number, **values):
+    return {**dict.fromkeys(COLUMNS), 'bag': f'{number}.mcap', 'refused': '', 'refused_kind': '',
+            'episode': 1, 'views': 4, 'stopped': 'max_views', 'verdict': '', 'warnings': [],
+            'object': 'chair', 'policy': 'uniform', 'report': '', **values}
+
+
+def test_bags_of_a_tree_are_found_once_and_in_order(tmp_path):
+    for name in ('z.mcap', 'b/metadata.yaml', 'b/b_0.mcap', 'split/split_0.mcap',
+                 'split/split_1.mcap', 'loose/x.db3', 'loose/y.mcap', 'loose/notes.txt',
+                 'loose/.y.mcap.part', 'empty/readme'):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    found = [str(path.relative_to(tmp_path)) for path in bags_below(tmp_path)]
+    assert found == ['b', 'loose/x.db3', 'loose/y.mcap', 'split', 'z.mcap']
+    inside = [str(tmp_path / 'loose'), str(tmp_path / 'loose' / 'y.mcap'), tmp_path.as_uri()]
+    assert find_roots(inside) == [tmp_path]
+    assert find_roots([str(tmp_path / '**' / '*.db3')]) == [tmp_path / 'loose' / 'x.db3']
+    with pytest.raises(DataError, match='no bags there'):
+        find_roots([str(tmp_path / '*.bag')])
+    with pytest.raises(ConfigError, match='s3://fleet/day: no such storage'):
+        find_roots(['s3://fleet/day'])
+
+
+def test_a_bag_that_cannot_be_read_is_a_row_and_changes_no_other(
+        archive, tmp_path, monkeypatch):
+    rows = batch(monkeypatch, 'measure', archive, tmp_path / 'with')
+    assert bags_of(rows) == ['a', 'broken.mcap', 'deep', 'c']
+    assert rows[1]['refused_kind'] == 'data' and 'no readable rosbag2 bag' in rows[1]['refused']
+    (archive / 'b' / 'broken.mcap').unlink()
+    without = batch(monkeypatch, 'measure', archive, tmp_path / 'without')
+    assert without == [rows[0], *rows[2:]]
+    assert all(row['views'] == 4 and row['stopped'] == 'max_views' and 0.5 < row['iou'] < 0.7
+               for row in without)
+
+
+def test_a_second_start_keeps_what_is_finished_and_unchanged(
+        archive, tmp_path, monkeypatch, capsys):
+    first = batch(monkeypatch, 'measure', archive, tmp_path / 'out')
+    table = (tmp_path / 'out' / 'table.parquet').read_bytes()
+    done = []
+    rows_of = work.rows_of
+    monkeypatch.setattr(work, 'rows_of', lambda task, bag: done.append(bag.name) or rows_of(
+        task, bag))
+    assert batch(monkeypatch, 'measure', archive, tmp_path / 'out') == first
+    assert not done
+    assert '4 of them finished before; 1 refused' in capsys.readouterr().out
+    os.utime(next((archive / 'c').glob('*.mcap')), ns=(1, 1))
+    next((tmp_path / 'out' / 'results').rglob('*.json')).write_text('{"state": ')  # torn
+    assert batch(monkeypatch, 'measure', archive, tmp_path / 'out') == first
+    assert 'c' in done and len(done) <= 2
+    assert (tmp_path / 'out' / 'table.parquet').read_bytes() == table
+    batch(monkeypatch, 'measure', archive, tmp_path / 'out', '--truth', 'sofa')
+    assert len(done) >= 5  # another option: all again
+
+
+def test_a_fault_of_the_program_refuses_its_bag_alone(archive, tmp_path, monkeypatch):
+    rows_of = work.rows_of
+    monkeypatch.setattr(work, 'rows_of', lambda task, bag: 1 / 0 if bag.name == 'a' else rows_of(
+        task, bag))
+    first, *others = batch(monkeypatch, 'measure', archive, tmp_path / 'out')
+    assert first['refused_kind'] == 'unexpected'
+    assert first['refused'].endswith('a: ZeroDivisionError: division by zero')
+    assert [row['refused_kind'] for row in others] == ['data', '', '']
+
+
+def test_a_full_disk_stops_with_one_line_and_a_second_start_does_the_rest(
+        archive, tmp_path, monkeypatch, capsys):
+    write, written = BagResult.write, []
+
+    def until_full(self, out, bag):
+        if len(written) == 2:
+            raise OSError(errno.ENOSPC, 'No space left on device')
+        written.append(bag)
+        write(self, out, bag)
+
+    monkeypatch.setattr(BagResult, 'write', until_full)
+    said = refusal(monkeypatch, capsys, 'batch', 'measure', archive, '--out', tmp_path / 'out',
+                   '--workers', 1)
+    assert 'no room to write' in said and 'start again' in said
+    monkeypatch.setattr(BagResult, 'write', write)
+    assert len(batch(monkeypatch, 'measure', archive, tmp_path / 'out')) == 4
+    assert '2 of them finished before' in capsys.readouterr().out
+
+
+def test_a_report_of_each_bag_is_linked_from_the_page(tmp_path, monkeypatch):
+    (row,) = batch(monkeypatch, 'report', PAPER, tmp_path / 'out')
+    page = (tmp_path / 'out' / 'summary.html').read_text()
+    (link,) = re.findall(r'href="(reports/[^"]+)"', page)
+    assert link == row['report'] and 'Plotly' in (tmp_path / 'out' / link).read_text()
+    assert 'https://' not in page.partition('<script type')[0]
+
+
+def test_a_replay_tells_whether_it_agrees_and_what_would_have_been(tmp_path, monkeypatch):
+    (row,) = batch(monkeypatch, 'replay', PAPER, tmp_path / 'replayed')
+    assert row['verdict'] in ('same bits', 'within tolerance')
+    (other,) = batch(monkeypatch, 'replay', PAPER, tmp_path / 'other', '--threshold', 0.9)
+    assert not other['verdict'] and other['iou'] < row['iou']
+
+
+def test_the_same_rows_give_the_same_table_whatever_their_number(tmp_path):
+    rows = [row_of(number, iou=number / 20_000) for number in range(12_001)]
+    for name in ('one', 'two'):
+        write_table(iter(rows), tmp_path / name)
+    assert (tmp_path / 'one').read_bytes() == (tmp_path / 'two').read_bytes()
+    assert [row['iou'] for row in read_table(tmp_path / 'one')] == [row['iou'] for row in rows]
+
+
+def test_the_page_shows_the_lowest_quality_first_and_tells_what_it_leaves_out(tmp_path):
+    summary = Summary()
+    rows = [row_of(number, iou=0.9 - number / 10_000) for number in range(MOST_SHOWN + 7)]
+    rows += [refusal_row(f'bad-{number}.mcap', 'no <bag>', 'data') for number in range(3)]
+    assert len(list(summary.counting(rows))) == len(rows)
+    summary.write(tmp_path / 'page.html', 'measure')
+    page = (tmp_path / 'page.html').read_text()
+    shown = [int(number) for number in re.findall(r'>(\d+)\.mcap<', page)]
+    assert shown == list(range(MOST_SHOWN + 6, 6, -1))
+    assert '7 more are in the table alone' in page
+    assert 'no &lt;bag&gt;' in page and '3 bags refused' in page

@@ -1,0 +1,156 @@
+"""Many items on a Ray cluster and in local processes: the same results, whatever dies."""
+
+from dataclasses import replace
+from functools import partial
+import shutil
+import sys
+
+from active_recon.cluster import crew_of, Result
+from active_recon.cluster.local import LocalCrew
+from active_recon.cluster.storage import SharedFolder, Storage
+from active_recon.cluster.telling import told
+from active_recon.errors import ConfigError, WorkError
+import cluster_items
+from command_line import command, refusal
+import pytest
+from ray_clusters import ray_cluster, ROOT
+import trimesh
+
+DIED = 'its worker died 3 times: expected a result, got none'
+
+
+@pytest.fixture(scope='module')
+def cluster():
+    """Return the address of a head and two workers, processes of their own on this machine."""
+    with ray_cluster() as started:
+        yield started.address
+
+
+@pytest.fixture(scope='module')
+def crews(cluster):
+    """Return what opens the workers of either kind."""
+    return {'local': lambda: crew_of(None, 2), 'ray': lambda: crew_of(cluster)}
+
+
+def results(crew, function, items, **more):
+    return sorted(crew.map(function, items, **more), key=lambda result: result.index)
+
+
+def same_files(folder, other):
+    """Return whether two trees have the same files with the same bytes."""
+    trees = [{path.relative_to(top): path.read_bytes() for path in top.rglob('*')
+              if path.is_file()} for top in (folder, other)]
+    return bool(trees[0]) and trees[0] == trees[1]
+
+
+def test_one_process_several_and_a_cluster_give_the_same_results(crews):
+    own = results(LocalCrew(1), cluster_items.halved, range(200))
+    assert own[2] == Result(2, 1.0)
+    assert own[3] == Result(3, None, '3: odd: expected an even number', 'data')
+    assert own[5] == Result(5, None, 'ZeroDivisionError: 5 is a fault of the program',
+                            'unexpected')
+    for opened in crews.values():
+        with opened() as crew:
+            assert results(crew, cluster_items.halved, iter(range(200))) == own
+
+
+@pytest.mark.parametrize('kind', ['local', 'ray'])
+def test_what_a_dying_worker_had_is_done_again_and_no_item_is_lost_or_doubled(
+        crews, kind, tmp_path):
+    with crews[kind]() as crew:
+        found = results(crew, partial(cluster_items.dying, tmp_path), range(8))
+    assert [result.index for result in found] == list(range(8))
+    assert found[5] == Result(5, None, DIED, 'worker_died')
+    assert [result.value for result in found if result.index != 5] == [0, 1, 2, 3, 4, 6, 7]
+    assert (tmp_path / '2-1').exists()
+
+
+@pytest.mark.parametrize('kind', ['local', 'ray'])
+def test_items_are_drawn_as_workers_have_room_for_them(crews, kind):
+    drawn = done = most = 0
+
+    def items():
+        nonlocal drawn
+        for number in range(3000):
+            drawn += 1
+            yield number
+
+    with crews[kind]() as crew:
+        for _ in crew.map(cluster_items.halved, items()):
+            most = max(most, drawn - done)
+            done += 1
+    assert done == 3000
+    assert most <= 64 * 2 * 4
+
+
+@pytest.mark.parametrize('kind', ['local', 'ray'])
+def test_a_full_disk_stops_the_work_with_one_error(crews, kind):
+    with crews[kind]() as crew, pytest.raises(
+            WorkError, match='no room to write: .*No space left .*start again'):
+        list(crew.map(cluster_items.without_room, range(100)))
+
+
+def test_a_machine_that_does_not_see_a_path_says_which(crews, tmp_path):
+    missing = tmp_path / 'archive'
+    with crews['ray']() as crew, pytest.raises(
+            WorkError, match=f'{missing}: not seen by .*: expected it on storage that all'):
+        list(crew.map(cluster_items.halved, range(4), reads=[missing]))
+    folder = SharedFolder.of(tmp_path / 'out')
+    Storage(folder, (tmp_path,)).require()
+    with pytest.raises(WorkError, match='out: not seen by'):
+        replace(folder, mark='of another disk').require()
+    folder.forget()
+    assert not list((tmp_path / 'out').iterdir())
+
+
+def test_a_batch_of_bags_is_the_same_on_a_cluster_and_a_bag_that_is_none_is_refused(
+        cluster, tmp_path, monkeypatch, capsys):
+    archive = tmp_path / 'archive'
+    for name in ('2026/a', '2026/b', '2027/c'):
+        shutil.copytree(ROOT / 'bags' / 'golden' / 'paper', archive / name)
+    (archive / '2026' / 'poisonous.mcap').write_bytes(b'no bag')
+    for name, where in (('local', ['--workers', 1]), ('ray', ['--cluster', cluster])):
+        assert command(monkeypatch, 'batch', 'measure', archive, '--out', tmp_path / name,
+                       *where) == 0
+        assert '4 bags' in capsys.readouterr().out
+    assert same_files(tmp_path / 'local', tmp_path / 'ray')
+
+
+def test_rendered_objects_are_the_same_on_a_cluster(cluster, tmp_path, monkeypatch):
+    for name, mesh in (('box', trimesh.creation.box((0.3, 0.2, 0.1))),
+                       ('ball', trimesh.creation.icosphere(1, 0.2))):
+        (tmp_path / 'meshes' / name).mkdir(parents=True)
+        mesh.export(tmp_path / 'meshes' / name / 'a.stl')
+    monkeypatch.chdir(tmp_path)  # workers begin in folders of their own
+    for name, where in (('local', ['--workers', 1]), ('ray', ['--cluster', cluster])):
+        assert command(monkeypatch, 'render', 'meshes', name, '--samples', 1, *where) == 0
+    assert same_files(tmp_path / 'local', tmp_path / 'ray')
+
+
+def test_without_ray_or_a_cluster_the_error_says_what_to_do(monkeypatch, capsys, tmp_path):
+    arguments = ['dataset', 'build', tmp_path, '--cluster']
+    assert "invalid address: expected 'auto', 'local', 'ray://HOST:PORT' or 'HOST:PORT', got " \
+        "'far away'" in refusal(monkeypatch, capsys, *arguments, 'far away')
+    for address in ('127.0.0.1:9', 'ray://127.0.0.1:9'):
+        assert f'no cluster at {address}: expected a Ray that runs there' in refusal(
+            monkeypatch, capsys, *arguments, address)
+    monkeypatch.setitem(sys.modules, 'ray', None)
+    assert 'pip install active_recon[cluster]' in refusal(
+        monkeypatch, capsys, *arguments, 'auto')
+
+
+def test_progress_tells_the_rate_the_workers_and_the_refused():
+    notes = []
+    crew = LocalCrew(1)
+    found = list(told(crew.map(cluster_items.halved, range(6)), crew,
+                      lambda steps, note: notes.append((steps, note)),
+                      lambda result: bool(result.refusal)))
+    assert [steps for steps, _ in notes] == [1] * len(found) == [1] * 6
+    assert notes[-1][1].endswith('/s, 1 worker, 2 refused')
+
+
+def test_work_that_must_stop_stops(crews):
+    with pytest.raises(WorkError, match='2: not seen'), crews['local']() as crew:
+        list(crew.map(cluster_items.that_stops, range(10)))
+    with pytest.raises(ConfigError, match='invalid address'), crew_of('ray:/x'):
+        pass
