@@ -82,20 +82,30 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
     known: dict[bytes, str] = {}
     for path in paths:
         try:
-            digest = hashlib.sha256(path.read_bytes()).digest()
-            photo = _opened(path)
-        except (DataError, *_UNREADABLE) as error:
-            left_out.append(f'{path.name}: not readable: expected a whole image, got: {error}')
-            continue
-        if digest in known:
-            left_out.append(f'{path.name}: the same photo as {known[digest]}')
-            continue
-        known[digest] = path.name
-        photos.append(photo)
+            photos.append(open_photo(path, known))
+        except DataError as error:
+            left_out.append(str(error))
     if not photos:
         raise DataError('no readable photo: expected at least one, got none'
                         + ''.join(f'; {reason}' for reason in left_out[:3]), 'no_photos')
     return photos, left_out
+
+
+def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
+    """
+    Return the photo of a file, which is noted in `known`: names of photos by their bytes' hash.
+
+    Raises DataError where it cannot be read, or another of `known` has the same bytes.
+    """
+    try:
+        digest = hashlib.sha256(path.read_bytes()).digest()
+        photo = _opened(path)
+    except (DataError, *_UNREADABLE) as error:
+        raise DataError(f'{path.name}: not readable: expected a whole image, got: '
+                        f'{error}') from error
+    if known.setdefault(digest, path.name) != path.name:
+        raise DataError(f'{path.name}: the same photo as {known[digest]}')
+    return photo
 
 
 def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:

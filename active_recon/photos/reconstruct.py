@@ -17,7 +17,7 @@ from active_recon.photos.integrating import carved, even_choice, found_cube, int
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import posed_by, Source
 from active_recon.photos.views import load_views, PhotoView, view_of
-from active_recon.reconstructor import load
+from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
 from active_recon.volumes.meshes import axis_direction
 from active_recon.volumes.voxels import VoxelGrid
@@ -124,9 +124,14 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
 
 
 def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = _DEFAULTS,
-               left_out: Sequence[str] = (), reporting: Reporting = silent) -> Shape:
-    """Reconstruct from photos in memory, whose cameras are of `file`'s world."""
-    reconstructor = load(options.model, threads=options.threads)
+               left_out: Sequence[str] = (), reporting: Reporting = silent,
+               reconstructor: Reconstructor | None = None) -> Shape:
+    """
+    Reconstruct from photos in memory, whose cameras are of `file`'s world.
+
+    `reconstructor` is one of the options' model that is already loaded; None: it is loaded here.
+    """
+    reconstructor = reconstructor or load(options.model, threads=options.threads)
     poses = [view.camera for view in views]
     up = axis_direction(options.up) if options.up else file.up
     cube = _told_cube(options, file, upward(poses) if up is None else up)
