@@ -72,7 +72,8 @@ class WatchPage:
     def _show(self, progress: Progress) -> None:
         before = None if self._shown is None else self._shown.shape
         self._shown = progress
-        self._page.set_text(progress.lines)
+        self._page.set_text(progress.lines if progress.sketch is not None else [
+            *progress.lines, 'From this code a phone reads where to send photos.'])
         self._page.set_picture(
             self._invitation if progress.sketch is None else progress.sketch)
         if progress.shape is None:

@@ -145,6 +145,6 @@ def told(shape: Shape, advice: Advice, metric: bool) -> list[str]:
     count = len(shape.views)
     quality = '' if shape.quality is None else f'; {shape.quality.summary}'
     lines.append(f'{count} photo{"s" if count > 1 else ""}{quality}.')
-    if advice.why is not None:
-        lines.append(f'The next photo {advice.why.sentence}.')
+    if advice.goal.gain is not None:
+        lines.append(f'The next photo is expected to gain {advice.goal.gain:.3f} of IoU.')
     return [*lines, *(f'Warning: {warning}' for warning in shape.warnings)]
