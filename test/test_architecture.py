@@ -20,7 +20,7 @@ ROWS: tuple[set[str], ...] = (
     {'environment', 'exporting', 'policies', 'simulation'},
     {'parameters', 'planner', 'reconstructor'},
     {'evaluation', 'msg_tools', 'photos', 'saved_states'},
-    {'bags', 'training'},
+    {'bags', 'capture', 'training'},
     {'paper', 'report', 'viewer'},
     {'nodes', 'watching'},
     {'launching'},
