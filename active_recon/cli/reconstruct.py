@@ -39,7 +39,7 @@ def reconstruct(
         help="With --board: lens in the YAML format of ROS's camera_calibration; default: "
              'estimated from the photos.')] = None,
     turntable_step_deg: Annotated[float | None, typer.Option(
-        help='The photos, sorted by name, show a turntable that turns by this angle between them, '
+        help='The photos, in their order, show a turntable that turns by this angle between them, '
              'counter-clockwise seen from above, before a fixed camera.')] = None,
     elevation_deg: Annotated[float, typer.Option(
         help="With a turntable: the camera's angle above the horizon.")] = 30.0,
@@ -64,6 +64,8 @@ def reconstruct(
         help='Folder of masks named like the photos, bright on the object.')] = None,
     views: Annotated[int | None, typer.Option(
         min=1, help='Use so many photos at even steps; default: all.')] = None,
+    order: Annotated[str, typer.Option(
+        help='Order of the photos: name, or time (when they were taken, by EXIF).')] = 'name',
     mesh_format: Annotated[str, typer.Option(
         help='ply, obj, stl, glb, or urdf: a robot description.')] = 'ply',
     bag: Annotated[bool, typer.Option(
@@ -134,7 +136,7 @@ def reconstruct(
                           'them')
     source = sources[0] if sources else None
     options = Options(None if box is None else _numbers(box), unit, size, up, axes, background,
-                      masks, views, model)
+                      masks, views, model, order=order)
     if watch:
         from active_recon.cli.watch_photos import Pages, watch_photos
         from active_recon.policies.stopping import StoppingRule
