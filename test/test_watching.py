@@ -19,6 +19,7 @@ from active_recon.watching.watch_page import loop_state, qr_code
 from active_recon.watching.watcher import Watcher
 import cv2
 import numpy as np
+from photo_scene import cameras, on_plain, rendered, write_photos
 from PIL import Image
 import pytest
 from rendered_boards import BOARD, LENS
@@ -104,6 +105,22 @@ def test_the_board_refines_the_focal_length_that_exif_gives(photos, tmp_path):
     assert posed[0].intrinsics.fx == pytest.approx(LENS.fx, rel=0.02)
     _, posed, _ = posed_by(SOURCE, wrong[:2])  # too few to refine it
     assert posed[0].intrinsics.fx == pytest.approx(1.2 * LENS.fx, rel=1e-3)
+
+
+def test_a_file_of_cameras_poses_photos_that_arrive(tmp_path):
+    views = cameras(4)
+    write_photos(tmp_path, views, [on_plain(image) for image in rendered(views)])
+    Image.new('RGB', (240, 180)).save(tmp_path / 'other.png')
+    found = Collection(tmp_path / 'transforms.json', Options())
+    assert found.add(tmp_path / 'photo0.png') == '' and found.shape is None
+    assert found.waiting.startswith('no object found yet: object not found: expected photos from '
+                                    'several directions')
+    for number in (1, 2):
+        assert found.add(tmp_path / f'photo{number}.png') == ''
+    assert len(found.shape.views) == 3 and not found.metric
+    assert found.add(tmp_path / 'other.png') == (
+        f'other.png: no camera in {tmp_path / "transforms.json"}')
+    assert len(found.shape.views) == 3
 
 
 def test_a_turntable_s_order_cannot_be_known_of_photos_that_arrive():

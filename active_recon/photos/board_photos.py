@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_FEWEST = 3
+FEWEST = 3
+"""Photos from which the lens is estimated where nothing else is known of it."""
 _LARGEST_ERROR = 0.004  # of the photo's longer side, RMS: beyond, it is a wrong pose
 SeenPhoto = tuple[PhotoFile, Detection]
 """A photo, and the board's corners in it."""
@@ -87,13 +88,19 @@ def _lens(seen: Sequence[SeenPhoto], board: Board, lens_file: Path | None,
     focals = [photo.focal * found.size[0] / photo.size[0] for photo, found in same
               if photo.focal is not None]
     focal = float(np.median(focals)) if focals else None
-    if len(seen) >= _FEWEST:
-        return estimate_lens([found for _, found in same], focal).lens
+    if len(seen) >= FEWEST:
+        try:
+            return estimate_lens([found for _, found in same], focal).lens
+        except cv2.error as error:
+            raise DataError('lens not estimated: expected the board from several sides, and large '
+                            f'in the photos, got corners that no lens fits ({len(same)} photos); '
+                            'take more, or give the lens by --camera-info',
+                            'too_few_images') from error
     if focal is not None:
         width, height = same[0][1].size
         return Intrinsics(focal, focal, width / 2, height / 2, width, height)
     raise DataError(f'board: seen in {len(seen)} of {of_photos} photos: expected it in '
-                    f'{_FEWEST} or more; check that it has {board.columns} x {board.rows} '
+                    f'{FEWEST} or more; check that it has {board.columns} x {board.rows} '
                     f'squares and the dictionary {board.dictionary}, that it is sharp, and '
                     'that several of its squares stay free', 'too_few_images')
 

@@ -4,7 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from active_recon.errors import ActiveReconError, ConfigError, DataError
-from active_recon.photos.board_photos import posed_on_board, seen_board, SeenPhoto
+from active_recon.photos.board_photos import (
+    FEWEST,
+    posed_on_board,
+    seen_board,
+    SeenPhoto,
+)
 from active_recon.photos.camera_file import CameraFile, PosedPhoto
 from active_recon.photos.files import open_photo, PhotoFile
 from active_recon.photos.reconstruct import from_views, Options
@@ -129,7 +134,7 @@ class Collection:
     def _missing(self, error: ActiveReconError) -> str:
         """Return what is missing for a shape, in one line."""
         count = len(self._kept)
-        if count and error.kind == 'too_few_images':
+        if 0 < count < FEWEST and error.kind == 'too_few_images':
             return (f'{count} photo{"s" if count > 1 else ""} with the board: the lens is '
                     'estimated from three, taken from different sides')
         if count and error.kind == 'no_cube':
