@@ -6,7 +6,7 @@ import os
 from setuptools import find_packages, setup
 
 NAME = 'active_recon'
-NODES = ('reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer')
+NODES = ('camera', 'reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer')
 EXECUTABLES = {
     'active-recon': f'{NAME}.cli.main', **{node: f'{NAME}.nodes.{node}' for node in NODES}}
 

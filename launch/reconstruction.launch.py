@@ -1,4 +1,4 @@
-"""Reconstructor, view planner and recorder for a camera; `--show-args` lists the arguments."""
+"""Reconstructor, planner, recorder, and the camera if asked; `--show-args` lists the arguments."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -15,6 +15,8 @@ ARGUMENTS = {
         'parameters file of the nodes'),
     'use_sim_time': ('false', 'whether to use the time on /clock'),
     'autostart': ('true', 'whether the nodes configure and activate themselves'),
+    'camera': ('false', 'whether to start the node camera, for a camera without a driver; its '
+               'source is in params_file'),
     'record': ('true', 'whether to record a bag'),
     'log_level': ('info', 'debug, info, warn, error or fatal'),
     'image': ('camera/image_raw', "topic of the camera's images"),
@@ -42,6 +44,8 @@ def generate_launch_description():
           for name, (default, description) in ARGUMENTS.items()),
         Node(executable='reconstructor', name='reconstructor', parameters=managed, **shared),
         Node(executable='view_planner', name='view_planner', parameters=managed, **shared),
+        Node(executable='camera', name='camera', parameters=managed,
+             condition=IfCondition(value['camera']), **shared),
         Node(executable='recorder', name='recorder', parameters=parameters,
              condition=IfCondition(value['record']), **shared),
     ])

@@ -28,6 +28,7 @@ from active_recon.nodes.runtime.graph_access import (
 from active_recon.parameters.recorder import TOPICS
 from msg_tools.cameras import pose_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
+from PIL import Image
 from rclpy.node import Node, NodeNameNonExistentError
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
@@ -57,7 +58,8 @@ def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
             'camera_position': [position.x, position.y, position.z],
             'camera_orientation': [turn.x, turn.y, turn.z, turn.w]},
             'turntable_camera': {'mesh': MESH, 'follows': 'view'}},
-        RECORDED: {'recorder': {'output_dir': folder}}}
+        RECORDED: {'recorder': {'output_dir': folder}},
+        '/policies_3': {'camera': {'source': folder}}}
 
 
 def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
@@ -70,6 +72,7 @@ def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
     os.environ.update(environment)  # for the observer in this process
     with (TemporaryDirectory() as folder, joined_domain(OBSERVER) as (observer, _),
           NodeProcesses(Path(folder), environment) as nodes):
+        Image.new('RGB', (64, 48)).save(Path(folder, 'image.png'))
         clock = observer.create_publisher(Clock, '/clock', 10)
         for topic in TOPICS:
             if not topic.startswith('/'):

@@ -20,9 +20,9 @@ ROWS: tuple[set[str], ...] = (
     {'environment', 'exporting', 'policies', 'simulation'},
     {'parameters', 'planner', 'reconstructor'},
     {'evaluation', 'msg_tools', 'photos', 'saved_states'},
-    {'bags', 'training'},
+    {'bags', 'capture', 'training'},
     {'paper', 'report', 'viewer'},
-    {'batch', 'nodes'},
+    {'batch', 'nodes', 'watching'},
     {'launching'},
     {'demo'},
     {'cli'},
@@ -30,7 +30,8 @@ ROWS: tuple[set[str], ...] = (
 ROW_OF = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
 # What runs on a robot needs nothing of what only researchers need, and the other way round
 RESEARCH = {'evaluation', 'training', 'paper'}
-ROBOT = {'msg_tools', 'bags', 'batch', 'report', 'viewer', 'nodes', 'launching', 'demo'}
+ROBOT = {'msg_tools', 'bags', 'batch', 'report', 'viewer', 'watching', 'nodes', 'launching',
+         'demo'}
 KNOW_ROS = {'nodes', 'msg_tools', 'launching'}
 IMPORTED_BY = {'msg_tools': {'bags', 'nodes', 'launching'}, 'nodes': {'launching'},
                'launching': {'demo', 'cli'}}

@@ -1,10 +1,17 @@
 """Photos are read upright, in 8 bits, and no larger than needed; what is no photo is left out."""
 
-from active_recon.errors import DataError
+from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.photos.camera_file import PosedPhoto
-from active_recon.photos.files import LARGEST_SIDE, open_photos, photo_paths, read_photo
+from active_recon.photos.files import (
+    in_order_of,
+    LARGEST_SIDE,
+    open_photos,
+    photo_paths,
+    read_photo,
+)
 from active_recon.photos.views import load_views, view_of
+import cv2
 import numpy as np
 from PIL import ExifTags, Image, ImageOps
 import pytest
@@ -50,11 +57,35 @@ def test_the_lens_decides_whether_a_photo_is_taken_as_stored(tmp_path):
         assert load_views(posed)[0][0].image.shape == (height, width, 3)
 
 
-def test_sixteen_bits_become_eight(tmp_path):
-    grey = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
-    Image.fromarray(grey).save(tmp_path / 'grey.png')
-    read = read_photo(opened(tmp_path / 'grey.png'))
-    np.testing.assert_allclose(read, np.repeat(grey[..., None] / 257, 3, axis=2), atol=1)
+@pytest.mark.parametrize('ending', ['png', 'tif'])
+@pytest.mark.parametrize('channels', [1, 3])
+def test_sixteen_bits_become_eight(ending, channels, tmp_path):
+    deep = (np.arange(12 * channels) * 1800).astype(np.uint16).reshape(3, 4, channels)
+    path = tmp_path / f'deep.{ending}'
+    assert cv2.imwrite(str(path), deep[..., ::-1])  # OpenCV's order is blue, green, red
+    expected = np.broadcast_to(deep / 257, (3, 4, 3))
+    np.testing.assert_allclose(read_photo(opened(path)), expected, atol=1)
+
+
+def taken_at(path, when):
+    exif = Image.Exif()
+    if when:
+        exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.DateTimeOriginal] = when
+    Image.fromarray(drawn()).save(path, exif=exif)
+
+
+def test_photos_are_in_the_order_of_their_names_or_of_their_times(tmp_path):
+    for name, when in (('a', '2026:11:02 10:00:00'), ('b', '2026:11:01 23:59:59'),
+                       ('c', '2026:11:02 09:00:00')):
+        taken_at(tmp_path / f'{name}.jpg', when)
+    photos = [opened(path) for path in photo_paths(tmp_path)]
+    assert [each.path.stem for each in in_order_of('name', photos)] == ['a', 'b', 'c']
+    assert [each.path.stem for each in in_order_of('time', photos)] == ['b', 'c', 'a']
+    with pytest.raises(ConfigError, match='order: unknown value: expected one of name, time'):
+        in_order_of('size', photos)
+    taken_at(tmp_path / 'd.jpg', '')
+    with pytest.raises(DataError, match='d.jpg: no time: expected when it was taken in EXIF'):
+        in_order_of('time', [*photos, opened(tmp_path / 'd.jpg')])
 
 
 @pytest.mark.parametrize('mode', ['L', 'P', 'CMYK', '1', 'LA'])

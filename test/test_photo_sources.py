@@ -2,9 +2,12 @@
 
 import math
 
+from active_recon.calibration.board import Board
+from active_recon.calibration.lens import write_lens
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
-from active_recon.photos.files import open_photos, photo_paths
+from active_recon.photos.board_photos import seen_board
+from active_recon.photos.files import LARGEST_SIDE, open_photos, photo_paths
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 import numpy as np
 from photo_rigs import blank_photos, PINHOLE, rig
@@ -50,6 +53,41 @@ def test_each_photo_finds_its_camera_by_the_board(photos, board_poses):
 def test_a_board_that_is_hardly_seen_is_refused(photos):
     with pytest.raises(DataError, match='board: seen in 2 of 3 photos: expected it in 3 or more'):
         posed_by(BoardCameras(BOARD), [*photos[:2], photos[-1]])
+
+
+def test_a_board_that_is_in_no_photo_is_refused(photos):
+    with pytest.raises(DataError, match='board: seen in 0 of 1 photos') as raised:
+        posed_by(BoardCameras(BOARD), photos[-1:])
+    assert '9 x 7 squares' in str(raised.value) and '\n' not in str(raised.value)
+
+
+def test_photos_of_another_board_are_left_out_and_say_which(photos):
+    smaller = Board(columns=5, rows=4, square=0.03, marker=0.0225)
+    with pytest.raises(DataError, match='board: seen in 0 of 2 photos'):
+        posed_by(BoardCameras(smaller), photos[:2])
+    with pytest.raises(DataError, match='0.png: another board: expected one of 5 x 4 squares'):
+        seen_board(photos[0], smaller)
+
+
+def test_photos_of_another_size_are_left_out_as_of_another_lens(photos, tmp_path):
+    with Image.open(photos[3].path) as image:
+        image.resize((960, 720)).save(tmp_path / 'large.png')
+    large = open_photos([tmp_path / 'large.png'])[0]
+    _, posed, left_out = posed_by(BoardCameras(BOARD), [*photos[:4], *large])
+    assert len(posed) == 4
+    assert left_out == ['large.png: another size: expected 640 x 480 pixels of one lens, got '
+                        '960 x 720']
+
+
+def test_a_lens_from_a_file_needs_a_single_photo_and_fits_a_reduced_one(photos, tmp_path):
+    write_lens(LENS.resized(4 * LENS.width, 4 * LENS.height), tmp_path / 'lens.yaml')
+    with Image.open(photos[0].path) as image:
+        image.resize((4 * LENS.width, 4 * LENS.height)).save(tmp_path / 'large.png')
+    large = open_photos([tmp_path / 'large.png'])[0]
+    _, posed, _ = posed_by(BoardCameras(BOARD, tmp_path / 'lens.yaml'), large)
+    assert posed[0].intrinsics.width <= LARGEST_SIDE < 4 * LENS.width
+    _, at_once, _ = posed_by(BoardCameras(BOARD), photos[:-1])
+    assert np.linalg.norm(posed[0].pose[:3, 3] - at_once[0].pose[:3, 3]) < 0.01
 
 
 def test_a_turntable_s_steps_are_azimuths_the_other_way_round(tmp_path):

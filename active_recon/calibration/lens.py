@@ -88,9 +88,11 @@ class EstimatedLens:
     whole: bool
 
 
-def estimate_lens(seen: Sequence[Detection]) -> EstimatedLens:
+def estimate_lens(seen: Sequence[Detection], focal: float | None = None) -> EstimatedLens:
     """
     Estimate the lens parameters from images of the board.
+
+    The search begins at the focal length `focal`, pixels; None: the image's width.
 
     A board that rotates flat under a fixed camera stays in one plane. A single plane, in however
     many images, does not separate principal point and distortion from its tilt.
@@ -98,7 +100,8 @@ def estimate_lens(seen: Sequence[Detection]) -> EstimatedLens:
     points = [one.points.astype(np.float32) for one in seen]
     pixels = [(one.pixels - 0.5).astype(np.float32) for one in seen]
     width, height = size = seen[0].size
-    start = _as_ros_counts(Intrinsics(width, width, width / 2, height / 2, width, height))
+    first = focal or width
+    start = _as_ros_counts(Intrinsics(first, first, width / 2, height / 2, width, height))
     calibrate = partial(cv2.calibrateCamera, points, pixels, size)
     _, matrix, _, turns, _ = calibrate(
         start, np.zeros(5), flags=cv2.CALIB_USE_INTRINSIC_GUESS | _FEW)

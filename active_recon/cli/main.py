@@ -9,6 +9,7 @@ from active_recon import __version__
 from active_recon.cli.bag import bag
 from active_recon.cli.batch import batch
 from active_recon.cli.calibrate import calibrate
+from active_recon.cli.camera import camera
 from active_recon.cli.demo import demo
 from active_recon.cli.evaluate import evaluate
 from active_recon.cli.export import export
@@ -32,8 +33,8 @@ import typer
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, up, reconstruct, calibrate, view, report, replay, play, record_sweep, render,
-                train, train_policy, export, evaluate, study, policies, paper, sheet):
+for command in (demo, up, reconstruct, calibrate, camera, view, report, replay, play, record_sweep,
+                render, train, train_policy, export, evaluate, study, policies, paper, sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

@@ -7,6 +7,7 @@ from typing import Annotated, TYPE_CHECKING
 from active_recon.cli.calibrate import printed_board
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError, RecordingError
+from active_recon.parameters.viewer import DEFAULT_PORT, HIGHEST_PORT
 import typer
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def reconstruct(
         help="With --board: lens in the YAML format of ROS's camera_calibration; default: "
              'estimated from the photos.')] = None,
     turntable_step_deg: Annotated[float | None, typer.Option(
-        help='The photos, sorted by name, show a turntable that turns by this angle between them, '
+        help='The photos, in their order, show a turntable that turns by this angle between them, '
              'counter-clockwise seen from above, before a fixed camera.')] = None,
     elevation_deg: Annotated[float, typer.Option(
         help="With a turntable: the camera's angle above the horizon.")] = 30.0,
@@ -63,12 +64,31 @@ def reconstruct(
         help='Folder of masks named like the photos, bright on the object.')] = None,
     views: Annotated[int | None, typer.Option(
         min=1, help='Use so many photos at even steps; default: all.')] = None,
+    order: Annotated[str, typer.Option(
+        help='Order of the photos: name, or time (when they were taken, by EXIF).')] = 'name',
     mesh_format: Annotated[str, typer.Option(
         help='ply, obj, stl, glb, or urdf: a robot description.')] = 'ply',
     bag: Annotated[bool, typer.Option(
         '--bag', help='Also write the bag of the run, for replay, and its report.')] = False,
     model: Annotated[str | None, typer.Option(
         help='A model that ships, by its name, or a .safetensors file.')] = None,
+    watch: Annotated[bool, typer.Option(
+        '--watch', help='Take photos in as they arrive in the folder, and show on a page where '
+                        'to stand next, until Ctrl-C.')] = False,
+    lan: Annotated[bool, typer.Option(
+        '--lan', help='With --watch: a phone in the local network may send photos, to an address '
+                      'that nobody can guess. Default: this machine only.')] = False,
+    port: Annotated[int, typer.Option(
+        min=0, max=HIGHEST_PORT, help='With --watch: port of the page with the shape, or the next '
+                                      'free one.')] = DEFAULT_PORT,
+    max_views: Annotated[int, typer.Option(
+        min=1, help='With --watch: photos after which there are enough.')] = 12,
+    target_quality: Annotated[float, typer.Option(
+        min=0, max=0.99, help='With --watch: there are enough when this IoU is promised, or out '
+                              'of reach; 0 for no target.')] = 0.0,
+    min_gain: Annotated[float, typer.Option(
+        min=0, max=0.99, help='With --watch: there are enough when no photo is expected to gain '
+                              'as much of IoU.')] = 0.005,
 ) -> None:
     """
     Reconstruct an object from a folder of photos with known cameras.
@@ -80,6 +100,8 @@ def reconstruct(
     Example: active-recon reconstruct photos/ --cameras transforms.json --out mug
 
     Example: active-recon reconstruct photos/ --board --size 0.2
+
+    Example: active-recon reconstruct photos/ --watch --board --lan
     """
     from active_recon.photos.reconstruct import from_files, Options
     from active_recon.photos.saving import FORMATS, save_shape
@@ -112,9 +134,22 @@ def reconstruct(
     if len(sources) > 1:
         raise ConfigError('several of --cameras, --board and --turntable-step-deg: give one of '
                           'them')
-    shape = from_files(photos, sources[0] if sources else None, Options(
-        None if box is None else _numbers(box), unit, size, up, axes, background, masks, views,
-        model), progress_bar)
+    source = sources[0] if sources else None
+    options = Options(None if box is None else _numbers(box), unit, size, up, axes, background,
+                      masks, views, model, order=order)
+    if watch:
+        from active_recon.cli.watch_photos import Pages, watch_photos
+        from active_recon.policies.stopping import StoppingRule
+
+        if views is not None:
+            raise ConfigError('--views with --watch: every photo that arrives is used; '
+                              '--max-views tells when there are enough')
+        shape = watch_photos(photos, source, options, StoppingRule(
+            max_views, target_quality=target_quality, min_gain=min_gain), Pages(port, lan))
+    elif lan:
+        raise ConfigError('--lan without --watch: there is no page then')
+    else:
+        shape = from_files(photos, source, options, progress_bar)
     _print(shape)
     for path in save_shape(shape, out, mesh_format):
         typer.echo(f'wrote {path}')

@@ -8,11 +8,12 @@ in the other photos leaves.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from active_recon.acquisition.background import without_specks
 from active_recon.calibration.board import Board
 from active_recon.errors import DataError
-from active_recon.geometry.cameras import Camera
+from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.photos.cube import Cube
 from active_recon.photos.hull import depth_in_masks, hull, object_box, seen_cells
 from active_recon.photos.views import PhotoView
@@ -146,9 +147,15 @@ def _shown(cells: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
     return np.asarray(cv2.morphologyEx(shown, cv2.MORPH_CLOSE, disc) > 0)
 
 
+@lru_cache(maxsize=1)
+def _optical_rays(lens: Intrinsics) -> NDArray[np.float64]:
+    """Return the rays of a lens in the optical frame, (H, W, 3): photos share their lens."""
+    return Camera(np.eye(4), lens).ray_directions()
+
+
 def _printed(camera: Camera, board: Board) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Return the board's print in [0, 1] as a camera sees it, (H, W), and where it is."""
-    rays = camera.ray_directions()
+    rays = _optical_rays(camera.intrinsics) @ camera.pose[:3, :3].T
     with np.errstate(divide='ignore', invalid='ignore'):
         away = np.where(rays[..., 2] < 0, -camera.position[2] / rays[..., 2], np.nan)
         x = camera.position[0] + away * rays[..., 0]

@@ -8,12 +8,14 @@ from pathlib import Path
 import warnings
 
 from active_recon.calibration.files import in_order, SUFFIXES
-from active_recon.errors import DataError
+from active_recon.errors import ConfigError, DataError
 import numpy as np
 from numpy.typing import NDArray
 from PIL import ExifTags, Image
 
 ENDINGS = (*SUFFIXES, '.webp')
+ORDERS = ('name', 'time')
+"""By their names, 2 before 10, or by when they were taken."""
 LARGEST_SIDE = 2048
 """Pixels a side to which larger photos are reduced: far more than any network's image has."""
 _MOST_PIXELS = 400_000_000
@@ -33,12 +35,14 @@ class PhotoFile:
 
     - size: width and height as stored, pixels; orientation: EXIF's, 1 (as stored) to 8
     - focal: focal length by EXIF, pixels of the photo as stored; None where it says nothing
+    - taken: when, by EXIF, in a form that sorts; '' where it says nothing
     """
 
     path: Path
     size: tuple[int, int]
     orientation: int = 1
     focal: float | None = None
+    taken: str = ''
 
     @property
     def name(self) -> str:
@@ -82,20 +86,48 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
     known: dict[bytes, str] = {}
     for path in paths:
         try:
-            digest = hashlib.sha256(path.read_bytes()).digest()
-            photo = _opened(path)
-        except (DataError, *_UNREADABLE) as error:
-            left_out.append(f'{path.name}: not readable: expected a whole image, got: {error}')
-            continue
-        if digest in known:
-            left_out.append(f'{path.name}: the same photo as {known[digest]}')
-            continue
-        known[digest] = path.name
-        photos.append(photo)
+            photos.append(open_photo(path, known))
+        except DataError as error:
+            left_out.append(str(error))
     if not photos:
         raise DataError('no readable photo: expected at least one, got none'
                         + ''.join(f'; {reason}' for reason in left_out[:3]), 'no_photos')
     return photos, left_out
+
+
+def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
+    """
+    Return the photo of a file, which is noted in `known`: names of photos by their bytes' hash.
+
+    Raises DataError where it cannot be read, or another of `known` has the same bytes.
+    """
+    try:
+        digest = hashlib.sha256(path.read_bytes()).digest()
+        photo = _opened(path)
+    except (DataError, *_UNREADABLE) as error:
+        raise DataError(f'{path.name}: not readable: expected a whole image, got: '
+                        f'{error}') from error
+    if known.setdefault(digest, path.name) != path.name:
+        raise DataError(f'{path.name}: the same photo as {known[digest]}')
+    return photo
+
+
+def in_order_of(order: str, photos: Sequence[PhotoFile]) -> list[PhotoFile]:
+    """
+    Return photos in one of ORDERS; those of the same time stay as they are.
+
+    Raises ConfigError on another order, DataError where EXIF has no time of a photo.
+    """
+    if order not in ORDERS:
+        raise ConfigError(f'order: unknown value: expected one of {", ".join(ORDERS)}, got '
+                          f'{order!r}')
+    if order == 'name':
+        return list(photos)
+    for photo in photos:
+        if not photo.taken:
+            raise DataError(f'{photo.name}: no time: expected when it was taken in EXIF; sort the '
+                            'photos by their names instead', 'no_time')
+    return sorted(photos, key=lambda photo: photo.taken)
 
 
 def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
@@ -133,7 +165,7 @@ def _opened(path: Path) -> PhotoFile:
             exif = Image.Image.getexif(image)  # that of PNG would decode the whole image
             turned = exif.get(ExifTags.Base.Orientation, 1)
             return PhotoFile(path, image.size, turned if turned in _TURNED else 1,
-                             _focal(exif, image.size))
+                             _focal(exif, image.size), _taken(exif))
 
 
 def _focal(exif: Image.Exif, size: tuple[int, int]) -> float | None:
@@ -150,6 +182,14 @@ def _focal(exif: Image.Exif, size: tuple[int, int]) -> float | None:
         return pixels if 0 < pixels < math.inf else None
     except (KeyError, TypeError, ValueError, ZeroDivisionError):
         return None
+
+
+def _taken(exif: Image.Exif) -> str:
+    """Return when a photo was taken, as 'YYYY:MM:DD HH:MM:SS' and parts of a second."""
+    found = exif.get_ifd(ExifTags.IFD.Exif)
+    taken = str(found.get(ExifTags.Base.DateTimeOriginal, '')).strip('\0 ')
+    parts = str(found.get(ExifTags.Base.SubsecTimeOriginal, '')).strip('\0 ')
+    return f'{taken}.{parts}' if taken else ''
 
 
 def _reduced(image: Image.Image) -> Image.Image:

@@ -12,12 +12,12 @@ from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
 from active_recon.photos.cube import Cube, first_cube, upward
 from active_recon.photos.doubts import doubts
-from active_recon.photos.files import open_photos, photo_paths
+from active_recon.photos.files import in_order_of, open_photos, photo_paths
 from active_recon.photos.integrating import carved, even_choice, found_cube, integrate
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import posed_by, Source
 from active_recon.photos.views import load_views, PhotoView, view_of
-from active_recon.reconstructor import load
+from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
 from active_recon.volumes.meshes import axis_direction
 from active_recon.volumes.voxels import VoxelGrid
@@ -39,6 +39,7 @@ class Options:
     - axes: camera axes, one of LOOKS, instead of the format's
     - background: one of BACKGROUNDS; masks: a folder of masks
     - views: how many photos at even steps are used; None: all
+    - order: of the photos, one of ORDERS
     - model: a model that ships by its name, or a weights file; threads: of the CPU
 
     Raises ConfigError on values that contradict each other.
@@ -54,6 +55,7 @@ class Options:
     views: int | None = None
     model: str | Path | None = None
     threads: int | None = 1
+    order: str = 'name'
 
     def __post_init__(self) -> None:
         """Reject what cannot be, before any photo is read."""
@@ -78,7 +80,7 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
                 *, background: str = 'auto', masks: Path | str | None = None,
                 box: Sequence[float] | None = None, unit: float = 1.0, up: str | None = None,
                 views: int | None = None, model: str | Path | None = None,
-                threads: int | None = 1) -> Shape:
+                threads: int | None = 1, order: str = 'name') -> Shape:
     """
     Reconstruct an object from photos of known cameras.
 
@@ -90,7 +92,7 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
     is as in `Options`. Raises ActiveReconError where no photo can be used.
     """
     options = Options(box, unit, size, up, None, background, None if masks is None else
-                      Path(masks), views, model, threads)
+                      Path(masks), views, model, threads, order)
     if isinstance(cameras, str):
         cameras = Path(cameras)
     if cameras is not None and not isinstance(cameras, Source):
@@ -116,6 +118,7 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
     Raises ActiveReconError where no photo can be used.
     """
     photos, left_out = open_photos(photo_paths(place))
+    photos = in_order_of(options.order, photos)
     file, posed, unposed = posed_by(source, photos, options.axes, reporting)
     chosen = even_choice(posed, options.views or len(posed))
     with reporting('reading the photos', len(chosen)) as advance:
@@ -124,9 +127,14 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
 
 
 def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = _DEFAULTS,
-               left_out: Sequence[str] = (), reporting: Reporting = silent) -> Shape:
-    """Reconstruct from photos in memory, whose cameras are of `file`'s world."""
-    reconstructor = load(options.model, threads=options.threads)
+               left_out: Sequence[str] = (), reporting: Reporting = silent,
+               reconstructor: Reconstructor | None = None) -> Shape:
+    """
+    Reconstruct from photos in memory, whose cameras are of `file`'s world.
+
+    `reconstructor` is one of the options' model that is already loaded; None: it is loaded here.
+    """
+    reconstructor = reconstructor or load(options.model, threads=options.threads)
     poses = [view.camera for view in views]
     up = axis_direction(options.up) if options.up else file.up
     cube = _told_cube(options, file, upward(poses) if up is None else up)

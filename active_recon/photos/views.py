@@ -1,7 +1,7 @@
 """Photos in memory: pixels, mask and camera of each, in the world of the camera file."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from active_recon.errors import DataError
@@ -77,6 +77,12 @@ def view_of(name: str, image: NDArray[np.uint8], camera: Camera) -> PhotoView:
     if not (alpha > 127).any():
         raise DataError(f'{name}: empty: expected an object in its alpha channel, got none')
     return PhotoView(name, image, camera, alpha > 127, 'alpha')
+
+
+def with_camera(view: PhotoView, posed: PosedPhoto) -> PhotoView:
+    """Return the view of a photo whose camera has become known better."""
+    height, width = view.image.shape[:2]
+    return replace(view, camera=Camera(posed.pose, _reduced(posed.intrinsics, width, height)))
 
 
 def _view(posed: PosedPhoto, masks: dict[str, Path]) -> PhotoView:

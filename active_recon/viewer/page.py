@@ -12,6 +12,7 @@ from active_recon.viewer.address import HOST
 from active_recon.viewer.scene import Scene
 from active_recon.viewer.state import entropy_lines, LoopState
 import numpy as np
+from numpy.typing import NDArray
 import rich
 from viser import ClientHandle, uplot, ViserServer
 
@@ -46,10 +47,12 @@ class Page:
     A page on 127.0.0.1 that shows the state of the loop.
 
     All methods are to be called from one thread. `object_size` is the side of the voxel grid in
-    metres. Where the port is in use the page is served at the next free one, see `url`.
+    metres; `has_front`: whether +x of the object frame is called its front. Where the port is in
+    use the page is served at the next free one, see `url`.
     """
 
-    def __init__(self, title: str, object_size: float = 1.0, port: int = 0) -> None:
+    def __init__(self, title: str, object_size: float = 1.0, port: int = 0,
+                 has_front: bool = True) -> None:
         if not 0 <= port <= HIGHEST_PORT:
             raise ConfigError(f'port: out of range: expected 0 (any) to {HIGHEST_PORT}, '
                               f'got {port}')
@@ -66,8 +69,9 @@ class Page:
         self._server.initial_camera.position = _LOOK_FROM
         self._server.initial_camera.look_at = _LOOK_AT
         self._server.on_client_connect(_zoom_out_in_narrow_window)
-        self._scene = Scene(self._server.scene, object_size)
+        self._scene = Scene(self._server.scene, object_size, has_front)
         self._text = self._server.gui.add_markdown('')
+        self._picture: Any = self._server.gui.add_image(_NO_IMAGE, visible=False)
         self._controls = self._server.gui.add_folder('Controls')
         self._build_figures()
         self._buttons: dict[str, Any] = {}
@@ -134,6 +138,12 @@ class Page:
             self._shown_text = lines
             first, *rest = lines
             self._text.content = '\n\n'.join([f'**{first}**', *rest])
+
+    def set_picture(self, image: NDArray[np.uint8] | None) -> None:
+        """Show a picture, (H, W, 3) uint8 RGB, below the text; None: no picture."""
+        self._picture.visible = image is not None
+        if image is not None:
+            self._picture.image = image
 
     @property
     def in_colors(self) -> bool:

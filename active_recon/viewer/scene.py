@@ -36,7 +36,7 @@ _GAP = 0.93  # of a cell: the gaps make single voxels visible
 class Scene:
     """The viser scene of a state; only what has changed since the last is sent."""
 
-    def __init__(self, scene: SceneApi, object_size: float) -> None:
+    def __init__(self, scene: SceneApi, object_size: float, has_front: bool = True) -> None:
         self._scene = scene
         self._size = object_size
         self._shown = LoopState()
@@ -53,8 +53,9 @@ class Scene:
                                    ground_color=(176, 182, 196), intensity=1.3)
         scene.add_cylinder('/turntable', 0.78, 0.02, (226, 229, 236), radial_segments=64,
                            position=(0, 0, _FLOOR - 0.015), cast_shadow=False)
-        scene.add_label('/front', 'front', position=(0.88, 0, _FLOOR), anchor='center-center',
-                        font_screen_scale=0.8)
+        if has_front:
+            scene.add_label('/front', 'front', position=(0.88, 0, _FLOOR), anchor='center-center',
+                            font_screen_scale=0.8)
 
     def set_object_size(self, object_size: float) -> None:
         """Clear the scene and set the side of the voxel grid, metres."""

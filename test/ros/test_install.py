@@ -12,6 +12,7 @@ import sys
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
+from PIL import Image as Picture
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.ros
 
 ROOT = Path(__file__).parents[2]
 COLCON = Path(sys.prefix, 'colcon')  # where `make test` puts it
-NODES = {'reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer'}
+NODES = {'camera', 'reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer'}
 PUBLISHED = {f'/diagnostics of /{node}' for node in NODES} | {'/episode', '/camera/image_raw'}
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 START_BUDGET_S, STOP_BUDGET_S = 180.0, 60.0  # of a second or two on an idle machine
@@ -97,7 +98,7 @@ def test_ament_index_finds_the_package(install, tmp_path):
     assert Path(found.strip()) == install.prefix
 
 
-def test_executables_are_the_five_nodes_and_the_command(install):
+def test_executables_are_the_six_nodes_and_the_command(install):
     assert {path.name for path in install.executables.iterdir()} == NODES | {'active-recon'}
     assert all(os.access(path, os.X_OK) for path in install.executables.iterdir())
 
@@ -116,7 +117,9 @@ def test_every_executable_publishes_and_ends_when_asked(
         install, ros_domain, tmp_path, monkeypatch):
     mesh = tmp_path / 'box.ply'
     trimesh.creation.box().export(mesh)
-    parameters = {'turntable_camera': f'mesh:={mesh}', 'recorder': f'output_dir:={tmp_path}/bags',
+    Picture.new('RGB', (64, 48)).save(tmp_path / 'image.png')
+    parameters = {'camera': f'source:={tmp_path}', 'turntable_camera': f'mesh:={mesh}',
+                  'recorder': f'output_dir:={tmp_path}/bags',
                   'reconstructor': f'output_dir:={tmp_path}'}
     private = {'ROS_DOMAIN_ID': str(ros_domain),
                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_LOG_DIR': str(tmp_path)}

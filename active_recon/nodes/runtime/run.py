@@ -31,7 +31,9 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
     With `--help` the executable prints what the node does and its parameters, and no node starts.
     """
     if is_help_wanted(sys.argv[1:] if args is None else args):
-        sys.stdout.write(usage(Path(sys.argv[0]).stem) + '\n')
+        program = Path(sys.argv[0])
+        name = program.parent.name if program.stem == '__main__' else program.stem
+        sys.stdout.write(usage(name) + '\n')
         return
     run_nodes(lambda: [make_node], args)
 

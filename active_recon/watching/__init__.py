@@ -1,0 +1,1 @@
+"""Photos that arrive one after the other: the shape so far, and where to stand next."""

@@ -1,0 +1,69 @@
+"""Where the next photo of a shape should be taken from, and whether there are enough."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from active_recon.acquisition.goals import Goal
+from active_recon.models.weights_files import find_weights
+from active_recon.photos.shape import Shape
+from active_recon.planner import Planner
+from active_recon.policies import AUTO_POLICY, load_policy, PolicyOptions
+from active_recon.policies.reasons import GoalReason
+from active_recon.policies.stopping import StoppingRule
+import numpy as np
+
+ELEVATIONS = (math.radians(20), math.radians(60))
+"""Between which photos are asked for, radians: from lower, a board can hardly be read."""
+ENOUGH: Mapping[str, str] = {
+    'target_reached': 'the quality that was asked for is promised',
+    'max_views': 'there are as many photos as were planned',
+    'target_out_of_reach': 'further photos will not bring the quality that was asked for',
+    'entropy_settled': 'the last photos hardly changed the shape',
+    'gain_too_small': 'no further photo is expected to gain much',
+    'no_reachable_azimuth': 'there is no place left'}
+"""Why there are photos enough, by the planner's reason."""
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """
+    The best next view, though there may be enough.
+
+    - goal: in the object frame, metres; why: what it would show
+    - done: why there are photos enough, a key of ENOUGH; '' while there are not
+    """
+
+    goal: Goal
+    why: GoalReason | None
+    done: str = ''
+
+
+class Adviser:
+    """Plans the next photo by the view policy of a model's weights, or by an even sweep."""
+
+    def __init__(self, stopping: StoppingRule, model: str | Path | None = None,
+                 threads: int | None = 1) -> None:
+        self._stopping = stopping
+        self._policy = load_policy(AUTO_POLICY, PolicyOptions(
+            views=stopping.max_views, weights=find_weights(model), threads=threads))
+
+    def advice(self, shape: Shape) -> Advice:
+        """
+        Return the advice after all photos of a shape.
+
+        Candidates stand on a dome as far away as the photos were, by their median.
+        """
+        rule = self._stopping
+        planner = Planner(
+            self._policy, rule.max_views, rule.entropy_tolerance,
+            distance=float(np.median([view.camera.distance for view in shape.views])),
+            elevation_range=ELEVATIONS, target_quality=rule.target_quality,
+            min_gain=rule.min_gain)
+        done = ''
+        for view in shape.views:
+            known = view.known
+            done = planner.add_view(known.latent, view.camera, known.grid.entropy(), known.grid,
+                                    known.quality).reason
+        return Advice(planner.plan(), planner.reason(), done)

@@ -1,0 +1,72 @@
+"""Photos that arrive in a folder, once each of them is whole."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from active_recon.calibration.files import in_order
+from active_recon.errors import DataError
+from active_recon.photos.files import ENDINGS
+
+SETTLED_S = 0.8
+"""A file is whole once it has not changed for so long, seconds."""
+
+
+@dataclass
+class _Seen:
+    size: int
+    changed: int  # nanoseconds, by the file system
+    since: float
+    told: bool = False
+
+
+class Arrivals:
+    """
+    Tells which photos of a folder have come, changed or gone.
+
+    Hidden files and those of other endings, as which programs that synchronise folders keep what
+    is not whole yet, are no photos. Raises DataError where there is no such folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        if not folder.is_dir():
+            raise DataError(f'{folder}: no such folder: expected one where photos will arrive',
+                            'no_photos')
+        self._folder = folder
+        self._known: dict[Path, _Seen] = {}
+
+    def gone(self) -> list[Path]:
+        """Return photos that were told of and are no longer as they were."""
+        there = dict(self._files())
+        gone = [path for path, seen in self._known.items() if seen.told
+                and there.get(path) != (seen.size, seen.changed)]
+        for path in gone:
+            del self._known[path]
+        return gone
+
+    def arrived(self, now: float) -> list[Path]:
+        """
+        Return the photos that have become whole, the oldest first, 2 before 10 of the same age.
+
+        `now` is any clock in seconds, the same at each call.
+        """
+        whole = []
+        for path, (size, changed) in self._files():
+            seen = self._known.get(path)
+            if seen is None or (seen.size, seen.changed) != (size, changed):
+                self._known[path] = _Seen(size, changed, now)
+            elif not seen.told and size and now - seen.since >= SETTLED_S:
+                seen.told = True
+                whole.append(path)
+        return sorted(whole, key=lambda path: (self._known[path].changed, in_order(path)))
+
+    def _files(self) -> Iterator[tuple[Path, tuple[int, int]]]:
+        """Yield each photo with its size and the time of its last change."""
+        for path in self._folder.iterdir():
+            if path.suffix.lower() not in ENDINGS or path.name.startswith(('.', '~')):
+                continue
+            try:
+                status = path.stat()
+            except OSError:  # gone since
+                continue
+            yield path, (status.st_size, status.st_mtime_ns)

@@ -1,0 +1,142 @@
+"""The photos that came so far, each read and searched once, and the shape made of them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from active_recon.errors import ActiveReconError, ConfigError, DataError
+from active_recon.photos.board_photos import (
+    FEWEST,
+    posed_on_board,
+    seen_board,
+    SeenPhoto,
+)
+from active_recon.photos.camera_file import CameraFile, PosedPhoto
+from active_recon.photos.files import open_photo, PhotoFile
+from active_recon.photos.reconstruct import from_views, Options
+from active_recon.photos.shape import Shape
+from active_recon.photos.sources import BoardCameras, posed_by, Source, TurntableCameras
+from active_recon.photos.views import load_views, PhotoView, with_camera
+from active_recon.reconstructor import load
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A photo, and what was seen of the board in it, where a board poses the photos."""
+
+    photo: PhotoFile
+    seen: SeenPhoto | None
+
+
+class Collection:
+    """
+    Photos that arrive one after the other, and the shape of all of them.
+
+    It is the shape that `from_files` makes of the same photos in the order of their arrival.
+
+    - shape: None while there are too few photos for one; `waiting` then says what is missing
+    - metric: whether lengths are in metres for certain
+
+    Raises ConfigError for a source that cannot pose a photo by itself.
+    """
+
+    def __init__(self, source: Source | None, options: Options) -> None:
+        if isinstance(source, TurntableCameras):
+            raise ConfigError('photos that arrive cannot be those of a turntable, whose order '
+                              'tells their cameras: expected a board or a file of cameras')
+        self._source = source
+        self._options = options
+        self._reconstructor = load(options.model, threads=options.threads)
+        self._kept: dict[Path, _Kept] = {}
+        self._views: dict[Path, PhotoView] = {}
+        self._digests: dict[bytes, str] = {}
+        self.shape: Shape | None = None
+        self.metric = False
+        self.waiting = 'no photo yet'
+
+    @property
+    def board(self) -> BoardCameras | None:
+        """The board that poses the photos, if one does."""
+        return self._source if isinstance(self._source, BoardCameras) else None
+
+    def add(self, path: Path) -> str:
+        """Take in a photo; return why it is left out, in one line, '' where it is used."""
+        digests = dict(self._digests)
+        try:
+            photo = open_photo(path, self._digests)
+            seen = None if self.board is None else seen_board(photo, self.board.board)
+        except DataError as error:
+            self._digests = digests
+            return str(error)
+        self._kept[path] = _Kept(photo, seen)
+        had_shape = self.shape is not None
+        try:
+            self._update()
+        except ActiveReconError as error:
+            if not had_shape:
+                self.waiting = self._missing(error)
+                return ''
+            self._digests = digests
+            self._forget(path)  # the shape is still that of the others
+            return f'{path.name}: {error}'
+        assert self.shape is not None
+        return next((reason for reason in self.shape.left_out
+                     if reason.startswith(f'{path.name}: ')), '')
+
+    def remove(self, path: Path) -> None:
+        """Leave out a photo that is gone; the shape becomes that of the others."""
+        if path not in self._kept:
+            return
+        self._forget(path)
+        self._digests = {digest: name for digest, name in self._digests.items()
+                         if name != path.name}
+        try:
+            self._update()
+        except ActiveReconError as error:
+            self.shape, self.waiting = None, self._missing(error)
+
+    def _forget(self, path: Path) -> None:
+        self._kept.pop(path, None)
+        self._views.pop(path, None)
+
+    def _update(self) -> None:
+        """Make the shape of all photos; raises ActiveReconError, and then it stays as it was."""
+        if not self._kept:
+            raise DataError('no photo yet')
+        file, posed, left_out = self._posed()
+        views, unread = [], []
+        for each in posed:
+            try:
+                views.append(self._view(each))
+            except DataError as error:
+                unread.append(str(error))
+        if not views:
+            raise DataError(unread[0])
+        self.shape = from_views(views, file, self._options, [*left_out, *unread],
+                                reconstructor=self._reconstructor)
+        self.metric, self.waiting = file.metric, ''
+
+    def _posed(self) -> tuple[CameraFile, list[PosedPhoto], list[str]]:
+        if self.board is None:
+            photos = [kept.photo for kept in self._kept.values()]
+            return posed_by(self._source, photos, self._options.axes)
+        seen = [kept.seen for kept in self._kept.values() if kept.seen is not None]
+        return posed_on_board(seen, self.board.board, self.board.lens_file)
+
+    def _view(self, posed: PosedPhoto) -> PhotoView:
+        """Return the view of a posed photo, whose pixels are read once."""
+        path = posed.photo.path
+        if path in self._views:
+            return with_camera(self._views[path], posed)
+        views, _ = load_views([posed], self._options.masks)
+        self._views[path] = views[0]
+        return views[0]
+
+    def _missing(self, error: ActiveReconError) -> str:
+        """Return what is missing for a shape, in one line."""
+        count = len(self._kept)
+        if 0 < count < FEWEST and error.kind == 'too_few_images':
+            return (f'{count} photo{"s" if count > 1 else ""} with the board: the lens is '
+                    'estimated from three, taken from different sides')
+        if count and error.kind == 'no_cube':
+            return f'no object found yet: {error}'
+        return str(error)

@@ -1,0 +1,230 @@
+"""
+The server of the upload page: it puts photos of a phone into the watched folder.
+
+It answers only below a random word that is new in every run, and only clients of the same machine
+or network. What a client sends is never a path, and only whole JPEG and PNG files are kept.
+"""
+
+import base64
+from collections.abc import Callable
+import hmac
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+import io
+import ipaddress
+import json
+import os
+from pathlib import Path
+import secrets
+import socket
+import threading
+from typing import Any
+import warnings
+
+from active_recon.errors import ConfigError
+from active_recon.viewer.address import HOST
+from active_recon.watching.upload_page import PAGE
+from active_recon.watching.watcher import Progress, Verdicts
+import cv2
+from PIL import Image
+
+LARGEST_UPLOAD = 30_000_000
+"""Bytes of a photo."""
+_SUFFIXES = {'JPEG': '.jpg', 'PNG': '.png'}
+_AT_ONCE = 4
+_ANSWER_S = 60.0
+_LOOK_S = 0.1  # how often it is looked whether to stop
+_IDLE_S = 30.0  # after which a client that sends nothing is left
+_CHUNK = 1 << 16
+_HEIC = b'ftyp'  # in bytes 4 to 8, also of AVIF and films
+
+
+class UploadServer(ThreadingHTTPServer):
+    """
+    A page on which photos are uploaded, in a thread of its own; `url` is its address.
+
+    `folder` gets the photos, under names of the server's own. `progress` is asked for what is
+    known, `verdicts` for what became of a photo. `host` is an address of this machine; port 0:
+    any. Raises ConfigError where it cannot be served there.
+    """
+
+    daemon_threads = True
+
+    def __init__(self, folder: Path, progress: Callable[[], Progress], verdicts: Verdicts,
+                 host: str = HOST, port: int = 0) -> None:
+        try:
+            super().__init__((host, port), _Handler)
+        except OSError as error:
+            raise ConfigError(f'upload page: cannot be served at {host}:{port}: '
+                              f'{error.strerror}') from error
+        self.token = secrets.token_urlsafe(16)
+        self.url = f'http://{host}:{self.server_address[1]}/{self.token}/'
+        self.progress, self.verdicts = progress, verdicts
+        self.open_uploads = threading.BoundedSemaphore(_AT_ONCE)
+        self._folder = folder
+        self._naming = threading.Lock()
+        threading.Thread(target=self.serve_forever, args=(_LOOK_S,), daemon=True).start()
+
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        """Return whether a client is on this machine or in a private network."""
+        return ipaddress.ip_address(client_address[0]).is_private
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Let a client go whose connection broke."""
+
+    def keep(self, photo: bytes, suffix: str) -> str:
+        """Write a photo under a new name, whole or not at all; return the name."""
+        with self._naming:
+            number = 1
+            while any((self._folder / f'phone-{number:04}{each}').exists()
+                      for each in _SUFFIXES.values()):
+                number += 1
+            name = f'phone-{number:04}{suffix}'
+            begun = self._folder / f'.{name}.part'
+            begun.write_bytes(photo)
+            os.replace(begun, self._folder / name)
+        return name
+
+    def close(self) -> None:
+        """Stop serving."""
+        self.shutdown()
+        self.server_close()
+
+
+def lan_address() -> str:
+    """Return this machine's address in the local network; raises ConfigError without one."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(('10.255.255.255', 9))  # sends nothing, but chooses an interface
+            found = str(probe.getsockname()[0])
+        except OSError:
+            found = HOST
+    address = ipaddress.ip_address(found)
+    if address.is_loopback or not address.is_private:
+        raise ConfigError(f'--lan: no local network: expected a private address, got {found}')
+    return found
+
+
+def refusal(photo: bytes) -> str:
+    """Return why bytes are no photo that can be used, in one line; '' where they are one."""
+    if photo[4:8] == _HEIC:
+        return ('HEIC photos cannot be read: let the camera take JPEG (on an iPhone: Settings, '
+                'Camera, Formats, Most Compatible)')
+    return '' if _format(photo) else 'not a photo: expected JPEG or PNG'
+
+
+def _format(photo: bytes) -> str:
+    """Return the format by the content, '' where it is none of those allowed."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore', Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(photo), formats=tuple(_SUFFIXES)) as image:
+                return str(image.format)
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        return ''
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """One connection."""
+
+    server: UploadServer
+    server_version, sys_version = 'active_recon', ''
+    timeout = _IDLE_S
+
+    def do_GET(self) -> None:
+        """Answer with the page, or with what is known."""
+        place = self._place()
+        if place == '':
+            nonce = secrets.token_urlsafe(12)
+            self._answer(HTTPStatus.OK, PAGE.replace('NONCE', nonce)
+                         .replace('LARGEST', str(LARGEST_UPLOAD)).encode(), 'text/html', nonce)
+        elif place == 'state':
+            self._tell(HTTPStatus.OK, _known(self.server.progress()))
+        else:
+            self._tell(HTTPStatus.NOT_FOUND, {'verdict': 'nothing here'})
+
+    def do_POST(self) -> None:
+        """Take a photo in, and answer with what became of it and where to stand next."""
+        self.close_connection = True
+        if self._place() != 'photo':
+            self._tell(HTTPStatus.NOT_FOUND, {'verdict': 'nothing here'})
+            return
+        length = self.headers.get('Content-Length', '')
+        if not length.isascii() or not length.isdigit():
+            self._tell(HTTPStatus.LENGTH_REQUIRED, {'verdict': 'Refused: no length given'})
+            return
+        if int(length[:20]) > LARGEST_UPLOAD:
+            self._tell(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, {'verdict':
+                       f'Refused: expected at most {LARGEST_UPLOAD / 1e6:.0f} MB'})
+            return
+        if not self.server.open_uploads.acquire(blocking=False):
+            self._tell(HTTPStatus.SERVICE_UNAVAILABLE,
+                       {'verdict': 'Busy with other photos: try again'})
+            return
+        try:
+            self._take(self._read(int(length)), int(length))
+        finally:
+            self.server.open_uploads.release()
+
+    def _read(self, length: int) -> bytes:
+        """Return up to so many bytes, fewer where the client ends before."""
+        parts = []
+        while length and (part := self.rfile.read(min(length, _CHUNK))):
+            parts.append(part)
+            length -= len(part)
+        return b''.join(parts)
+
+    def _take(self, photo: bytes, length: int) -> None:
+        if len(photo) < length:
+            self._tell(HTTPStatus.BAD_REQUEST, {'verdict': 'Refused: the photo is not whole'})
+            return
+        refused = refusal(photo)
+        if refused:
+            self._tell(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, {'verdict': f'Refused: {refused}'})
+            return
+        try:
+            name = self.server.keep(photo, _SUFFIXES[_format(photo)])
+        except OSError as error:
+            self._tell(HTTPStatus.INSUFFICIENT_STORAGE,
+                       {'verdict': f'Not kept: {error.strerror}'})
+            return
+        left_out = self.server.verdicts.wait(name, _ANSWER_S)
+        verdict = ('Received; it is still being worked on' if left_out is None else
+                   f'Left out: {left_out}' if left_out else f'Taken in as {name}.')
+        self._tell(HTTPStatus.OK, {'verdict': verdict, **_known(self.server.progress())})
+
+    def _place(self) -> str | None:
+        """Return what of the path is below the token; None where that is wrong."""
+        parts = self.path.split('/', 2)
+        token, place = parts[1:] if len(parts) == 3 else ('', '')
+        # In a time that does not depend on where they differ
+        right = hmac.compare_digest(token.encode(errors='replace'), self.server.token.encode())
+        return place if right else None
+
+    def _tell(self, status: HTTPStatus, content: dict[str, Any]) -> None:
+        self._answer(status, json.dumps(content).encode(), 'application/json')
+
+    def _answer(self, status: HTTPStatus, body: bytes, kind: str, nonce: str = '') -> None:
+        self.send_response(status)
+        allowed = (f"script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; "
+                   'img-src data:; ' if nonce else '')
+        for name, value in (
+                ('Content-Type', f'{kind}; charset=utf-8'), ('Content-Length', str(len(body))),
+                ('Cache-Control', 'no-store'), ('Referrer-Policy', 'no-referrer'),
+                ('X-Content-Type-Options', 'nosniff'), ('X-Frame-Options', 'DENY'),
+                ('Content-Security-Policy', f"{allowed}default-src 'none'; base-uri 'none'")):
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, *words: Any) -> None:
+        """Log nothing: the terminal belongs to the photos, and the address is a secret."""
+
+
+def _known(progress: Progress) -> dict[str, Any]:
+    """Return the progress for the page: lines, and the sketch as a data URL, or None."""
+    drawn = None
+    if progress.sketch is not None:
+        _, png = cv2.imencode('.png', progress.sketch[..., ::-1])
+        drawn = f'data:image/png;base64,{base64.b64encode(png.tobytes()).decode()}'
+    return {'lines': list(progress.lines), 'sketch': drawn}

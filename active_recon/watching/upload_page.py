@@ -1,0 +1,78 @@
+"""The page that a phone opens to send photos: one file without any other."""
+
+PAGE = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>active_recon, photos</title>
+<style nonce="NONCE">
+:root { color-scheme: light dark; }
+body { font: 17px/1.45 system-ui, sans-serif; margin: 0 auto; max-width: 30rem; padding: 1rem; }
+label { background: #2563a8; border-radius: .6rem; color: #fff; display: block; padding: 1rem;
+        text-align: center; }
+label:focus-within { outline: 3px solid #fac400; }
+input { height: 1px; opacity: 0; position: absolute; width: 1px; }
+img { background: #fcfcfc; border-radius: .6rem; display: block; margin: 1rem auto;
+      max-width: 100%; }
+#verdict { min-height: 1.5em; }
+#lines p:first-child { font-weight: 600; }
+[hidden] { display: none; }
+</style>
+<label>Take a photo<input id="photo" type="file" accept="image/*" capture="environment"></label>
+<p id="verdict" role="status"></p>
+<div id="lines"></div>
+<img id="sketch" alt="From above: the board, the photos taken, and in yellow the next one" hidden>
+<script nonce="NONCE">
+const field = (name) => document.getElementById(name);
+const say = (words) => { field('verdict').textContent = words; };
+let busy = false, shown = '';
+const show = (state) => {
+  const text = JSON.stringify(state);
+  if (text === shown) return;
+  shown = text;
+  field('lines').replaceChildren(...state.lines.map((line) => {
+    const words = document.createElement('p');
+    words.textContent = line;
+    return words;
+  }));
+  field('sketch').hidden = !state.sketch;
+  if (state.sketch) field('sketch').src = state.sketch;
+};
+field('photo').addEventListener('change', async () => {
+  const file = field('photo').files[0];
+  if (!file) return;
+  if (file.size > LARGEST) {
+    say('Not sent: expected at most ' + LARGEST / 1e6 + ' MB');
+    return;
+  }
+  busy = true;
+  say('Sending the photo …');
+  try {
+    const answer = await fetch('photo', {method: 'POST', body: file});
+    const told = await answer.json();
+    say(told.verdict);
+    if (told.lines) show({lines: told.lines, sketch: told.sketch});
+  } catch (error) {
+    say('Not sent: is the computer still in this network?');
+  }
+  field('photo').value = '';
+  busy = false;
+});
+const look = async () => {
+  if (busy) return;
+  try {
+    show(await (await fetch('state')).json());
+  } catch (error) {
+    say('The computer does not answer.');
+  }
+};
+setInterval(look, 3000);
+look();
+</script>
+</html>
+"""
+"""
+HTML in which NONCE stands for a random word of each answer, LARGEST for the bytes of a photo.
+
+The names of files are not sent.
+"""

@@ -1,0 +1,150 @@
+"""The loop over photos that arrive: each is taken in, and it is told where the next one stands."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+import threading
+
+from active_recon.errors import DataError
+from active_recon.photos.shape import Shape
+from active_recon.watching.advice import Advice, Adviser, ENOUGH
+from active_recon.watching.arrivals import Arrivals
+from active_recon.watching.collection import Collection
+from active_recon.watching.directions import where_to_stand
+from active_recon.watching.sketch import sketch
+import numpy as np
+from numpy.typing import NDArray
+
+_SHOWN_LEFT_OUT = 5  # on the page; the terminal has them all
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """
+    What is known after the photos so far.
+
+    - lines: in words, the most important one first; enough: whether a photo is asked for no more
+    - shape, advice: None while there is none; sketch: see `sketch`, None likewise
+    """
+
+    lines: Sequence[str] = ('Waiting for the first photo.',)
+    shape: Shape | None = None
+    advice: Advice | None = None
+    sketch: NDArray[np.uint8] | None = None
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are photos enough."""
+        return self.advice is not None and bool(self.advice.done)
+
+
+@dataclass(eq=False)
+class Verdicts:
+    """What became of photos, by their names, for threads that wait for it."""
+
+    _known: dict[str, str] = field(default_factory=dict)
+    _changed: threading.Condition = field(default_factory=threading.Condition)
+
+    def put(self, name: str, left_out: str) -> None:
+        """Tell why a photo was left out; '' where it was not."""
+        with self._changed:
+            self._known[name] = left_out
+            self._changed.notify_all()
+
+    def wait(self, name: str, seconds: float) -> str | None:
+        """Return why a photo was left out, '' where it was not; None if that is not known yet."""
+        with self._changed:
+            self._changed.wait_for(lambda: name in self._known, seconds)
+            return self._known.get(name)
+
+
+class Watcher:
+    """
+    Takes photos in as they arrive in a folder; call `step` repeatedly, from one thread.
+
+    `say` gets what happened, line by line. Other threads may read `progress`, which is replaced
+    and never changed, and wait for `verdicts`.
+    """
+
+    def __init__(self, folder: Path, collection: Collection, adviser: Adviser,
+                 say: Callable[[str], None]) -> None:
+        self._arrivals = Arrivals(folder)
+        self._collection = collection
+        self._adviser = adviser
+        self._say = say
+        self._queue: list[Path] = []
+        self._left_out: dict[str, str] = {}
+        self.progress = Progress()
+        self.verdicts = Verdicts()
+
+    def step(self, now: float) -> bool:
+        """
+        Take in what has changed in the folder, at most one photo; return whether it was anything.
+
+        `now` is any clock in seconds.
+        """
+        gone = self._arrivals.gone()
+        for path in gone:
+            self._left_out.pop(path.name, None)
+            self._collection.remove(path)
+            self._say(f'{path.name}: gone from the folder')
+        self._queue = [path for path in (*self._queue, *self._arrivals.arrived(now))
+                       if path not in gone]
+        if not self._queue:
+            if gone:
+                self._tell()
+            return bool(gone)
+        path = self._queue.pop(0)
+        left_out = self._collection.add(path)
+        if left_out:
+            self._left_out[path.name] = left_out
+            self._say(f'left out: {left_out}')
+        else:
+            self._say(f'{path.name}: taken in')
+        self._tell()
+        self.verdicts.put(path.name, left_out)
+        return True
+
+    def result(self) -> Shape:
+        """Return the shape of all photos so far; raises DataError where there is none."""
+        shape = self._collection.shape
+        if shape is None:
+            raise DataError(f'no shape: expected photos of an object, got: '
+                            f'{self._collection.waiting}', 'no_photos')
+        return replace(shape, left_out=self._all_left_out(shape))
+
+    def _all_left_out(self, shape: Shape | None) -> list[str]:
+        own = list(self._left_out.values())
+        return [*own, *(reason for reason in (() if shape is None else shape.left_out)
+                        if reason not in own)]
+
+    def _tell(self) -> None:
+        """Say where to stand next, and show it."""
+        shape = self._collection.shape
+        out = [f'Left out: {reason}' for reason in self._all_left_out(shape)[-_SHOWN_LEFT_OUT:]]
+        if shape is None:
+            waiting = self._collection.waiting
+            self.progress = Progress([f'{waiting[0].upper()}{waiting[1:]}.', *out])
+            self._say(self.progress.lines[0])
+            return
+        advice = self._adviser.advice(shape)
+        lines = told(shape, advice, self._collection.metric)
+        for line in lines[:2]:
+            self._say(line)
+        board = self._collection.board
+        self.progress = Progress(
+            [*lines, *out], shape, advice,
+            sketch(shape, advice.goal.camera, None if board is None else board.board))
+
+
+def told(shape: Shape, advice: Advice, metric: bool) -> list[str]:
+    """Return in words where the next photo stands or why there are enough, and how good it is."""
+    way = where_to_stand(advice.goal.camera, shape.views[-1].camera, metric)
+    lines = ([f'Enough photos: {ENOUGH[advice.done]}. Another one would stand {way}.']
+             if advice.done else [f'Next: {way}.'])
+    count = len(shape.views)
+    quality = '' if shape.quality is None else f'; {shape.quality.summary}'
+    lines.append(f'{count} photo{"s" if count > 1 else ""}{quality}.')
+    if advice.goal.gain is not None:
+        lines.append(f'The next photo is expected to gain {advice.goal.gain:.3f} of IoU.')
+    return [*lines, *(f'Warning: {warning}' for warning in shape.warnings)]

@@ -1,0 +1,35 @@
+"""The upload page in a real browser: a photo is chosen, sent, and answered."""
+
+import threading
+
+from active_recon.watching.upload import UploadServer
+from active_recon.watching.watcher import Progress, Verdicts
+import numpy as np
+from PIL import Image
+import pytest
+
+pytestmark = pytest.mark.browser
+PHONE = (390, 844)
+
+
+def test_a_phone_sends_a_photo_and_is_told_where_to_stand(chromium, tmp_path):
+    folder = tmp_path / 'photos'
+    folder.mkdir()
+    Image.new('RGB', (40, 30), (9, 99, 199)).save(tmp_path / 'mine.jpg')
+    verdicts, now = Verdicts(), [Progress()]
+    server = UploadServer(folder, lambda: now[0], verdicts)
+    try:
+        chromium.open(server.url, PHONE)
+        chromium.until(lambda: 'Waiting for the first photo.' in chromium.text(), 'the state')
+        chromium.driver.find_element('id', 'photo').send_keys(str(tmp_path / 'mine.jpg'))
+        chromium.until(lambda: list(folder.glob('phone-*.jpg')), 'the photo')
+        now[0] = Progress(['Next: <b>half</b> a turn.'], sketch=np.zeros((9, 9, 3), np.uint8))
+        threading.Timer(0.1, verdicts.put, ('phone-0001.jpg', '')).start()
+        chromium.until(lambda: 'Taken in as phone-0001.jpg.' in chromium.text(), 'the verdict')
+        assert 'Next: <b>half</b> a turn.' in chromium.text()  # words, never markup
+        sketch = chromium.driver.find_element('id', 'sketch')
+        chromium.until(lambda: sketch.get_property('naturalWidth') == 9, 'the sketch')
+        assert chromium.run('return document.documentElement.scrollWidth') <= PHONE[0]
+        assert not chromium.errors()
+    finally:
+        server.close()

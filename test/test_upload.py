@@ -1,0 +1,194 @@
+"""The upload page: only who has its address may send photos, and only photos are kept."""
+
+import http.client
+import ipaddress
+import json
+import socket
+import threading
+
+from active_recon.errors import ConfigError
+from active_recon.watching import upload as room
+from active_recon.watching.upload import lan_address, LARGEST_UPLOAD, refusal, UploadServer
+from active_recon.watching.watcher import Progress, Verdicts
+import numpy as np
+from PIL import Image
+import pytest
+
+
+def encoded(kind, folder):
+    path = folder / f'made.{kind}'
+    Image.fromarray(np.arange(1200, dtype=np.uint16).astype(np.uint8).reshape(20, 20, 3)).save(
+        path, kind)
+    data = path.read_bytes()
+    path.unlink()
+    return data
+
+
+@pytest.fixture
+def verdicts():
+    return Verdicts()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / 'photos').mkdir()
+    return tmp_path / 'photos'
+
+
+@pytest.fixture
+def server(folder, verdicts, monkeypatch):
+    monkeypatch.setattr(room, '_ANSWER_S', 0.05)
+    progress = Progress(['Next: half a turn.'], sketch=np.zeros((4, 4, 3), np.uint8))
+    served = UploadServer(folder, lambda: progress, verdicts)
+    yield served
+    served.close()
+
+
+def ask(server, method, path, body=None, headers=()):
+    """Return the status, the headers and the body of an answer."""
+    connection = http.client.HTTPConnection(*server.server_address, timeout=10)
+    try:
+        connection.request(method, path, body, dict(headers))
+        answer = connection.getresponse()
+        return answer.status, answer.headers, answer.read()
+    finally:
+        connection.close()
+
+
+def send(server, photo, **rest):
+    status, _, body = ask(server, 'POST', f'/{server.token}/photo', photo, **rest)
+    return status, json.loads(body)
+
+
+def test_the_page_is_at_its_secret_address_on_this_machine_only(server):
+    host, port = server.server_address
+    assert host == '127.0.0.1'
+    assert server.url == f'http://127.0.0.1:{port}/{server.token}/'
+    assert len(server.token) >= 20
+    status, headers, body = ask(server, 'GET', f'/{server.token}/')
+    assert status == 200 and b'capture="environment"' in body and b'NONCE' not in body
+    assert "default-src 'none'" in headers['Content-Security-Policy']
+    assert headers['Referrer-Policy'] == 'no-referrer'  # the address is a secret
+    nonce = headers['Content-Security-Policy'].split("'nonce-")[1].split("'")[0]
+    assert f'<script nonce="{nonce}">'.encode() in body
+    _, again, _ = ask(server, 'GET', f'/{server.token}/')
+    assert nonce not in again['Content-Security-Policy']
+
+
+def test_every_run_has_another_address(server, folder, verdicts):
+    other = UploadServer(folder, Progress, verdicts)
+    try:
+        assert other.token != server.token
+        assert ask(other, 'GET', f'/{server.token}/')[0] == 404
+    finally:
+        other.close()
+
+
+@pytest.mark.parametrize('path', ['/', '/photo', '/x/photo', '//photo', '/{}', '/{}x/photo',
+                                  '/{}/../photo', '/{}/other', '/{}/photo/../../etc/passwd',
+                                  '/%e4%00/photo'])
+def test_any_other_address_is_not_found_and_keeps_nothing(server, folder, path):
+    path = path.format(server.token)
+    for method in ('GET', 'POST'):
+        assert ask(server, method, path, encoded('PNG', folder) if method == 'POST' else None
+                   )[0] == 404
+    assert not list(folder.iterdir())
+
+
+def test_a_photo_is_kept_under_a_name_of_the_server_s_own(server, folder):
+    photo = encoded('JPEG', folder)
+    headers = {'Content-Disposition': 'attachment; filename="../../evil.jpg"',
+               'X-File-Name': '/etc/evil.jpg'}.items()
+    status, told = send(server, photo, headers=headers)
+    assert status == 200 and 'still being worked on' in told['verdict']
+    assert send(server, encoded('PNG', folder))[0] == 200
+    assert sorted(path.name for path in folder.iterdir()) == ['phone-0001.jpg', 'phone-0002.png']
+    assert (folder / 'phone-0001.jpg').read_bytes() == photo
+    assert [path.name for path in folder.parent.iterdir()] == ['photos']
+
+
+def test_the_answer_says_what_became_of_the_photo_and_where_to_stand(server, verdicts, folder):
+    verdicts.put('phone-0001.jpg', 'phone-0001.jpg: no board seen in it')
+    _, told = send(server, encoded('JPEG', folder))
+    assert told['verdict'] == 'Left out: phone-0001.jpg: no board seen in it'
+    assert told['lines'] == ['Next: half a turn.']
+    assert told['sketch'].startswith('data:image/png;base64,')
+    verdicts.put('phone-0002.jpg', '')
+    assert send(server, encoded('JPEG', folder))[1]['verdict'] == 'Taken in as phone-0002.jpg.'
+    status, _, body = ask(server, 'GET', f'/{server.token}/state')
+    assert status == 200 and json.loads(body)['lines'] == ['Next: half a turn.']
+
+
+@pytest.mark.parametrize(('photo', 'words'), [
+    (b'<html>no photo</html>', 'expected JPEG or PNG'), (b'', 'expected JPEG or PNG'),
+    (b'\xff\xd8\xff\xe0 no more', 'expected JPEG or PNG'),
+    (b'\0\0\0\x18ftypheic' + bytes(40), 'HEIC photos cannot be read')])
+def test_what_is_no_photo_is_refused_by_its_content(server, folder, photo, words):
+    status, told = send(server, photo, headers={'Content-Type': 'image/jpeg'}.items())
+    assert status == 415 and words in told['verdict'] and '\n' not in told['verdict']
+    assert not list(folder.iterdir())
+
+
+def test_images_of_other_formats_are_refused(tmp_path):
+    assert refusal(encoded('GIF', tmp_path)) == refusal(encoded('TIFF', tmp_path)) != ''
+    assert refusal(encoded('JPEG', tmp_path)) == refusal(encoded('PNG', tmp_path)) == ''
+
+
+def test_what_is_too_large_is_refused_before_it_is_read(server, folder):
+    with socket.create_connection(server.server_address, timeout=10) as client:
+        client.sendall(f'POST /{server.token}/photo HTTP/1.1\r\nHost: x\r\nContent-Length: '
+                       f'{LARGEST_UPLOAD + 1}\r\n\r\n'.encode())
+        assert b' 413 ' in client.recv(4096).split(b'\r\n')[0]
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize(('length', 'status'), [
+    ('', b' 411 '), ('Content-Length: -1\r\n', b' 411 '), ('Content-Length: x\r\n', b' 411 '),
+    ('Transfer-Encoding: chunked\r\n', b' 411 '), ('Content-Length: ' + '9' * 400 + '\r\n',
+                                                   b' 413 ')])
+def test_a_length_that_cannot_be_trusted_is_refused(server, folder, length, status):
+    with socket.create_connection(server.server_address, timeout=10) as client:
+        client.sendall(f'POST /{server.token}/photo HTTP/1.1\r\nHost: x\r\n{length}\r\n'.encode())
+        assert status in client.recv(4096).split(b'\r\n')[0]
+    assert not list(folder.iterdir())
+
+
+def test_a_photo_that_is_cut_off_is_not_kept(server, folder):
+    photo = encoded('PNG', folder)
+    with socket.create_connection(server.server_address, timeout=10) as client:
+        client.sendall(f'POST /{server.token}/photo HTTP/1.1\r\nHost: x\r\nContent-Length: '
+                       f'{len(photo) + 5}\r\n\r\n'.encode() + photo)
+        client.shutdown(socket.SHUT_WR)
+        assert b' 400 ' in client.recv(4096).split(b'\r\n')[0]
+    assert not list(folder.iterdir())
+
+
+def test_photos_that_come_together_are_all_kept(server, folder):
+    photo = encoded('PNG', folder)
+    threads = [threading.Thread(target=send, args=(server, photo)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(list(folder.iterdir())) == 4
+
+
+@pytest.mark.parametrize(('address', 'served'), [
+    ('127.0.0.1', True), ('192.168.1.7', True), ('10.3.4.5', True), ('8.8.8.8', False),
+    ('172.15.0.1', False)])
+def test_only_clients_of_a_private_network_are_answered(server, address, served):
+    assert server.verify_request(None, (address, 1234)) is served
+
+
+def test_the_local_network_is_never_all_networks():
+    try:
+        found = ipaddress.ip_address(lan_address())
+    except ConfigError as error:
+        assert str(error).startswith('--lan: no local network')
+    else:
+        assert found.is_private and not found.is_loopback and not found.is_unspecified
+
+
+def test_an_address_that_is_not_this_machine_s_is_refused(folder, verdicts):
+    with pytest.raises(ConfigError, match='upload page: cannot be served at 192.0.2.1'):
+        UploadServer(folder, Progress, verdicts, '192.0.2.1')

@@ -1,0 +1,293 @@
+"""Photos that arrive: each is taken in or left out, and it is told where to stand next."""
+
+import math
+import shutil
+import signal
+
+from active_recon.cli.main import app
+from active_recon.errors import ConfigError, DataError
+from active_recon.photos.files import open_photos
+from active_recon.photos.reconstruct import from_files, Options
+from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
+from active_recon.policies.stopping import StoppingRule
+from active_recon.watching.advice import Adviser, ELEVATIONS
+from active_recon.watching.arrivals import Arrivals, SETTLED_S
+from active_recon.watching.collection import Collection
+from active_recon.watching.directions import where_to_stand
+from active_recon.watching.sketch import NEXT_COLOR, SIDE, sketch
+from active_recon.watching.watch_page import loop_state, qr_code
+from active_recon.watching.watcher import Watcher
+import cv2
+import numpy as np
+from photo_scene import cameras, on_plain, rendered, write_photos
+from PIL import Image
+import pytest
+from rendered_boards import BOARD, LENS
+from typer.testing import CliRunner
+from watched_photos import orbit, with_focal, written
+
+SOURCE = BoardCameras(BOARD)
+_SAME = 2e-3  # the search for the lens ends a little elsewhere in each run
+
+
+@pytest.fixture(scope='module')
+def photos(tmp_path_factory):
+    return written(tmp_path_factory.mktemp('photos'))
+
+
+@pytest.fixture(scope='module')
+def collection(photos):
+    """Return a collection of all photos but the last."""
+    found = Collection(SOURCE, Options())
+    assert [found.add(path) for path in photos[:-1]] == [''] * 3
+    return found
+
+
+@pytest.fixture(scope='module')
+def shape(collection):
+    return collection.shape
+
+
+@pytest.fixture(scope='module')
+def adviser():
+    return Adviser(StoppingRule(12))
+
+
+def test_photos_that_arrive_have_the_shape_of_all_of_them_at_once(photos, shape):
+    at_once = from_files(photos[:-1], SOURCE)
+    np.testing.assert_allclose(shape.occupancy, at_once.occupancy, atol=_SAME)
+    np.testing.assert_allclose(shape.world_from_object, at_once.world_from_object, atol=1e-6)
+
+
+def test_what_is_wrong_with_a_photo_is_one_line_and_the_shape_stays(collection, photos, tmp_path):
+    Image.new('RGB', (640, 480), (90, 120, 90)).save(tmp_path / 'empty.jpg')
+    (tmp_path / 'cut.png').write_bytes(photos[0].read_bytes()[:20_000])
+    shutil.copy(photos[0], tmp_path / 'again.png')
+    with Image.open(photos[3]) as image:
+        image.resize((320, 240)).save(tmp_path / 'small.png')
+    before = collection.shape.occupancy
+    for name, words in (('empty.jpg', 'no board seen in it'), ('cut.png', 'not readable'),
+                        ('again.png', 'the same photo as 0.png'),
+                        ('small.png', 'another size: expected 640 x 480')):
+        reason = collection.add(tmp_path / name)
+        assert reason.startswith(f'{name}: {words}') and '\n' not in reason
+        collection.remove(tmp_path / name)
+    np.testing.assert_allclose(collection.shape.occupancy, before, atol=_SAME)
+
+
+def test_a_photo_that_is_gone_leaves_the_shape_of_the_others(collection, photos):
+    before = collection.shape.occupancy
+    assert collection.add(photos[3]) == ''
+    assert len(collection.shape.views) == 4
+    collection.remove(photos[3])
+    np.testing.assert_allclose(collection.shape.occupancy, before, atol=_SAME)
+
+
+def test_until_the_lens_is_known_it_is_said_what_is_missing(photos):
+    found = Collection(SOURCE, Options())
+    assert found.waiting == 'no photo yet'
+    assert found.add(photos[0]) == '' and found.shape is None
+    assert found.waiting.startswith('1 photo with the board: the lens is estimated from three')
+
+
+def test_a_focal_length_in_exif_gives_a_shape_from_the_first_photo_on(photos, tmp_path):
+    found = Collection(SOURCE, Options())
+    assert found.add(with_focal(photos[0], tmp_path / 'a.jpg')) == ''
+    assert found.shape is not None and found.metric
+    assert found.shape.views[0].camera.intrinsics.fx == pytest.approx(LENS.fx, rel=1e-3)
+
+
+def test_the_board_refines_the_focal_length_that_exif_gives(photos, tmp_path):
+    paths = [with_focal(path, tmp_path / f'{path.stem}.jpg') for path in photos]
+    files = [*open_photos(paths)[0]]
+    wrong = [type(each)(each.path, each.size, 1, 1.2 * each.focal) for each in files]
+    _, posed, _ = posed_by(SOURCE, wrong)
+    assert posed[0].intrinsics.fx == pytest.approx(LENS.fx, rel=0.02)
+    _, posed, _ = posed_by(SOURCE, wrong[:2])  # too few to refine it
+    assert posed[0].intrinsics.fx == pytest.approx(1.2 * LENS.fx, rel=1e-3)
+
+
+def test_a_file_of_cameras_poses_photos_that_arrive(tmp_path):
+    views = cameras(4)
+    write_photos(tmp_path, views, [on_plain(image) for image in rendered(views)])
+    Image.new('RGB', (240, 180)).save(tmp_path / 'other.png')
+    found = Collection(tmp_path / 'transforms.json', Options())
+    assert found.add(tmp_path / 'photo0.png') == '' and found.shape is None
+    assert found.waiting.startswith('no object found yet: object not found: expected photos from '
+                                    'several directions')
+    for number in (1, 2):
+        assert found.add(tmp_path / f'photo{number}.png') == ''
+    assert len(found.shape.views) == 3 and not found.metric
+    assert found.add(tmp_path / 'other.png') == (
+        f'other.png: no camera in {tmp_path / "transforms.json"}')
+    assert len(found.shape.views) == 3
+
+
+def test_a_turntable_s_order_cannot_be_known_of_photos_that_arrive():
+    with pytest.raises(ConfigError, match='expected a board or a file of cameras'):
+        Collection(TurntableCameras(0.2, 0.3, 0.6), Options())
+
+
+def test_a_file_has_arrived_once_it_no_longer_changes(tmp_path):
+    arrivals = Arrivals(tmp_path)
+    path = tmp_path / 'a.jpg'
+    path.write_bytes(b'begun')
+    for name in ('.syncthing.b.jpg.tmp', '.c.jpg', '~d.jpg', 'e.txt', 'f.jpg.part'):
+        (tmp_path / name).write_bytes(b'other')
+    assert arrivals.arrived(0.0) == []
+    path.write_bytes(b'begun and going on')
+    assert arrivals.arrived(10.0) == []
+    assert arrivals.arrived(10.0 + 0.9 * SETTLED_S) == []
+    assert arrivals.arrived(10.0 + SETTLED_S) == [path]
+    assert arrivals.arrived(99.0) == [] and arrivals.gone() == []
+    path.write_bytes(b'another')  # is a new photo under an old name
+    assert arrivals.gone() == [path]
+    assert arrivals.arrived(100.0) == []
+    assert arrivals.arrived(101.0) == [path]
+    path.unlink()
+    assert arrivals.gone() == [path] and arrivals.gone() == []
+
+
+def test_photos_that_were_there_come_in_the_order_of_their_age(tmp_path):
+    import os
+
+    arrivals = Arrivals(tmp_path)
+    for name, age in (('b.jpg', 1), ('img10.jpg', 2), ('img2.jpg', 2), ('a.jpg', 3)):
+        (tmp_path / name).write_bytes(b'x')
+        os.utime(tmp_path / name, (age, age))
+    arrivals.arrived(0.0)
+    assert [path.name for path in arrivals.arrived(1.0)] == [
+        'b.jpg', 'img2.jpg', 'img10.jpg', 'a.jpg']
+    with pytest.raises(DataError, match='no such folder'):
+        Arrivals(tmp_path / 'none')
+
+
+@pytest.mark.parametrize('turn', [-150, -90, -30, 30, 90, 150])
+def test_left_and_right_are_those_of_who_looks_at_the_object(turn):
+    last, goal = orbit(50), orbit(50 + turn)
+    across = (goal.position - last.position) @ last.pose[:3, 0]  # x points right in the image
+    words = where_to_stand(goal, last, metric=True)
+    assert ('to the right' if across > 0 else 'to the left') in words
+    mirrored = where_to_stand(orbit(50 - turn), last, metric=True)
+    assert mirrored == words.replace('right', 'LEFT').replace('left', 'right').replace(
+        'LEFT', 'left')
+
+
+PARTS = {'twelfth': 30, 'eighth': 45, 'sixth': 60, 'quarter': 90, 'third': 120, 'nearly half': 150,
+         'half a turn from': 180}
+
+
+@pytest.mark.parametrize('turn', range(-175, 181, 12))
+def test_the_part_of_a_turn_is_the_nearest_that_has_a_name(turn):
+    words = where_to_stand(orbit(turn), orbit(0), metric=False)
+    if abs(turn) < 8:
+        assert words.startswith('from the side of the last photo')
+        return
+    named = next(degrees for part, degrees in PARTS.items() if part in words)
+    assert abs(named - abs(turn)) == min(abs(each - abs(turn)) for each in PARTS.values())
+
+
+def test_height_and_distance_are_told_where_they_change():
+    told = where_to_stand(orbit(120, 45, 0.8), orbit(0, 20, 0.5), metric=True)
+    assert told == ('a third of a turn to the right of the last photo, higher, camera at 45 '
+                    'degrees, 80 cm from the object')
+    assert 'cm' not in where_to_stand(orbit(120, 45, 0.8), orbit(0, 20, 0.5), metric=False)
+    assert 'lower' in where_to_stand(orbit(0, 20), orbit(0, 45), True)
+    level = where_to_stand(orbit(0, 30), orbit(0, 33), True)
+    assert level == 'from the side of the last photo, camera at 30 degrees'
+
+
+def test_the_goal_is_above_the_table_at_the_photos_own_distance(shape, adviser):
+    advice = adviser.advice(shape)
+    goal = advice.goal.camera
+    assert ELEVATIONS[0] - 1e-6 <= goal.elevation <= ELEVATIONS[1] + 1e-6
+    assert goal.distance == pytest.approx(np.median([
+        view.camera.distance for view in shape.views]))
+    assert advice.done == '' and advice.goal.gain is not None
+    assert len({round(each.elevation, 3) for each in advice.goal.candidates}) == 3
+    for view in shape.views:
+        assert np.arccos(view.camera.direction @ goal.direction) > math.radians(10)
+
+
+def test_it_is_enough_after_the_photos_planned_or_at_the_quality_asked_for(shape):
+    assert Adviser(StoppingRule(3)).advice(shape).done == 'max_views'
+    assert Adviser(StoppingRule(4, 0.0)).advice(shape).done == ''
+    assert Adviser(StoppingRule(12, min_gain=0.9)).advice(shape).done == 'gain_too_small'
+
+
+def test_the_sketch_has_the_last_photo_below_and_the_next_at_its_side(shape):
+    last = shape.views[-1].camera
+    for turn in (-90, 90):
+        goal = orbit(math.degrees(last.azimuth) + turn, 30, last.distance)
+        drawn = sketch(shape, goal, BOARD)
+        assert drawn.shape == (SIDE, SIDE, 3)
+        there = np.argwhere((drawn == NEXT_COLOR).all(axis=2))
+        assert np.sign(there[:, 1].mean() - SIDE / 2) == np.sign(turn)
+        assert there[:, 0].max() > SIDE / 2  # the way begins below
+    none = sketch(shape, None, BOARD)
+    assert not (none == NEXT_COLOR).all(axis=2).any()
+
+
+def test_the_page_s_state_has_a_goal_until_there_are_enough(shape, adviser):
+    state = loop_state(shape, adviser.advice(shape))
+    assert state.goal is not None and len(state.views) == 3 and state.grid is shape.grid
+    enough = loop_state(shape, Adviser(StoppingRule(3)).advice(shape))
+    assert enough.goal is None and enough.done == 'max_views' and enough.scores is not None
+
+
+def test_a_phone_reads_the_address_from_the_page():
+    address = 'http://192.168.1.17:43210/abcdefghijklmnopqrstuv/'
+    assert cv2.QRCodeDetector().detectAndDecode(qr_code(address))[0] == address
+
+
+def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(photos, tmp_path, adviser):
+    said = []
+    watcher = Watcher(tmp_path, Collection(SOURCE, Options()), adviser, said.append)
+    with pytest.raises(DataError, match='no shape: expected photos of an object'):
+        watcher.result()
+    assert not watcher.step(0.0)
+    for path in photos[:3]:
+        shutil.copy(path, tmp_path)
+    (tmp_path / '9.jpg').write_bytes(b'no photo')
+    watcher.step(1.0)
+    for second in range(2, 6):
+        assert watcher.step(float(second))
+    assert not watcher.step(9.0)
+    assert [line for line in said if 'taken in' in line] == [
+        f'{number}.png: taken in' for number in range(3)]
+    assert watcher.verdicts.wait('1.png', 0) == ''
+    assert watcher.verdicts.wait('9.jpg', 0).startswith('9.jpg: not readable')
+    assert watcher.verdicts.wait('other', 0) is None
+    lines = watcher.progress.lines
+    assert lines[0].startswith('Next: ') and ' degrees' in lines[0]
+    assert lines[1].startswith('3 photos; expected IoU ')
+    assert lines[-1].startswith('Left out: 9.jpg: not readable')
+    assert watcher.progress.sketch is not None and not watcher.progress.enough
+    assert watcher.result().left_out == [lines[-1].removeprefix('Left out: ')]
+    (tmp_path / '9.jpg').unlink()
+    watcher.step(10.0)
+    assert not watcher.result().left_out
+    assert '9.jpg: gone from the folder' in said
+
+
+def test_ctrl_c_writes_the_products(photos, tmp_path, monkeypatch):
+    folder = tmp_path / 'arriving'
+    folder.mkdir()
+    for path in photos[:3]:
+        shutil.copy(path, folder)
+    step = Watcher.step
+
+    def interrupted(self, now):
+        changed = step(self, now)
+        if self.progress.shape is not None:
+            signal.raise_signal(signal.SIGINT)
+        return changed
+
+    monkeypatch.setattr(Watcher, 'step', interrupted)
+    done = CliRunner().invoke(app, [
+        'reconstruct', str(folder), '--watch', '--board', '--squares', '9x7', '--port', '0',
+        '--out', str(tmp_path / 'out')])
+    assert done.exit_code == 0, done.output
+    assert 'Next: ' in done.output and '3 photos; silhouettes: what covers' in done.output
+    for name in ('mesh.ply', 'shape.json', 'picture.png'):
+        assert (tmp_path / 'out' / name).stat().st_size > 1000
