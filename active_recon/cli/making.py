@@ -18,6 +18,9 @@ Samples = Annotated[int, typer.Option(
 
 Fine = Annotated[bool, typer.Option(
     '--fine', help='Also voxelise at 64 cells a side; finished objects get only these voxels.')]
+Depth = Annotated[bool, typer.Option(
+    '--depth', help='Also write a depth image beside each image, without noise; finished objects '
+                    'get only these.')]
 Cameras = Annotated[str, typer.Option(
     help="'turntable' (24 azimuths, elevation 30 degrees), 'dome' (12 azimuths at elevations of "
          "10, 30, 50 and 70 degrees) or 'any' (random for each object: elevation -10 to 85 "
@@ -52,6 +55,7 @@ def render(
              'CC-BY or public domain.')] = False,
     samples: Samples = 2,
     fine: Fine = False,
+    depth: Depth = False,
     cameras: Cameras = 'turntable',
     views: Views = 12,
     turned: Turned = False,
@@ -81,7 +85,7 @@ def render(
                           f'--explicit-licence, got {meshes}')
     else:
         jobs = mesh_jobs(meshes, out, up, front)
-    _make('rendering', jobs, samples, workers, fine, viewing)
+    _make('rendering', jobs, samples, workers, fine, viewing, depth)
 
 
 @dataset.command()
@@ -99,6 +103,7 @@ def build(
         help='Only these categories (may be given several times).')] = None,
     samples: Samples = 2,
     fine: Fine = False,
+    depth: Depth = False,
     cameras: Cameras = 'turntable',
     views: Views = 12,
     turned: Turned = False,
@@ -128,18 +133,18 @@ def build(
                         f'({code[:12]}), got another hash in {made_by}; choose another folder')
     out.mkdir(parents=True, exist_ok=True)
     made_by.write_text(code + '\n')
-    _make('making', jobs, samples, workers, fine, Viewing(cameras, views, turned))
+    _make('making', jobs, samples, workers, fine, Viewing(cameras, views, turned), depth)
 
 
 def _make(title: str, jobs: 'list[Job]', samples: int, workers: int, fine: bool,
-          viewing: 'Viewing') -> None:
+          viewing: 'Viewing', depth: bool) -> None:
     from active_recon.datasets.making import make_dataset
 
     if not jobs:
         raise DataError('no objects to make: expected at least one, got none with these options')
     rejected = []
     with progress_bar(title, len(jobs)) as advance:
-        for outcome in make_dataset(jobs, samples, workers, fine, viewing):
+        for outcome in make_dataset(jobs, samples, workers, fine, viewing, depth):
             if outcome.refusal:
                 rejected.append(outcome)
             advance(1, f'{len(rejected)} rejected' if rejected else '')

@@ -10,7 +10,12 @@ import multiprocessing
 from pathlib import Path
 
 from active_recon.datasets.drawn_cameras import TURNTABLE, Viewing
-from active_recon.datasets.layout import ObjectFolder, write_object, write_voxels
+from active_recon.datasets.layout import (
+    ObjectFolder,
+    write_depths,
+    write_object,
+    write_voxels,
+)
 from active_recon.errors import ActiveReconError, DataError
 from active_recon.shapes import check_category, make_shape
 from active_recon.volumes.meshes import file_rotation, fit_to_grid, load_mesh
@@ -95,16 +100,18 @@ def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
                 partial(make_shape, category, seed)) for seed in seeds]
 
 
-def make_object(job: Job, samples: int, fine: bool = False,
-                viewing: Viewing = TURNTABLE) -> Outcome:
+def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = TURNTABLE,
+                depth: bool = False) -> Outcome:
     """
     Render and voxelise one object at 32 cells a side, with `fine` also at 64.
 
-    Each image pixel averages `samples` x `samples` rays. Existing files are kept. Errors become
-    the outcome's `refusal`.
+    Each image pixel averages `samples` x `samples` rays. With `depth` there is a depth image,
+    without noise, beside each image. Existing files are kept. Errors become the outcome's
+    `refusal`.
     """
     lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
-    if job.folder.complete and not lacks_fine:
+    lacks_depth = depth and not job.folder.has_depth
+    if job.folder.complete and not (lacks_fine or lacks_depth):
         return Outcome(job.folder)
     try:
         mesh = job.make_mesh()
@@ -115,6 +122,9 @@ def make_object(job: Job, samples: int, fine: bool = False,
             _render(job.folder, mesh, samples, viewing)
         if lacks_fine:
             write_voxels(job.folder, voxelise(mesh, FINE_RESOLUTION))
+        if lacks_depth:
+            renderer = Renderer(mesh)
+            write_depths(job.folder, [renderer.depth(camera) for camera in job.folder.cameras()])
     except (ActiveReconError, OSError) as error:
         return Outcome(job.folder, str(error))
     return Outcome(job.folder)
@@ -135,7 +145,7 @@ def _name(folder: ObjectFolder) -> str:
 
 
 def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool = False,
-                 viewing: Viewing = TURNTABLE) -> Iterator[Outcome]:
+                 viewing: Viewing = TURNTABLE, depth: bool = False) -> Iterator[Outcome]:
     """
     Make all objects in `workers` processes; yield each one's outcome as it is finished.
 
@@ -147,10 +157,10 @@ def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool
                             f'{count} meshes for {folder.category}/{folder.name}; rename their '
                             'files')
     if workers == 1:
-        yield from (make_object(job, samples, fine, viewing) for job in jobs)
+        yield from (make_object(job, samples, fine, viewing, depth) for job in jobs)
         return
     # spawn, because a fork of a process that has threads (torch, embree, ROS) may hang
     with ProcessPoolExecutor(workers, multiprocessing.get_context('spawn')) as pool:
-        futures = [pool.submit(make_object, job, samples, fine, viewing) for job in jobs]
+        futures = [pool.submit(make_object, job, samples, fine, viewing, depth) for job in jobs]
         for future in as_completed(futures):
             yield future.result()

@@ -43,6 +43,22 @@ def seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
     return _shrunk(np.asarray(sampled, np.uint8), size, size)
 
 
+def depth_seen_by(target: Camera, depth: NDArray[np.float32],
+                  camera: Camera) -> NDArray[np.float32]:
+    """
+    Return a camera's depth image, (H, W), as the target beside it measures it, (S, S).
+
+    Both are along the optical axis of their camera; 0 is no value. Each pixel takes the nearest
+    one: the mean of two would lie on neither side of an edge.
+    """
+    size, lens = target.intrinsics.width, camera.intrinsics
+    turned = depth * (camera.ray_directions() @ target.pose[:3, 2]).astype(np.float32)
+    column, row = np.moveaxis(np.floor(_seen(camera, target, size)).astype(np.int64), -1, 0)
+    inside = (column >= 0) & (column < lens.width) & (row >= 0) & (row < lens.height)
+    taken = turned[np.where(inside, row, 0), np.where(inside, column, 0)]
+    return np.where(inside & (taken > 0), taken, 0).astype(np.float32)
+
+
 def _seen(camera: Camera, target: Camera, size: int) -> NDArray[np.float64]:
     """Return the camera's pixel coordinates of size x size target pixels, (size, size, 2)."""
     if camera.intrinsics.distortion is None and np.array_equal(camera.position, target.position):
