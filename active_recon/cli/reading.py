@@ -27,7 +27,8 @@ def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
     Without `at_once`, images of a network that needs no front are read when they are first used.
     With a `split`, only the objects of its `part` (train, val or test) are read. A single root
     may be the folder of PASCAL3D+, whose photographs are objects of one view each. With `depth`,
-    views come with their depth images, and objects without are left out. Raises DataError where no object can be read, ConfigError where the network cannot use photographs.
+    views come with their depth images, and objects without are left out. Raises DataError where
+    no object can be read, ConfigError where the network cannot use photographs.
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.splits import list_split

@@ -114,7 +114,7 @@ class ObjectFolder:
             raise DataError(f'{path}: no readable depth image: expected a PNG of one channel of '
                             f'16 bits, got {found}; make them by `render` or `dataset build` with '
                             '`--depth`')
-        return stored.astype(np.float32) / _STEPS
+        return np.asarray(stored / np.float32(_STEPS), np.float32)
 
     def voxels(self, resolution: int = RESOLUTION) -> VoxelGrid:
         """Return the true voxels; raises DataError where there are none of this resolution."""

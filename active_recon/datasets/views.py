@@ -154,8 +154,8 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
     """Read views from arbitrary cameras; see `read_views`."""
     without = [folder for folder in folders if depth and not folder.has_depth]
     folders, shown, lacking = read_cameras([each for each in folders if each not in without])
-    lacking += tuple(f'{folder.images_folder}: no depth images: expected {folder.depth_path(0).name}'
-                     ' and so on, which `--depth` makes' for folder in without)
+    lacking += tuple(f'{folder.depth_path(0)}: no depth images: expected those that `render` or '
+                     '`dataset build` makes with `--depth`' for folder in without)
     if not folders:
         raise DataError('no readable object: expected at least one in the dataset, got none'
                         + ''.join(f'\n  {error}' for error in lacking[:5]))

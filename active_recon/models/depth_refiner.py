@@ -13,6 +13,7 @@ from torch.nn import functional
 KINDS = 3  # of evidence: see `depth_evidence`
 _SEEN = 6  # channels at 64 cells
 _LEARNED = 4  # logit, and weights of the given logit, of free space and of surfaces
+_SURE = 1e-6  # occupancies nearer to 0 and 1 count as this
 _MOST = 8.0  # of a given logit: beyond it a network is sure
 
 
@@ -98,6 +99,12 @@ class DepthRefiner(nn.Module):
         calibrated: Tensor = self.calibration[0] * corrected + self.calibration[1]
         return calibrated
 
+    def refine(self, occupancy: Tensor, evidence: Tensor, count: Tensor, total: Tensor) -> Tensor:
+        """Return corrected occupancy of occupancy in [0, 1]; for the rest see `forward`."""
+        sure = occupancy.clamp(_SURE, 1 - _SURE)
+        corrected: Tensor = self((sure / (1 - sure)).log(), evidence, count, total).sigmoid()
+        return corrected
+
 
 def described(evidence: Tensor) -> Tensor:
     """
@@ -107,7 +114,7 @@ def described(evidence: Tensor) -> Tensor:
     at a surface; whether it was seen at a surface; how often it was behind one; whether it has a
     value.
     """
-    free, near, behind = evidence.split(1, dim=1)
+    free, near, behind = torch.split(evidence, 1, dim=1)
     known = free + near + behind
     return torch.cat([
         free.clamp(max=1), free / (free + near).clamp(min=0.25), near.clamp(max=1),

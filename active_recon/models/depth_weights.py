@@ -37,8 +37,8 @@ def load_refiner(weights: Path | None = None, device: str = 'cpu') -> DepthRefin
     weights = weights or SHIPPED
     path, network_sha256 = depth_path(weights), weights_hash(weights)
     if not path.is_file():
-        raise WeightsError(f'{weights.name}: takes no depth: expected {path.name} beside it, which '
-                           '`active-recon train-depth` makes')
+        raise WeightsError(f'{weights.name}: takes no depth: expected {path.name} beside it, '
+                           'which `active-recon train-depth` makes')
     try:
         with safe_open(path, framework='pt', device=device) as stored:
             facts = stored.metadata() or {}

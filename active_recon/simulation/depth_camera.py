@@ -1,7 +1,11 @@
 """Depth as cameras measure it: steps, holes, flying pixels and a scale that is slightly wrong."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from active_recon.geometry.cameras import Camera
+from active_recon.volumes.depth_evidence import depth_evidence, Evidence, no_evidence
+from active_recon.volumes.voxels import FINE_RESOLUTION
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +42,22 @@ class DepthFaults:
 
 
 def draw_depth_faults(rng: np.random.Generator) -> DepthFaults:
-    """Return the faults of a random camera: a scale wrong by at most 1 %, lengths of a unit cube."""
+    """Return the faults of a random camera, of lengths in sides of the cube that it looks at."""
     return DepthFaults(
         scale=rng.uniform(-0.01, 0.01), step=rng.uniform(0.0005, 0.01),
         noise=rng.uniform(0, 0.006), edge_holes=rng.uniform(0, 0.8), flying=rng.uniform(0, 0.4),
         grazing=rng.uniform(0, 0.3), shiny=rng.uniform(0, 0.4) * (rng.random() < 0.6),
         lost=rng.uniform(0, 0.05))
+
+
+def measured_evidence(views: Iterable[tuple[Depth, Camera]], faults: DepthFaults,
+                      rng: np.random.Generator, side: int = FINE_RESOLUTION) -> Evidence:
+    """Return the evidence of true depths (H, W) as one camera with faults measures them."""
+    evidence = no_evidence(side)
+    for depth, camera in views:
+        evidence += depth_evidence(measured_depth(depth, camera.intrinsics.fx, faults, rng),
+                                   camera, side)
+    return evidence
 
 
 def measured_depth(depth: Depth, focal: float, faults: DepthFaults,

@@ -8,11 +8,14 @@ from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.models.depth_refiner import DepthRefiner
 from active_recon.models.lifting import Lifting
 from active_recon.models.network import Cameras
-from active_recon.simulation.depth_camera import draw_depth_faults, measured_depth, with_plane
+from active_recon.simulation.depth_camera import (
+    draw_depth_faults,
+    measured_evidence,
+    with_plane,
+)
 from active_recon.training.loop import Draw, Run, train_steps, TrainingConfig
 from active_recon.training.losses import volume_loss
 from active_recon.training.posed_batches import draw_posed_batch, PosedBatch
-from active_recon.volumes.depth_evidence import depth_evidence, no_evidence
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -124,27 +127,30 @@ def depth_sample(network: Lifting, batch: PosedBatch, rng: np.random.Generator,
 
 def _seen(batch: PosedBatch, row: int, rng: np.random.Generator) -> NDArray[np.float32]:
     """Return the evidence of an object of a batch by the depth of all or some of its views."""
-    assert batch.depths is not None
-    length = len(batch.depths)
+    length, side = len(batch.cameras.poses), batch.voxels.shape[-1]
     have = np.full(length, True) if rng.random() < _ALL_SHARE else rng.random(length) < _ONE_SHARE
     have[rng.integers(length)] = True
-    faults = draw_depth_faults(rng)
-    place, evidence = rng.random(), no_evidence(batch.voxels.shape[-1])
-    ground = float(np.flatnonzero(batch.voxels[row].numpy().any((0, 1)))[0]
-                   / batch.voxels.shape[-1] - 0.5) if batch.voxels[row].any() else -0.5
-    wall = rng.uniform(*_WALL)
+    faults, place, wall = draw_depth_faults(rng), rng.random(), rng.uniform(*_WALL)
+    layers = np.flatnonzero(batch.voxels[row].numpy().any((0, 1)))
+    ground = (layers[0] if len(layers) else 0) / side - 0.5
+    views = []
     for view in np.flatnonzero(have):
-        depth = batch.depths[view, row].numpy()
-        size = depth.shape[0]
-        matrix = batch.cameras.intrinsics[view, row].numpy()
-        camera = Camera(batch.cameras.poses[view, row].numpy(), Intrinsics(
-            matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], size, size))
+        depth, camera = depth_view(batch.depths, batch.cameras, int(view), row)
         if place < _TABLE_SHARE:
             depth = with_plane(depth, camera.ray_directions(), camera.position,
                                np.array([0.0, 0, 1]), ground)
         elif place < _TABLE_SHARE + _WALL_SHARE:
             depth = with_plane(depth, camera.ray_directions(), camera.position,
                                -camera.direction, wall)
-        evidence += depth_evidence(measured_depth(depth, matrix[0, 0], faults, rng), camera,
-                                   batch.voxels.shape[-1])
-    return evidence
+        views.append((depth, camera))
+    return measured_evidence(views, faults, rng, side)
+
+
+def depth_view(depths: Tensor | None, cameras: Cameras, *place: int
+               ) -> tuple[NDArray[np.float32], Camera]:
+    """Return one of depth images (..., S, S), and its camera."""
+    assert depths is not None, 'views were read without depth'
+    depth = depths[place].numpy()
+    lens, size = cameras.intrinsics[place].numpy(), depth.shape[0]
+    return depth, Camera(cameras.poses[place].numpy(), Intrinsics(
+        lens[0, 0], lens[1, 1], lens[0, 2], lens[1, 2], size, size))

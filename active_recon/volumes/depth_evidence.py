@@ -68,4 +68,5 @@ def _projected(camera: Camera, side: int) -> tuple[NDArray[np.float32], ...]:
 def _distances(camera: Camera, side: int) -> NDArray[np.float32]:
     """Return the distance of each cell's centre from the camera, (R, R, R)."""
     x, y, z = ((_along(side) - part) ** 2 for part in camera.position)
-    return np.sqrt((x[:, None] + y).astype(np.float32)[:, :, None] + z.astype(np.float32))
+    return np.asarray(np.sqrt(
+        (x[:, None] + y).astype(np.float32)[:, :, None] + z.astype(np.float32)), np.float32)

@@ -1,4 +1,4 @@
-"""Rendering of meshes and of their depth: ray casting with Embree, flat shading, straight alpha."""
+"""Rendering of meshes and their depth: ray casting with Embree, flat shading, straight alpha."""
 
 from typing import Any
 

@@ -21,7 +21,7 @@ class RecordedObject:
     def step(self, view: RecordedView) -> Reconstruction:
         """Reconstruct with one more view; raises ViewError with a hint on the options."""
         try:
-            return self._reconstructor.add_view(view.image, view.camera)
+            return self._reconstructor.add_view(view.image, view.camera, view.depth)
         except ViewError as error:
             raise with_option_hint(error) from error
 
