@@ -98,7 +98,8 @@ def calibrate_depth(refiner: DepthRefiner, network: Lifting,
     found, truth = [], []
     for length in LENGTHS:
         length = min(length, validation.images.shape[1])
-        batch = draw_posed_batch(validation, _CALIBRATED, length, rng, augment=False)
+        batch = draw_posed_batch(validation, min(_CALIBRATED, len(validation)), length, rng,
+                                 augment=False)
         sample = depth_sample(network, batch, rng)
         with torch.inference_mode():
             logits = refiner(sample.logits, sample.evidence, sample.count, sample.total)
