@@ -17,7 +17,7 @@ unexport PYTHONDONTWRITEBYTECODE
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet
 # Live tests mostly wait, hence more workers than two cores; one thread each, so that they share.
-TEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:cacheprovider -n 6 --dist loadfile \
+TEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:cacheprovider -n 4 --dist loadfile \
 	--no-loadscope-reorder
 SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell find \
 	active_recon msg_tools resource scripts launch config rviz security \

@@ -8,7 +8,13 @@ from active_recon.datasets.drawn_cameras import DOME_ELEVATIONS, Viewing
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.errors import ConfigError, DataError
-from active_recon.evaluation.next_view.choosing import chosen_ahead, chosen_by, judged
+from active_recon.evaluation.next_view import study
+from active_recon.evaluation.next_view.choosing import (
+    chosen_ahead,
+    chosen_by,
+    judged,
+    motion_time,
+)
 from active_recon.evaluation.next_view.fixed_sequence import find_sequence, FixedSequence
 from active_recon.evaluation.next_view.renderings import another_rendering, POSE_ERROR
 from active_recon.evaluation.next_view.study import (
@@ -135,6 +141,20 @@ def test_the_oracle_takes_what_is_best_and_no_policy_has_a_better_second_view(wa
         assert judged(watched, chosen_by(policy, watched, 5, 3))[1] <= best + 1e-6
 
 
+def test_the_more_motion_costs_the_less_a_policy_moves_and_no_view_is_taken_twice(watched):
+    orders = [chosen_by(load_policy('visible_entropy'), watched, 5, 6, cost)
+              for cost in (0.0, 0.2, 100.0)]
+    times = [motion_time(watched, order) for order in orders]
+    assert times == sorted(times, reverse=True) and times[0] > times[2]
+    assert times[2] == pytest.approx(5 * math.radians(15))
+    assert all(len(set(order)) == 6 for order in orders)
+
+
+def test_the_motion_of_an_even_sweep_is_the_way_around(watched):
+    assert motion_time(watched, (5, 11, 17, 23)) == pytest.approx(math.radians(270))
+    assert motion_time(watched, (0, 12, 0)) == pytest.approx(math.radians(360))
+
+
 def test_a_policy_s_views_are_where_it_goes(watched):
     assert chosen_by(UniformPolicy(4), watched, 5, 4) == (5, 11, 17, 23)
     assert chosen_by(FarthestPolicy(), watched, 0, 2) == (0, 12)
@@ -232,10 +252,21 @@ def test_a_sequence_found_on_objects_is_measured_like_a_policy(scene, carving):
     assert '| sequence |' in text and 'ahead of uniform' in text
 
 
+def test_swapped_looks_at_the_next_object_and_only_there(scene, carving, monkeypatch):
+    monkeypatch.setattr(study, '_LOOKS_ELSEWHERE', 'visible_entropy')
+    episodes = Episodes(('visible_entropy', 'swapped'), 1, 3, bfloat16=False)
+    lone = replace(scene, views=some_objects(scene.views, torch.tensor([1])),
+                   truths={32: scene.truths[32][1:2]})
+    same = run_episodes(lone, carving, episodes)
+    np.testing.assert_array_equal(same.other['swapped'], same.other['visible_entropy'])
+    found = run_episodes(scene, carving, episodes)
+    assert (found.motion['swapped'] != found.motion['visible_entropy']).any()
+
+
 def test_without_a_gap_nothing_has_a_share_of_it():
     alike = np.random.default_rng(0).random((5, 2, 1, 3))
-    result = figures(Found({'random': alike, 'oracle': alike},
-                           {'random': alike, 'oracle': alike}))
+    result = figures(Found(*[{'random': alike, 'oracle': alike}] * 2,
+                           {name: alike[..., 0] for name in ('random', 'oracle')}))
     assert result['policies']['random']['share'] is None
     assert result['gap']['repeatable']['mean'] == 0
 
@@ -245,6 +276,8 @@ def test_policies_that_there_are_not_and_episodes_without_a_choice_are_refused()
         Episodes(('random', 'best'))
     with pytest.raises(ConfigError, match='nothing to choose'):
         Episodes(('random',), count=1)
+    with pytest.raises(ConfigError, match="expected NAME@COST .* got 'uniform@much'"):
+        Episodes(('random', 'uniform@much'))
     assert {'attention', 'sequence', 'peeking', 'oracle'} <= set(known_names())
 
 

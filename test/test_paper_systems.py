@@ -109,6 +109,7 @@ def test_a_study_without_its_weights_says_how_to_get_some(tmp_path):
         _ = Study(model=str(tmp_path / 'none.safetensors')).weights
 
 
+@pytest.mark.slow
 def test_what_is_fitted_in_one_go_is_fitted_where_others_are_trained(
         study, monkeypatch, tmp_path):
     monkeypatch.setattr(weights_module, 'FOLDER', tmp_path)  # in which nothing ships

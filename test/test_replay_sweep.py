@@ -37,7 +37,9 @@ def test_a_sweep_has_nothing_to_compare_and_says_so(sweep, monkeypatch, capsys):
     assert 'compared' not in said
 
 
-@pytest.mark.parametrize('policy', POLICIES)
+@pytest.mark.parametrize('policy', [
+    name if name in ('attention', 'farthest') else pytest.param(name, marks=pytest.mark.slow)
+    for name in POLICIES])
 def test_each_policy_takes_the_views_that_it_asks_for(
         sweep, tmp_path, policy, monkeypatch, capsys):
     out = tmp_path / policy

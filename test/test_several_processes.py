@@ -35,6 +35,7 @@ def test_two_processes_write_one_set_of_weights_and_one_log(dataset, tmp_path):
     assert load_weights(tmp_path / 'run' / 'weights.safetensors').model == '2d3d'
 
 
+@pytest.mark.slow
 def test_a_batch_that_cannot_be_shared_is_refused(dataset, tmp_path):
     with pytest.raises(AssertionError, match='batch_size: not divisible: expected a multiple of '
                        'the 2 processes'):

@@ -9,6 +9,7 @@ from active_recon.evaluation.statistics import (
     Interval,
     mean_interval,
     resampled_means,
+    views_to_reach,
 )
 import numpy as np
 import pytest
@@ -154,3 +155,15 @@ def test_episodes_are_gathered_by_object():
 def test_episodes_that_differ_in_number_or_are_mixed_are_refused(objects):
     with pytest.raises(DataError, match='mixed episodes: expected the same number of'):
         by_object(np.zeros(len(objects)), np.array(objects))
+
+
+def test_views_to_reach_a_level_are_where_the_mean_curve_crosses_it():
+    curve = np.broadcast_to([0.2, 0.4, 0.5, 0.55], (6, 2, 1, 4))
+    ends = np.broadcast_to([0.1, 0.2, 0.3, 0.45], (6, 2, 3, 4))
+    found = views_to_reach(curve, ends)
+    assert (found.mean, found.low, found.high) == pytest.approx((2.5, 2.5, 2.5))
+    assert views_to_reach(ends, curve).mean == 4  # it does not get there
+    assert views_to_reach(curve, curve - 0.6).mean == 1
+    drawn_ends = ends + np.random.default_rng(0).normal(0, 0.1, (6, 1, 1, 1))
+    spread = views_to_reach(curve, drawn_ends)
+    assert 1 <= spread.low < spread.mean < spread.high <= 4

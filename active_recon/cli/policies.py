@@ -28,9 +28,11 @@ def policies(
         help='A network of posed views: a model that ships, or a weights file.')] = 'lifting',
     names: Annotated[str | None, typer.Option(
         '--policies', help=f'Policies, separated by commas, out of {", ".join(POLICIES)}, '
-        'sequence (the best that is the same for all objects, found on --training), peeking and '
-        'oracle (which see what no robot does). Default: all, attention only where the model has '
-        'a learned policy, sequence only with --training.')] = None,
+        'sequence (the best that is the same for all objects, found on --training), swapped '
+        '(attention, shown the volume of another object), peeking and oracle (which see what no '
+        'robot does); NAME@COST is a policy whose motion costs so much IoU a second. Default: '
+        'all but swapped, attention only where the model has a learned policy, sequence only with '
+        '--training.')] = None,
     training: Annotated[Path | None, typer.Option(
         help='Folder of other objects, on which the sequence is found.')] = None,
     objects: Annotated[int, typer.Option(

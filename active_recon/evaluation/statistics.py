@@ -86,6 +86,35 @@ def gap_closed(values: Values, random: Values, oracle: Values, rounds: int = _RO
     return _interval(share, (own - floor)[ahead] / (top - floor)[ahead])
 
 
+def views_to_reach(values: Values, others: Values, rounds: int = _ROUNDS, seed: int = 0
+                   ) -> Interval:
+    """
+    Return after how many views the mean of values is where that of others ends, and its interval.
+
+    Both are (objects, starts, seeds, T), of 1 to T views; between two views the mean is linear.
+    What is not reached counts as T. Raises DataError as `difference`.
+    """
+    _require_paired(values, others)
+    curves = np.stack([resampled_means(of_view, rounds, seed)
+                       for of_view in np.moveaxis(values, -1, 0)])
+    ends = resampled_means(others[..., -1], rounds, seed)
+    return _interval(_crossing(values.mean(axis=(0, 1, 2)), float(others[..., -1].mean())),
+                     np.array([_crossing(curve, float(end))
+                               for curve, end in zip(curves.T, ends, strict=True)]))
+
+
+def _crossing(curve: Values, level: float) -> float:
+    """Return where a curve of 1 to T views first reaches a level, T where it does not."""
+    reached = np.flatnonzero(curve >= level)
+    if not len(reached):
+        return float(len(curve))
+    after = int(reached[0])
+    if after == 0:
+        return 1.0
+    below = curve[after - 1]
+    return float(after + (level - below) / (curve[after] - below))
+
+
 def headroom_sentence(headroom: Interval) -> str:
     """Return a sentence on the headroom of view policies: the oracle's mean minus random's."""
     spread = f'{headroom.mean:.4f} [{headroom.low:.4f}, {headroom.high:.4f}]'

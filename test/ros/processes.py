@@ -1,6 +1,7 @@
 """Processes of nodes: programs, and forks of a process that has imported what all nodes import."""
 
 from collections.abc import Sequence
+import gc
 from importlib import import_module
 import multiprocessing
 import os
@@ -79,4 +80,7 @@ def _run(name: str, argv: list[str], folder: Path, log: Path, environment: dict[
     os.chdir(folder)
     sys.path.insert(0, str(folder))  # as `python -m` has it
     sys.argv = argv
-    import_module(f'active_recon.nodes.{name}').main()
+    try:
+        import_module(f'active_recon.nodes.{name}').main()
+    finally:
+        gc.collect()  # a fork ends without it, and would leave its shared memory behind

@@ -1,8 +1,12 @@
 """Ways to choose the views of an episode: policies, and what no robot has."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 
+from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
 from active_recon.evaluation.next_view.watching import Ahead, WatchedObject
+from active_recon.geometry.cameras import Camera
 from active_recon.policies import Policy
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +15,39 @@ Order = tuple[int, ...]
 """The views of an episode, by their numbers, the first of which was not chosen."""
 
 
-def chosen_by(policy: Policy, watched: WatchedObject, start: int, count: int) -> Order:
+def chosen_by(policy: Policy, watched: WatchedObject, start: int, count: int,
+              motion_cost: float = 0.0) -> Order:
     """
     Return the views that a policy takes: the best of its scores, each time.
 
-    What it proposes between the candidates is left out, since nothing was rendered there.
+    `motion_cost` of a second, at 1 rad/s around either axis, is taken off, see `TimedMotion`; no
+    view is taken twice then. What a policy proposes between the candidates is left out, since
+    nothing was rendered there.
     """
     walk, memory = watched.begin(start), policy.initial_state(1)
+    cost = MotionCost(timed=TimedMotion(motion_cost=motion_cost))
+    cameras = cameras_of(watched)
     while len(walk.taken) < min(count, watched.count):
         choice, memory = policy.choose(watched.observation(walk, policy.wants_volume), memory)
-        walk = watched.step(walk, int(choice.scores[0].argmax()))
+        scores = choice.scores[0]
+        if motion_cost:
+            scores = cost.utility(scores, choice.is_gain, cameras[walk.taken[-1]], cameras,
+                                  MotionLimits())
+            scores[list(walk.taken)] = -np.inf
+        walk = watched.step(walk, int(scores.argmax()))
     return walk.taken
+
+
+def cameras_of(watched: WatchedObject) -> Sequence[Camera]:
+    """Return the cameras of all views."""
+    return [Camera(pose) for pose in watched.views.poses[0].numpy()]
+
+
+def motion_time(watched: WatchedObject, order: Order) -> float:
+    """Return the time that the motion through an order takes, seconds at 1 rad/s."""
+    cameras = cameras_of(watched)
+    return float(sum(TimedMotion().seconds(cameras[one], [cameras[other]], MotionLimits())[0]
+                     for one, other in pairwise(order)))
 
 
 def chosen_ahead(worth: Callable[[Ahead], NDArray[np.float64]], watched: WatchedObject,

@@ -5,19 +5,32 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from active_recon.errors import ConfigError
-from active_recon.evaluation.next_view.choosing import chosen_ahead, chosen_by, judged, Order
+from active_recon.evaluation.next_view.choosing import (
+    chosen_ahead,
+    chosen_by,
+    judged,
+    motion_time,
+    Order,
+)
 from active_recon.evaluation.next_view.fixed_sequence import find_sequence, FixedSequence, Offsets
 from active_recon.evaluation.next_view.renderings import another_rendering
 from active_recon.evaluation.next_view.watching import Ahead, WatchedObject
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import Scene
 from active_recon.evaluation.posed.walking import some_objects
-from active_recon.evaluation.statistics import difference, gap_closed, mean_interval, Values
+from active_recon.evaluation.statistics import (
+    difference,
+    gap_closed,
+    mean_interval,
+    Values,
+    views_to_reach,
+)
 from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
 import numpy as np
 import torch
 
-ORACLE, PEEKING, SEQUENCE = 'oracle', 'peeking', 'sequence'
+ORACLE, PEEKING, SEQUENCE, SWAPPED = 'oracle', 'peeking', 'sequence', 'swapped'
+_LOOKS_ELSEWHERE = 'attention'  # the policy that `swapped` is
 _WORTH: dict[str, Callable[[Ahead], Values]] = {
     ORACLE: lambda ahead: ahead.iou, PEEKING: lambda ahead: ahead.expected}
 _ON_BOTH = ('random', ORACLE)  # the gap between them is told on either rendering
@@ -28,7 +41,8 @@ class Episodes:
     """
     What is run of every object.
 
-    - policies: names of the registry, `sequence`, `peeking` and `oracle`
+    - policies: names of the registry, `sequence`, `swapped`, `peeking` and `oracle`; NAME@COST is
+      a policy with a `motion_cost`, see `chosen_by`
     - starts: first views of each object, drawn; count: views of an episode
     - seeds: how often a policy that draws is run
     - seed: draws the starts, the renderings and what policies draw
@@ -44,7 +58,7 @@ class Episodes:
     def __post_init__(self) -> None:
         """Reject policies that there are not, and episodes without a choice."""
         known = known_names()
-        if unknown := [name for name in self.policies if name not in known]:
+        if unknown := [name for name in self.policies if _parted(name)[0] not in known]:
             raise ConfigError(f'policies: no such policy: expected some of {", ".join(known)}, '
                               f'got {unknown[0]!r}')
         if self.count < 2:
@@ -58,16 +72,18 @@ class Found:
     The IoU of episodes by policy, (objects, starts, seeds, T) each.
 
     `same`: on the rendering on which views were chosen, of random and the oracle alone; `other`:
-    on another rendering of the same views.
+    on another rendering of the same views. `motion`: the time that the motion takes, seconds at
+    1 rad/s, (objects, starts, seeds).
     """
 
     same: Mapping[str, Values]
     other: Mapping[str, Values]
+    motion: Mapping[str, Values]
 
 
 def known_names() -> list[str]:
     """Return what can be measured: all policies, learned ones if there are any, and more."""
-    return [*POLICIES, SEQUENCE, PEEKING, ORACLE]
+    return [*POLICIES, SEQUENCE, SWAPPED, PEEKING, ORACLE]
 
 
 def find_offsets(scene: Scene, entrant: Entrant, episodes: Episodes,
@@ -89,20 +105,26 @@ def run_episodes(scene: Scene, entrant: Entrant, episodes: Episodes,
     """
     same: dict[str, list[Values]] = {name: [] for name in episodes.policies}
     others: dict[str, list[Values]] = {name: [] for name in episodes.policies}
+    motion: dict[str, list[Values]] = {name: [] for name in episodes.policies}
     for row in range(len(scene)):
         own, other = (_watched(scene, entrant, episodes, row, 2 * episodes.seed + rendering)
                       for rendering in range(2))
         for name in episodes.policies:
-            orders = [[_order(name, own, start, [episodes.seed, seed, row, start], entrant,
+            looked_at = own if name != SWAPPED else _watched(
+                scene, entrant, episodes, (row + 1) % len(scene), 2 * episodes.seed)
+            orders = [[_order(name, looked_at, start, [episodes.seed, seed, row, start], entrant,
                               episodes, offsets)
                        for seed in range(_seeds(name, episodes))]
                       for start in _starts(scene, episodes, row)]
             others[name].append(_judged(other, orders))
+            motion[name].append(np.array([[motion_time(own, order) for order in seeds]
+                                          for seeds in orders]))
             if name in _ON_BOTH:
                 same[name].append(_judged(own, orders))
         advance(1)
     return Found({name: np.array(rows) for name, rows in same.items() if rows},
-                 {name: np.array(rows) for name, rows in others.items()})
+                 {name: np.array(rows) for name, rows in others.items()},
+                 {name: np.array(rows) for name, rows in motion.items()})
 
 
 def figures(found: Found) -> dict[str, Any]:
@@ -111,7 +133,8 @@ def figures(found: Found) -> dict[str, Any]:
 
     - policies: the IoU after each view, and the area under that curve (its mean), on the other
       rendering; `ahead` of other policies, paired by object and start; `share` of the repeatable
-      gap, None where there surely is none
+      gap, None where there surely is none; `views_for_random`: after how many views it is where
+      random ends; `motion_s`: the time of the motion
     - gap: what the oracle is ahead of random, `same`: on the rendering that it chose on;
       `repeatable`: on the other one
     """
@@ -123,7 +146,11 @@ def figures(found: Found) -> dict[str, Any]:
             'iou': [asdict(mean_interval(of_view)) for of_view in np.moveaxis(values, 3, 0)],
             'area': asdict(mean_interval(areas[name])),
             'ahead': {rival: asdict(difference(areas[name], areas[rival]))
-                      for rival in areas if rival != name}}
+                      for rival in areas if rival != name},
+            'motion_s': asdict(mean_interval(found.motion[name]))}
+        if 'random' in found.other:
+            policies[name]['views_for_random'] = asdict(
+                views_to_reach(values, found.other['random']))
         if has_gap:
             share = gap_closed(areas[name], areas['random'], areas[ORACLE])
             policies[name]['share'] = share and asdict(share)
@@ -144,22 +171,34 @@ def _order(name: str, watched: WatchedObject, start: int, seed: Sequence[int], e
            episodes: Episodes, offsets: Offsets | None) -> Order:
     if name in _WORTH:
         return chosen_ahead(_WORTH[name], watched, start, episodes.count)
-    return chosen_by(_policy(name, seed, entrant, episodes, offsets), watched, start,
-                     episodes.count)
+    plain, motion_cost = _parted(name)
+    return chosen_by(_policy(plain, seed, entrant, episodes, offsets), watched, start,
+                     episodes.count, motion_cost)
+
+
+def _parted(name: str) -> tuple[str, float]:
+    """Return the policy of a name NAME@COST and its cost of motion, 0 where none is named."""
+    plain, _, cost = name.partition('@')
+    try:
+        return plain, float(cost or 0)
+    except ValueError as error:
+        raise ConfigError(f'policies: no cost of motion: expected NAME@COST such as '
+                          f'attention@0.002, got {name!r}') from error
 
 
 def _policy(name: str, seed: Sequence[int], entrant: Entrant, episodes: Episodes,
             offsets: Offsets | None) -> Policy:
     if name != SEQUENCE:
-        return load_policy(name, PolicyOptions(np.random.default_rng(seed), episodes.count,
-                                               entrant.path))
+        return load_policy(_LOOKS_ELSEWHERE if name == SWAPPED else name, PolicyOptions(
+            np.random.default_rng(seed), episodes.count, entrant.path))
     if offsets is None:
         raise ConfigError('sequence: none was found: expected training objects to find one on')
     return FixedSequence(offsets)
 
 
 def _seeds(name: str, episodes: Episodes) -> int:
-    return episodes.seeds if name in POLICIES and POLICIES[name].draws else 1
+    plain, _ = _parted(name)
+    return episodes.seeds if plain in POLICIES and POLICIES[plain].draws else 1
 
 
 def _starts(scene: Scene, episodes: Episodes, row: int) -> list[int]:

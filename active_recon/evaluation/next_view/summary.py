@@ -15,7 +15,9 @@ def markdown(result: Mapping[str, Any]) -> str:
              'light, image noise, poses off by half a degree. Means with 95 % intervals over '
              'objects and first views; differences are paired. `oracle` tries every view and '
              'takes the one after which the IoU with the truth is highest, `peeking` the one '
-             'after which the network itself expects the highest IoU; no robot has either.']
+             'after which the network itself expects the highest IoU; no robot has either. '
+             '`swapped` is the learned policy, shown the volume of another object. The motion '
+             'takes a second a radian around either axis; NAME@COST takes its cost in IoU off.']
     if 'sequence' in result:
         offsets = ', '.join(f'{azimuth:g} at {elevation:g}'
                             for azimuth, elevation in result['sequence']['offsets_deg'])
@@ -42,9 +44,11 @@ def _set_tables(figures: Mapping[str, Any]) -> list[str]:
             for name, own in policies.items()]
     parts.append(table(['IoU after views', *views, 'area'], rows))
     rows = [[name, *(_spread(own['ahead'].get(rival), 4) for rival in rivals),
-             _spread(own.get('share'), 2)] for name, own in policies.items()]
+             _spread(own.get('share'), 2), _spread(own.get('views_for_random'), 2),
+             _spread(own.get('motion_s'), 2)] for name, own in policies.items()]
     parts.append(table(['area', *(f'ahead of {name}' for name in rivals),
-                        'share of the repeatable gap'], rows))
+                        'share of the repeatable gap', 'views to where random ends',
+                        'motion, s'], rows))
     return parts
 
 
