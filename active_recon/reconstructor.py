@@ -7,7 +7,7 @@ from functools import cached_property, partial
 import math
 from pathlib import Path
 
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, ViewError, WeightsError
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.canonical import network_image, NetworkSpec, useful_reduction
 from active_recon.models.weights_files import find_weights, SHIPPED
@@ -15,7 +15,16 @@ from active_recon.quality.judge import Judge
 from active_recon.quality.quality import Quality
 from active_recon.quality.silhouettes import SeenView
 from active_recon.quality.tables import find_tables, QualityTables
-from active_recon.runtimes import AUTO, load_runtime, Runtime, State
+from active_recon.runtimes import (
+    AUTO,
+    DepthRuntime,
+    load_depth_runtime,
+    load_runtime,
+    Runtime,
+    State,
+)
+from active_recon.volumes.depth_evidence import depth_evidence, Evidence, no_evidence
+from active_recon.volumes.depth_images import DepthImage, usable_depth
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +40,14 @@ class Reconstruction:
     The reconstruction after a view: the grid in the object frame, and the latent (C, h, w).
 
     `image` is the network's input, (S, S, 3 or 4) uint8; the fourth channel is 255 where the
-    camera saw the pixel. `judge` computes the quality, which does not delay what needs none.
+    camera saw the pixel. `depth_refusal` says in one line why a depth image that was given was not
+    used. `judge` computes the quality, which does not delay what needs none.
     """
 
     grid: VoxelGrid
     latent: NDArray[np.float32]
     image: NDArray[np.uint8] | None = None
+    depth_refusal: str = ''
     judge: Callable[[], Quality | None] = lambda: None
 
     @cached_property
@@ -47,11 +58,16 @@ class Reconstruction:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """What a reconstructor knows of an episode: the state, and what was seen of its views."""
+    """
+    What a reconstructor knows of an episode: the state, and what was seen of its views.
+
+    `evidence` is that of its depth images, None where there was none.
+    """
 
     state: State
     view_count: int
     seen: tuple[SeenView, ...]
+    evidence: Evidence | None = None
 
 
 class Reconstructor:
@@ -61,10 +77,13 @@ class Reconstructor:
     `object_size` is the side of the voxel grid in metres. `object_yaw` is the azimuth of the
     object's front in the object frame, radians. Only networks that predict with the front at +x
     use it. `threshold` None is that of the weights. `tables` None: quality is not judged.
+    `load_depth` returns what works depth images in, and raises WeightsError where there is none;
+    it is called when it is first needed. None: no depth is taken.
     """
 
     def __init__(self, runtime: Runtime, object_size: float = 1.0, object_yaw: float = 0.0,
-                 threshold: float | None = None, tables: QualityTables | None = None) -> None:
+                 threshold: float | None = None, tables: QualityTables | None = None,
+                 load_depth: Callable[[], DepthRuntime] | None = None) -> None:
         if not object_size > 0:
             raise ConfigError('object_size: out of range: expected metres above 0, got '
                               f'{object_size}')
@@ -75,6 +94,8 @@ class Reconstructor:
         self.object_size = object_size
         self._yaw = object_yaw if runtime.spec.needs_front else 0.0
         self._judge = None if tables is None else Judge(tables)
+        self._load_depth = load_depth
+        self._depth: DepthRuntime | None = None
         self.no_quality = ''
         """Why quality is not judged, in words, where it might be expected."""
         self.reset()
@@ -92,7 +113,9 @@ class Reconstructor:
         loaded = load_runtime(weights, runtime, device, threads, precision)
         tables, without = find_tables(
             weights or SHIPPED, loaded.provenance.get('weights_sha256', ''))
-        reconstructor = cls(loaded, object_size, object_yaw, threshold, tables)
+        reconstructor = cls(
+            loaded, object_size, object_yaw, threshold, tables,
+            lambda: load_depth_runtime(weights, runtime, device, threads, precision))
         reconstructor.no_quality = without
         return reconstructor
 
@@ -125,14 +148,30 @@ class Reconstructor:
                               f'{threshold}')
         self.threshold = threshold
 
-    def warm_up(self) -> None:
-        """Run the network once, so that the first view is as fast as the others."""
+    def warm_up(self, depth: bool = False) -> None:
+        """
+        Run the network once, so that the first view is as fast as the others.
+
+        With `depth`, also what works depth images in; raises WeightsError where there is none.
+        """
         self._runtime.warm_up()
+        if depth:
+            side = self._runtime.spec.resolution
+            self._depth_runtime().refine(np.zeros((side,) * 3, np.float32), no_evidence(side),
+                                         self._runtime.initial_state())
+
+    def _depth_runtime(self) -> DepthRuntime:
+        if self._depth is None:
+            if self._load_depth is None:
+                raise WeightsError('no depth refiner: expected a reconstructor loaded with one')
+            self._depth = self._load_depth()
+        return self._depth
 
     def reset(self) -> None:
         """Clear the state for a new episode."""
         self._state = self._runtime.initial_state()
         self._view_count = 0
+        self._evidence: Evidence | None = None
         self._seen: deque[SeenView] = deque(maxlen=_COMPARED_VIEWS)
 
     @property
@@ -147,12 +186,13 @@ class Reconstructor:
     @property
     def progress(self) -> Progress:
         """What is known of the episode, to go on from later."""
-        return Progress(self._state, self._view_count, tuple(self._seen))
+        return Progress(self._state, self._view_count, tuple(self._seen), self._evidence)
 
     def go_on_from(self, progress: Progress) -> None:
         """Take up an episode of a reconstructor with the same weights, size and yaw."""
         self.reset()
         self._state, self._view_count = progress.state, progress.view_count
+        self._evidence = progress.evidence
         self._seen.extend(progress.seen)
 
     def reduction(self, camera: Camera) -> int:
@@ -163,19 +203,37 @@ class Reconstructor:
         """
         return useful_reduction(camera, self.spec, self.object_size, _COLORING_SIDE)
 
-    def add_view(self, image: NDArray[np.uint8], camera: Camera) -> Reconstruction:
+    def add_view(self, image: NDArray[np.uint8], camera: Camera,
+                 depth: DepthImage | None = None) -> Reconstruction:
         """
         Update the reconstruction by one view.
 
-        Takes an image (H, W, 3) uint8 RGB and its camera in the object frame. Raises ViewError,
-        which leaves the state unchanged.
+        Takes an image (H, W, 3) uint8 RGB, its camera in the object frame, and what a depth camera
+        measured beside it. Depth that cannot be used is left out, and the result says why. Raises
+        ViewError, which leaves the state unchanged.
         """
         shown, seen_by = network_image(image, camera, self._runtime.spec, self.object_size)
         placed = seen_by.turned(-self._yaw).scaled(1 / self.object_size)
         occupancy, latent, self._state = self._runtime.step(shown, placed, self._state)
         self._view_count += 1
+        refusal = '' if depth is None else self._add_depth(depth, camera)
+        if self._evidence is not None:
+            occupancy = self._depth_runtime().refine(occupancy, self._evidence, self._state)
         grid = VoxelGrid(turned(occupancy, self._yaw), self.object_size)
-        return Reconstruction(grid, latent, shown, self._judgement(occupancy, latent, placed))
+        return Reconstruction(grid, latent, shown, refusal,
+                              self._judgement(occupancy, latent, placed))
+
+    def _add_depth(self, depth: DepthImage, camera: Camera) -> str:
+        """Add the evidence of a view's depth image; return why it cannot be used, else ''."""
+        try:
+            self._depth_runtime()
+            measured, seen_by = usable_depth(depth, camera, self.object_size)
+        except (ViewError, WeightsError) as error:
+            return str(error)
+        side = self._runtime.spec.resolution
+        new = depth_evidence(measured, seen_by, side)
+        self._evidence = new if self._evidence is None else self._evidence + new
+        return ''
 
     def _judgement(self, occupancy: NDArray[np.float32], latent: NDArray[np.float32],
                    camera: Camera) -> Callable[[], Quality | None]:

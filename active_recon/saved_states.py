@@ -12,6 +12,7 @@ from active_recon.meshes.photos import Photo
 from active_recon.quality.quality import Quality
 from active_recon.quality.silhouettes import SeenView
 from active_recon.reconstructor import Progress, Reconstruction, Reconstructor
+from active_recon.volumes.depth_evidence import no_evidence
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from safetensors.numpy import save_file
 
 SUFFIX = '.state.safetensors'
 _FORMAT = '1'
+_EVIDENCE = 'depth_evidence'
 _LENS = ('fx', 'fy', 'cx', 'cy', 'width', 'height')
 _SAME = {'weights_sha256': 'weights', 'resolution': 'cells a side', 'object_size':
          'object_size, metres', 'object_yaw': 'object_yaw, radians'}
@@ -48,6 +50,7 @@ def write_state(saved: SavedState, reconstructor: Reconstructor, path: Path) -> 
         **{f'state/{name}': array for name, array in progress.state.items()},
         'occupancy': known.grid.occupancy, 'latent': known.latent,
         'last_pose': saved.last_camera.pose,
+        **({} if progress.evidence is None else {_EVIDENCE: progress.evidence}),
         **_written_cameras('seen', [view.camera for view in progress.seen]),
         **_written_cameras('photo', [photo.camera for photo in saved.photos])}
     for number, view in enumerate(progress.seen):
@@ -115,14 +118,17 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
         lens = photo.camera.intrinsics
         if photo.image.dtype != np.uint8 or photo.image.shape[:2] != (lens.height, lens.width):
             raise ValueError(f'an image of {photo.image.shape} {photo.image.dtype}')
+    evidence, side = arrays.get(_EVIDENCE), reconstructor.spec.resolution
+    if evidence is not None and evidence.shape != no_evidence(side).shape:
+        raise ValueError(f'depth evidence of {evidence.shape}')
     told = json.loads(facts['quality'])
     quality = Quality(**told) if told else None
     occupancy = arrays['occupancy']
-    if occupancy.shape != (reconstructor.spec.resolution,) * 3 or not (
+    if occupancy.shape != (side,) * 3 or not (
             (occupancy >= 0) & (occupancy <= 1)).all():
         raise ValueError(f'occupancies of {occupancy.shape}, not all of them in [0, 1]')
     return SavedState(
-        Progress(state, int(facts['views']), tuple(seen)),
+        Progress(state, int(facts['views']), tuple(seen), evidence),
         Reconstruction(VoxelGrid(occupancy, reconstructor.object_size), arrays['latent'], None,
                        lambda: quality),
         photos, Camera(arrays['last_pose']))

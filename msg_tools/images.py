@@ -1,4 +1,4 @@
-"""Camera images, masks and latents to and from sensor_msgs/Image."""
+"""Camera images, masks, depth and latents to and from sensor_msgs/Image."""
 
 import array
 import re
@@ -16,6 +16,10 @@ _FLOAT: np.dtype[Any] = np.dtype(np.float32)
 ENCODINGS = {'rgb8': (_BYTE, 3), 'bgr8': (_BYTE, 3), 'rgba8': (_BYTE, 4), 'bgra8': (_BYTE, 4),
              'mono8': (_BYTE, 1), '8UC3': (_BYTE, 3), '32FC3': (_FLOAT, 3)}
 MASK_ENCODINGS = ('mono8', '8UC1')
+DEPTH_ENCODINGS: dict[str, np.dtype[Any]] = {
+    encoding: np.dtype(kind) for encoding, kind in (
+        ('16UC1', np.uint16), ('mono16', np.uint16), ('32FC1', np.float32))}
+_MILLIMETRES = 1000  # in a metre, of depth in 16 bits
 _TO_RGB = {'bgr8': cv2.COLOR_BGR2RGB, '8UC3': cv2.COLOR_BGR2RGB, 'mono8': cv2.COLOR_GRAY2RGB,
            'rgba8': cv2.COLOR_RGBA2RGB, 'bgra8': cv2.COLOR_BGRA2RGB}
 
@@ -87,6 +91,26 @@ def mask_from_msg(msg: Image) -> NDArray[np.bool_]:
 def mask_to_msg(mask: NDArray[np.bool_], header: Header) -> Image:
     """Return a mask, (height, width), as mono8: 255 where the object is, else 0."""
     return _image_msg(mask[..., None] * np.uint8(255), 'mono8', header)
+
+
+def depth_from_msg(msg: Image) -> NDArray[np.float32]:
+    """
+    Return depth in metres, (height, width); as in REP-118, 0, NaN and infinity are no value.
+
+    Raises MessageError unless it is 16UC1 (or mono16), in millimetres, or 32FC1, in metres, if it
+    is empty, or has too few bytes.
+    """
+    if msg.encoding not in DEPTH_ENCODINGS:
+        raise MessageError(f'unknown depth encoding: expected {", ".join(DEPTH_ENCODINGS)}, got '
+                           f'{msg.encoding!r}', 'depth')
+    kind = DEPTH_ENCODINGS[msg.encoding]
+    values = _pixels(msg, kind, 1)[..., 0].astype(np.float32)
+    return values if kind == _FLOAT else values / np.float32(_MILLIMETRES)
+
+
+def depth_to_msg(metres: NDArray[np.floating], header: Header) -> Image:
+    """Return depth in metres, (height, width), as 32FC1."""
+    return _image_msg(np.asarray(metres, np.float32)[..., None], '32FC1', header)
 
 
 def over_white(color: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -5,11 +5,12 @@ from typing import Any
 from active_recon.geometry.cameras import Camera, OBJECT_FRAME
 from active_recon.policies.reasons import GoalReason
 from active_recon.quality.quality import Quality
+from active_recon.volumes.depth_images import DepthImage
 from active_recon.volumes.voxels import VoxelGrid
 from msg_tools.cameras import camera_to_msgs, pose_to_msg
 from msg_tools.entropy import entropy_to_msg
 from msg_tools.goals import azimuth_goal_to_msg, score_table_to_msg, view_goal_to_msg
-from msg_tools.images import image_to_msg, latent_to_msg
+from msg_tools.images import depth_to_msg, image_to_msg, latent_to_msg
 from msg_tools.quality import quality_to_msg
 from msg_tools.reasons import goal_reason_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
@@ -28,6 +29,15 @@ def image_to_msgs(stamp: int, image: NDArray[np.uint8], camera: Camera,
     info, pose = camera_to_msgs(camera, header, object_frame)
     return {'camera/pose': pose, 'camera/camera_info': info,
             'camera/image_raw': image_to_msg(image, header)}
+
+
+def depth_to_msgs(stamp: int, depth: DepthImage) -> dict[str, Any]:
+    """Return a depth camera's messages at a stamp in ns; aligned depth has no camera info."""
+    header = _header(stamp, CAMERA_FRAME)
+    messages: dict[str, Any] = {'camera/depth/image_raw': depth_to_msg(depth.metres, header)}
+    if depth.camera is not None:
+        messages['camera/depth/camera_info'], _ = camera_to_msgs(depth.camera, header)
+    return messages
 
 
 def view_to_msgs(stamp: int, camera: Camera, probabilities: VoxelGrid | None,

@@ -1,4 +1,4 @@
-"""Views joined from their streams: image, camera info, pose and mask of one stamp."""
+"""Views joined from their streams: image, camera info, pose, mask and depth of one stamp."""
 
 import bisect
 from collections import deque
@@ -28,13 +28,14 @@ class View:
     An image and the camera that took it, at a stamp in nanoseconds.
 
     The image is decoded when it is first asked for. `mask` is the mask message of its object, if
-    masks are joined and one was received.
+    masks are joined and one was received; `depth` likewise.
     """
 
     stamp: int
     image_msg: Image | CompressedImage
     camera: Camera
     mask: Image | None = None
+    depth: Image | None = None
 
     @cached_property
     def image(self) -> NDArray[np.uint8]:
@@ -69,12 +70,15 @@ class ViewJoiner:
     An image is joined with the camera info of its stamp, and with the pose of its stamp or one
     interpolated between two neighbours, each at most `max_pose_gap` seconds away. It waits for
     them until a later one is there or `patience` seconds have passed. With `masks` it waits in
-    the same way for the mask of its stamp, but is joined without it too. `max_pose_gap` may be
+    the same way for the mask of its stamp, but is joined without it too; with a `max_depth_gap`
+    of 0 seconds or more also for the nearest depth image within that. `max_pose_gap` may be
     changed at any time.
     """
 
-    def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False) -> None:
+    def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False,
+                 max_depth_gap: float | None = None) -> None:
         self.max_pose_gap = max_pose_gap
+        self._max_depth_gap = max_depth_gap
         self._patience = patience
         self._with_masks = masks
         self.clear()
@@ -90,6 +94,7 @@ class ViewJoiner:
         self._images: deque[_WaitingImage] = deque()
         self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_MAX_INFOS)
         self._masks: deque[tuple[int, Image]] = deque(maxlen=_MAX_WAITING)
+        self._depths: deque[tuple[int, Image]] = deque(maxlen=_MAX_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
 
     def add_image(self, stamp: int, msg: Image | CompressedImage, now: float) -> None:
@@ -118,6 +123,11 @@ class ViewJoiner:
         if stamp >= self._earliest:
             self._masks.append((stamp, mask))
 
+    def add_depth(self, stamp: int, depth: Image) -> None:
+        """Add a depth image message."""
+        if stamp >= self._earliest:
+            self._depths.append((stamp, depth))
+
     def add_pose(self, stamp: int, pose: NDArray[np.float64]) -> None:
         """Add a pose, (4, 4), object from optical frame."""
         if stamp < self._earliest:
@@ -144,6 +154,11 @@ class ViewJoiner:
                 mask = _of_stamp(self._masks, stamp) if self._with_masks else None
                 if self._with_masks and mask is None and not _is_past(self._masks, stamp, late):
                     return
+                depth = None
+                if self._max_depth_gap is not None:
+                    if not _is_past(self._depths, stamp - 1, late):
+                        return
+                    depth = nearest_part(self._depths, stamp, self._max_depth_gap)
                 height, width = image.size
                 if (intrinsics.height, intrinsics.width) != (height, width):
                     raise MessageError(
@@ -154,7 +169,7 @@ class ViewJoiner:
                 yield error
                 continue
             self._drop_first()
-            yield View(stamp, image.msg, Camera(pose, intrinsics), mask)
+            yield View(stamp, image.msg, Camera(pose, intrinsics), mask, depth)
 
     def _are_too_many(self) -> bool:
         return len(self._images) > _MAX_WAITING or (
@@ -162,10 +177,12 @@ class ViewJoiner:
             and sum(len(image.msg.data) for image in self._images) > _MAX_WAITING_BYTES)
 
     def _drop_first(self) -> None:
-        """Forget the first image and its mask, as well as older masks."""
+        """Forget the first image and its mask, as well as older masks and depth images."""
         stamp = self._images.popleft().stamp
         while self._masks and self._masks[0][0] <= stamp:
             self._masks.popleft()
+        while len(self._depths) > 1 and self._depths[1][0] <= stamp:
+            self._depths.popleft()
 
     def _intrinsics_at(self, stamp: int, late: bool) -> Intrinsics | None:
         """Return the camera info of that stamp, None while it may still arrive."""
@@ -207,6 +224,14 @@ def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
     pose[:3, :3] = Slerp([0, 1], rotations)(fraction).as_matrix()
     pose[:3, 3] = (1 - fraction) * start[:3, 3] + fraction * end[:3, 3]
     return pose
+
+
+def nearest_part(parts: Sequence[tuple[int, Part]], stamp: int, gap: float) -> Part | None:
+    """Return the part whose stamp is nearest, None where it is more than `gap` seconds away."""
+    nearest = min(parts, key=lambda each: abs(each[0] - stamp), default=None)
+    if nearest is None or abs(nearest[0] - stamp) > round(gap * 1e9):
+        return None
+    return nearest[1]
 
 
 def _of_stamp(parts: Sequence[tuple[int, Part]], stamp: int) -> Part | None:

@@ -54,7 +54,7 @@ def starts(folder: Path) -> dict[str, dict[str, dict[str, object]]]:
                'reconstructor': {'output_dir': folder}, 'view_planner': {}, 'viewer': {'port': 0}},
         '/policies_1': {'reconstructor': {
             'output_dir': folder, 'background': 'mask', 'publish_mesh': True,
-            'pose_source': 'turntable_joint',
+            'use_depth': True, 'pose_source': 'turntable_joint',
             'camera_position': [position.x, position.y, position.z],
             'camera_orientation': [turn.x, turn.y, turn.z, turn.w]},
             'turntable_camera': {'mesh': MESH, 'follows': 'view'}},

@@ -25,6 +25,7 @@ from active_recon.cli.report import report
 from active_recon.cli.sheet import sheet
 from active_recon.cli.study import study
 from active_recon.cli.train import train
+from active_recon.cli.train_depth import train_depth
 from active_recon.cli.train_policy import train_policy
 from active_recon.cli.up import up
 from active_recon.cli.view import view
@@ -34,7 +35,8 @@ import typer
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 for command in (demo, up, reconstruct, calibrate, camera, view, report, replay, play, record_sweep,
-                render, train, train_policy, export, evaluate, study, policies, paper, sheet):
+                render, train, train_policy, train_depth, export, evaluate, study, policies, paper,
+                sheet):
     app.command()(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

@@ -18,6 +18,9 @@ Samples = Annotated[int, typer.Option(
 
 Fine = Annotated[bool, typer.Option(
     '--fine', help='Also voxelise at 64 cells a side; finished objects get only these voxels.')]
+Depth = Annotated[bool, typer.Option(
+    '--depth', help='Also write a depth image beside each image, without noise; finished objects '
+                    'get only these.')]
 Cameras = Annotated[str, typer.Option(
     help="'turntable' (24 azimuths, elevation 30 degrees), 'dome' (12 azimuths at elevations of "
          "10, 30, 50 and 70 degrees) or 'any' (random for each object: elevation -10 to 85 "
@@ -51,6 +54,7 @@ def render(
              'CC-BY or public domain.')] = False,
     samples: Samples = 2,
     fine: Fine = False,
+    depth: Depth = False,
     cameras: Cameras = 'turntable',
     views: Views = 12,
     turned: Turned = False,
@@ -82,7 +86,7 @@ def render(
                           f'--explicit-licence, got {meshes}')
     else:
         jobs = mesh_jobs(meshes, out, up, front)
-    _make('rendering', jobs, samples, fine, viewing, workers, cluster, [meshes])
+    _make('rendering', jobs, samples, fine, viewing, depth, workers, cluster, [meshes])
 
 
 @dataset.command()
@@ -100,6 +104,7 @@ def build(
         help='Only these categories (may be given several times).')] = None,
     samples: Samples = 2,
     fine: Fine = False,
+    depth: Depth = False,
     cameras: Cameras = 'turntable',
     views: Views = 12,
     turned: Turned = False,
@@ -131,11 +136,12 @@ def build(
                         f'({code[:12]}), got another hash in {made_by}; choose another folder')
     out.mkdir(parents=True, exist_ok=True)
     made_by.write_text(code + '\n')
-    _make('making', jobs, samples, fine, Viewing(cameras, views, turned), workers, cluster)
+    _make('making', jobs, samples, fine, Viewing(cameras, views, turned), depth, workers, cluster)
 
 
 def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Viewing',
-          workers: int | None, cluster: str | None, reads: Sequence[Path] = ()) -> None:
+          depth: bool, workers: int | None, cluster: str | None,
+          reads: Sequence[Path] = ()) -> None:
     from active_recon.cluster.telling import told
     from active_recon.datasets.making import make_dataset
 
@@ -143,7 +149,7 @@ def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Vie
         raise DataError('no objects to make: expected at least one, got none with these options')
     rejected = []
     with workers_of(cluster, workers) as crew, progress_bar(title, len(jobs)) as advance:
-        outcomes = make_dataset(jobs, samples, 1, fine, viewing, crew, reads)
+        outcomes = make_dataset(jobs, samples, 1, fine, viewing, depth, crew, reads)
         for outcome in told(outcomes, crew, advance, lambda outcome: bool(outcome.refusal)):
             if outcome.refusal:
                 rejected.append(outcome)

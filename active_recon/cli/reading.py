@@ -19,14 +19,16 @@ Split = Annotated[str | None, typer.Option(
 
 
 def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
-                 split: str | None = None, part: str = '', at_once: bool = True) -> 'ViewSet':
+                 split: str | None = None, part: str = '', at_once: bool = True,
+                 depth: bool = False) -> 'ViewSet':
     """
     Read the objects of datasets into memory, at the sizes that a network needs.
 
     Without `at_once`, images of a network that needs no front are read when they are first used.
     With a `split`, only the objects of its `part` (train, val or test) are read. A single root
-    may be the folder of PASCAL3D+, whose photographs are objects of one view each. Raises
-    DataError where no object can be read, ConfigError where the network cannot use photographs.
+    may be the folder of PASCAL3D+, whose photographs are objects of one view each. With `depth`,
+    views come with their depth images, and objects without are left out. Raises DataError where
+    no object can be read, ConfigError where the network cannot use photographs.
     """
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.splits import list_split
@@ -41,7 +43,7 @@ def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
         missing += lacking
     with progress_bar(f'reading {title}', len(folders)) as advance:
         views = read_views(folders, lambda: advance(1, ''), spec.resolution, spec.image_size,
-                           framed=not spec.needs_front, at_once=at_once)
+                           framed=not spec.needs_front, at_once=at_once, depth=depth)
     _print_left_out(title, len(views), missing, views.unreadable)
     return views
 

@@ -163,8 +163,10 @@ def _print(shape: 'Shape') -> None:
     for warning in shape.warnings:
         typer.echo(f'warning: {warning}', err=True)
     side = shape.cube
-    typer.echo(f'{len(shape.views)} photos; silhouettes: {shape.background}; cube of '
-               f'{shape.size:.4g} m about {", ".join(f"{value:.4g}" for value in side.centre)}')
+    deep = sum(view.depth is not None for view in shape.views)
+    typer.echo(f'{len(shape.views)} photos{f", {deep} with depth" if deep else ""}; '
+               f'silhouettes: {shape.background}; cube of {shape.size:.4g} m about '
+               f'{", ".join(f"{value:.4g}" for value in side.centre)}')
     if shape.quality is not None:
         typer.echo(f'quality: {shape.quality.summary}')
 

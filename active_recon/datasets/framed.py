@@ -8,6 +8,7 @@ from active_recon.datasets.layout import ObjectFolder
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.canonical import framed_layers, framing_camera
+from active_recon.geometry.resampling import depth_seen_by
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -50,6 +51,17 @@ class FramedViews:
         """Read an image, (S, S, 4), and its mask `seen`, (S, S); raises DataError on bad ones."""
         layers = np.asarray(weighted(self.folders[index].image(view)).round(), np.uint8)
         return framed_layers(layers, self._shown[index][view], self._sides[index], self._size)[:2]
+
+    def read_depth(self, index: int, view: int) -> NDArray[np.float32]:
+        """Read a depth image, (S, S), in sides of the grid; raises DataError on bad ones."""
+        depth, camera = self.folders[index].depth(view), self._shown[index][view]
+        if depth.shape != (camera.intrinsics.height, camera.intrinsics.width):
+            raise DataError(f'{self.folders[index].depth_path(view)}: wrong size: expected '
+                            f'{camera.intrinsics.height} x {camera.intrinsics.width} pixels, as '
+                            f'its camera says, got {depth.shape[0]} x {depth.shape[1]}')
+        side = self._sides[index]
+        target = framing_camera(camera, side, self._size)
+        return np.asarray(depth_seen_by(target, depth, camera) / side, np.float32)
 
     def read_voxels(self, index: int) -> NDArray[np.bool_]:
         """Read the voxels of one object, (R, R, R); raises DataError where they are unreadable."""

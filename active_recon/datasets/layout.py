@@ -2,6 +2,7 @@
 R2N2's layout on disk, read and written: the same for real ShapeNet and for datasets made here.
 
     <root>/ShapeNetRendering/<category>/<id>/rendering/NN.png  RGBA, 137 x 137
+                                                      /NN_depth.png (optional)
                                                       /rendering_metadata.txt
                                                       /renderings.txt
                                                       /cameras.json (optional)
@@ -12,7 +13,9 @@ A row of the metadata holds azimuth, elevation and in-plane rotation in degrees,
 field of view, which is ignored. The azimuth is clockwise, so it is negated, and the distance is in
 units of 1.75 sides of the grid. The metadata assumes R2N2's lens and no roll; any other cameras
 are stored in `cameras.json` instead, which takes precedence: for each camera its pose, 4 x 4
-object from optical frame, and its intrinsics in pixels.
+object from optical frame, and its intrinsics in pixels. A depth image has the size of the image
+beside it, 16 bits, in thousandths of the cameras' unit along the optical axis (millimetres where
+that is metres); 0 is no value.
 """
 
 from collections.abc import Sequence
@@ -34,6 +37,7 @@ RENDERING, VOXELS = 'ShapeNetRendering', 'ShapeNetVox'
 _CAMERAS = 'cameras.json'
 _LENS = ('fx', 'fy', 'cx', 'cy', 'width', 'height')
 _DISTANCE_UNIT = 1.75
+_STEPS, _FARTHEST = 1000, 65.535  # of depth images: steps in a unit, and what 16 bits hold
 _FIELD_OF_VIEW_COLUMN = 25.0  # as R2N2 writes it; not the field of view of its lens
 
 
@@ -86,6 +90,31 @@ class ObjectFolder:
             raise DataError(f'{path}: wrong image format: expected four channels (RGBA) of 8 '
                             f'bits, got the shape {bgra.shape} {bgra.dtype}')
         return np.asarray(cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA), np.uint8)
+
+    def depth_path(self, index: int) -> Path:
+        """Return the path of the depth image beside an image."""
+        return self.images_folder / f'{index:02d}_depth.png'
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether there are depth images: all are written where one is."""
+        return self.depth_path(0).is_file()
+
+    def depth(self, index: int) -> NDArray[np.float32]:
+        """
+        Return one depth image, (H, W), in the unit of the cameras, 0 where there is no value.
+
+        Raises DataError where it cannot be read.
+        """
+        path = self.depth_path(index)
+        stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        if stored is None or stored.ndim != 2 or stored.dtype != np.uint16:
+            found = ('no whole PNG' if path.is_file() else 'no file') if stored is None else (
+                f'the shape {stored.shape} {stored.dtype}')
+            raise DataError(f'{path}: no readable depth image: expected a PNG of one channel of '
+                            f'16 bits, got {found}; make them by `render` or `dataset build` with '
+                            '`--depth`')
+        return np.asarray(stored / np.float32(_STEPS), np.float32)
 
     def voxels(self, resolution: int = RESOLUTION) -> VoxelGrid:
         """Return the true voxels; raises DataError where there are none of this resolution."""
@@ -153,6 +182,20 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
         _write_cameras(folder.images_folder / _CAMERAS, cameras)
     (folder.images_folder / 'renderings.txt').write_text('\n'.join(names) + '\n')
     write_voxels(folder, grid)
+
+
+def write_depths(folder: ObjectFolder, depths: Sequence[NDArray[np.float32]]) -> None:
+    """
+    Write the depth images (H, W) of an object's views, in the unit of its cameras; 0 is no value.
+
+    Values beyond the 65.535 units that 16 bits hold become no value. The first comes last: it
+    tells that there are all. Raises DataError where one cannot be written.
+    """
+    for index, depth in reversed(list(enumerate(depths))):
+        path = folder.depth_path(index)
+        stored = np.rint(np.where(depth <= _FARTHEST, depth, 0) * _STEPS).astype(np.uint16)
+        if not cv2.imwrite(str(path), stored):
+            raise DataError(f'{path}: cannot be written; is the disk full?')
 
 
 def _is_r2n2(camera: Camera) -> bool:

@@ -12,7 +12,12 @@ from active_recon.cluster import Crew
 from active_recon.cluster.local import LocalCrew
 from active_recon.cluster.results import is_no_room
 from active_recon.datasets.drawn_cameras import TURNTABLE, Viewing
-from active_recon.datasets.layout import ObjectFolder, write_object, write_voxels
+from active_recon.datasets.layout import (
+    ObjectFolder,
+    write_depths,
+    write_object,
+    write_voxels,
+)
 from active_recon.errors import ActiveReconError, DataError
 from active_recon.shapes import check_category, make_shape
 from active_recon.volumes.meshes import file_rotation, fit_to_grid, load_mesh
@@ -97,16 +102,18 @@ def shape_jobs(category: str, seeds: Iterable[int], out: Path) -> list[Job]:
                 partial(make_shape, category, seed)) for seed in seeds]
 
 
-def make_object(job: Job, samples: int, fine: bool = False,
-                viewing: Viewing = TURNTABLE) -> Outcome:
+def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = TURNTABLE,
+                depth: bool = False) -> Outcome:
     """
     Render and voxelise one object at 32 cells a side, with `fine` also at 64.
 
-    Each image pixel averages `samples` x `samples` rays. Existing files are kept. Errors become
-    the outcome's `refusal`; raises OSError where there is no room to write.
+    Each image pixel averages `samples` x `samples` rays. With `depth` there is a depth image,
+    without noise, beside each image. Existing files are kept. Errors become the outcome's
+    `refusal`; raises OSError where there is no room to write.
     """
     lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
-    if job.folder.complete and not lacks_fine:
+    lacks_depth = depth and not job.folder.has_depth
+    if job.folder.complete and not (lacks_fine or lacks_depth):
         return Outcome(job.folder)
     try:
         mesh = job.make_mesh()
@@ -117,6 +124,9 @@ def make_object(job: Job, samples: int, fine: bool = False,
             _render(job.folder, mesh, samples, viewing)
         if lacks_fine:
             write_voxels(job.folder, voxelise(mesh, FINE_RESOLUTION))
+        if lacks_depth:
+            renderer = Renderer(mesh)
+            write_depths(job.folder, [renderer.depth(camera) for camera in job.folder.cameras()])
     except (ActiveReconError, OSError) as error:
         if is_no_room(error):
             raise
@@ -139,7 +149,7 @@ def _name(folder: ObjectFolder) -> str:
 
 
 def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool = False,
-                 viewing: Viewing = TURNTABLE, crew: Crew | None = None,
+                 viewing: Viewing = TURNTABLE, depth: bool = False, crew: Crew | None = None,
                  reads: Sequence[Path] = ()) -> Iterator[Outcome]:
     """
     Make all objects in `workers` processes; yield each one's outcome as it is finished.
@@ -154,7 +164,8 @@ def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool
                             f'{count} meshes for {folder.category}/{folder.name}; rename their '
                             'files')
     out = Path(os.path.commonpath([job.folder.root for job in jobs])) if jobs else None
-    make = partial(make_object, samples=samples, fine=fine, viewing=viewing)
+    make = partial(make_object, samples=samples, fine=fine, viewing=viewing,
+                   depth=depth)
     for result in (crew or LocalCrew(workers)).map(make, jobs, out, reads):
         outcome: Outcome | None = result.value
         yield outcome or Outcome(jobs[result.index].folder, result.refusal)

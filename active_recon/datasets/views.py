@@ -31,6 +31,8 @@ class ViewSet:
     - voxels: (N, R, R, R) bool
     - folders: the source of each object; unreadable: errors of the objects left out
     - seen: (N, V, S, S) bool, the pixels that lie in the cameras' original images; None: all
+    - depths: (N, V, S, S) float32, along the optical axis in sides of the grid, 0 where there is
+      no value; None: not read
     """
 
     images: Tensor
@@ -40,6 +42,7 @@ class ViewSet:
     folders: tuple[ObjectFolder, ...]
     unreadable: tuple[str, ...] = ()
     seen: Tensor | None = None
+    depths: Tensor | None = None
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -97,7 +100,7 @@ def with_seen(pictures: Tensor, seen: Tensor) -> Tensor:
 
 def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = lambda: None,
                resolution: int = RESOLUTION, image_size: int = 64,
-               framed: bool = False, at_once: bool = True) -> ViewSet:
+               framed: bool = False, at_once: bool = True, depth: bool = False) -> ViewSet:
     """
     Read objects, with voxels and images of the sizes that a network declares.
 
@@ -105,10 +108,11 @@ def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = l
     cropped to the object's cube, with as many views of each object as every object has. Without
     it, they are the 24 of the turntable. Objects that cannot be read are left out and listed in
     `unreadable`. Without `at_once`, framed images are read when they are first indexed, and raise
-    DataError then. Raises DataError if no object can be read.
+    DataError then. With `depth`, framed views come with their depth images, and objects that have
+    none are left out. Raises DataError if no object can be read.
     """
     if framed:
-        return _read_framed(folders, progress, resolution, image_size, at_once)
+        return _read_framed(folders, progress, resolution, image_size, at_once, depth)
     count = len(folders)
     # Filled in place: stacking a list of arrays would need twice the memory
     images = np.empty((count, VIEW_COUNT, image_size, image_size, 4), np.uint8)
@@ -146,9 +150,12 @@ def _read_all(read: Callable[[int], str], count: int) -> tuple[slice | list[int]
 
 
 def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], resolution: int,
-                 image_size: int, at_once: bool) -> ViewSet:
+                 image_size: int, at_once: bool, depth: bool) -> ViewSet:
     """Read views from arbitrary cameras; see `read_views`."""
-    folders, shown, lacking = read_cameras(folders)
+    without = [folder for folder in folders if depth and not folder.has_depth]
+    folders, shown, lacking = read_cameras([each for each in folders if each not in without])
+    lacking += tuple(f'{folder.depth_path(0)}: no depth images: expected those that `render` or '
+                     '`dataset build` makes with `--depth`' for folder in without)
     if not folders:
         raise DataError('no readable object: expected at least one in the dataset, got none'
                         + ''.join(f'\n  {error}' for error in lacking[:5]))
@@ -158,10 +165,12 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
     if not at_once:
         on_demand: Any = [OnDemand(image_shape, lambda *place: views.image(*place)[0]),
                           OnDemand(views.voxels_shape, views.voxels),
-                          OnDemand(seen_shape, lambda *place: views.image(*place)[1])]
+                          OnDemand(seen_shape, lambda *place: views.image(*place)[1]),
+                          OnDemand(seen_shape, views.read_depth) if depth else None]
         return ViewSet(on_demand[0], poses, intrinsics, on_demand[1], tuple(folders), lacking,
-                       on_demand[2])
+                       *on_demand[2:])
     images, seen = np.empty(image_shape, np.uint8), np.empty(seen_shape, np.bool_)
+    depths = np.empty(seen_shape if depth else (len(folders), 0), np.float32)
     voxels = np.empty(views.voxels_shape, np.bool_)
 
     def read(index: int) -> str:
@@ -169,6 +178,8 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
             voxels[index] = views.read_voxels(index)
             for view in range(images.shape[1]):
                 images[index, view], seen[index, view] = views.read_image(index, view)
+                if depth:
+                    depths[index, view] = views.read_depth(index, view)
             return ''
         except DataError as error:
             return str(error)
@@ -178,7 +189,8 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
     kept, unreadable = _read_all(read, len(folders))
     return ViewSet(torch.from_numpy(images[kept]), poses[kept], intrinsics[kept],
                    torch.from_numpy(voxels[kept]), tuple(np.array(folders, object)[kept]),
-                   lacking + unreadable, torch.from_numpy(seen[kept]))
+                   lacking + unreadable, torch.from_numpy(seen[kept]),
+                   torch.from_numpy(depths[kept]) if depth else None)
 
 
 def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],

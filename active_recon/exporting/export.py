@@ -6,13 +6,25 @@ from typing import Any
 import warnings
 
 from active_recon.errors import ConfigError
-from active_recon.exporting.parts import network_parts, Part, policy_part
+from active_recon.exporting.parts import depth_part, network_parts, Part, policy_part
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID
+from active_recon.models.depth_weights import load_refiner
 from active_recon.models.network import State
 from active_recon.models.scorer_weights import load_scorer
 from active_recon.models.weights import Bundle, load_weights
-from active_recon.models.weights_files import config_hash, scorer_path, weights_hash
-from active_recon.runtimes.graph_files import graph_path, GraphMetadata, KEY, POLICY_PART
+from active_recon.models.weights_files import (
+    config_hash,
+    depth_path,
+    scorer_path,
+    weights_hash,
+)
+from active_recon.runtimes.graph_files import (
+    DEPTH_PART,
+    graph_path,
+    GraphMetadata,
+    KEY,
+    POLICY_PART,
+)
 import numpy as np
 import torch
 
@@ -23,7 +35,9 @@ _MODEL_VERSION = 8  # of ONNX files, the one that goes with the opset
 
 def export(weights: Path, folder: Path | None = None) -> list[Path]:
     """
-    Write the graphs of weights, and of the view policy in them or beside them; return the files.
+    Write the graphs of weights, and of what goes with them; return the files.
+
+    That is the view policy in them or beside them, and the depth refiner beside them.
 
     They lie beside the weights, or in another folder. Raises WeightsError as `load_weights` does,
     and ConfigError where the network runs in torch alone, where it has something that no graph
@@ -43,6 +57,10 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
     graphs = {name: _written(bundle.model, part, GraphMetadata(name, digest, state, facts))
               for name, part in network_parts(network).items()}
     graphs |= _policy_graph(weights, bundle, digest)
+    if depth_path(weights).is_file():
+        told = GraphMetadata(DEPTH_PART, digest, {},
+                             {'depth_sha256': weights_hash(depth_path(weights))})
+        graphs[DEPTH_PART] = _written(bundle.model, depth_part(load_refiner(weights)), told)
     (folder or weights.parent).mkdir(parents=True, exist_ok=True)
     written = []
     for name, data in graphs.items():

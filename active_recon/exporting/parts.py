@@ -3,11 +3,17 @@
 from collections.abc import Mapping, Sequence
 import copy
 from dataclasses import dataclass
+from typing import TypeVar
 
+from active_recon.models.depth_refiner import DepthRefiner, KINDS
+from active_recon.models.lifting import COARSE_SIDE
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.runtimes.graph_files import NEXT
+from active_recon.volumes.voxels import FINE_RESOLUTION
 import torch
 from torch import nn, Tensor
+
+Network = TypeVar('Network', bound=nn.Module)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +86,16 @@ class _Decode(nn.Module):
             dict(zip(self.names, summary, strict=True))).sigmoid()
 
 
+class _Refine(nn.Module):
+    def __init__(self, refiner: DepthRefiner) -> None:
+        super().__init__()
+        self.refiner = refiner
+
+    def forward(self, occupancy: Tensor, evidence: Tensor, count: Tensor,
+                total: Tensor) -> Tensor:
+        return self.refiner.refine(occupancy, evidence, count, total)
+
+
 class _Choose(nn.Module):
     def __init__(self, model: nn.Module, inputs: Sequence[str], names: Sequence[str]) -> None:
         super().__init__()
@@ -131,14 +147,25 @@ def policy_part(model: nn.Module, inputs: Mapping[str, Tensor],
     return Part(_Choose(model, list(inputs), list(state)), {**inputs, **state}, outputs, dynamic)
 
 
+@torch.no_grad()
+def depth_part(refiner: DepthRefiner) -> Part:
+    """Return a depth refiner, for one object."""
+    module = _Refine(refiner)
+    fine, coarse = (FINE_RESOLUTION,) * 3, (COARSE_SIDE,) * 3
+    inputs = {'occupancy': torch.full((1, *fine), 0.5), 'evidence': torch.zeros(1, KINDS, *fine),
+              'count': torch.ones(1, 1, *coarse),
+              'total': torch.zeros(1, refiner.features, *coarse)}
+    return Part(_for_graphs(module), inputs, ['refined'], {})
+
+
 def _added(network: ReconstructionNetwork, state: State) -> State:
     """Return what the decoder gets that is not in the state under the same name."""
     return {name: part for name, part in network.summarise(state).items()
             if part is not state.get(name)}
 
 
-def _for_graphs(network: ReconstructionNetwork) -> ReconstructionNetwork:
-    """Return a copy of a network on the CPU whose normalisations are `ChannelNorm`."""
+def _for_graphs(network: Network) -> Network:
+    """Return a copy of a module on the CPU whose normalisations are `ChannelNorm`."""
     copied = copy.deepcopy(network).eval().cpu()
     for layer in copied.modules():
         if isinstance(layer, nn.GroupNorm):

@@ -66,6 +66,22 @@ def reduction(target: Camera, camera: Camera) -> int:
     return next((by for by in REDUCTIONS if apart >= _FINEST * by), 1)
 
 
+def depth_seen_by(target: Camera, depth: NDArray[np.float32],
+                  camera: Camera) -> NDArray[np.float32]:
+    """
+    Return a camera's depth image, (H, W), as the target beside it measures it, (S, S).
+
+    Both are along the optical axis of their camera; 0 is no value. Each pixel takes the nearest
+    one: the mean of two would lie on neither side of an edge.
+    """
+    size, lens = target.intrinsics.width, camera.intrinsics
+    turned = depth * (camera.ray_directions() @ target.pose[:3, 2]).astype(np.float32)
+    column, row = (np.floor(places).astype(np.int64) for places in _seen(camera, target, size))
+    inside = (column >= 0) & (column < lens.width) & (row >= 0) & (row < lens.height)
+    taken = turned[np.where(inside, row, 0), np.where(inside, column, 0)]
+    return np.where(inside & (taken > 0), taken, 0).astype(np.float32)
+
+
 def _places(seen: NDArray[np.float64], first: int, scale: float, count: int
             ) -> NDArray[np.float32]:
     """Return coordinates as OpenCV counts them in a window, scaled and kept beside its pixels."""

@@ -29,7 +29,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-_COARSE_SIDE = 16
+COARSE_SIDE = 16
 _LATENT_SIDE = 4
 _COUNTS = 12
 _STATISTICS = ('count', 'sum', 'sum_squares', 'max', 'min')
@@ -120,13 +120,13 @@ class Lifting(ReconstructionNetwork):
         init_occupancy_bias(decoder.logit_32.bias)
         lifted = config.coarse_channels + config.visibility  # a logit beside the features
         return cls(
-            encoder, GeometricLift(_COARSE_SIDE, config.coarse_hidden, lifted), Lift(FINE_SIDE),
+            encoder, GeometricLift(COARSE_SIDE, config.coarse_hidden, lifted), Lift(FINE_SIDE),
             decoder, config.coarse_channels, config.fine_channels, config.visibility)
 
     def initial_state(self, batch: int) -> State:
         """Return the state before any view: nothing seen."""
         device = self.device
-        coarse = initial_statistics(batch, self._coarse_channels, _COARSE_SIDE, device)
+        coarse = initial_statistics(batch, self._coarse_channels, COARSE_SIDE, device)
         fine = initial_statistics(batch, self._fine_channels, FINE_SIDE, device)
         visible = {'visible_weight': coarse['count'], 'visible_sum': coarse['sum']}
         side = self.resolution
@@ -174,7 +174,7 @@ class Lifting(ReconstructionNetwork):
                 **self._visible(state, features, logits, inside),
                 'hull': self._carved(maps.foreground, matrices, state['hull']),
                 'foreground': maps.shown()[-batch:] * inside[-1].amax(dim=2)[..., None, None],
-                'latent': functional.avg_pool2d(mean.mean(dim=4), _COARSE_SIDE // _LATENT_SIDE)}
+                'latent': functional.avg_pool2d(mean.mean(dim=4), COARSE_SIDE // _LATENT_SIDE)}
 
     def decode(self, state: State) -> Tensor:
         """

@@ -14,6 +14,8 @@ DEFAULT_MODEL, PAPER_MODEL = 'lifting', '2d3d-attention'
 FOLDER = Path(__file__).parents[1] / 'weights'
 SCORER = '-scorer'
 """What the name of a network's weights is followed by in that of its view policy's."""
+DEPTH = '-depth'
+"""Likewise of the depth refiner's."""
 SHIPPED = FOLDER / f'{DEFAULT_MODEL}.safetensors'
 
 
@@ -58,7 +60,7 @@ def find_weights(model: str | Path | None = None) -> Path:
     shipped = FOLDER / f'{model}.safetensors'
     if not shipped.is_file():
         names = ', '.join(sorted(file.stem for file in FOLDER.glob('*.safetensors')
-                                 if not file.stem.endswith(SCORER)))
+                                 if not file.stem.endswith((SCORER, DEPTH))))
         raise WeightsError(f'{model}: neither a weights file (.safetensors) nor a model whose '
                            f'weights ship ({names}); `active-recon train` makes weights')
     return shipped
@@ -68,6 +70,12 @@ def scorer_path(weights: Path | None = None) -> Path:
     """Return where the scorer of a network's weights lies; None: of those that ship."""
     weights = weights or SHIPPED
     return weights.with_name(f'{weights.stem}{SCORER}.safetensors')
+
+
+def depth_path(weights: Path | None = None) -> Path:
+    """Return where the depth refiner of a network's weights lies; None: of those that ship."""
+    weights = weights or SHIPPED
+    return weights.with_name(f'{weights.stem}{DEPTH}.safetensors')
 
 
 def read_card(path: Path) -> dict[str, Any]:

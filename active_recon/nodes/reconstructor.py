@@ -11,6 +11,7 @@ from active_recon.acquisition.view_gate import ViewGate
 from active_recon.errors import DataError, MessageError
 from active_recon.geometry.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
 from active_recon.models.weights_files import find_weights
+from active_recon.nodes.camera.depth_images import DEPTH_INFO_TOPIC, DEPTH_TOPIC, DepthImages
 from active_recon.nodes.camera.images import CameraImages
 from active_recon.nodes.camera.monitor import CameraMonitor
 from active_recon.nodes.camera.pose_sources import check_pose_source, subscribe_poses
@@ -48,9 +49,9 @@ FACTS = {'weights_sha256': 'SHA-256 of the weights',
          'computed_by': 'what runs the network: library, version, precision, processor, threads',
          'needs_front': "whether the network needs the object's front"}
 """Read-only parameters that describe the network, with their descriptions."""
-TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', 'next_view',
-          'view', 'view_image', 'network_image', 'occupancy', 'probabilities', 'latent', 'entropy',
-          'quality', 'episode', 'mesh')
+TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', DEPTH_TOPIC,
+          DEPTH_INFO_TOPIC, 'next_view', 'view', 'view_image', 'network_image', 'occupancy',
+          'probabilities', 'latent', 'entropy', 'quality', 'episode', 'mesh')
 """Topics that the node subscribes to and publishes."""
 
 
@@ -71,7 +72,9 @@ class ReconstructorNode(ManagedNode):
         publish_topic_names(self, TOPICS)
         check_pose_source(params)
         self._reconstructor = self._load(params)
-        self._joiner = ViewJoiner(params.max_pose_gap, masks=self._background.how == 'mask')
+        self._joiner = ViewJoiner(
+            params.max_pose_gap, masks=self._background.how == 'mask',
+            max_depth_gap=params.max_depth_gap if params.use_depth else None)
         self._gate = ViewGate(
             params.take_views, params.goal_tolerance, params.min_view_separation,
             params.settle_time)
@@ -105,6 +108,9 @@ class ReconstructorNode(ManagedNode):
         inputs.subscribe(CameraInfo, 'camera/camera_info', self._on_camera_info, SENSOR_QOS)
         if self._background.how == 'mask':
             inputs.subscribe(Image, 'camera/mask', self._on_mask, SENSOR_QOS)
+        self._depths = DepthImages(
+            self, self._diagnostics, inputs, self._joiner,
+            self._on_message) if self._params.values.use_depth else None
         self._poses = subscribe_poses(self, self._params.values, self._object_frame, self._on_pose,
                                       self._diagnostics, inputs)
         self._goals = self.create_subscription(PoseStamped, 'next_view', self._on_goal, SENSOR_QOS)
@@ -129,7 +135,7 @@ class ReconstructorNode(ManagedNode):
             params.precision)
         for fact, meaning in FACTS.items():
             set_read_only_parameter(self, fact, reconstructor.provenance.get(fact, ''), meaning)
-        reconstructor.warm_up()
+        reconstructor.warm_up(params.use_depth)
         return reconstructor
 
     def _change(self, params: ReconstructorParameters) -> Commit | None:
@@ -241,7 +247,10 @@ class ReconstructorNode(ManagedNode):
 
     def _add_view(self, view: View) -> None:
         image, camera, is_cleared = self._prepared(view)
-        reconstruction = self._reconstructor.add_view(image, camera)
+        depth = None if self._depths is None else self._depths.of(view)
+        reconstruction = self._reconstructor.add_view(image, camera, depth)
+        if self._depths is not None and reconstruction.depth_refusal:
+            self._depths.warn(reconstruction.depth_refusal)
         self._gate.took(view.camera)
         self._check_elevation(view.camera)
         self._diagnostics.count('views')

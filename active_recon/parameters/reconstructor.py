@@ -40,6 +40,10 @@ class ReconstructorParameters(BackgroundParameters, CameraPoseParameters, FrontP
     max_pose_gap: float = parameter(
         0.1, 'largest time from an image to the poses it is interpolated from, s', low=0.0,
         high=10.0, dynamic=True)
+    use_depth: bool = parameter(
+        False, 'whether views take in what camera/depth/image_raw measures')
+    max_depth_gap: float = parameter(
+        0.02, 'largest time between an image and its depth image, s', low=0.0, high=1.0)
     stall_timeout: float = parameter(
         1.0, 'time that the camera may rest away from its goal before a warning that it has '
         'stalled, s', low=0.1, high=3600.0, dynamic=True)

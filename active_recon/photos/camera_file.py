@@ -23,11 +23,13 @@ class Entry:
 
     - name: of the photo, as the file has it, perhaps with folders or without a suffix
     - pose: world from optical frame (z forward, x right, y down), (4, 4), in the file's units
+    - depth: the depth image that the file names, or None
     """
 
     name: str
     pose: NDArray[np.float64]
     lens: Lens
+    depth: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +60,14 @@ class PosedPhoto:
 
     - pose: world from optical frame, (4, 4), in the file's units
     - intrinsics: for the photo's own size, turned by EXIF if `upright`
+    - depth: its depth image, where the cameras' file names one
     """
 
     photo: PhotoFile
     pose: NDArray[np.float64]
     intrinsics: Intrinsics
     upright: bool = True
+    depth: Path | None = None
 
 
 def sized(lens: Intrinsics) -> Lens:
@@ -109,11 +113,12 @@ def posed_photos(cameras: CameraFile, photos: Sequence[PhotoFile]
 def _posed(entry: Entry, photo: PhotoFile) -> PosedPhoto:
     """Return a photo turned by EXIF, or as stored where only that has its camera's size."""
     try:
-        return PosedPhoto(photo, entry.pose, entry.lens(photo.upright_size))
+        return PosedPhoto(photo, entry.pose, entry.lens(photo.upright_size), depth=entry.depth)
     except ViewError:
         if photo.upright_size == photo.size:
             raise
-        return PosedPhoto(photo, entry.pose, entry.lens(photo.size), upright=False)
+        return PosedPhoto(photo, entry.pose, entry.lens(photo.size), upright=False,
+                          depth=entry.depth)
 
 
 def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]) -> Mapping[Path, Entry]:

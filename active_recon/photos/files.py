@@ -9,6 +9,7 @@ import warnings
 
 from active_recon.calibration.files import in_order, SUFFIXES
 from active_recon.errors import ConfigError, DataError
+from active_recon.photos.depth_files import is_depth
 import numpy as np
 from numpy.typing import NDArray
 from PIL import ExifTags, Image
@@ -59,15 +60,15 @@ def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
     """
     Return the photos of a folder in the order of their names, 2 before 10; a list stays as it is.
 
-    Raises DataError where the folder is missing or has none.
+    Depth images beside them are none. Raises DataError where the folder is missing or has none.
     """
     if not isinstance(place, Path):
         return list(place)
     if not place.is_dir():
         raise DataError(f'{place}: no such folder: expected one with photos '
                         f'({", ".join(ENDINGS)})', 'no_photos')
-    paths = sorted((path for path in place.iterdir() if path.suffix.lower() in ENDINGS),
-                   key=in_order)
+    paths = sorted((path for path in place.iterdir()
+                    if path.suffix.lower() in ENDINGS and not is_depth(path)), key=in_order)
     if not paths:
         raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none',
                         'no_photos')

@@ -17,6 +17,7 @@ from active_recon.photos.hull import (
 from active_recon.photos.shape import TakenView
 from active_recon.photos.views import PhotoView
 from active_recon.reconstructor import Reconstructor
+from active_recon.volumes.depth_images import DepthImage
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 
@@ -32,13 +33,13 @@ _SAME = 0.08  # relative change of the cube below which the search ends
 
 
 def integrate(views: Sequence[PhotoView], cube: Cube, size: float, reconstructor: Reconstructor,
-              background: str, advance: Advance = lambda steps, note: None
-              ) -> tuple[list[TakenView], list[str]]:
+              background: str, advance: Advance = lambda steps, note: None,
+              with_depth: bool = False) -> tuple[list[TakenView], list[str]]:
     """
     Return the views after each other in the reconstruction, and why others are left out.
 
-    `size` is the side of the cube, metres. Raises DataError where no view can be used, with the
-    first reason.
+    `size` is the side of the cube, metres, which has to be true for `with_depth`. Raises DataError
+    where no view can be used, with the first reason.
     """
     reconstructor.object_size = size
     reconstructor.reset()
@@ -47,8 +48,10 @@ def integrate(views: Sequence[PhotoView], cube: Cube, size: float, reconstructor
         camera = cube.camera(view.camera, size)
         try:
             image, source = shown_image(view, camera, size, background)
-            known = reconstructor.add_view(image, camera)
-            taken.append(TakenView(view.name, image, camera, source, known))
+            depth = None if view.depth is None or not with_depth else DepthImage(view.depth)
+            known = reconstructor.add_view(image, camera, depth)
+            taken.append(TakenView(view.name, image, camera, source, known,
+                                   None if known.depth_refusal else depth))
         except ViewError as error:
             left_out.append(f'{view.name}: {error}')
         advance(1, view.name)

@@ -41,7 +41,7 @@ def read_cameras(path: Path, photos: Sequence[PhotoFile], looks: str | None = No
 
 def with_other_axes(cameras: CameraFile) -> CameraFile:
     """Return cameras as if the file had been read with the other one of LOOKS."""
-    entries = [Entry(each.name, each.pose @ FLIP, each.lens) for each in cameras.entries]
+    entries = [replace(each, pose=each.pose @ FLIP) for each in cameras.entries]
     other = LOOKS[1 - LOOKS.index(cameras.looks)]
     return replace(cameras, entries=entries, looks=other)
 

@@ -14,7 +14,7 @@ from active_recon.photos.cube import Cube, first_cube, upward
 from active_recon.photos.doubts import doubts
 from active_recon.photos.files import in_order_of, open_photos, photo_paths
 from active_recon.photos.integrating import carved, even_choice, found_cube, integrate
-from active_recon.photos.shape import Shape
+from active_recon.photos.shape import Shape, TakenView
 from active_recon.photos.sources import posed_by, Source
 from active_recon.photos.views import load_views, PhotoView, view_of
 from active_recon.reconstructor import load, Reconstructor
@@ -151,15 +151,23 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         cube = cube.of_side(options.size, file.board is not None)
     size = options.size or cube.side * options.unit
     with reporting('reconstructing', len(views)) as advance:
-        taken, unseen = integrate(views, cube, size, reconstructor, options.background, advance)
+        taken, unseen = integrate(views, cube, size, reconstructor, options.background, advance,
+                                  with_depth=True)
     grid, covered = carved(taken[-1].known.grid, reconstructor.threshold, views, cube)
     if file.board is not None:
         occupancy = np.where(cube.above_ground(len(grid.occupancy)), grid.occupancy, np.float32(0))
         grid = VoxelGrid(occupancy, grid.size)
     return Shape(grid, reconstructor.threshold, taken, cube,
                  named([view.background for view in taken]), [*left_out, *empty, *unseen],
-                 doubts(taken, views, cube, reconstructor, options.background, covered),
-                 dict(reconstructor.provenance))
+                 [*doubts(taken, views, cube, reconstructor, options.background, covered),
+                  *_without_depth(views, taken)], dict(reconstructor.provenance))
+
+
+def _without_depth(views: Sequence[PhotoView], taken: Sequence[TakenView]) -> list[str]:
+    """Return why depth images were not used, one line each."""
+    refusals = [(view.name, view.depth_refusal) for view in views]
+    refusals += [(view.name, view.known.depth_refusal) for view in taken]
+    return [f'{name}: without its depth: {refusal}' for name, refusal in refusals if refusal]
 
 
 def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Options) -> Shape:

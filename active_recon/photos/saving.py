@@ -56,6 +56,7 @@ def described(shape: Shape) -> dict[str, object]:
                  'up': shape.cube.up.tolist()},
         'background': shape.background,
         'views': [{'photo': view.name, 'background': view.background,
+                   'depth': view.depth is not None,
                    'azimuth_rad': view.camera.azimuth, 'elevation_rad': view.camera.elevation,
                    'distance_m': view.camera.distance} for view in shape.views],
         'quality': None if shape.quality is None else asdict(shape.quality),

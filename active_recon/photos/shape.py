@@ -11,6 +11,7 @@ from active_recon.meshes.photos import album_of
 from active_recon.photos.cube import Cube
 from active_recon.quality.quality import Quality
 from active_recon.reconstructor import Reconstruction
+from active_recon.volumes.depth_images import DepthImage
 from active_recon.volumes.refinement import refined_mesh
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
@@ -27,7 +28,7 @@ class TakenView:
 
     - image: as the network was shown it, (H, W, 3) uint8 RGB; camera: in the object frame, metres
     - background: what removed the background, see `shown_image`
-    - known: the reconstruction after it
+    - known: the reconstruction after it; depth: what it took in beside the image, or None
     """
 
     name: str
@@ -35,6 +36,7 @@ class TakenView:
     camera: Camera
     background: str
     known: Reconstruction
+    depth: DepthImage | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ Cameras in `transforms.json`, as NeRF, instant-ngp and nerfstudio write it.
 z up in the world. Intrinsics stand in the file or in a frame: `fl_x`, `fl_y`, `cx`, `cy`, `w`,
 `h` in pixels, where (0.5, 0.5) is the centre of the first, or `camera_angle_x` alone, the
 horizontal field of view in radians. Distortion: `k1`, `k2`, `k3`, `p1`, `p2` of OpenCV's model, or
-`k1` to `k4` of its fisheye model.
+`k1` to `k4` of its fisheye model. `depth_file_path` of a frame names its depth image.
 
 The format: https://docs.nerf.studio/quickstart/data_conventions.html
 """
@@ -51,7 +51,8 @@ def read_transforms(path: Path) -> CameraFile:
             raise DataError(f'{where}: no camera: expected file_path, transform_matrix and '
                             f'intrinsics, got: {error}') from error
         pose = rigid(matrix[:3, :3], matrix[:3, 3], where) @ FLIP
-        entries.append(Entry(name, pose, lens))
+        depth = frame.get('depth_file_path')
+        entries.append(Entry(name, pose, lens, path.parent / str(depth) if depth else None))
     return CameraFile(str(path), entries, up=np.array([0.0, 0.0, 1.0]), looks='opengl')
 
 

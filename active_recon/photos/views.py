@@ -7,6 +7,7 @@ from pathlib import Path
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.photos.camera_file import PosedPhoto
+from active_recon.photos.depth_files import depth_files, read_depth
 from active_recon.photos.files import ENDINGS, read_photo
 import cv2
 import numpy as np
@@ -25,6 +26,8 @@ class PhotoView:
     - image: (H, W, 3) uint8 RGB; mask: (H, W) bool, true on the object, or None
     - mask_source: 'masks' (files), 'alpha', or '' without a mask
     - camera: pose world from optical frame, in the units of the camera file
+    - depth: (H, W) metres along the optical axis, 0 where there is no value, or None;
+      depth_refusal: why there is none although there is a file, else ''
     """
 
     name: str
@@ -32,22 +35,26 @@ class PhotoView:
     camera: Camera
     mask: NDArray[np.bool_] | None = None
     mask_source: str = ''
+    depth: NDArray[np.float32] | None = None
+    depth_refusal: str = ''
 
 
 def load_views(posed: Sequence[PosedPhoto], masks: Path | None = None,
                advance: Callable[[int, str], None] = lambda steps, note: None
                ) -> tuple[list[PhotoView], list[str]]:
     """
-    Read photos with their masks, and return why others are left out.
+    Read photos with their masks and depth, and return why others are left out.
 
     `masks` is a folder with a mask for each photo, of the same name or stem, bright on the
     object. Raises DataError where no photo is left, or the folder has no mask for any.
     """
     known = _masks_by_stem(masks)
+    depths = depth_files([each.photo.path for each in posed])
     views, left_out = [], []
     for each in posed:
         try:
-            views.append(_view(each, known))
+            views.append(_with_depth(_view(each, known),
+                                     each.depth or depths.get(each.photo.path)))
         except DataError as error:
             left_out.append(str(error))
         advance(1, each.photo.name)
@@ -95,6 +102,16 @@ def _view(posed: PosedPhoto, masks: dict[str, Path]) -> PhotoView:
     if path is None:
         return view
     return PhotoView(name, view.image, camera, _mask(path, width, height), 'masks')
+
+
+def _with_depth(view: PhotoView, path: Path | None) -> PhotoView:
+    if path is None:
+        return view
+    height, width = view.image.shape[:2]
+    try:
+        return replace(view, depth=read_depth(path, width, height))
+    except DataError as error:
+        return replace(view, depth_refusal=str(error))
 
 
 def _reduced(lens: Intrinsics, width: int, height: int) -> Intrinsics:

@@ -2,6 +2,8 @@
 
 from active_recon.runtimes.base import (
     AUTO,
+    DepthRuntime,
+    load_depth_runtime,
     load_policy_runtime,
     load_runtime,
     PolicyRuntime,
@@ -13,5 +15,6 @@ from active_recon.runtimes.base import (
 )
 from active_recon.runtimes.precision import PRECISIONS
 
-__all__ = ['AUTO', 'PRECISIONS', 'PolicyRuntime', 'REMARK', 'RUNTIMES', 'RUNTIME_CHOICES',
-           'Runtime', 'State', 'load_policy_runtime', 'load_runtime']
+__all__ = ['AUTO', 'DepthRuntime', 'PRECISIONS', 'PolicyRuntime', 'REMARK', 'RUNTIMES',
+           'RUNTIME_CHOICES', 'Runtime', 'State', 'load_depth_runtime', 'load_policy_runtime',
+           'load_runtime']

@@ -7,7 +7,12 @@ from typing import Any, Protocol, TYPE_CHECKING
 
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.geometry.cameras import Camera
-from active_recon.runtimes.graph_files import is_exported, NETWORK_PARTS, POLICY_PART
+from active_recon.runtimes.graph_files import (
+    DEPTH_PART,
+    is_exported,
+    NETWORK_PARTS,
+    POLICY_PART,
+)
 from active_recon.runtimes.precision import require_precision
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +26,8 @@ State = Mapping[str, NDArray[np.float32]]
 RUNTIMES: Mapping[str, str] = {
     name: f'active_recon.runtimes.{name}' for name in ('openvino', 'torch', 'onnxruntime')}
 """
-The module of each runtime, which offers `load_network` and `load_policy`; imported when asked for.
+The module of each runtime, which offers `load_network`, `load_policy` and `load_depth`; imported
+when asked for.
 """
 AUTO = 'auto'
 RUNTIME_CHOICES = (AUTO, *RUNTIMES)
@@ -92,6 +98,26 @@ class PolicyRuntime(Protocol):
         ...
 
 
+class DepthRuntime(Protocol):
+    """
+    Works what depth images saw into the occupancy of a network, for one object.
+
+    - provenance: what diagnostics tell of it
+    """
+
+    @property
+    def provenance(self) -> Mapping[str, str]: ...
+
+    def refine(self, occupancy: NDArray[np.float32], evidence: NDArray[np.float32],
+               state: State) -> NDArray[np.float32]:
+        """
+        Return the occupancy (R, R, R) corrected by `evidence` (3, R, R, R).
+
+        See `depth_evidence` for the latter. `occupancy` and `state` are the network's.
+        """
+        ...
+
+
 def load_runtime(weights: Path | None = None, runtime: str = AUTO, device: str = 'cpu',
                  threads: int | None = None, precision: str = 'auto') -> Runtime:
     """
@@ -113,6 +139,14 @@ def load_policy_runtime(weights: Path | None = None, runtime: str = AUTO, device
     """Return a runtime of the learned policy in a weights file; see `load_runtime`."""
     loaded: PolicyRuntime = _loaded('load_policy', (POLICY_PART,), weights, runtime, device,
                                     threads, precision)
+    return loaded
+
+
+def load_depth_runtime(weights: Path | None = None, runtime: str = AUTO, device: str = 'cpu',
+                       threads: int | None = None, precision: str = 'auto') -> DepthRuntime:
+    """Return a runtime of the depth refiner beside a weights file; see `load_runtime`."""
+    loaded: DepthRuntime = _loaded('load_depth', (DEPTH_PART,), weights, runtime, device, threads,
+                                   precision)
     return loaded
 
 

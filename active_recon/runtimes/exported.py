@@ -7,9 +7,10 @@ from typing import Protocol
 from active_recon.errors import WeightsError
 from active_recon.geometry.cameras import Camera, orbit_camera
 from active_recon.geometry.canonical import network_image, NetworkSpec
-from active_recon.models.weights_files import scorer_path, SHIPPED, weights_hash
+from active_recon.models.weights_files import depth_path, scorer_path, SHIPPED, weights_hash
 from active_recon.runtimes.base import State
 from active_recon.runtimes.graph_files import (
+    DEPTH_PART,
     graph_path,
     GraphMetadata,
     NETWORK_PARTS,
@@ -111,6 +112,22 @@ class ExportedPolicyRuntime:
         return found, after
 
 
+class ExportedDepthRuntime:
+    """A depth refiner in a graph; see DepthRuntime."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self.provenance: Mapping[str, str] = {}
+
+    def refine(self, occupancy: NDArray[np.float32], evidence: NDArray[np.float32],
+               state: State) -> NDArray[np.float32]:
+        """Return the corrected occupancy; see DepthRuntime."""
+        refined: NDArray[np.float32] = self._graph.run(
+            {'occupancy': occupancy[None], 'evidence': evidence[None],
+             'count': state['coarse_count'], 'total': state['coarse_sum']})['refined'][0]
+        return refined
+
+
 def first_state(described: Mapping[str, tuple[Sequence[int], float]], batch: int) -> State:
     """Return the state before any view of so many objects."""
     return {name: np.full((batch, *shape), value, np.float32)
@@ -144,6 +161,18 @@ def open_policy(weights: Path | None, open_graph: OpenGraph) -> ExportedPolicyRu
                            f'policy: expected that of {beside.name}, trained since; export the '
                            'weights anew')
     return ExportedPolicyRuntime(graph, told)
+
+
+def open_depth(weights: Path | None, open_graph: OpenGraph) -> ExportedDepthRuntime:
+    """Return the exported depth refiner beside weights; None: of those that ship. WeightsError."""
+    weights = weights or SHIPPED
+    graph, told = _opened(weights, DEPTH_PART, weights_hash(weights), open_graph, False)
+    beside = depth_path(weights)
+    if beside.is_file() and told.facts.get('depth_sha256') != weights_hash(beside):
+        raise WeightsError(f'{graph_path(weights, DEPTH_PART)}: exported from another depth '
+                           f'refiner: expected that of {beside.name}, trained since; export the '
+                           'weights anew')
+    return ExportedDepthRuntime(graph)
 
 
 def _opened(weights: Path, part: str, digest: str, open_graph: OpenGraph,

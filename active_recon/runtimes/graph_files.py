@@ -14,7 +14,7 @@ KEY = 'active_recon'
 """The key of a file's metadata, JSON text, among those of ONNX."""
 NEXT = 'next_'
 """What the name of a part of the state begins with where it is an output."""
-NETWORK_PARTS, POLICY_PART = ('encode', 'update', 'decode'), 'policy'
+NETWORK_PARTS, POLICY_PART, DEPTH_PART = ('encode', 'update', 'decode'), 'policy', 'depth'
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,13 @@ class GraphMetadata:
     """
     What an exported file says of itself.
 
-    - part: one of NETWORK_PARTS, or POLICY_PART
-    - weights_sha256: of the weights file whose network it is, or with which the policy goes
+    - part: one of NETWORK_PARTS, POLICY_PART or DEPTH_PART
+    - weights_sha256: of the weights file whose network it is, or with which the part goes
     - state: the shape of each named array, without the axis of objects, and the value that all of
       it has before the first view
     - facts: of a network `model`, `threshold`, `image_size`, `resolution`, `needs_front` and
-      `config_sha256`; of a policy, those of its model, and its `policy_sha256`
+      `config_sha256`; of a policy, those of its model, and its `policy_sha256`; of a depth
+      refiner its `depth_sha256`
     """
 
     part: str

@@ -6,8 +6,10 @@ from typing import Any
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.runtimes.exported import (
     Arrays,
+    ExportedDepthRuntime,
     ExportedPolicyRuntime,
     ExportedRuntime,
+    open_depth,
     open_network,
     open_policy,
 )
@@ -52,6 +54,15 @@ def load_policy(weights: Path | None, device: str, threads: int | None,
     """Return the policy that was exported beside weights; see `load_policy_runtime`."""
     opener = _Opener(device, threads, 'f32')  # it takes no time in f32
     loaded = open_policy(weights, opener)
+    loaded.provenance = {'computed_by': opener.told()}
+    return loaded
+
+
+def load_depth(weights: Path | None, device: str, threads: int | None,
+               precision: str) -> ExportedDepthRuntime:
+    """Return the depth refiner that was exported beside weights; see `load_depth_runtime`."""
+    opener = _Opener(device, threads, 'f32')
+    loaded = open_depth(weights, opener)
     loaded.provenance = {'computed_by': opener.told()}
     return loaded
 

@@ -10,8 +10,10 @@ from active_recon.runtimes.base import REMARK
 from active_recon.runtimes.compiled_cache import compiled_path, read_compiled, write_compiled
 from active_recon.runtimes.exported import (
     Arrays,
+    ExportedDepthRuntime,
     ExportedPolicyRuntime,
     ExportedRuntime,
+    open_depth,
     open_network,
     open_policy,
 )
@@ -75,6 +77,16 @@ def load_policy(weights: Path | None, device: str, threads: int | None,
     chosen_precision(precision, device)
     opener = _Opener(threads, 'f32')  # it takes no time in f32
     loaded = open_policy(weights, opener)
+    loaded.provenance = opener.provenance
+    return loaded
+
+
+def load_depth(weights: Path | None, device: str, threads: int | None,
+               precision: str) -> ExportedDepthRuntime:
+    """Return the depth refiner that was exported beside weights; see `load_depth_runtime`."""
+    chosen_precision(precision, device)
+    opener = _Opener(threads, 'f32')
+    loaded = open_depth(weights, opener)
     loaded.provenance = opener.provenance
     return loaded
 

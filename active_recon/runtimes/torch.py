@@ -8,6 +8,8 @@ from typing import Any, cast
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.geometry.cameras import Camera, orbit_camera
 from active_recon.geometry.canonical import network_image
+from active_recon.models.depth_refiner import DepthRefiner
+from active_recon.models.depth_weights import load_refiner
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.models.registry import network_entry
 from active_recon.models.scorer_weights import load_scorer
@@ -83,6 +85,27 @@ class TorchPolicyRuntime:
             return _arrays(outputs._asdict()), _arrays(known)
 
 
+class TorchDepthRuntime:
+    """A depth refiner in torch; see DepthRuntime."""
+
+    def __init__(self, refiner: DepthRefiner, threads: int | None = None) -> None:
+        self._refiner, self._threads = refiner.eval(), threads
+        self.provenance: Mapping[str, str] = _provenance(
+            next(refiner.parameters()).device, threads)
+
+    @torch.inference_mode()
+    def refine(self, occupancy: NDArray[np.float32], evidence: NDArray[np.float32],
+               state: State) -> NDArray[np.float32]:
+        """Return the corrected occupancy; see DepthRuntime."""
+        device = next(self._refiner.parameters()).device
+        with _computing_with(self._threads):
+            given = _tensors({'occupancy': occupancy[None], 'evidence': evidence[None],
+                              'count': state['coarse_count'], 'total': state['coarse_sum']},
+                             device)
+            refined: NDArray[np.float32] = self._refiner.refine(**given)[0].cpu().numpy()
+            return refined
+
+
 def load_network(weights: Path | None, device: str, threads: int | None,
                  precision: str) -> TorchRuntime:
     """Return the network of a weights file; see `load_runtime`."""
@@ -103,6 +126,13 @@ def load_policy(weights: Path | None, device: str, threads: int | None,
         raise WeightsError(f'{(weights or SHIPPED).name}: no view policy in these weights: take '
                            'those of lifting or 2d3d-attention, or a policy that is not learned')
     return TorchPolicyRuntime(model, threads)
+
+
+def load_depth(weights: Path | None, device: str, threads: int | None,
+               precision: str) -> TorchDepthRuntime:
+    """Return the depth refiner beside a weights file; raises WeightsError without one."""
+    _require(device, 'f32')  # whatever the network's
+    return TorchDepthRuntime(load_refiner(weights, device), threads)
 
 
 def _require(device: str, precision: str) -> None:

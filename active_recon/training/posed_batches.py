@@ -20,6 +20,7 @@ class PosedBatch:
     - alpha: (T, B, S, S) in [0, 1], the object's share of each pixel
     - voxels: (B, R, R, R) in {0, 1} float32
     - objects: (B,) indices into the set
+    - depths: (T, B, S, S) float32, as the set has them; None where it has none
     """
 
     images: Tensor
@@ -27,6 +28,7 @@ class PosedBatch:
     alpha: Tensor
     voxels: Tensor
     objects: Tensor
+    depths: Tensor | None = None
 
 
 def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
@@ -46,6 +48,9 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
             else views.seen[objects, chosen])
     images[:, mirrored] = images[:, mirrored].flip(-2)
     seen[:, mirrored] = seen[:, mirrored].flip(-1)
+    depths = None if views.depths is None else views.depths[objects, chosen]
+    if depths is not None:
+        depths[:, mirrored] = depths[:, mirrored].flip(-1)
     cameras = mirror_some(views.cameras(objects, chosen), mirrored, images.shape[2])
     cameras = cameras.turned(torch.from_numpy(quarters * np.pi / 2).expand(length, size))
     voxels = views.voxels[objects].float()
@@ -56,10 +61,10 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
     if augment:
         return PosedBatch(augment_posed(images, seen, cameras, voxels, views, rng),
                           perturb_poses(cameras, rng), alpha,
-                          voxels, objects)
+                          voxels, objects, depths)
     planes = images.permute(0, 1, 4, 2, 3).float() / 255
     return PosedBatch(with_seen(planes[:, :, :3] + 1 - planes[:, :, 3:], seen), cameras, alpha,
-                      voxels, objects)
+                      voxels, objects, depths)
 
 
 def turned_by_quarters(voxels: Tensor, quarters: int) -> Tensor:

@@ -1,4 +1,4 @@
-"""Rendering of meshes: ray casting with Embree, flat shading, straight alpha."""
+"""Rendering of meshes and their depth: ray casting with Embree, flat shading, straight alpha."""
 
 from typing import Any
 
@@ -13,6 +13,7 @@ import trimesh
 # The light comes from above and left of the camera, so that no view of a turntable is dark.
 _LIGHT = np.array([-0.45, -0.65, -0.61])  # towards the light, in the optical frame
 _AMBIENT, _DIFFUSE = 0.38, 0.66
+_NOWHERE = 1e30  # Embree's distance of what a ray does not hit is larger
 
 
 class Renderer:
@@ -57,6 +58,25 @@ class Renderer:
             seen = _averaged(seen, (right - left, bottom - top))
         image[top:bottom, left:right] = seen
         return image
+
+    def depth(self, camera: Camera) -> NDArray[np.float32]:
+        """
+        Return the depth of what a camera sees, (height, width), 0 where it sees nothing.
+
+        That is the distance along the optical axis, in the unit of the mesh, of what the ray
+        through each pixel's centre hits first.
+        """
+        lens = camera.intrinsics
+        left, top, right, bottom = self._bounds(camera)
+        depth = np.zeros((lens.height, lens.width), np.float32)
+        if left >= right or top >= bottom:
+            return depth
+        rays = camera.ray_directions()[top:bottom, left:right].astype(np.float32).reshape(-1, 3)
+        origins = np.broadcast_to(camera.position.astype(np.float32), rays.shape)
+        found = self._scene.run(np.ascontiguousarray(origins), rays, query='DISTANCE')
+        found = np.where(found < _NOWHERE, found, 0)
+        depth[top:bottom, left:right] = found.reshape(bottom - top, right - left)
+        return depth
 
     def _bounds(self, camera: Camera) -> tuple[int, int, int, int]:
         """Return left, top, right, bottom of the pixels that the mesh can touch."""

@@ -26,10 +26,11 @@ def photo_run(shape: Shape, folder: Path, begin: int | None = None) -> RecordedR
         views.append(RecordedView(
             start + number * _PERIOD_NS, view.image, view.camera, grid.above(PUBLISHED_FLOOR),
             grid.above(shape.threshold), view.known.latent, grid.entropy(), None, {},
-            quality=view.known.quality))
+            quality=view.known.quality, depth=view.depth))
     end = views[-1].stamp
     episode = RecordedEpisode('photos', start, None, views, 'photos')
     provenance = {'version': __version__, 'object': 'photos', **shape.provenance}
     parameters = {'/reconstructor': {'object_size': shape.size, 'threshold': shape.threshold,
-                                     'threads': 1}}
+                                     'threads': 1, 'use_depth': any(
+                                         view.depth is not None for view in shape.views)}}
     return RecordedRun(folder, [episode], provenance, parameters, {}, (), start, end)

@@ -10,6 +10,7 @@ from active_recon.bags.runs.camera_stream import CameraStream
 from active_recon.bags.runs.image_gaps import gaps_between, ImageGaps, uncounted_images
 from active_recon.bags.runs.loop_record import LoopRecord
 from active_recon.bags.runs.parameters import checked_parameters
+from active_recon.bags.runs.recorded_depth import with_depth
 from active_recon.bags.runs.recorded_views import gated_views, recorded_episodes
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun
 from active_recon.bags.runs.scene import Scene
@@ -77,7 +78,8 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
         gaps = gaps_between([stamp for stamp, _ in stream.images])
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
     record = LoopRecord(bag, namespace, node.get('object_size', scene.size), topics.object_frame)
-    episodes = recorded_episodes(stream, record, scene)
+    episodes = with_depth(recorded_episodes(stream, record, scene), bag, namespace,
+                          summary.provenance, node)
     if camera.of_views:  # the images between the views were not recorded
         return _Read(episodes, record.counters, ImageGaps(), _assumed(stream, scene))
     gaps = gaps_between([stamp for stamp, _ in stream.images])

@@ -22,7 +22,7 @@ class RecordedObject:
         """Reconstruct with one more view; raises ViewError with a hint on the options."""
         try:
             return self._reconstructor.add_view(
-                *view.for_network(self._reconstructor.reduction(view.camera)))
+                *view.for_network(self._reconstructor.reduction(view.camera)), view.depth)
         except ViewError as error:
             raise with_option_hint(error) from error
 

@@ -11,6 +11,7 @@ from active_recon.bags.storage.metadata import QosProfile
 from active_recon.geometry.cameras import Camera
 from active_recon.policies.reasons import GoalReason
 from active_recon.quality.quality import Quality
+from active_recon.volumes.depth_images import DepthImage
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +91,7 @@ class RecordedView:
     - goal: decided after this view; None also if the episode was done
     - done: the reason if the episode was done after this view, else ''; a goal may follow if
       `plan` was called then
+    - depth: of the depth camera beside the camera, where the loop took it in
     - received: receive times of the view's messages, nanoseconds, by topic name in the loop:
       'camera/image_raw', 'view', 'occupancy', 'probabilities', 'entropy', ...
     - reduced: returns a smaller image and its camera; None where the image was worked on
@@ -106,6 +108,7 @@ class RecordedView:
     received: Mapping[str, int]
     done: str = ''
     quality: Quality | None = None
+    depth: DepthImage | None = None
     reduced: Callable[[int], tuple[NDArray[np.uint8], Camera]] | None = None
 
     def for_network(self, reduction: int) -> tuple[NDArray[np.uint8], Camera]:

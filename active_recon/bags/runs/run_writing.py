@@ -11,7 +11,7 @@ from active_recon.bags.storage.metadata import QosProfile
 from active_recon.bags.storage.writer import BagWriter
 from active_recon.geometry.cameras import OBJECT_FRAME
 from msg_tools.episodes import done_to_msg, Episode, episode_to_msg
-from msg_tools.loop import goal_to_msgs, image_to_msgs, view_to_msgs
+from msg_tools.loop import depth_to_msgs, goal_to_msgs, image_to_msgs, view_to_msgs
 
 _UNNAMED = 'unnamed'  # messages need an id, runs without recorded episodes have none
 _LATCHED = QosProfile(durability='transient_local')
@@ -59,6 +59,8 @@ def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, 
         messages = image_to_msgs(view.stamp, view.image, view.camera, frame) | view_to_msgs(
             view.stamp, view.camera, view.reconstruction, view.occupied, view.latent,
             view.entropy, view.quality, frame)
+        if view.depth is not None:
+            messages |= depth_to_msgs(view.stamp, view.depth)
         yield from _at(messages, view.stamp, view.received)
         if reason := episode.done_after(view):
             received = max([view.stamp, *view.received.values()])

@@ -92,4 +92,5 @@ def some_objects(views: ViewSet, rows: Tensor) -> ViewSet:
         views, images=views.images[rows], poses=views.poses[rows],
         intrinsics=views.intrinsics[rows], voxels=views.voxels[rows],
         folders=tuple(views.folders[row] for row in rows.tolist()),
-        seen=None if views.seen is None else views.seen[rows])
+        seen=None if views.seen is None else views.seen[rows],
+        depths=None if views.depths is None else views.depths[rows])

@@ -1,0 +1,101 @@
+"""`active-recon train-depth`: what depth images add to a network that was trained without."""
+
+from pathlib import Path
+from typing import Annotated
+
+from active_recon.cli.command_line import command_line
+from active_recon.cli.progress import progress_bar
+from active_recon.cli.reading import read_objects
+from active_recon.errors import ConfigError
+import typer
+
+
+def train_depth(
+    data: Annotated[list[Path], typer.Argument(
+        help="Folders of training objects in R2N2's layout with depth images (see `active-recon "
+             'dataset build --fine --depth`).')],
+    validation: Annotated[Path, typer.Option(
+        help='Folder of other objects, on which the corrected occupancy is calibrated.')],
+    model: Annotated[str, typer.Option(
+        help='The network, which stays as it is: a model that ships, or a weights file.'
+        )] = 'lifting',
+    out: Annotated[Path, typer.Option(
+        help='Folder of the checkpoint, and of the weights at the end.')] = Path('runs/depth'),
+    steps: Annotated[int, typer.Option(min=1, help='Steps.')] = 1500,
+    batch_size: Annotated[int, typer.Option(min=1, help='Objects of a step.')] = 8,
+    learning_rate: Annotated[float, typer.Option(help='Peak learning rate.')] = 2e-3,
+    max_views: Annotated[int, typer.Option(
+        min=1, max=99, help='Longest sequence, in views.')] = 8,
+    warmup_steps: Annotated[int, typer.Option(
+        min=1, help='Steps over which the learning rate rises to its peak.')] = 100,
+    checkpoint_every: Annotated[int, typer.Option(
+        min=1, help='Steps between two checkpoints.')] = 100,
+    augment: Annotated[bool, typer.Option(
+        help='Augment backgrounds, light and poses; --no-augment: plain white.')] = True,
+    seed: Annotated[int, typer.Option(help='Seed of the weights and of the batches.')] = 0,
+    bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+    resume: Annotated[bool, typer.Option(
+        help='Continue from the checkpoint in the run folder.')] = False,
+) -> None:
+    """
+    Train what depth images add to a lifting network, which stays as it is.
+
+    Simulated depth cameras see the objects with steps, holes, flying pixels and a wrong scale; a
+    small network learns to correct the occupancy by what they saw. Without depth it is not run,
+    and the network gives what it gave. Writes OUT/<weights>-depth.safetensors and its card: copy
+    both beside the network's weights.
+
+    For example:
+
+      active-recon train-depth data/train things/train --validation data/val --out runs/depth
+    """
+    from active_recon.models.depth_refiner import DepthRefiner, DepthRefinerConfig
+    from active_recon.models.depth_weights import save_refiner
+    from active_recon.models.lifting import Lifting
+    from active_recon.models.weights import load_weights
+    from active_recon.models.weights_files import depth_path, find_weights, weights_hash
+    from active_recon.reporting import by_step
+    from active_recon.training.depth import calibrate_depth, train_depth
+    from active_recon.training.loop import make_fabric, Run, TrainingConfig, TrainingStoppedError
+    import torch
+
+    path, checkpoint = find_weights(model), out / 'checkpoint.safetensors'
+    network = load_weights(path).reconstruction
+    if not isinstance(network, Lifting):
+        raise ConfigError(f'--model: no such network: expected lifting, got {model!r}')
+    if checkpoint.exists() and not resume:
+        raise ConfigError(f'{out}: holds another training ({checkpoint.name}); continue it with '
+                          '--resume, or name another folder with --out')
+    torch.set_num_threads(threads)
+    torch.manual_seed(seed)
+    training = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, augment, 0,
+                              warmup_steps, checkpoint_every, validate_every=steps)
+    fabric = make_fabric(bf16)
+    fabric.launch()
+    views = read_objects(data, 'training data', network.spec, at_once=False, depth=True)
+    held_out = read_objects([validation], 'validation data', network.spec, depth=True)
+    config = DepthRefinerConfig(features=network.initial_state(1)['coarse_sum'].shape[1])
+    refiner, digest = DepthRefiner.from_config(config), weights_hash(path)
+    try:
+        with progress_bar('depth', steps) as advance:
+            reached = by_step(advance)
+
+            def report(step: int, measured: dict[str, float]) -> None:
+                reached(step, '  '.join(f'{name} {value:.4f}'
+                                        for name, value in measured.items()))
+
+            train_depth(refiner, network, views, training,
+                        Run(fabric, checkpoint, report, resume), {'network_sha256': digest})
+    except TrainingStoppedError as stopped:
+        typer.echo(str(stopped))
+        raise typer.Exit(130) from None
+    scale, bias = calibrate_depth(refiner, network, held_out)
+    typer.echo(f'calibrated on validation: {scale:.3f} logit {bias:+.3f}')
+    written = out / depth_path(path).name
+    save_refiner(written, refiner, config, digest, {
+        'command': command_line(), 'training': training.to_dict(),
+        'data': {str(folder): sum(each.root == folder for each in views.folders)
+                 for folder in data},
+        'calibration': [scale, bias]})
+    typer.echo(f'wrote {written}')

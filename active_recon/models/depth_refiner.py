@@ -1,0 +1,121 @@
+"""What depth images saw, worked into the occupancy of a lifting network that did not see them."""
+
+from dataclasses import dataclass
+
+from active_recon.config import Config
+from active_recon.errors import ConfigError
+from active_recon.models.encoder import group_norm
+from active_recon.models.lifting_decoder import depth_to_space, Residual3d, space_to_depth
+import torch
+from torch import nn, Tensor
+from torch.nn import functional
+
+KINDS = 3  # of evidence: see `depth_evidence`
+_SEEN = 6  # channels at 64 cells
+_LEARNED = 4  # logit, and weights of the given logit, of free space and of surfaces
+_SURE = 1e-6  # occupancies nearer to 0 and 1 count as this
+_MOST = 8.0  # of a given logit: beyond it a network is sure
+
+
+@dataclass(frozen=True)
+class DepthRefinerConfig(Config):
+    """
+    Sizes of the refiner.
+
+    - features: channels of the lifting network's mean over views at 16 cells a side
+    - head_channels: at 32 cells; volume_channels: at 16, 8 and 4 cells
+    """
+
+    features: int = 32
+    head_channels: int = 24
+    volume_channels: tuple[int, int, int] = (40, 64, 96)
+
+    def __post_init__(self) -> None:
+        """Reject sizes that make no network."""
+        if min(self.features, self.head_channels, *self.volume_channels) < 1:
+            raise ConfigError('DepthRefinerConfig: invalid channels: expected 1 or more, got '
+                              f'{self.to_dict()}')
+
+
+class DepthRefiner(nn.Module):
+    """
+    Corrects occupancy by depth evidence, with a U-Net at 32, 16, 8 and 4 cells a side.
+
+    The corrected logit is the given one, plus a learned logit, plus the given one, the free
+    evidence and the surface evidence, each times a factor learned per cell. The last layer begins
+    at zero, so that an untrained refiner returns what it is given. Without depth it is not asked.
+    """
+
+    def __init__(self, features: int, head: int, channels: tuple[int, int, int]) -> None:
+        super().__init__()
+        at_16, at_8, at_4 = channels
+        self.features = features
+        self.enter_32 = nn.Sequential(nn.Conv3d(8 * _SEEN, head, 1), nn.ReLU())
+        self.enter_16 = nn.Conv3d(features + 1, at_16, 1)
+        self.to_16, self.norm_16 = nn.Conv3d(head, at_16, 2, stride=2), group_norm(at_16)
+        self.down_16 = Residual3d(at_16, 1)
+        self.to_8 = nn.Sequential(nn.Conv3d(at_16, at_8, 2, stride=2), group_norm(at_8), nn.ReLU())
+        self.down_8 = Residual3d(at_8, 1)
+        self.to_4 = nn.Sequential(nn.Conv3d(at_8, at_4, 2, stride=2), group_norm(at_4), nn.ReLU())
+        self.at_4 = Residual3d(at_4, 2)
+        self.from_4, self.up_8 = nn.Conv3d(at_4, 8 * at_8, 1), Residual3d(at_8, 1)
+        self.from_8, self.up_16 = nn.Conv3d(at_8, 8 * at_16, 1), Residual3d(at_16, 1)
+        self.to_32, self.skip_32 = nn.Conv3d(at_16, 8 * head, 1), nn.Conv3d(head, head, 1)
+        self.mix_32 = nn.Sequential(nn.Conv3d(head, head, 1), nn.ReLU())
+        self.to_64 = nn.Conv3d(head, 8 * _LEARNED, 1)
+        self.calibration: Tensor  # scale and bias of the corrected logit
+        self.register_buffer('calibration', torch.tensor([1.0, 0]))
+        nn.init.zeros_(self.to_64.weight)
+        assert self.to_64.bias is not None
+        nn.init.zeros_(self.to_64.bias)
+
+    @classmethod
+    def from_config(cls, config: DepthRefinerConfig) -> 'DepthRefiner':
+        """Build the refiner of a configuration, with fresh weights."""
+        return cls(config.features, config.head_channels, config.volume_channels)
+
+    def forward(self, logits: Tensor, evidence: Tensor, count: Tensor, total: Tensor) -> Tensor:
+        """
+        Return corrected logits of occupancy, (B, 64, 64, 64).
+
+        Takes the lifting network's logits, of that shape, evidence (B, 3, 64, 64, 64), and of its
+        state `coarse_count` (B, 1, 16, 16, 16) and `coarse_sum` (B, features, 16, 16, 16).
+        """
+        given = logits[:, None].clamp(-_MOST, _MOST)
+        seen = torch.cat([given / 4, described(evidence)], dim=1)
+        blocks = space_to_depth(seen)  # (B, 8 * channels, 32, 32, 32)
+        at_32 = self.enter_32(blocks)
+        mean = torch.cat([total / count.clamp(min=1), count.clamp(max=1)], dim=1)
+        at_16 = functional.relu(self.norm_16(self.to_16(at_32) + self.enter_16(mean)))
+        at_16 = self.down_16(at_16)
+        at_8 = self.down_8(self.to_8(at_16))
+        at_4 = self.at_4(self.to_4(at_8))
+        at_8 = self.up_8(at_8 + depth_to_space(self.from_4(at_4)))
+        at_16 = self.up_16(at_16 + depth_to_space(self.from_8(at_8)))
+        at_32 = functional.relu(depth_to_space(self.to_32(at_16)) + self.skip_32(at_32))
+        learned, more, free, near = depth_to_space(self.to_64(self.mix_32(at_32))).unbind(dim=1)
+        corrected = (logits + learned + more * given[:, 0] - free * seen[:, 1]
+                     + near * seen[:, 3])
+        calibrated: Tensor = self.calibration[0] * corrected + self.calibration[1]
+        return calibrated
+
+    def refine(self, occupancy: Tensor, evidence: Tensor, count: Tensor, total: Tensor) -> Tensor:
+        """Return corrected occupancy of occupancy in [0, 1]; for the rest see `forward`."""
+        sure = occupancy.clamp(_SURE, 1 - _SURE)
+        corrected: Tensor = self((sure / (1 - sure)).log(), evidence, count, total).sigmoid()
+        return corrected
+
+
+def described(evidence: Tensor) -> Tensor:
+    """
+    Return evidence (B, 3, R, R, R) as shares in [0, 1], (B, 5, R, R, R).
+
+    They are: whether the cell was seen free, and how often among the views that saw it free or
+    at a surface; whether it was seen at a surface; how often it was behind one; whether it has a
+    value.
+    """
+    free, near, behind = torch.split(evidence, 1, dim=1)
+    known = free + near + behind
+    return torch.cat([
+        free.clamp(max=1), free / (free + near).clamp(min=0.25), near.clamp(max=1),
+        behind / known.clamp(min=1), known.clamp(max=1)], dim=1)

@@ -1,0 +1,55 @@
+"""Depth images beside photos: where they are, and their values in metres."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from active_recon.errors import DataError
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+FOLDER, SUFFIX = 'depth', '_depth'
+"""Of the depth of `a.jpg`: `depth/a.png`, or `a_depth.png` beside it."""
+_ENDINGS = ('.png', '.tif', '.tiff')
+_MILLIMETRES = 1000  # in a metre
+_SHAPE_OFF = 0.01
+
+
+def is_depth(path: Path) -> bool:
+    """Return whether a file among photos is the depth of one of them, by its name."""
+    return path.stem.lower().endswith(SUFFIX) and path.suffix.lower() in _ENDINGS
+
+
+def depth_files(photos: Sequence[Path]) -> Mapping[Path, Path]:
+    """Return the depth image of each photo that has one beside it or in `depth`."""
+    found = {}
+    for folder in {photo.parent for photo in photos}:
+        beside = {path.stem.lower(): path for place in (folder, folder / FOLDER)
+                  if place.is_dir() for path in sorted(place.iterdir())
+                  if path.suffix.lower() in _ENDINGS and (place != folder or is_depth(path))}
+        for photo in (each for each in photos if each.parent == folder):
+            for stem in (f'{photo.stem}{SUFFIX}', photo.stem):
+                if (path := beside.get(stem.lower())) and path != photo:
+                    found[photo] = path
+                    break
+    return found
+
+
+def read_depth(path: Path, width: int, height: int) -> NDArray[np.float32]:
+    """
+    Return depth in metres, of a photo's size in pixels (height, width); 0 is no value.
+
+    Reads one channel of 16 bits in millimetres, or of floats in metres, of any size of the photo's
+    shape. Raises DataError on another file.
+    """
+    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if stored is None or stored.ndim != 2 or stored.dtype not in (np.uint16, np.float32):
+        found = 'no image' if stored is None else f'the shape {stored.shape} {stored.dtype}'
+        raise DataError(f'{path.name}: no depth image: expected one channel of 16 bits in '
+                        f'millimetres, or of floats in metres, got {found}')
+    if abs(stored.shape[1] * height - width * stored.shape[0]) > _SHAPE_OFF * stored.size:
+        raise DataError(f'{path.name}: depth of another size: expected {width} x {height} pixels '
+                        f'or the same shape, got {stored.shape[1]} x {stored.shape[0]}')
+    metres = stored.astype(np.float32) / (_MILLIMETRES if stored.dtype == np.uint16 else 1)
+    sized = cv2.resize(metres, (width, height), interpolation=cv2.INTER_NEAREST)
+    return np.asarray(np.where(np.isfinite(sized), sized, 0), np.float32)

@@ -1,0 +1,84 @@
+"""Depth images beside the views of an object, and which of them can be used."""
+
+from dataclasses import dataclass
+
+from active_recon.errors import ViewError
+from active_recon.geometry.cameras import Camera
+from active_recon.geometry.framing import cube_corners
+import numpy as np
+from numpy.typing import NDArray
+
+_THOUSAND = 1000
+_LEAST_WITHIN = 0.01  # share of the values before the cube that have to lie in it
+_MARGIN = 0.25  # sides of the cube, before and behind it, that count as in it here
+
+
+@dataclass(frozen=True, eq=False)
+class DepthImage:
+    """
+    What a depth camera measured.
+
+    - metres: (H, W) float, the distance along the optical axis; what is not finite or not above
+      0 is no value
+    - camera: its camera, with a pose in the object frame; None: that of the view's image, with
+      whose pixels the depth is aligned
+    """
+
+    metres: NDArray[np.floating]
+    camera: Camera | None = None
+
+
+def usable_depth(image: DepthImage, view: Camera,
+                 object_size: float) -> tuple[NDArray[np.float32], Camera]:
+    """
+    Return depth (H, W) and its camera, with lengths in sides of the cube of `object_size` metres.
+
+    0 is no value. `view` is the camera of the image beside it. Raises ViewError where it is of
+    another size than its camera's, where it has no value before the cube, or where its values
+    contradict the camera: none of them in the cube, as with another unit, scale or alignment.
+    """
+    camera = image.camera or view
+    lens, metres = camera.intrinsics, image.metres
+    if metres.shape != (lens.height, lens.width):
+        raise ViewError(f'wrong depth image: expected {lens.height} x {lens.width} pixels, as its '
+                        'camera says, got '
+                        f'{" x ".join(map(str, metres.shape)) or "a number"}; register it to the '
+                        'image, or give its own camera', 'depth')
+    with np.errstate(invalid='ignore'):
+        valid = np.isfinite(metres) & (metres > 0)
+    depth = np.where(valid, metres, 0).astype(np.float32) / np.float32(object_size)
+    placed = camera.scaled(1 / object_size)
+    _require_fitting(depth, placed, object_size)
+    return depth, placed
+
+
+def _require_fitting(depth: NDArray[np.float32], camera: Camera, object_size: float) -> None:
+    pixels, corners = camera.project(cube_corners())
+    near, far = max(float(corners.min()), 0.0), float(corners.max())
+    if far <= 0:
+        raise ViewError('depth camera looks away from the object: expected one that looks at it',
+                        'depth')
+    if near > 0:
+        left, top = np.maximum(np.floor(pixels.min(axis=0)).astype(int), 0)
+        right, bottom = np.maximum(np.ceil(pixels.max(axis=0)).astype(int), 0)
+        depth = depth[top:bottom, left:right]
+    found = depth[depth > 0]
+    if not found.size:
+        raise ViewError("empty depth image: expected distances where the object's cube is, got no "
+                        'value above 0 there', 'depth')
+    if _fits(found, near, far):
+        return
+    hint = '; are its unit, its scale and its alignment with the image right?'
+    if _fits(found * _THOUSAND, near, far):
+        hint = '; metres read as millimetres? 16 bits are millimetres, floats are metres'
+    elif _fits(found / _THOUSAND, near, far):
+        hint = '; millimetres read as metres? 16 bits are millimetres, floats are metres'
+    raise ViewError(
+        "depth contradicts the camera: expected distances in the object's cube, "
+        f'{near * object_size:.3g} to {far * object_size:.3g} m, got '
+        f'{float(np.median(found)) * object_size:.3g} m in the middle{hint}', 'depth')
+
+
+def _fits(depth: NDArray[np.floating], near: float, far: float) -> bool:
+    within = (depth > near - _MARGIN) & (depth < far + _MARGIN)
+    return float(within.mean()) >= _LEAST_WITHIN
