@@ -13,6 +13,7 @@ from benchmarks.figures import Figure, reference_ms
 from benchmarks.goal import goal_figures, single_process_figures
 from benchmarks.idle import idle_figure
 from benchmarks.loop import demo_figure, reconstructor_figures
+from benchmarks.published_networks import published_figures
 from benchmarks.runtimes import runtime_figures
 from benchmarks.stream import stream_figures
 from benchmarks.viewer import watching_figures
@@ -21,6 +22,7 @@ RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'benchmarks.json'
 PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'view': lambda: [reconstruct_and_plan()],
     'runtimes': runtime_figures,
+    'published': published_figures,
     'rendering': lambda: [rendering(1, 400), rendering(2, 100)],
     'candidates': lambda: [rendering_of_candidates(32), rendering_of_candidates(64)],
     'reconstructor': reconstructor_figures,

@@ -1,6 +1,6 @@
 """What every benchmark returns, and the reference that makes machines comparable."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import time
 
@@ -44,6 +44,19 @@ def timed_ms(task: Callable[[], object], repeats: int, warm_up: int = 3) -> list
         start = time.perf_counter()
         task()
         samples.append(1e3 * (time.perf_counter() - start))
+    return samples
+
+
+def interleaved(tasks: Mapping[str, Callable[[], object]],
+                repeats: int = 40) -> dict[str, list[float]]:
+    """Return how long each of some tasks took, milliseconds, in turns: they share what slows."""
+    samples: dict[str, list[float]] = {name: [] for name in tasks}
+    for turn in range(repeats + 2):
+        for name, task in tasks.items():
+            start = time.perf_counter()
+            task()
+            if turn >= 2:
+                samples[name].append(1e3 * (time.perf_counter() - start))
     return samples
 
 

@@ -1,6 +1,6 @@
 """The default network in each runtime, with no ROS: a view, a plan, and the start of a process."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from copy import copy
 from pathlib import Path
 import subprocess
@@ -16,11 +16,11 @@ from active_recon.runtimes.precision import has_bf16
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
-from benchmarks.figures import Figure
+from benchmarks.figures import Figure, interleaved
 import numpy as np
 
 _CHAIR = Path(__file__).parents[1] / 'active_recon' / 'objects' / 'chair.glb'
-_REPEATS, _STARTS = 40, 5
+_STARTS = 5
 _RUNTIMES = ('torch', 'openvino')
 _START = """
 import os, sys
@@ -50,7 +50,7 @@ def _views(threads: int) -> Iterator[Figure]:
             _, _, state = runtime.step(*view, state)
         tasks[f'a view, {name} {precision}, threads: {threads}'] = (
             lambda runtime=runtime, view=views[4], state=state: runtime.step(*view, state))
-    for name, samples in _interleaved(tasks).items():
+    for name, samples in interleaved(tasks).items():
         yield Figure(name, 'ms', samples, 4)
 
 
@@ -72,7 +72,7 @@ def _plans(count: int, goal: float) -> Iterator[Figure]:
             before.add_view(*view)
         tasks[f'a plan of {count} candidates, {name}'] = (
             lambda before=before: copy(before).add_view(*given[4]))
-    for name, samples in _interleaved(tasks).items():
+    for name, samples in interleaved(tasks).items():
         yield Figure(name, 'ms', samples, goal)
 
 
@@ -88,18 +88,6 @@ def _starts() -> Iterator[Figure]:
             peaks.append(float(ended.stdout))
         yield Figure(f'start to a network that has run, {name}', 's', times[1:], 0.5)
         yield Figure(f'peak memory of that, {name}', 'MB', peaks[1:], 150)
-
-
-def _interleaved(tasks: Mapping[str, Callable[[], object]]) -> dict[str, list[float]]:
-    """Return how long each of some tasks took, milliseconds, in turns: they share what slows."""
-    samples: dict[str, list[float]] = {name: [] for name in tasks}
-    for turn in range(_REPEATS + 2):
-        for name, task in tasks.items():
-            start = time.perf_counter()
-            task()
-            if turn >= 2:
-                samples[name].append(1e3 * (time.perf_counter() - start))
-    return samples
 
 
 def _taken() -> list[tuple[np.ndarray, Camera]]:

@@ -49,10 +49,9 @@ def seen_within(target: Camera, image: NDArray[np.uint8], camera: Camera,
     across, down = width / (right - left), height / (bottom - top)
     fine = size * _samples((x * across, y * down))
     # OpenCV's (0, 0) is the centre of the first pixel, ours its corner
-    sampled = cv2.remap(window, *(
-        _places(*each) for each in zip(_seen(camera, target, fine), (left, top), (across, down),
-                                       (width, height), strict=True)),
-        cv2.INTER_LINEAR, borderMode=beyond)
+    x, y = _seen(camera, target, fine)
+    sampled = cv2.remap(window, _places(x, left, across, width), _places(y, top, down, height),
+                        cv2.INTER_LINEAR, borderMode=beyond)
     return _shrunk(np.asarray(sampled, np.uint8), size, size), within
 
 

@@ -6,9 +6,10 @@ import signal
 import subprocess
 import sys
 
+from geometry_msgs.msg import PoseStamped
 import pytest
 
-from .conftest import BUDGET_S
+from .conftest import BUDGET_S, FakeCamera
 from .processes import ROOT
 
 pytestmark = pytest.mark.ros
@@ -80,3 +81,19 @@ def test_a_file_that_cannot_be_used_starts_nothing(up, tmp_path):
     assert up('recorder: {ros__parameters: {output_dri: bags}}').wait(BUDGET_S) == 2
     said = (tmp_path / 'up.log').read_text()
     assert 'recorder has no parameter output_dri; did you mean output_dir?' in said
+
+
+def test_nodes_that_share_a_process_answer_a_view_with_a_goal(up, bench, tmp_path):
+    process = up('/**/reconstructor: {ros__parameters: {take_views: all}}\n'
+                 '/**/view_planner: {ros__parameters: {max_views: 9}}\n'
+                 '/**/recorder: {ros__parameters: {record_at_start: false}}\n',
+                 '--single-process')
+    goals = bench.subscribe(PoseStamped, 'next_view')
+    seen = FakeCamera(bench).show()
+    bench.until(lambda: any(msg.header.stamp.sec * 10 ** 9 + msg.header.stamp.nanosec > seen
+                            for msg in goals), 'a goal after the view')
+    assert len(node_pids(tmp_path)) == 2  # the recorder has a process of its own
+    process.send_signal(signal.SIGINT)
+    assert process.wait(BUDGET_S) == 0
+    assert not node_pids(tmp_path)
+    assert 'Traceback' not in (tmp_path / 'up.log').read_text()
