@@ -78,7 +78,8 @@ setup(
         'onnxruntime': ['onnxruntime>=1.20,<2'],
         'test': [
             'coacd>=1.0.5,<2', 'mcap-ros2-support>=0.5.5', 'mujoco>=3.2,<4', 'onnx>=1.17,<2',
-            'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pyarrow>=18,<28', 'pymcap-cli>=0.30',
-            'pytest>=8', 'pytest-xdist>=3.6', 'ray>=2.44,<3', 'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
+            'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pyarrow>=18,<28',
+            'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6', 'ray>=2.44,<3', 'rosless>=0.5',
+            'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-_LOOPBACK = '127.0.0.2'  # Ray reads 127.0.0.1 as the machine's address to others
+_HEAD = '127.0.0.2'  # Ray reads 127.0.0.1 as the machine's address to others
 _STORE = 80 * 2 ** 20  # bytes of memory shared by the processes of a node
 
 
@@ -18,12 +18,13 @@ def ray_cluster(workers=2):
         [str(ROOT), str(ROOT / 'test'), *filter(None, [path])])
     from ray.cluster_utils import Cluster
 
-    place = {'node_ip_address': _LOOPBACK, 'object_store_memory': _STORE}
     cluster = Cluster(initialize_head=True, head_node_args={
-        **place, 'num_cpus': 0, 'include_dashboard': False})
+        'node_ip_address': _HEAD, 'object_store_memory': _STORE, 'num_cpus': 0,
+        'include_dashboard': False})
     try:
-        for _ in range(workers):
-            cluster.add_node(num_cpus=1, **place)
+        for number in range(workers):
+            cluster.add_node(node_ip_address=f'127.0.0.{3 + number}', num_cpus=1,
+                             object_store_memory=_STORE)
         yield cluster
     finally:
         cluster.shutdown()

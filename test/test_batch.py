@@ -4,7 +4,9 @@ import errno
 import os
 from pathlib import Path
 import re
+import shlex
 import shutil
+import subprocess
 
 from active_recon.batch import work
 from active_recon.batch.finding import bags_below, find_roots
@@ -15,8 +17,10 @@ from active_recon.batch.table import read_table, write_table
 from active_recon.errors import ConfigError, DataError
 from command_line import command, refusal
 import pytest
+import yaml
 
-PAPER = Path(__file__).parents[1] / 'bags' / 'golden' / 'paper'
+ROOT = Path(__file__).parents[1]
+PAPER = ROOT / 'bags' / 'golden' / 'paper'
 
 
 @pytest.fixture
@@ -155,3 +159,37 @@ def test_the_page_shows_the_lowest_quality_first_and_tells_what_it_leaves_out(tm
     assert shown == list(range(MOST_SHOWN + 6, 6, -1))
     assert '7 more are in the table alone' in page
     assert 'no &lt;bag&gt;' in page and '3 bags refused' in page
+
+
+def test_the_documentation_has_every_column():
+    page = (ROOT / 'doc' / 'cluster.md').read_text()
+    assert all(f'| `{name}` | {kind} | {meaning} |' in page
+               for name, (kind, meaning) in COLUMNS.items())
+
+
+def test_the_manifest_of_kubernetes_has_what_kuberay_requires():
+    """Offline: what its schema requires, and that names agree; it has not run on a cluster."""
+    job = yaml.safe_load((ROOT / 'examples' / 'cluster' / 'rayjob.yaml').read_text())
+    assert (job['apiVersion'], job['kind']) == ('ray.io/v1', 'RayJob') and job['metadata']['name']
+    spec = job['spec']['rayClusterSpec']
+    groups = [spec['headGroupSpec'], *spec['workerGroupSpecs']]
+    for group in groups:
+        pod = group['template']['spec']
+        (container,) = pod['containers']
+        assert isinstance(group['rayStartParams'], dict)
+        assert all(isinstance(value, str) for value in group['rayStartParams'].values())
+        assert container['name'] and container['image']
+        assert container['resources']['limits'] == container['resources']['requests']
+        volumes = {volume['name'] for volume in pod['volumes']}
+        assert {mount['name'] for mount in container['volumeMounts']} <= volumes
+        assert {mount['mountPath'] for mount in container['volumeMounts']} == {'/data'}
+    assert all(group['groupName'] and group['minReplicas'] <= group['replicas']
+               <= group['maxReplicas'] for group in spec['workerGroupSpecs'])
+    command = shlex.split(job['spec']['entrypoint'])
+    assert command[:3] == ['active-recon', 'batch', 'measure']
+    assert command[-2:] == ['--cluster', 'auto']
+
+
+def test_the_script_for_slurm_is_a_shell_script():
+    script = ROOT / 'examples' / 'cluster' / 'slurm.sh'
+    subprocess.run(['bash', '-n', script], check=True)

@@ -9,7 +9,8 @@ import typer
 from typer.testing import CliRunner
 
 COMMANDS = [('',), *((name,) for name in typer.main.get_command(app).commands),
-            ('bag', 'info'), ('bag', 'repair'), ('dataset', 'build')]
+            ('bag', 'info'), ('bag', 'repair'), ('dataset', 'build'), ('batch', 'measure'),
+            ('batch', 'replay'), ('batch', 'report')]
 
 
 def shown(*arguments):

@@ -2,12 +2,15 @@
 
 import os
 from pathlib import Path
+import socket
 import subprocess
 import sys
+import time
 
 from active_recon.models.weights import load_weights
 import numpy as np
 import pytest
+from safetensors.numpy import load_file
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 ROOT = Path(__file__).parents[1]
@@ -54,3 +57,40 @@ def test_two_processes_give_the_loss_curve_of_one_within_noise(dataset, tmp_path
     error = np.sqrt((alone.var(axis=0, ddof=1) + together.var(axis=0, ddof=1)) / 4)
     assert (np.abs(alone.mean(axis=0) - together.mean(axis=0)) < 4 * error).all()
     assert (together[:, -1] < together[:, 0]).all()  # and it is a curve that falls
+
+
+def on_two_nodes(dataset, out, *more):
+    """Start the command once for each of two nodes on the loopback; return the two processes."""
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    return [subprocess.Popen(
+        [sys.executable, '-m', 'active_recon.cli.main', 'train', dataset, '--validation', dataset,
+         '--out', out, '--threads', '1', '--nodes', '2', '--model', '2d3d', '--batch-size', '4',
+         '--checkpoint-every', '1', *more],
+        env=os.environ | {'OMP_NUM_THREADS': '1', 'PYTHONPATH': str(ROOT),
+                          'MASTER_ADDR': '127.0.0.1', 'MASTER_PORT': str(port),
+                          'NODE_RANK': str(rank), 'GLOO_SOCKET_IFNAME': 'lo'},
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for rank in range(2)]
+
+
+@pytest.mark.slow
+def test_two_nodes_train_as_two_processes_do_and_go_on_after_one_died(dataset, tmp_path):
+    train(dataset, tmp_path / 'processes', 2, 12, '--batch-size', '4')
+    out = tmp_path / 'nodes'
+    both = on_two_nodes(dataset, out, '--steps', '12')
+    checkpoint, end = out / 'reconstruction.safetensors', time.monotonic() + 300
+    while not checkpoint.exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    for process in reversed(both):  # one dies, and its launcher ends the other
+        process.kill()
+        process.communicate()
+    assert checkpoint.exists() and not (out / 'weights.safetensors').exists()
+    told = [process.communicate(timeout=600)[0]
+            for process in on_two_nodes(dataset, out, '--steps', '12', '--resume')]
+    assert sum(text.count('wrote ') for text in told) == 1, told
+    expected, found = (load_file(folder / 'weights.safetensors')
+                       for folder in (tmp_path / 'processes', out))
+    assert expected.keys() == found.keys()
+    for name, value in expected.items():
+        np.testing.assert_allclose(found[name], value, atol=1e-4)
