@@ -12,6 +12,7 @@ import typer
 
 ROOT = Path(__file__).parents[1]
 TUTORIAL = ROOT / 'doc/photos.md'
+WATCHING = ROOT / 'doc/watching.md'
 NOTEBOOK = ROOT / 'examples/photos.ipynb'
 
 
@@ -43,7 +44,7 @@ def test_the_tutorial_s_python_runs(tmp_path, monkeypatch, capsys):
 
 def test_the_tutorial_names_every_option_of_the_command():
     command = typer.main.get_command(app).commands['reconstruct']
-    text = TUTORIAL.read_text()
+    text = TUTORIAL.read_text() + WATCHING.read_text()
     board = {'--marker-mm', '--dictionary', '--squares', '--square-mm'}  # those of calibrate
     missing = [option for each in command.params for option in each.opts
                if option.startswith('--') and option not in text and option not in board

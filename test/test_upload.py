@@ -15,10 +15,10 @@ from PIL import Image
 import pytest
 
 
-def encoded(kind, folder):
+def encoded(kind, folder, size=None):
     path = folder / f'made.{kind}'
-    Image.fromarray(np.arange(1200, dtype=np.uint16).astype(np.uint8).reshape(20, 20, 3)).save(
-        path, kind)
+    drawn = np.arange(1200, dtype=np.uint16).astype(np.uint8).reshape(20, 20, 3)
+    (Image.new('1', size) if size else Image.fromarray(drawn)).save(path, kind)
     data = path.read_bytes()
     path.unlink()
     return data
@@ -131,6 +131,7 @@ def test_what_is_no_photo_is_refused_by_its_content(server, folder, photo, words
 
 def test_images_of_other_formats_are_refused(tmp_path):
     assert refusal(encoded('GIF', tmp_path)) == refusal(encoded('TIFF', tmp_path)) != ''
+    assert 'at most 200 megapixels' in refusal(encoded('PNG', tmp_path, (20_000, 10_001)))
     assert refusal(encoded('JPEG', tmp_path)) == refusal(encoded('PNG', tmp_path)) == ''
 
 

@@ -63,16 +63,14 @@ def test_what_is_wrong_with_a_photo_is_one_line_and_the_shape_stays(collection, 
     Image.new('RGB', (640, 480), (90, 120, 90)).save(tmp_path / 'empty.jpg')
     (tmp_path / 'cut.png').write_bytes(photos[0].read_bytes()[:20_000])
     shutil.copy(photos[0], tmp_path / 'again.png')
-    with Image.open(photos[3]) as image:
-        image.resize((320, 240)).save(tmp_path / 'small.png')
+    (tmp_path / 'phone.heic').write_bytes(b'any')
     before = collection.shape.occupancy
     for name, words in (('empty.jpg', 'no board seen in it'), ('cut.png', 'not readable'),
                         ('again.png', 'the same photo as 0.png'),
-                        ('small.png', 'another size: expected 640 x 480')):
+                        ('phone.heic', 'HEIC photos cannot be read: let the camera take')):
         reason = collection.add(tmp_path / name)
         assert reason.startswith(f'{name}: {words}') and '\n' not in reason
-        collection.remove(tmp_path / name)
-    np.testing.assert_allclose(collection.shape.occupancy, before, atol=_SAME)
+    assert collection.shape.occupancy is before
 
 
 def test_a_photo_that_is_gone_leaves_the_shape_of_the_others(collection, photos):
@@ -152,12 +150,12 @@ def test_photos_that_were_there_come_in_the_order_of_their_age(tmp_path):
     import os
 
     arrivals = Arrivals(tmp_path)
-    for name, age in (('b.jpg', 1), ('img10.jpg', 2), ('img2.jpg', 2), ('a.jpg', 3)):
+    for name, age in (('b.heic', 1), ('img10.jpg', 2), ('img2.jpg', 2), ('a.jpg', 3)):
         (tmp_path / name).write_bytes(b'x')
         os.utime(tmp_path / name, (age, age))
     arrivals.arrived(0.0)
     assert [path.name for path in arrivals.arrived(1.0)] == [
-        'b.jpg', 'img2.jpg', 'img10.jpg', 'a.jpg']
+        'b.heic', 'img2.jpg', 'img10.jpg', 'a.jpg']
     with pytest.raises(DataError, match='no such folder'):
         Arrivals(tmp_path / 'none')
 

@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 from PIL import ExifTags, Image
 
 ENDINGS = (*SUFFIXES, '.webp')
+HEIC_ENDINGS = ('.heic', '.heif')
+HEIC_ADVICE = ('HEIC photos cannot be read: let the camera take JPEG (on an iPhone: Settings, '
+               'Camera, Formats, Most Compatible)')
+"""What to do about the format that phones may use."""
 ORDERS = ('name', 'time')
 """By their names, 2 before 10, or by when they were taken."""
 LARGEST_SIDE = 2048
@@ -102,6 +106,8 @@ def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
 
     Raises DataError where it cannot be read, or another of `known` has the same bytes.
     """
+    if path.suffix.lower() in HEIC_ENDINGS:
+        raise DataError(f'{path.name}: {HEIC_ADVICE}')
     try:
         digest = hashlib.sha256(path.read_bytes()).digest()
         photo = _opened(path)

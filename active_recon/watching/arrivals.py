@@ -6,7 +6,7 @@ from pathlib import Path
 
 from active_recon.calibration.files import in_order
 from active_recon.errors import DataError
-from active_recon.photos.files import ENDINGS
+from active_recon.photos.files import ENDINGS, HEIC_ENDINGS
 
 SETTLED_S = 0.8
 """A file is whole once it has not changed for so long, seconds."""
@@ -62,8 +62,9 @@ class Arrivals:
 
     def _files(self) -> Iterator[tuple[Path, tuple[int, int]]]:
         """Yield each photo with its size and the time of its last change."""
+        endings = (*ENDINGS, *HEIC_ENDINGS)  # the latter to be told of
         for path in self._folder.iterdir():
-            if path.suffix.lower() not in ENDINGS or path.name.startswith(('.', '~')):
+            if path.suffix.lower() not in endings or path.name.startswith(('.', '~')):
                 continue
             try:
                 status = path.stat()

@@ -22,6 +22,7 @@ from typing import Any
 import warnings
 
 from active_recon.errors import ConfigError
+from active_recon.photos.files import HEIC_ADVICE
 from active_recon.viewer.address import HOST
 from active_recon.watching.upload_page import PAGE
 from active_recon.watching.watcher import Progress, Verdicts
@@ -31,6 +32,7 @@ from PIL import Image
 LARGEST_UPLOAD = 30_000_000
 """Bytes of a photo."""
 _SUFFIXES = {'JPEG': '.jpg', 'PNG': '.png'}
+_MOST_PIXELS = 200_000_000
 _AT_ONCE = 4
 _ANSWER_S = 60.0
 _LOOK_S = 0.1  # how often it is looked whether to stop
@@ -108,9 +110,9 @@ def lan_address() -> str:
 def refusal(photo: bytes) -> str:
     """Return why bytes are no photo that can be used, in one line; '' where they are one."""
     if photo[4:8] == _HEIC:
-        return ('HEIC photos cannot be read: let the camera take JPEG (on an iPhone: Settings, '
-                'Camera, Formats, Most Compatible)')
-    return '' if _format(photo) else 'not a photo: expected JPEG or PNG'
+        return HEIC_ADVICE
+    return '' if _format(photo) else ('not a photo: expected JPEG or PNG of at most '
+                                      f'{_MOST_PIXELS / 1e6:.0f} megapixels')
 
 
 def _format(photo: bytes) -> str:
@@ -119,7 +121,7 @@ def _format(photo: bytes) -> str:
         with warnings.catch_warnings():
             warnings.simplefilter('ignore', Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(photo), formats=tuple(_SUFFIXES)) as image:
-                return str(image.format)
+                return str(image.format) if image.width * image.height <= _MOST_PIXELS else ''
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         return ''
 
