@@ -8,7 +8,8 @@ faults of its own, drawn by the object's place in the set, measures each object:
 up to 1 %, steps, noise, holes at edges and on shiny and grazing surfaces, flying pixels; nothing
 is measured behind the object. Images are on white. The threshold is that of the weights.
 `share_above_lower_bound`: how often the IoU is at least the quality's lower bound, which was
-fitted without depth; `view_ms`: the median time of a view, in turns, on one thread.
+fitted without depth; `view_ms`: the median time of a view, in turns, on one thread. A line of
+`of_objects` has an object and its IoU by colour alone and with depth, after each count.
 """
 
 import argparse
@@ -64,7 +65,10 @@ def main() -> None:
             [each['kept'][way] for each in found], axis=0).round(4).tolist() for way in WAYS},
         'view_ms': {way: round(float(np.median([each['ms'][way] for each in found])), 1)
                     for way in WAYS},
-        'refused': sum(each['refused'] for each in found), 'of_objects': found}, indent=1) + '\n')
+        'refused': sum(each['refused'] for each in found),
+        'of_objects': [' '.join([each['object'], *(f'{value:.3f}' for way in WAYS
+                                                   for value in each[way])])
+                       for each in found]}, indent=1) + '\n')
     for way, values in (*table.items(), ('gain', gain)):
         print(way, values.mean(axis=0).round(4))  # noqa: T201
 

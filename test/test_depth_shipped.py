@@ -1,5 +1,8 @@
 """What the refiner that ships does with depth: on a known object, from photos, and in a bag."""
 
+import json
+from pathlib import Path
+
 import active_recon
 from active_recon.bags.replay.verification import verify
 from active_recon.bags.runs.loop_setup import recorded_setup
@@ -20,6 +23,7 @@ import numpy as np
 from photo_scene import cameras, CENTRE, on_plain, rendered, SIDE, thing, write_photos
 import pytest
 
+ROOT = Path(__file__).parents[1]
 SIZE = 1.1 * SIDE
 
 
@@ -40,6 +44,16 @@ def test_the_refiner_belongs_to_the_weights_that_ship():
     load_refiner()
     assert read_card(depth_path())['network_sha256'] == weights_hash()
     assert read_card(depth_path())['sha256'] == weights_hash(depth_path())
+
+
+@pytest.mark.parametrize('page', ['doc/results.md', 'active_recon/weights/MODEL_CARD.md'])
+def test_the_figures_are_those_that_were_measured_with_the_weights_that_ship(page):
+    result, text = json.loads((ROOT / 'docs/results/depth.json').read_text()), (
+        ROOT / page).read_text()
+    assert result['weights_sha256'] == weights_hash()
+    assert result['depth_sha256'] == weights_hash(depth_path())
+    for way in ('color', 'depth'):
+        assert all(f'{value:.3f}' in text for value in result['iou_64'][way])
 
 
 def test_depth_makes_one_view_better_and_what_it_saw_free_is_free(placed):
