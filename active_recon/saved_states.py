@@ -130,7 +130,7 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
     return SavedState(
         Progress(state, int(facts['views']), tuple(seen), evidence),
         Reconstruction(VoxelGrid(occupancy, reconstructor.object_size), arrays['latent'], None,
-                       lambda: quality),
+                       judge=lambda: quality),
         photos, Camera(arrays['last_pose']))
 
 

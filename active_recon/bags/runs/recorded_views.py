@@ -159,4 +159,4 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
     return RecordedView(view.stamp, image, view.camera,
                         part('probabilities'), part('occupancy'), part('latent'), part('entropy'),
                         goal, received, (part('done') or (0, ''))[1], part('quality'),
-                        view.reduced if whole else None)
+                        reduced=view.reduced if whole else None)
