@@ -146,7 +146,9 @@ class RayCrew:
                 errors.LocalRayletDiedError, errors.ObjectLostError):
             return None
         except errors.RayError as error:
-            raise WorkError(f'--cluster: {(str(error).splitlines() or [""])[0]}') from error
+            # Of a task that failed outside its function, for example for want of active_recon
+            reason = str(getattr(error, 'cause', None) or error).splitlines() or ['']
+            raise WorkError(f'--cluster: a worker failed: {reason[0]}') from error
         return done
 
 
