@@ -1,5 +1,6 @@
 """Devices, video files and folders as images: their pace, their faults, and how they come back."""
 
+import os
 import threading
 import time
 
@@ -7,13 +8,17 @@ from active_recon.capture import grabber as grabbing
 from active_recon.capture import sources
 from active_recon.capture.grabber import Grabber
 from active_recon.capture.sources import fitting_lens, FOLDER_RATE, open_source
+from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Intrinsics
+from active_recon.parameters.camera import CameraParameters
 import cv2
 from films import film, shade, SIZE
 import numpy as np
 from PIL import Image
 import pytest
+from typer.testing import CliRunner
+import yaml
 
 
 def waited(condition, budget_s=20.0):
@@ -202,6 +207,24 @@ def test_what_cannot_be_opened_is_told_in_one_line(tmp_path, capfd):
     with pytest.raises(ConfigError, match='no source: expected a video device'):
         open_source('')
     assert capfd.readouterr().err == ''  # nothing of the libraries' own
+
+
+def test_the_command_hands_its_options_to_the_node_as_they_are(monkeypatch):
+    begun = []
+    monkeypatch.setattr(os, 'execv', lambda program, words: begun.append(words))
+    done = CliRunner().invoke(app, ['camera', '0', '--size', '1280x720', '--frame', "it's",
+                                    '--loop', '--camera-info', 'my lens.yaml', '-r', '__ns:=/b'])
+    assert done.exit_code == 0, done.output
+    words, = begun
+    given = dict(word.split(':=', 1) for word in words if ':=' in word)
+    assert given.pop('__ns') == '/b'
+    read = {name: yaml.safe_load(value) for name, value in given.items()}
+    expected = CameraParameters(source='0', camera_info='my lens.yaml', camera_frame="it's",
+                                width=1280, height=720, loop=True)
+    assert read == {name: getattr(expected, name) for name in read}
+    assert all(type(value) is type(getattr(expected, name)) for name, value in read.items())
+    wrong = CliRunner().invoke(app, ['camera', '0', '--size', 'large'])
+    assert 'expected WIDTHxHEIGHT' in str(wrong.exception)
 
 
 def test_a_calibration_for_another_size_is_refused():

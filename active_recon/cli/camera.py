@@ -1,5 +1,6 @@
 """`active-recon camera`: a webcam, a video file or a folder of images as ROS topics."""
 
+import json
 import os
 from pathlib import Path
 import sys
@@ -43,13 +44,13 @@ def camera(
     if size and not (width.isdecimal() and height.isdecimal()):
         raise ConfigError('--size: invalid size: expected WIDTHxHEIGHT, e.g. 1280x720, got '
                           f'{size!r}')
-    if source.isascii() and source.isdigit():
-        source = f'/dev/video{source}'  # the node's parameter is a string, not a number
-    parameters = {'source': f"'{source}'", 'rate': rate, 'camera_frame': frame,
-                  'loop': str(loop).lower(), 'width': width or 0, 'height': height or 0}
-    if camera_info is not None:
-        parameters['camera_info'] = f"'{camera_info}'"
-    given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+    parameters = {
+        'source': source, 'camera_info': '' if camera_info is None else str(camera_info),
+        'camera_frame': frame, 'rate': rate, 'loop': loop, 'width': int(width or 0),
+        'height': int(height or 0)}
+    # ROS reads YAML, of which JSON is a part: a string in quotes is no number, whatever it holds
+    given = [word for name, value in parameters.items()
+             for word in ('-p', f'{name}:={json.dumps(value)}')]
     names = [word for each in remap or () for word in ('-r', each)]
     # The node replaces this process and receives its Ctrl-C
     os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.camera', '--ros-args',
