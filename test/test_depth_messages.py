@@ -184,7 +184,7 @@ def test_depth_in_a_bag_belongs_to_its_view_and_is_read_where_the_loop_used_it(t
     for view, written in zip(found, depths, strict=True):
         if written is not None:
             np.testing.assert_array_equal(view.depth.metres, written.metres)
-            assert view.depth.camera is None
+            assert view.depth.camera == view.camera
     unused = run_with_depth(tmp_path / 'unused', depths, use_depth=False)
     assert all(view.depth is None for view in unused)
 
