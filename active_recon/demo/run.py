@@ -28,7 +28,7 @@ from rich.live import Live
 _LIKELY_RESOLUTION = 64
 _START_S = 60.0  # also where the machine is busy
 _VIEW_S = 60.0
-_ANSWER_S = 10.0
+_ANSWER_S = 60.0
 
 
 @dataclass(frozen=True)
