@@ -137,7 +137,8 @@ def test_a_replay_tells_whether_it_agrees_and_what_would_have_been(tmp_path, mon
     (row,) = batch(monkeypatch, 'replay', PAPER, tmp_path / 'replayed')
     assert row['verdict'] in ('same bits', 'within tolerance')
     (other,) = batch(monkeypatch, 'replay', PAPER, tmp_path / 'other', '--threshold', 0.9)
-    assert not other['verdict'] and other['iou'] < row['iou']
+    assert not other['verdict'] and other['iou'] != row['iou']
+    assert other['entropy'] == row['entropy']  # the probabilities are the same
 
 
 def test_the_same_rows_give_the_same_table_whatever_their_number(tmp_path):
