@@ -5,6 +5,7 @@ from pathlib import Path
 
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
+from active_recon.meshes.coloring import colored
 from active_recon.meshes.files import write_mesh
 from active_recon.meshes.photos import Album, Photo
 from active_recon.nodes.loop.mesh_publisher import MeshPublisher
@@ -13,6 +14,7 @@ from active_recon.nodes.runtime.output import output_path
 from active_recon.nodes.runtime.run import one_line
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.saved_states import SavedState, SUFFIX, write_state
+from active_recon.volumes.refinement import refined_mesh
 from msg_tools.episodes import Episode
 import numpy as np
 from numpy.typing import NDArray
@@ -62,9 +64,6 @@ class Products:
                   response: Trigger.Response) -> Trigger.Response:
         """Write the coloured mesh; answer with its path, or why it was not written."""
         def write(path: Path, known: Reconstruction) -> None:
-            from active_recon.meshes.coloring import colored  # trimesh is half of a node's start
-            from active_recon.volumes.refinement import refined_mesh
-
             mesh = refined_mesh(known.grid, self._reconstructor.threshold)
             write_mesh(colored(mesh, self._album.photos), path)
 
