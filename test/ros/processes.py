@@ -15,12 +15,10 @@ ROOT = Path(__file__).parents[2]
 _NODES = ('reconstructor', 'view_planner', 'turntable_camera', 'camera', 'recorder', 'viewer',
           'player')
 _FORKS = multiprocessing.get_context('forkserver')
-# The last are what reconstructors import with their weights, and with their first mesh
+# The last are what reconstructors import with their weights
 _FORKS.set_forkserver_preload([*(f'active_recon.nodes.{name}' for name in _NODES),
                                'active_recon.runtimes.torch',
-                               'active_recon.runtimes.openvino', 'openvino',
-                               'active_recon.meshes.coloring', 'active_recon.volumes.refinement',
-                               __name__])
+                               'active_recon.runtimes.openvino', 'openvino', __name__])
 
 
 class Started:
