@@ -94,6 +94,7 @@ def test_a_training_that_is_interrupted_says_where_and_how_to_go_on(
     assert command(monkeypatch, *asked, '--resume') == 0
 
 
+@pytest.mark.slow
 def test_the_paper_s_network_with_cameras_goes_from_data_to_figures(
         dataset, tmp_path, monkeypatch):
     asked = training(dataset, tmp_path, '--model', '2d3d-posed')

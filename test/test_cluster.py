@@ -116,6 +116,7 @@ def test_a_batch_of_bags_is_the_same_on_a_cluster_and_a_bag_that_is_none_is_refu
     assert same_files(tmp_path / 'local', tmp_path / 'ray')
 
 
+@pytest.mark.slow
 def test_rendered_objects_are_the_same_on_a_cluster(cluster, tmp_path, monkeypatch):
     for name, mesh in (('box', trimesh.creation.box((0.3, 0.2, 0.1))),
                        ('ball', trimesh.creation.icosphere(1, 0.2))):

@@ -87,7 +87,7 @@ def test_all_replays_have_one_hash(run, loop, count):
 
 
 @pytest.mark.parametrize(('variables', 'threads'), [
-    ({'ATEN_CPU_CAPABILITY': 'default'}, 1),
+    pytest.param({'ATEN_CPU_CAPABILITY': 'default'}, 1, marks=pytest.mark.slow),
     pytest.param({'ONEDNN_MAX_CPU_ISA': 'SSE41'}, 1, marks=pytest.mark.slow),
     pytest.param({'ATEN_CPU_CAPABILITY': 'default', 'ONEDNN_MAX_CPU_ISA': 'SSE41'}, 2,
                  marks=pytest.mark.slow)])
@@ -144,8 +144,9 @@ def copied(golden, tmp_path):
 
 
 @pytest.mark.parametrize(('options', 'name', 'knows_policy'), [
-    (('--threshold', '0.6'), 'threshold-0.6', True), (('--model', '2d3d'), '2d3d', False),
-    (('--policy',), '', True)])
+    (('--threshold', '0.6'), 'threshold-0.6', True),
+    pytest.param(('--model', '2d3d'), '2d3d', False, marks=pytest.mark.slow),
+    pytest.param(('--policy',), '', True, marks=pytest.mark.slow)])
 def test_a_replay_with_overrides_is_a_bag_that_replays_to_the_same_bits(
         copied, run, options, name, knows_policy, monkeypatch, capsys):
     if options == ('--policy',):  # its own, which asks for views that there are

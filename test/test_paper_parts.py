@@ -15,6 +15,7 @@ import pytest
 from shown_views import part_of
 import torch
 
+pytestmark = pytest.mark.slow  # all parts are made: half a minute of a core
 
 @pytest.fixture(scope='module')
 def patch():

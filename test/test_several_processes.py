@@ -30,6 +30,7 @@ def train(dataset, out, devices, steps, *more):
     return np.array([event.value for event in events.Scalars('reconstruction/loss')]), done
 
 
+@pytest.mark.slow
 def test_two_processes_write_one_set_of_weights_and_one_log(dataset, tmp_path):
     losses, done = train(dataset, tmp_path / 'run', 2, 2, '--batch-size', '4')
     assert len(losses) == 2

@@ -100,6 +100,7 @@ def test_the_page_follows_the_loop_and_begins_a_new_episode_when_asked(demo, chr
     assert not chromium.errors()
 
 
+@pytest.mark.slow
 def test_who_comes_late_is_shown_what_is_latched_at_another_port(demo, late_view, chromium):
     first = demo.said(r'the page is at (http://127\.0\.0\.1:\d+)')
     url = late_view.said(r'the page is at (http://127\.0\.0\.1:\d+)')
@@ -125,6 +126,7 @@ def small_loop(tmp_path):
     command.kill()
 
 
+@pytest.mark.slow
 def test_a_loop_of_other_size_and_names_is_shown_without_being_told(
         small_loop, tmp_path, chromium):
     command = Command(tmp_path / 'view', 'view', '--port', '0', **small_loop)

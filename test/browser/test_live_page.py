@@ -245,6 +245,7 @@ def test_a_bag_is_stepped_through_view_by_view(playback, chromium):
     assert not chromium.errors()
 
 
+@pytest.mark.slow
 def test_a_bag_plays_to_its_end_and_then_from_the_first_view(playback, chromium):
     opened(chromium, playback.page.url)
     words = []

@@ -52,9 +52,11 @@ def cells(page):
     return int(page.run('return document.querySelector(".count").textContent').split()[0])
 
 
-@pytest.mark.parametrize('scheme', ['light', 'dark'])
-@pytest.mark.parametrize('size', [LAPTOP, PHONE], ids=['laptop', 'phone'])
-@pytest.mark.parametrize('name', ['one', 'three'])
+@pytest.mark.parametrize(('name', 'size', 'scheme'), [
+    ('one', LAPTOP, 'light'), ('three', PHONE, 'dark'),
+    *(pytest.param(*rest, marks=pytest.mark.slow) for rest in (
+        ('one', LAPTOP, 'dark'), ('one', PHONE, 'light'), ('one', PHONE, 'dark'),
+        ('three', LAPTOP, 'light'), ('three', LAPTOP, 'dark'), ('three', PHONE, 'light')))])
 def test_page_is_drawn_without_complaint_and_fits_its_window(opened, name, size, scheme):
     page = opened(name, size, scheme)
     picture = shape(page).astype(int)
@@ -68,7 +70,7 @@ def test_page_is_drawn_without_complaint_and_fits_its_window(opened, name, size,
     assert page.errors() == []
 
 
-@pytest.mark.parametrize('name', ['one', 'three'])
+@pytest.mark.parametrize('name', ['one', pytest.param('three', marks=pytest.mark.slow)])
 def test_no_figure_of_the_timing_table_is_cut_off_on_a_phone(opened, name):
     page = opened(name, PHONE)
     inside = page.run(
@@ -98,6 +100,7 @@ def test_another_view_shows_another_shape_and_what_was_thought_then(opened, chan
     assert last_goal != first_goal
 
 
+@pytest.mark.slow
 def test_page_turns_dark_with_its_reader(opened, changed_share):
     page = opened()
     light = shape(page)
@@ -131,11 +134,13 @@ def test_higher_threshold_leaves_fewer_cells(opened, changed_share):
     assert changed_share(before, shape(page)) > 0.01
 
 
+@pytest.mark.slow
 def test_at_the_recorded_threshold_just_the_recorded_cells_are_drawn(opened):
     recorded = recorded_run('chair').episodes[0].views[-1].occupied
     assert cells(opened()) == recorded.occupied(0).sum()
 
 
+@pytest.mark.slow
 def test_object_turns_until_it_is_paused(opened, changed_share):
     page = opened(motion='no-preference')
     assert button(page) == 'Pause'
@@ -160,6 +165,7 @@ def test_the_surface_in_its_colours_is_drawn(opened, changed_share):
     assert cells(page) > 0
 
 
+@pytest.mark.slow
 def test_object_stands_still_for_who_prefers_less_motion(opened, changed_share):
     page = opened()
     assert button(page) == 'Turn'

@@ -26,7 +26,8 @@ def soaked(request, tmp_path_factory):
     return json.loads((folder / 'soak.json').read_text())
 
 
-@pytest.mark.parametrize('soaked', [0.25, LONG], indirect=True)
+@pytest.mark.parametrize('soaked', [pytest.param(0.25, marks=pytest.mark.slow), LONG],
+                         indirect=True)
 def test_every_episode_of_a_long_run_is_whole_and_recorded(soaked):
     assert not soaked['broken_by']
     assert soaked['episodes'] >= 1
