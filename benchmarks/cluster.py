@@ -25,7 +25,8 @@ from active_recon.batch.work import do_bag
 from active_recon.cluster import Crew, crew_of
 from active_recon.datasets.making import make_object, shape_jobs
 
-GOLDEN = Path(__file__).parents[1] / 'bags' / 'golden' / 'run'
+_ROOT = Path(__file__).parents[1]
+GOLDEN = _ROOT / 'bags' / 'golden' / 'run'
 _EMPTY = 20_000
 Work = tuple[Callable[[Any], Any], list[Any]]
 
@@ -62,8 +63,8 @@ def alone(name: str, count: int) -> float:
 
 def independent(name: str, count: int, processes: int) -> float:
     """Return the items a second of some processes that know nothing of each other, in all."""
-    running = [subprocess.Popen([sys.executable, '-P', '-m', 'benchmarks.cluster', '--alone', name,
-                                 '--items', str(count)], stdout=subprocess.PIPE)
+    running = [subprocess.Popen([sys.executable, '-m', 'benchmarks.cluster', '--alone', name,
+                                 '--items', str(count)], stdout=subprocess.PIPE, cwd=_ROOT)
                for _ in range(processes)]
     return sum(float(each.communicate()[0]) for each in running)
 
