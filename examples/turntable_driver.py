@@ -118,13 +118,11 @@ def main() -> None:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     for request in (signal.SIGINT, signal.SIGTERM):
         signal.signal(request, signal.default_int_handler)
-    driver = TurntableDriver(Motor(SimulatedPort()))
     try:
-        rclpy.spin(driver)
+        rclpy.spin(TurntableDriver(Motor(SimulatedPort())))
     except KeyboardInterrupt:
         pass
     finally:
-        driver.destroy_node()
         rclpy.try_shutdown()
 
 
