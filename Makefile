@@ -25,7 +25,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full doc html bench soak policies ready chromium lint clean
+.PHONY: help venv demo golden test test-full doc html bench soak policies weights ready chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -80,6 +80,9 @@ bench: .venv/installed  ## the figures of doc/benchmarks.md, measured here
 soak: .venv/installed  ## an hour of the loop, for docs/soak.md; ARGS='--minutes 5' for less
 	@echo '== soaking'
 	@$(BIN)/python -m benchmarks.soak $(ARGS)
+
+weights: .venv/installed  ## the default weights from scratch, resumable; see weights.mk
+	@$(MAKE) --no-print-directory -f weights.mk $(ARGS)
 
 policies: .venv/installed  ## security/policies.xml anew, from the live graph
 	@$(BIN)/python security/generate.py

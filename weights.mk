@@ -1,0 +1,113 @@
+# The default weights from scratch: `make weights MESHES=FOLDER`, resumable at every step.
+#
+# Renders the training data, trains the network, its view policy, the tables of its quality and its
+# depth refiner, and puts all of it, exported, into ./weights. What stands is not made again, an
+# interrupted training continues. The numbers below are of the weights that ship; fewer are faster.
+#
+#   MESHES    folder with manifest.csv of real models (docs/data-sources.csv); without, none are used
+#   RUN       folder of data and runs, some 8 GB
+#   STEPS     of the network; two cores take about an hour for 3,200
+
+RUN ?= runs/default
+MESHES ?=
+STEPS ?= 10000
+DEVICES ?= 2
+PARAMETRIC ?= --train 320 --val 8
+THINGS ?= --category thing --train 6000 --val 0
+TURNTABLE ?= --train 16 --val 4
+TURNTABLE_THINGS ?= --category thing --train 200 --val 0
+DEEP ?= --train 40 --val 8
+DEEP_THINGS ?= --category thing --train 500 --val 0
+POLICY ?= --objects 200
+DEPTH_STEPS ?= 1500
+FAULTS ?= unknown pose object_size mask
+
+AR ?= .venv/bin/active-recon
+BUILD := $(AR) dataset build
+NO_TEST := --test 0 --unseen 0
+ANY := --cameras any --fine --turned
+REAL := $(if $(MESHES),real_train)
+REAL_VAL := $(if $(MESHES),real_val)
+NAMES := .safetensors .json -scorer.safetensors -scorer.json -quality.json -depth.safetensors \
+	-depth.json
+
+.DELETE_ON_ERROR:
+.PHONY: weights
+weights: $(RUN)/exported
+
+# Data: one stamp each, so that a second start renders only what is missing
+$(RUN)/data.rendered:
+	@mkdir -p $(RUN)
+	$(BUILD) $(RUN)/data $(PARAMETRIC) $(NO_TEST) $(ANY)
+	@touch $@
+$(RUN)/things.rendered:
+	@mkdir -p $(RUN)
+	$(BUILD) $(RUN)/things $(THINGS) $(NO_TEST) $(ANY)
+	@touch $@
+$(RUN)/turn.rendered:
+	@mkdir -p $(RUN)
+	$(BUILD) $(RUN)/turn $(TURNTABLE) $(NO_TEST) --fine
+	$(BUILD) $(RUN)/turn_things $(TURNTABLE_THINGS) $(NO_TEST) --fine
+	@touch $@
+$(RUN)/deep.rendered:
+	@mkdir -p $(RUN)
+	$(BUILD) $(RUN)/deep $(DEEP) $(NO_TEST) $(ANY) --depth
+	$(BUILD) $(RUN)/deep_things $(DEEP_THINGS) $(NO_TEST) $(ANY) --depth
+	@touch $@
+$(RUN)/real_train.rendered:
+	@mkdir -p $(RUN)
+	$(AR) render $(MESHES)/manifest.csv $(RUN)/real_train --split train --explicit-licence \
+		$(ANY) --depth
+	$(AR) render $(MESHES)/manifest.csv $(RUN)/turn_real --split train --explicit-licence --fine
+	@touch $@
+$(RUN)/real_val.rendered:
+	@mkdir -p $(RUN)
+	$(AR) render $(MESHES)/manifest.csv $(RUN)/real_val --split val --fine
+	@touch $@
+
+# The network
+NETWORK := $(RUN)/lifting/weights
+$(NETWORK).safetensors: $(RUN)/data.rendered $(RUN)/things.rendered $(REAL:%=$(RUN)/%.rendered)
+	$(AR) train $(RUN)/data/train $(RUN)/things/train $(REAL:%=$(RUN)/%) \
+		--validation $(RUN)/data/val --out $(RUN)/lifting --model lifting --steps $(STEPS) \
+		--batch-size 8 --learning-rate 1.2e-3 --max-views 8 --curriculum-fraction 0 \
+		--warmup-steps 100 --checkpoint-every 100 --devices $(DEVICES) --threads 1 --resume
+
+# What belongs to it: the view policy, the quality's tables, the depth refiner
+$(RUN)/policy/weights-scorer.safetensors: $(NETWORK).safetensors $(RUN)/turn.rendered
+	$(AR) train-policy $(RUN)/turn/train $(RUN)/turn_things/train $(REAL:%=$(RUN)/turn_real) \
+		--validation $(RUN)/turn/val --model $(NETWORK).safetensors --out $(RUN)/policy $(POLICY)
+
+MEASURE = $(AR) quality measure --model $(NETWORK).safetensors
+JUDGED := $(if $(REAL_VAL),$(RUN)/real_val,$(RUN)/turn/val)
+$(RUN)/quality/known-%.npz: $(NETWORK).safetensors $(RUN)/turn.rendered
+	@mkdir -p $(@D)
+	$(MEASURE) $(RUN)/$*/train $@
+$(RUN)/quality/judged.npz: $(NETWORK).safetensors $(RUN)/turn.rendered \
+		$(REAL_VAL:%=$(RUN)/%.rendered)
+	@mkdir -p $(@D)
+	$(MEASURE) $(JUDGED) $@ --views 6
+$(RUN)/quality/judged-%.npz: $(RUN)/quality/judged.npz
+	$(MEASURE) $(JUDGED) $@ --views 6 --fault $*
+$(NETWORK)-quality.json: $(RUN)/quality/known-turn.npz $(RUN)/quality/known-turn_things.npz \
+		$(RUN)/quality/judged.npz $(FAULTS:%=$(RUN)/quality/judged-%.npz)
+	$(AR) quality fit --model $(NETWORK).safetensors --out $@ \
+		$(patsubst %,--known %,$(filter %known-turn.npz %known-turn_things.npz,$^)) \
+		$(patsubst %,--calibration %,$(filter $(RUN)/quality/judged%,$^))
+
+$(RUN)/depth/weights-depth.safetensors: $(NETWORK).safetensors $(RUN)/deep.rendered
+	$(AR) train-depth $(RUN)/deep/train $(RUN)/deep_things/train $(REAL:%=$(RUN)/%) \
+		--validation $(RUN)/deep/val --model $(NETWORK).safetensors --out $(RUN)/depth \
+		--steps $(DEPTH_STEPS) --threads 1 --resume
+
+# All of it in one folder, under the name by which it is loaded
+$(RUN)/exported: $(NETWORK).safetensors $(RUN)/policy/weights-scorer.safetensors \
+		$(NETWORK)-quality.json $(RUN)/depth/weights-depth.safetensors
+	@mkdir -p $(RUN)/weights
+	@for name in $(NAMES); do for folder in lifting policy depth; do \
+		if test -e $(RUN)/$$folder/weights$$name; then \
+		cp $(RUN)/$$folder/weights$$name $(RUN)/weights/lifting$$name; fi; done; done
+	$(AR) export $(RUN)/weights/lifting.safetensors
+	@touch $@
+	@echo "wrote $(RUN)/weights: load it by --model or the parameter weights, \
+	$(RUN)/weights/lifting.safetensors"
