@@ -12,6 +12,7 @@ from active_recon.evaluation.next_view import study
 from active_recon.evaluation.next_view.choosing import (
     chosen_ahead,
     chosen_by,
+    chosen_together,
     judged,
     motion_time,
 )
@@ -139,6 +140,27 @@ def test_the_oracle_takes_what_is_best_and_no_policy_has_a_better_second_view(wa
     assert best == pytest.approx(np.nanmax(watched.ahead(watched.begin(5)).iou))
     for policy in (UniformPolicy(3), FarthestPolicy(), load_policy('unseen_entropy')):
         assert judged(watched, chosen_by(policy, watched, 5, 3))[1] <= best + 1e-6
+
+
+def test_no_three_views_from_a_start_are_better_than_those_that_are_best_together(watched):
+    order = chosen_together(watched, 5, 3)
+    assert order[0] == 5 and len(set(order)) == 3
+    pairs = [(one, other) for one in range(24) for other in range(one) if 5 not in (one, other)]
+    best = judged(watched, order)
+    assert best[2] == pytest.approx(max(judged(watched, (5, *pair))[2] for pair in pairs))
+    assert best[1] >= judged(watched, (5, order[2]))[1]
+    assert best[2] >= judged(watched, chosen_ahead(lambda ahead: ahead.iou, watched, 5, 3))[2]
+
+
+def test_views_after_those_that_are_best_together_are_the_oracles(watched):
+    order = chosen_together(watched, 5, 4)
+    walk = watched.begin(5)
+    for view in order[1:3]:
+        walk = watched.step(walk, view)
+    assert order[:3] == chosen_together(watched, 5, 3)
+    assert order[3] == np.nanargmax(watched.ahead(walk).iou)
+    assert chosen_together(watched, 5, 2) == chosen_ahead(
+        lambda ahead: ahead.iou, watched, 5, 2)
 
 
 def test_the_more_motion_costs_the_less_a_policy_moves_and_no_view_is_taken_twice(watched):

@@ -10,6 +10,7 @@ from active_recon.config import Config
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.interrupts import held_interrupts
+from active_recon.training.allocation import keep_freed_memory
 from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
 from lightning_fabric import Fabric
 import torch
@@ -87,8 +88,10 @@ def make_fabric(bfloat16: bool, devices: int = 1, nodes: int = 1) -> Fabric:
     """
     Return what runs a training on `devices` processes of each of `nodes` machines.
 
-    A GPU is used where there is one. Every process draws its own part of a batch.
+    A GPU is used where there is one. Every process draws its own part of a batch, and from now on
+    keeps the memory that it frees, see `keep_freed_memory`.
     """
+    keep_freed_memory()
     return Fabric(accelerator='auto', devices=devices, num_nodes=nodes,
                   strategy='ddp' if devices * nodes > 1 else 'auto',
                   precision='bf16-mixed' if bfloat16 else '32-true')

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
-from active_recon.evaluation.next_view.watching import Ahead, WatchedObject
+from active_recon.evaluation.next_view.watching import Ahead, Walk, WatchedObject
 from active_recon.geometry.cameras import Camera
 from active_recon.policies import Policy
 import numpy as np
@@ -53,10 +53,37 @@ def motion_time(watched: WatchedObject, order: Order) -> float:
 def chosen_ahead(worth: Callable[[Ahead], NDArray[np.float64]], watched: WatchedObject,
                  start: int, count: int) -> Order:
     """Return the views that are each worth most, one step ahead, of all not yet taken."""
-    walk = watched.begin(start)
+    return _continued(worth, watched, watched.begin(start), count)
+
+
+def _continued(worth: Callable[[Ahead], NDArray[np.float64]], watched: WatchedObject, walk: Walk,
+               count: int) -> Order:
     while len(walk.taken) < min(count, watched.count):
         walk = watched.step(walk, int(np.nanargmax(worth(watched.ahead(walk)))))
     return walk.taken
+
+
+def chosen_together(watched: WatchedObject, start: int, count: int) -> Order:
+    """
+    Return the best three views with the first of them given, and then the best one at a time.
+
+    Every pair of further views is tried: what looking one step ahead misses shows. Takes as many
+    reconstructions as there are ordered pairs.
+    """
+    first = watched.begin(start)
+    alone = watched.ahead(first).iou
+    # The better of two alone comes first; the IoU of a pair does not depend on the order
+    pairs = {(view, int(np.nanargmax(after))): float(np.nanmax(after))
+             for view in np.flatnonzero(np.isfinite(alone)).tolist()
+             if np.isfinite(after := watched.ahead(watched.step(first, view)).iou).any()}
+    order = [start]
+    if pairs and count > 2:
+        best = max(pairs, key=lambda pair: pairs[pair])
+        order += sorted(best, key=lambda view: -float(alone[view]))
+    walk = first
+    for view in order[1:]:
+        walk = watched.step(walk, view)
+    return _continued(lambda ahead: ahead.iou, watched, walk, count)
 
 
 def judged(watched: WatchedObject, order: Order) -> list[float]:

@@ -8,6 +8,7 @@ from active_recon.errors import ConfigError
 from active_recon.evaluation.next_view.choosing import (
     chosen_ahead,
     chosen_by,
+    chosen_together,
     judged,
     motion_time,
     Order,
@@ -30,6 +31,7 @@ import numpy as np
 import torch
 
 ORACLE, PEEKING, SEQUENCE, SWAPPED = 'oracle', 'peeking', 'sequence', 'swapped'
+TOGETHER = 'together'
 _LOOKS_ELSEWHERE = 'attention'  # the policy that `swapped` is
 _WORTH: dict[str, Callable[[Ahead], Values]] = {
     ORACLE: lambda ahead: ahead.iou, PEEKING: lambda ahead: ahead.expected}
@@ -41,8 +43,8 @@ class Episodes:
     """
     What is run of every object.
 
-    - policies: names of the registry, `sequence`, `swapped`, `peeking` and `oracle`; NAME@COST is
-      a policy with a `motion_cost`, see `chosen_by`
+    - policies: names of the registry, `sequence`, `swapped`, `peeking`, `oracle` and `together`,
+      see `chosen_together`; NAME@COST is a policy with a `motion_cost`, see `chosen_by`
     - starts: first views of each object, drawn; count: views of an episode
     - seeds: how often a policy that draws is run
     - seed: draws the starts, the renderings and what policies draw
@@ -83,7 +85,7 @@ class Found:
 
 def known_names() -> list[str]:
     """Return what can be measured: all policies, learned ones if there are any, and more."""
-    return [*POLICIES, SEQUENCE, SWAPPED, PEEKING, ORACLE]
+    return [*POLICIES, SEQUENCE, SWAPPED, PEEKING, ORACLE, TOGETHER]
 
 
 def find_offsets(scene: Scene, entrant: Entrant, episodes: Episodes,
@@ -171,6 +173,8 @@ def _order(name: str, watched: WatchedObject, start: int, seed: Sequence[int], e
            episodes: Episodes, offsets: Offsets | None) -> Order:
     if name in _WORTH:
         return chosen_ahead(_WORTH[name], watched, start, episodes.count)
+    if name == TOGETHER:
+        return chosen_together(watched, start, episodes.count)
     plain, motion_cost = _parted(name)
     return chosen_by(_policy(plain, seed, entrant, episodes, offsets), watched, start,
                      episodes.count, motion_cost)

@@ -15,7 +15,8 @@ def markdown(result: Mapping[str, Any]) -> str:
              'light, image noise, poses off by half a degree. Means with 95 % intervals over '
              'objects and first views; differences are paired. `oracle` tries every view and '
              'takes the one after which the IoU with the truth is highest, `peeking` the one '
-             'after which the network itself expects the highest IoU; no robot has either. '
+             'after which the network itself expects the highest IoU, `together` the best two '
+             'further views of all pairs, and then as the oracle; no robot has any of them. '
              '`swapped` is the learned policy, shown the volume of another object. The motion '
              'takes a second a radian around either axis; NAME@COST takes its cost in IoU off.']
     if 'sequence' in result:
