@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from active_recon.errors import ConfigError
-from active_recon.models.octree import cells_per_level, EMPTY, FILLED, MIXED, states_of
+from active_recon.models.octree import EMPTY, FILLED, MIXED, states_of, tree_of
 from active_recon.models.ogn import octree_report, Ogn, OgnConfig, SIZES
 from active_recon.volumes.voxels import iou
 import pytest
@@ -69,7 +69,7 @@ def test_where_all_is_mixed_the_octree_is_the_dense_grid():
 def test_in_training_the_cells_that_are_mixed_in_truth_are_divided(ball):
     truth = states_of(ball)
     found = [len(level.cells) for level in tiny_ogn().levels(torch.rand(2, 16), truth)]
-    assert found == cells_per_level(truth)
+    assert found == [len(cells) for cells in tree_of(truth)]
 
 
 def test_the_report_counts_cells_and_bytes_of_what_is_predicted():

@@ -83,11 +83,6 @@ def tree_of(states: Sequence[Tensor]) -> list[Tensor]:
     return tree
 
 
-def cells_per_level(states: Sequence[Tensor]) -> list[int]:
-    """Return how many cells the levels of a tree hold, given its dense states."""
-    return [len(cells) for cells in tree_of(states)]
-
-
 def _doubled(grid: Tensor) -> Tensor:
     for axis in (1, 2, 3):
         grid = grid.repeat_interleave(2, dim=axis)
