@@ -11,8 +11,8 @@ from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from active_recon.parameters.params_file import read_params_file
 import pytest
 
-CONFIG = Path(__file__).parents[2] / 'config'
-SHIPPED = sorted(CONFIG.glob('*.yaml'))
+ROOT = Path(__file__).parents[2]
+SHIPPED = sorted([*ROOT.glob('config/*.yaml'), *ROOT.glob('examples/*.yaml')])
 
 
 @pytest.mark.parametrize('path', SHIPPED, ids=lambda path: path.stem)
