@@ -82,7 +82,7 @@ def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_pat
     path.write_text('recorder:\n  ros__parameters: {max_bag_size_mb: 2\n')
     ended = subprocess.run(
         [sys.executable, '-m', 'active_recon.nodes.recorder', '--ros-args', '--params-file', path],
-        cwd=CONFIG.parent, capture_output=True, text=True)
+        cwd=ROOT, capture_output=True, text=True)
     assert ended.returncode == 1
     assert 'Traceback' not in ended.stderr
     said = ended.stderr.splitlines()[-1]
@@ -92,7 +92,7 @@ def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_pat
 @pytest.mark.parametrize('node', NODE_PARAMETERS)
 def test_a_node_asked_for_help_lists_its_parameters_and_ends(node):
     asked = subprocess.run([sys.executable, '-m', f'active_recon.nodes.{node}', '--help'],
-                           cwd=CONFIG.parent, capture_output=True, text=True, timeout=600)
+                           cwd=ROOT, capture_output=True, text=True, timeout=600)
     assert asked.returncode == 0 and not asked.stderr
     lines = asked.stdout.splitlines()
     assert lines[0].startswith(f'usage: {node} ')
