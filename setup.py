@@ -68,7 +68,7 @@ setup(
     ],
     extras_require={
         'batch': ['pyarrow>=18,<28'],
-        'cluster': ['pyarrow>=18,<28', 'ray>=2.44,<3'],
+        'cluster': ['pyarrow>=18,<28', 'ray[client]>=2.44,<3'],
         'coacd': ['coacd>=1.0.5,<2'],
         'doc': [
             'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
@@ -79,7 +79,7 @@ setup(
         'test': [
             'coacd>=1.0.5,<2', 'mcap-ros2-support>=0.5.5', 'mujoco>=3.2,<4', 'onnx>=1.17,<2',
             'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pyarrow>=18,<28',
-            'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6', 'ray>=2.44,<3', 'rosless>=0.5',
+            'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6', 'ray[client]>=2.44,<3', 'rosless>=0.5',
             'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

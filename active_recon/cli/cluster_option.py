@@ -6,15 +6,26 @@ from pathlib import Path
 from typing import Annotated
 
 from active_recon.cluster import Crew, crew_of
+from active_recon.errors import ConfigError
 import typer
 
 Cluster = Annotated[str | None, typer.Option(
-    metavar='ADDRESS', help="Ray cluster that does the work: 'auto' (the Ray that runs on this "
-                            "machine), 'ray://HOST:PORT', or 'local' (starts a Ray here). Paths "
-                            'must be on storage that its machines share. Default: processes of '
-                            'this machine.')]
+    metavar='ADDRESS', help="Ray cluster that does the work: 'auto' (the Ray of RAY_ADDRESS, else "
+                            "the one that runs on this machine), 'HOST:PORT', 'ray://HOST:PORT', "
+                            "or 'local' (starts a Ray here). Paths must be on storage that its "
+                            'machines share. Default: processes of this machine.')]
 Workers = Annotated[int | None, typer.Option(
     min=1, help='Processes; default: one for each core, of this machine or of the cluster.')]
+
+ClusterWorkers = Annotated[int | None, typer.Option(
+    min=1, help='With --cluster: so many workers; default: one for each of its cores.')]
+
+
+def require_cluster(cluster: str | None, workers: int | None) -> None:
+    """Raise ConfigError where workers are asked for without a cluster."""
+    if workers and not cluster:
+        raise ConfigError('--workers: no cluster: expected --cluster too, got --workers '
+                          f'{workers} alone')
 
 
 @contextmanager

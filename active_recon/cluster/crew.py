@@ -49,8 +49,9 @@ def crew_of(cluster: str | None = None, workers: int | None = None) -> Iterator[
     """
     Yield the workers of a cluster; None: processes of this machine.
 
-    - cluster: 'auto' (the Ray that runs on this machine), 'ray://host:port', 'host:port', or
-      'local' (a Ray that is started on this machine and ends with the block)
+    - cluster: 'auto' (the Ray that RAY_ADDRESS names, else the one that runs on this machine),
+      'ray://host:port', 'host:port', or 'local' (a Ray that is started on this machine and ends
+      with the block)
     - workers: how many at once; None: one for each core, of this machine or of the cluster
 
     Raises ConfigError where Ray is missing or the cluster cannot be reached.

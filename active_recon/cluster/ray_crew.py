@@ -35,6 +35,8 @@ def connect(address: str, workers: int | None) -> tuple[Any, str]:
     except ImportError as error:
         raise ConfigError('--cluster: no Ray here: expected it installed: pip install '
                           f'active_recon[cluster] ({error})') from error
+    if address == 'auto':
+        address = os.environ.get('RAY_ADDRESS') or address
     _require_listener(address)
     own: dict[str, Any] = {}
     if address == 'local':
