@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+import re
 from typing import Annotated
 
 from active_recon.cluster import Crew, crew_of
@@ -38,5 +39,12 @@ def workers_of(cluster: str | None, workers: int | None) -> Iterator[Crew]:
 
 
 def reachable(path: Path, cluster: str | None) -> Path:
-    """Return a path as workers take it: absolute for those of a cluster, which begin elsewhere."""
+    """
+    Return a path as workers take it: absolute for those of a cluster, which begin elsewhere.
+
+    Raises ConfigError on a URL, which only `active-recon batch` takes.
+    """
+    if re.match(r'[A-Za-z][A-Za-z0-9+.-]+:/', str(path)):
+        raise ConfigError(f'{path}: no path: expected a folder that all machines see, got a URL; '
+                          'mount the store, for example with s3fs, gcsfuse or rclone')
     return path if cluster is None else path.absolute()
