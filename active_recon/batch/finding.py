@@ -76,16 +76,19 @@ def bags_below(root: Place) -> Iterator[Place]:
     A folder is a bag if it has metadata.yaml, or files that a recorder numbered after the folder;
     every other MCAP or sqlite3 file is a bag by itself. Links to folders are not followed.
     """
-    is_folder = root.is_dir()
-    entries = sorted(_entries(root)) if is_folder else []
-    if not is_folder or is_bag_folder(root, [name for name, _ in entries]):
-        yield root
+    yield from _bags_in(root) if root.is_dir() else [root]
+
+
+def _bags_in(folder: Place) -> Iterator[Place]:
+    entries = sorted(_entries(folder))
+    if is_bag_folder(folder, [name for name, _ in entries]):
+        yield folder
         return
-    for name, has_more in entries:
-        if has_more:
-            yield from bags_below(root / name)
+    for name, is_folder in entries:
+        if is_folder:
+            yield from _bags_in(folder / name)
         elif name.endswith(_SUFFIXES) and not name.startswith('.'):
-            yield root / name
+            yield folder / name
 
 
 def _entries(folder: Place) -> list[tuple[str, bool]]:

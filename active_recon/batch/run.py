@@ -1,6 +1,7 @@
 """All bags through the workers, then into the table and the page."""
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +28,7 @@ from active_recon.whole_files import whole_file
 SUMMARY = 'summary.html'
 _LIST = 'bags.jsonl'
 _MOST_CHECKED = 16  # paths that are named, whose presence each worker looks at
+_AT_ONCE = 32  # results that are read from a store while others are on their way
 
 
 @dataclass(frozen=True)
@@ -128,9 +130,12 @@ def _write_refusal(out: Place, listed: Path, result: Result) -> None:
 
 
 def _rows(out: Place, listed: Path) -> Iterator[Row]:
-    for bag in _listed(listed):
-        result = BagResult.read(out, bag)
-        if result is None:
-            raise DataError(f'{out}: no result of {bag}: expected the one that its worker wrote; '
-                            'start again')
-        yield from result.rows
+    left = _listed(listed)
+    with ThreadPoolExecutor(_AT_ONCE if isinstance(out, Stored) else 1) as threads:
+        while bags := list(islice(left, _AT_ONCE)):
+            for bag, result in zip(bags, threads.map(partial(BagResult.read, out), bags),
+                                   strict=True):
+                if result is None:
+                    raise DataError(f'{out}: no result of {bag}: expected the one that its worker '
+                                    'wrote; start again')
+                yield from result.rows

@@ -11,7 +11,6 @@ from typing import Any
 
 from active_recon.errors import ActiveReconError, ConfigError, DataError, WorkError
 from active_recon.whole_files import whole_file
-import fsspec
 
 PACKAGES = {'s3': 's3fs', 'gs': 'gcsfs', 'az': 'adlfs'}
 """The package that fsspec needs for the URLs of a scheme."""
@@ -71,13 +70,9 @@ class Stored:
 
     def entries(self) -> list[Entry]:
         """Return what stands in the folder, or the file itself; raises DataError if unreadable."""
-        with self._reading():
-            found = self._files().ls(self.url, detail=True)
-        own = self.url.partition('://')[2]
         return [Entry(each['name'].rstrip('/').rpartition('/')[2], each['type'] == 'directory',
                       each['size'] or 0, str(next(filter(None, map(each.get, _CHANGES)), '')))
-                for each in found
-                if each['type'] != 'directory' or each['name'].rstrip('/') != own]
+                for each in self._listing()]
 
     def matches(self) -> list['Stored']:
         """Return what a pattern with `*`, `?` and `**` matches."""
@@ -89,14 +84,14 @@ class Stored:
     def fetch(self, folder: Path) -> Path:
         """Copy the file, or the folder with its files, into a folder; return the copy's path."""
         copy = folder / self.name
+        found = [each['name'] for each in self._listing() if each['type'] != 'directory']
         with self._reading():
-            if self.is_dir():
-                copy.mkdir()
-                for entry in self.entries():
-                    if not entry.is_folder:
-                        self._files().get_file(f'{self.url}/{entry.name}', str(copy / entry.name))
-            else:
+            if found == [self._path]:
                 self._files().get_file(self.url, str(copy))
+                return copy
+            copy.mkdir()
+            for path in found:
+                self._files().get_file(path, str(copy / path.rpartition('/')[2]))
         return copy
 
     def read_text(self, encoding: str = 'utf-8') -> str:
@@ -117,6 +112,21 @@ class Stored:
         except FileNotFoundError:
             if not missing_ok:
                 raise
+
+    @property
+    def _path(self) -> str:
+        """What the store's library calls it."""
+        return self.url.partition('://')[2]
+
+    def _listing(self) -> list[dict[str, Any]]:
+        """Return what the store tells of the folder's entries, or of the file itself."""
+        files = self._files()
+        with self._reading():
+            # The listing of a file would be looked for in that of its folder, however long
+            if '.' in self.name and (found := files.info(self.url))['type'] == 'file':
+                return [found]
+            return [each for each in files.ls(self.url, detail=True)
+                    if each['type'] != 'directory' or each['name'].rstrip('/') != self._path]
 
     def _files(self) -> Any:
         return _file_system(self.url.partition('://')[0])
@@ -189,6 +199,8 @@ def at_hand(place: Place) -> Iterator[Path]:
 
 @lru_cache
 def _file_system(scheme: str) -> Any:
+    import fsspec
+
     try:
         # Listings are not kept: memory would grow with the archive, and results appear meanwhile
         return fsspec.filesystem(scheme, use_listings_cache=False)
