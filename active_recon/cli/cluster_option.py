@@ -42,9 +42,14 @@ def reachable(path: Path, cluster: str | None) -> Path:
     """
     Return a path as workers take it: absolute for those of a cluster, which begin elsewhere.
 
-    Raises ConfigError on a URL, which only `active-recon batch` takes.
+    Raises ConfigError on a URL.
     """
+    return require_path(path) if cluster is None else require_path(path).absolute()
+
+
+def require_path(path: Path) -> Path:
+    """Return a path; raises ConfigError on a URL, which only `active-recon batch` takes."""
     if re.match(r'[A-Za-z][A-Za-z0-9+.-]+:/', str(path)):
         raise ConfigError(f'{path}: no path: expected a folder that all machines see, got a URL; '
                           'mount the store, for example with s3fs, gcsfuse or rclone')
-    return path if cluster is None else path.absolute()
+    return path

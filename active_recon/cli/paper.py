@@ -5,7 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.cluster_option import Cluster, ClusterWorkers, require_cluster, workers_of
+from active_recon.cli.cluster_option import (
+    Cluster,
+    ClusterWorkers,
+    require_cluster,
+    require_path,
+    workers_of,
+)
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
@@ -90,6 +96,7 @@ def paper(
         raise ConfigError('--device: no such device: expected cpu, or cuda where there is a GPU, '
                           f'got {device}')
     require_cluster(cluster, workers)
+    data, models, out = (require_path(folder) for folder in (data, models, out))
     if cluster and device != 'cpu':
         raise ConfigError(f'--cluster: expected --device cpu, got {device}')
     torch.set_num_threads(threads)
