@@ -42,6 +42,7 @@ setup(
         f'{name} = {module}:main' for name, module in EXECUTABLES.items()]},
     install_requires=[
         'embreex>=2.17.7.post6,<5',
+        'fsspec>=2025.2,<2028',
         'jinja2>=3.1,<4',
         'lightning-fabric>=2.4,<3',
         'lz4>=4.3,<5',
@@ -68,7 +69,7 @@ setup(
     ],
     extras_require={
         'batch': ['pyarrow>=18,<28'],
-        'cluster': ['pyarrow>=18,<28', 'ray>=2.44,<3'],
+        'cluster': ['pyarrow>=18,<28', 'ray[client]>=2.44,<3'],
         'coacd': ['coacd>=1.0.5,<2'],
         'doc': [
             'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
@@ -76,10 +77,12 @@ setup(
         'export': ['onnx>=1.17,<2'],
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'onnxruntime': ['onnxruntime>=1.20,<2'],
+        's3': ['s3fs>=2025.2'],
         'test': [
-            'coacd>=1.0.5,<2', 'mcap-ros2-support>=0.5.5', 'mujoco>=3.2,<4', 'onnx>=1.17,<2',
-            'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pyarrow>=18,<28',
-            'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6', 'ray>=2.44,<3', 'rosless>=0.5',
+            'coacd>=1.0.5,<2', 'flask>=3,<4', 'flask-cors>=5', 'mcap-ros2-support>=0.5.5',
+            'moto[s3]>=5,<6', 'mujoco>=3.2,<4', 'onnx>=1.17,<2', 'onnxruntime>=1.20,<2',
+            'point-cloud-utils>=0.34', 'pyarrow>=18,<28', 'pymcap-cli>=0.30', 'pytest>=8',
+            'pytest-xdist>=3.6', 'ray[client]>=2.44,<3', 'rosless>=0.5', 's3fs>=2025.2',
             'selenium>=4.20', 'setuptools>=70.1'],
     },
 )

@@ -6,8 +6,10 @@ What two workers are worth, beside two independent processes; and what giving ou
 
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 import json
+import os
 from pathlib import Path
 import resource
 import shutil
@@ -55,25 +57,70 @@ def rate(results: Iterable[Any]) -> float:
 
 
 def alone(name: str, count: int) -> float:
-    """Return the items a second of this process."""
+    """
+    Return the items a second of this process.
+
+    After the first item it says so, and waits for a line: so that all of them work at one time.
+    """
     with TemporaryDirectory() as folder:
-        function, items = WORKS[name](Path(folder), count)
-        return rate(map(function, items))
+        function, items = WORKS[name](Path(folder), count + 1)
+        function(items.pop())
+        print('ready', flush=True)  # noqa: T201
+        sys.stdin.readline()
+        begun = time.perf_counter()
+        for item in items:
+            function(item)
+        return count / (time.perf_counter() - begun)
 
 
 def independent(name: str, count: int, processes: int) -> float:
     """Return the items a second of some processes that know nothing of each other, in all."""
     running = [subprocess.Popen([sys.executable, '-m', 'benchmarks.cluster', '--alone', name,
-                                 '--items', str(count)], stdout=subprocess.PIPE, cwd=_ROOT)
+                                 '--items', str(count)], stdin=subprocess.PIPE,
+                                stdout=subprocess.PIPE, text=True, cwd=_ROOT)
                for _ in range(processes)]
-    return sum(float(each.communicate()[0]) for each in running)
+    for each in running:
+        assert each.stdout is not None
+        each.stdout.readline()
+    return sum(float(each.communicate('go\n')[0]) for each in running)
 
 
-def of_crew(name: str, count: int, crew: Crew) -> float:
-    """Return the items a second of workers."""
+@dataclass(frozen=True)
+class Timed:
+    """When a process began and ended an item, seconds of a clock that all of them share."""
+
+    process: tuple[str, int]
+    begun: float
+    ended: float
+
+
+def timed(function: Callable[[Any], Any], item: Any) -> Timed:
+    """Call a function, and tell when and where."""
+    begun = time.perf_counter()
+    function(item)
+    return Timed((os.uname().nodename, os.getpid()), begun, time.perf_counter())
+
+
+def of_crew(name: str, count: int, crew: Crew) -> dict[str, float]:
+    """
+    Return what workers of this machine do while all of them work.
+
+    That is from the first result of the last of them to begin, to the last result of the first
+    to end: `items_per_s`, and `busy`, the share of their time that goes to items.
+    """
     with TemporaryDirectory() as folder:
         function, items = WORKS[name](Path(folder), count)
-        return rate(crew.map(function, items))
+        done = [result.value for result in crew.map(partial(timed, function), items)]
+    each = {process: sorted((one.begun, one.ended) for one in done if one.process == process)
+            for process in {one.process for one in done}}
+    begun = max(times[0][1] for times in each.values())
+    ended = min(times[-1][1] for times in each.values())
+    inside = [sum(max(0.0, min(end, ended) - max(begin, begun)) for begin, end in times)
+              for times in each.values()]
+    shares = [(min(end, ended) - max(begin, begun)) / (end - begin) for times in each.values()
+              for begin, end in times if end > begun and begin < ended]
+    return {'items_per_s': sum(shares) / (ended - begun),
+            'busy': sum(inside) / (ended - begun) / len(each)}
 
 
 def nothing(item: int) -> int:
@@ -120,9 +167,10 @@ def main() -> None:
         for name in WORKS if asked.items else ():
             one = independent(name, asked.items, 1)
             limit = independent(name, asked.items, 2) / one
-            gain = of_crew(name, 2 * asked.items, crew) / one
+            both = of_crew(name, 2 * asked.items, crew)
+            gain = both['items_per_s'] / one
             found[name] = {'one_per_s': one, 'limit_of_two': limit, 'two_workers': gain,
-                           'share_of_limit': gain / limit}
+                           'share_of_limit': gain / limit, 'busy': both['busy']}
     print(json.dumps(found, indent=1))  # noqa: T201
 
 

@@ -60,8 +60,8 @@ def test_bags_of_a_tree_are_found_once_and_in_order(tmp_path):
     assert find_roots([str(tmp_path / '**' / '*.db3')]) == [tmp_path / 'loose' / 'x.db3']
     with pytest.raises(DataError, match='no bags there'):
         find_roots([str(tmp_path / '*.bag')])
-    with pytest.raises(ConfigError, match='s3://fleet/day: no such storage'):
-        find_roots(['s3://fleet/day'])
+    with pytest.raises(ConfigError, match='ftp://fleet/day: no such storage'):
+        find_roots(['ftp://fleet/day'])
 
 
 def test_a_bag_that_cannot_be_read_is_a_row_and_changes_no_other(

@@ -54,6 +54,14 @@ def test_one_process_several_and_a_cluster_give_the_same_results(crews):
             assert results(crew, cluster_items.halved, iter(range(200))) == own
 
 
+def test_auto_is_the_cluster_that_ray_address_names(cluster, monkeypatch):
+    monkeypatch.setenv('RAY_ADDRESS', cluster)
+    with crew_of('auto') as crew:
+        assert crew.workers == 2
+        assert results(crew, cluster_items.halved, range(8)) == results(
+            LocalCrew(1), cluster_items.halved, range(8))
+
+
 @pytest.mark.parametrize('kind', ['local', 'ray'])
 def test_what_a_dying_worker_had_is_done_again_and_no_item_is_lost_or_doubled(
         crews, kind, tmp_path):

@@ -1,5 +1,7 @@
 """Large work on a Ray cluster: what is killed in the middle, and what is large."""
 
+from contextlib import nullcontext
+from dataclasses import replace
 import json
 import os
 from pathlib import Path
@@ -10,8 +12,11 @@ import sys
 import time
 
 from active_recon.batch.table import read_table
+from active_recon.cluster import crew_of
+from active_recon.paper.parts import run_part
+from paper_study import make_study, small_objects
 import pytest
-from ray_clusters import ray_cluster, ROOT
+from ray_clusters import ray_client_server, ray_cluster, ROOT
 from test_cluster import same_files
 
 pytestmark = pytest.mark.slow
@@ -118,6 +123,17 @@ def test_a_driver_that_is_killed_goes_on_where_it_was(kind, cluster, linked, tmp
     assert local_table(archive, tmp_path / 'local') == (out / 'table.parquet').read_bytes()
 
 
+def test_a_driver_outside_of_the_cluster_gets_the_same_over_ray_client(
+        cluster, linked, tmp_path):
+    archive = linked(6)
+    (archive / '000' / 'x.mcap').write_bytes(b'no bag')
+    with ray_client_server(cluster) as address:
+        assert '7 bags' in said(started('batch', 'measure', archive, '--out', tmp_path / 'ray',
+                                        '--cluster', address))
+    local_table(archive, tmp_path / 'local')
+    assert same_files(tmp_path / 'local', tmp_path / 'ray')
+
+
 def test_one_poisonous_bag_among_a_thousand_is_refused_alone(cluster, linked, tmp_path):
     archive = linked(999)
     (archive / '005' / '000500x.mcap').write_bytes(b'no bag')
@@ -174,3 +190,21 @@ def test_evaluation_and_gains_are_the_same_on_a_cluster(cluster, dataset, tmp_pa
     assert same_files(tmp_path / 'local' / 'gains-1', tmp_path / 'ray' / 'gains-1')
     assert (tmp_path / 'local' / 'carving-scorer.safetensors').read_bytes() == (
         tmp_path / 'ray' / 'carving-scorer.safetensors').read_bytes()
+
+
+def test_trainings_and_measurements_of_the_paper_are_the_same_on_a_cluster(
+        cluster, dataset, tiny, tmp_path, monkeypatch):
+    small_objects(monkeypatch)
+    found = []
+    for name, crew_or_none in (('local', nullcontext()), ('ray', crew_of(cluster.address))):
+        (tmp_path / name).mkdir()
+        study = replace(make_study(tmp_path / name, dataset, tiny), policy_seeds=3)
+        with crew_or_none as crew:
+            for part in ('table5', 'policies'):
+                assert run_part(replace(study, crew=crew), part)
+        [*trained] = sorted((study.models / 'policies').rglob('weights.safetensors'))
+        tables = [column for part in ('table5', 'policies')
+                  for table in json.loads((study.out / f'{part}.json').read_text())['tables']
+                  for column in table['columns'] if column['heading'] != 'ms to decide']
+        found.append((tables, [path.read_bytes() for path in trained]))
+    assert len(found[0][1]) == 2 and found[0] == found[1]

@@ -34,7 +34,7 @@ def extras() -> dict[str, Requirement]:
 def in_strings(tree: ast.AST) -> dict[str, Requirement]:
     texts = (node.value for node in ast.walk(tree)
              if isinstance(node, ast.Constant) and isinstance(node.value, str))
-    found = map(Requirement, filter(re.compile(r'[\w-]+>=\d[\w.,<]*').fullmatch, texts))
+    found = map(Requirement, filter(re.compile(r'[\w-]+(\[\w+\])?>=\d[\w.,<]*').fullmatch, texts))
     return {canonicalize_name(requirement.name): requirement for requirement in found}
 
 

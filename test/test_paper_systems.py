@@ -17,8 +17,8 @@ from active_recon.paper.systems import (
     SYSTEMS,
     training_plan,
     TWO_STAGE,
-    views_seen,
 )
+from active_recon.paper.trainings import views_seen
 from paper_study import untrained
 import pytest
 

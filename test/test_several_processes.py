@@ -1,7 +1,9 @@
 """Training on two processes: one set of weights, and the loss curve of one process."""
 
+from contextlib import suppress
 import os
 from pathlib import Path
+import signal
 import socket
 import subprocess
 import sys
@@ -60,38 +62,60 @@ def test_two_processes_give_the_loss_curve_of_one_within_noise(dataset, tmp_path
     assert (together[:, -1] < together[:, 0]).all()  # and it is a curve that falls
 
 
-def on_two_nodes(dataset, out, *more):
-    """Start the command once for each of two nodes on the loopback; return the two processes."""
+def train_words(dataset, out, *more):
+    return ['-m', 'active_recon.cli.main', 'train', dataset, '--validation', dataset, '--out', out,
+            '--threads', '1', '--nodes', '2', '--model', '2d3d', '--batch-size', '4',
+            '--checkpoint-every', '1', *more]
+
+
+def on_two_nodes(by_torchrun, *words):
+    """Start what two nodes on the loopback start, by hand or by torchrun; return both."""
     with socket.socket() as free:
         free.bind(('127.0.0.1', 0))
-        port = free.getsockname()[1]
+        port = str(free.getsockname()[1])
+    launcher = ['-m', 'torch.distributed.run', '--nnodes', '2', '--nproc-per-node', '1',
+                '--rdzv-backend', 'c10d', '--rdzv-endpoint', f'127.0.0.1:{port}',
+                '--local-addr', '127.0.0.1'] if by_torchrun else []
+    common = {'OMP_NUM_THREADS': '1', 'PYTHONPATH': str(ROOT), 'GLOO_SOCKET_IFNAME': 'lo'}
     return [subprocess.Popen(
-        [sys.executable, '-m', 'active_recon.cli.main', 'train', dataset, '--validation', dataset,
-         '--out', out, '--threads', '1', '--nodes', '2', '--model', '2d3d', '--batch-size', '4',
-         '--checkpoint-every', '1', *more],
-        env=os.environ | {'OMP_NUM_THREADS': '1', 'PYTHONPATH': str(ROOT),
-                          'MASTER_ADDR': '127.0.0.1', 'MASTER_PORT': str(port),
-                          'NODE_RANK': str(rank), 'GLOO_SOCKET_IFNAME': 'lo'},
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for rank in range(2)]
+        [sys.executable, *launcher, *words],
+        env=os.environ | common | ({} if by_torchrun else {
+            'MASTER_ADDR': '127.0.0.1', 'MASTER_PORT': port, 'NODE_RANK': str(rank)}),
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+        for rank in range(2)]
+
+
+@pytest.fixture(scope='module')
+def undisturbed(dataset, tmp_path_factory):
+    """Return the weights of two processes that trained to the end."""
+    out = tmp_path_factory.mktemp('undisturbed')
+    train(dataset, out, 2, 12, '--batch-size', '4')
+    return load_file(out / 'weights.safetensors')
 
 
 @pytest.mark.slow
-def test_two_nodes_train_as_two_processes_do_and_go_on_after_one_died(dataset, tmp_path):
-    train(dataset, tmp_path / 'processes', 2, 12, '--batch-size', '4')
+@pytest.mark.parametrize('by_torchrun', [False, True])
+def test_two_nodes_train_as_two_processes_do_and_go_on_after_one_died(
+        by_torchrun, dataset, undisturbed, tmp_path):
     out = tmp_path / 'nodes'
-    both = on_two_nodes(dataset, out, '--steps', '12')
+    words = train_words(dataset, out, '--steps', '12', '--resume')
+    first, second = on_two_nodes(by_torchrun, *words)
     checkpoint, end = out / 'reconstruction.safetensors', time.monotonic() + 300
-    while not checkpoint.exists() and time.monotonic() < end:
-        time.sleep(0.02)
-    for process in reversed(both):  # one dies, and its launcher ends the other
-        process.kill()
-        process.communicate()
+    try:
+        while not checkpoint.exists() and time.monotonic() < end:
+            time.sleep(0.02)
+        os.killpg(second.pid, signal.SIGKILL)  # the machine with all that runs on it
+        first.communicate(timeout=300)  # the other does not go on alone, nor wait for ever
+    finally:
+        for process in (first, second):
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    assert first.returncode != 0
     assert checkpoint.exists() and not (out / 'weights.safetensors').exists()
-    told = [process.communicate(timeout=600)[0]
-            for process in on_two_nodes(dataset, out, '--steps', '12', '--resume')]
+    told = [process.communicate(timeout=600)[0] for process in on_two_nodes(by_torchrun, *words)]
     assert sum(text.count('wrote ') for text in told) == 1, told
-    expected, found = (load_file(folder / 'weights.safetensors')
-                       for folder in (tmp_path / 'processes', out))
-    assert expected.keys() == found.keys()
-    for name, value in expected.items():
+    found = load_file(out / 'weights.safetensors')
+    assert undisturbed.keys() == found.keys()
+    for name, value in undisturbed.items():
         np.testing.assert_allclose(found[name], value, atol=1e-4)

@@ -43,6 +43,13 @@ def test_what_was_saved_is_loaded_to_half_precision(saved, network, attention, t
             assert_close(loaded.state_dict()[name], tensor, rtol=1e-3, atol=1e-6)
 
 
+def test_the_same_weights_are_written_as_the_same_bytes(saved, network, attention, tiny, tmp_path):
+    for number in range(8):  # safetensors draws the order of the metadata anew each time
+        again = tmp_path / f'{number}.safetensors'
+        save_weights(again, Bundle(network, attention, tiny, 0.35))
+        assert again.read_bytes() == saved.read_bytes()
+
+
 def test_a_loaded_network_answers_as_the_one_that_was_saved(saved, network):
     images = torch.rand(2, 3, 64, 64)
     with torch.no_grad():

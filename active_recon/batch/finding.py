@@ -7,59 +7,98 @@ from pathlib import Path
 import re
 from urllib.parse import unquote, urlsplit
 
+from active_recon.cluster.stores import PACKAGES, Place, Stored
 from active_recon.errors import ConfigError, DataError
 
 _SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 
 
-def place_of(text: str) -> Path:
-    """Return the absolute path of a path or a file:// URL; raises ConfigError on other URLs."""
+def place_of(text: str) -> Place:
+    """
+    Return the absolute path of a path or a file:// URL, or a place in an object store.
+
+    Raises ConfigError on other URLs, and where the store's package is not installed.
+    """
     if not re.match(r'[A-Za-z][A-Za-z0-9+.-]*://', text):
         return Path(text).absolute()
     url = urlsplit(text)
+    if url.scheme in PACKAGES and url.netloc:
+        place = Stored(text.rstrip('/'))
+        place.require_package()
+        return place
     if url.scheme != 'file' or url.netloc not in ('', 'localhost'):
-        raise ConfigError(f'{text}: no such storage: expected a path or file:///PATH that all '
-                          'machines see; mount a bucket, for example with s3fs, gcsfuse or rclone')
+        others = ', '.join(f'{scheme}://BUCKET/NAME' for scheme in PACKAGES)
+        reason = ('the memory of one process, which workers do not see'
+                  if url.scheme == 'memory' else 'no such storage')
+        raise ConfigError(f'{text}: {reason}: expected a path or file:///PATH that all machines '
+                          f'see, or {others}')
     return Path(unquote(url.path)).absolute()
 
 
-def find_roots(named: Sequence[str]) -> list[Path]:
+def path_of(option: str, text: str) -> Path:
+    """Return the absolute path of a path or a file:// URL; raises ConfigError on other URLs."""
+    place = place_of(text)
+    if isinstance(place, Stored):
+        raise ConfigError(f'{option}: {text}: no path: expected a path or file:///PATH that all '
+                          'machines see; bags and --out may be in object stores')
+    return place
+
+
+def find_roots(named: Sequence[str]) -> list[Place]:
     """
-    Return the absolute paths that arguments name, in order, none of them inside another.
+    Return the places that arguments name, in order, none of them inside another.
 
     Patterns with `*`, `?` and `**` are expanded. Raises DataError where there is nothing.
     """
-    found: set[Path] = set()
+    found: set[Place] = set()
     for text in named:
-        path = place_of(text)
-        matches = [path] if path.exists() or not has_magic(str(path)) else [
-            Path(each) for each in glob(str(path), recursive=True)]
+        place = place_of(text)
+        matches = [place] if place.exists() or not has_magic(str(place)) else _matches(place)
         if not matches or not all(each.exists() for each in matches):
             raise DataError(f'{text}: no bags there: expected a bag, a folder of bags, or a '
                             'pattern that matches some')
-        found.update(Path(os.path.normpath(each)) for each in matches)
-    return [path for path in sorted(found) if not any(above in found for above in path.parents)]
+        found.update(each if isinstance(each, Stored) else Path(os.path.normpath(each))
+                     for each in matches)
+    return [place for place in sorted(found, key=str)
+            if not any(above in found for above in place.parents)]
 
 
-def bags_below(root: Path) -> Iterator[Path]:
+def _matches(pattern: Place) -> Sequence[Place]:
+    if isinstance(pattern, Stored):
+        return pattern.matches()
+    return [Path(each) for each in glob(str(pattern), recursive=True)]
+
+
+def bags_below(root: Place) -> Iterator[Place]:
     """
     Yield the bags in a tree, in the order of their paths; a file that is named is one.
 
     A folder is a bag if it has metadata.yaml, or files that a recorder numbered after the folder;
     every other MCAP or sqlite3 file is a bag by itself. Links to folders are not followed.
     """
-    if not root.is_dir() or is_bag_folder(root, os.listdir(root)):
-        yield root
+    yield from _bags_in(root) if root.is_dir() else [root]
+
+
+def _bags_in(folder: Place) -> Iterator[Place]:
+    entries = sorted(_entries(folder))
+    if is_bag_folder(folder, [name for name, _ in entries]):
+        yield folder
         return
-    for entry in sorted(os.scandir(root), key=lambda each: each.name):
-        path = root / entry.name
-        if entry.is_dir(follow_symlinks=False):
-            yield from bags_below(path)
-        elif entry.name.endswith(_SUFFIXES) and not entry.name.startswith('.'):
-            yield path
+    for name, is_folder in entries:
+        if is_folder:
+            yield from _bags_in(folder / name)
+        elif name.endswith(_SUFFIXES) and not name.startswith('.'):
+            yield folder / name
 
 
-def is_bag_folder(folder: Path, names: Sequence[str]) -> bool:
+def _entries(folder: Place) -> list[tuple[str, bool]]:
+    """Return the names in a folder, and whether each is one."""
+    if isinstance(folder, Stored):
+        return [(each.name, each.is_folder) for each in folder.entries()]
+    return [(each.name, each.is_dir(follow_symlinks=False)) for each in os.scandir(folder)]
+
+
+def is_bag_folder(folder: Place, names: Sequence[str]) -> bool:
     """Return whether a folder that has these entries is one bag."""
     if 'metadata.yaml' in names:
         return True

@@ -1,12 +1,14 @@
 """All bags through the workers, then into the table and the page."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from active_recon.batch.finding import bags_below
 from active_recon.batch.results import BagResult
@@ -17,6 +19,7 @@ from active_recon.batch.task import Task
 from active_recon.batch.work import BagDone, do_bag
 from active_recon.cluster import Crew, Result
 from active_recon.cluster.results import is_no_room
+from active_recon.cluster.stores import Place, Stored
 from active_recon.cluster.telling import told
 from active_recon.errors import DataError, WorkError
 from active_recon.reporting import Reporting, silent
@@ -25,6 +28,7 @@ from active_recon.whole_files import whole_file
 SUMMARY = 'summary.html'
 _LIST = 'bags.jsonl'
 _MOST_CHECKED = 16  # paths that are named, whose presence each worker looks at
+_AT_ONCE = 32  # results that are read from a store while others are on their way
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class Counts:
     kept: int
 
 
-def run_batch(task: Task, roots: Sequence[Path], crew: Crew,
+def run_batch(task: Task, roots: Sequence[Place], crew: Crew,
               reporting: Reporting = silent) -> Counts:
     """
     Do all bags below some paths; write table.parquet and summary.html to the task's folder.
@@ -46,9 +50,9 @@ def run_batch(task: Task, roots: Sequence[Path], crew: Crew,
     on, ConfigError where pyarrow is missing.
     """
     parquet()
-    task.out.mkdir(parents=True, exist_ok=True)
     try:
-        return _run(task, roots, crew, reporting)
+        with _place_of_list(task.out) as listed:
+            return _run(task, roots, crew, reporting, listed)
     except OSError as error:
         if not is_no_room(error):
             raise
@@ -56,25 +60,36 @@ def run_batch(task: Task, roots: Sequence[Path], crew: Crew,
                         'kept: start again once there is room', 'no_room') from error
 
 
-def _run(task: Task, roots: Sequence[Path], crew: Crew, reporting: Reporting) -> Counts:
-    listed = task.out / _LIST
+@contextmanager
+def _place_of_list(out: Place) -> Iterator[Path]:
+    """Yield the path of the list of bags, which goes again; it may be too large for memory."""
+    if isinstance(out, Path):
+        out.mkdir(parents=True, exist_ok=True)
+        try:
+            yield out / _LIST
+        finally:
+            with suppress(OSError):
+                (out / _LIST).unlink()
+        return
+    with TemporaryDirectory() as folder:
+        yield Path(folder) / _LIST
+
+
+def _run(task: Task, roots: Sequence[Place], crew: Crew, reporting: Reporting,
+         listed: Path) -> Counts:
     count = _write_list(listed, roots)
     refused = kept = 0
-    try:
-        with reporting(task.kind, count) as advance:
-            results = crew.map(partial(do_bag, task, task.identity), _listed(listed), task.out,
-                               [*roots[:_MOST_CHECKED], *_truths(task)])
-            for result in told(results, crew, advance, _was_refused):
-                if result.refusal:
-                    _write_refusal(task.out, listed, result)
-                refused += _was_refused(result)
-                kept += isinstance(result.value, BagDone) and result.value.kept
-        summary = Summary()
-        write_table(summary.counting(_rows(task.out, listed)), task.out / TABLE)
-        summary.write(task.out / SUMMARY, task.kind)
-    finally:
-        with suppress(OSError):
-            listed.unlink()
+    with reporting(task.kind, count) as advance:
+        results = crew.map(partial(do_bag, task, task.identity), _listed(listed), task.out,
+                           [*roots[:_MOST_CHECKED], *_truths(task)])
+        for result in told(results, crew, advance, _was_refused):
+            if result.refusal:
+                _write_refusal(task.out, listed, result)
+            refused += _was_refused(result)
+            kept += isinstance(result.value, BagDone) and result.value.kept
+    summary = Summary()
+    write_table(summary.counting(_rows(task.out, listed)), task.out / TABLE)
+    summary.write(task.out / SUMMARY, task.kind)
     return Counts(count, refused, kept)
 
 
@@ -83,7 +98,7 @@ def _truths(task: Task) -> list[Path]:
     return [task.truth.path] if task.truth and task.truth.path.is_absolute() else []
 
 
-def _write_list(path: Path, roots: Sequence[Path]) -> int:
+def _write_list(path: Path, roots: Sequence[Place]) -> int:
     """Write the paths of all bags, one in a line as JSON; return their number."""
     count = 0
     with whole_file(path) as unfinished, unfinished.open('w', encoding='ascii') as file:
@@ -97,26 +112,30 @@ def _write_list(path: Path, roots: Sequence[Path]) -> int:
     return count
 
 
-def _listed(path: Path) -> Iterator[Path]:
+def _listed(path: Path) -> Iterator[Place]:
     with path.open(encoding='ascii') as file:
         for line in file:
-            yield Path(json.loads(line))
+            place = json.loads(line)
+            yield Stored(place) if '://' in place else Path(place)
 
 
 def _was_refused(result: Result) -> bool:
     return bool(result.refusal) or result.value.refused
 
 
-def _write_refusal(out: Path, listed: Path, result: Result) -> None:
+def _write_refusal(out: Place, listed: Path, result: Result) -> None:
     """Write the result of a bag of which no worker could tell."""
     bag = next(islice(_listed(listed), result.index, None))
     BagResult('', [refusal_row(str(bag), f'{bag}: {result.refusal}', result.kind)]).write(out, bag)
 
 
-def _rows(out: Path, listed: Path) -> Iterator[Row]:
-    for bag in _listed(listed):
-        result = BagResult.read(out, bag)
-        if result is None:
-            raise DataError(f'{out}: no result of {bag}: expected the one that its worker wrote; '
-                            'start again')
-        yield from result.rows
+def _rows(out: Place, listed: Path) -> Iterator[Row]:
+    left = _listed(listed)
+    with ThreadPoolExecutor(_AT_ONCE if isinstance(out, Stored) else 1) as threads:
+        while bags := list(islice(left, _AT_ONCE)):
+            for bag, result in zip(bags, threads.map(partial(BagResult.read, out), bags),
+                                   strict=True):
+                if result is None:
+                    raise DataError(f'{out}: no result of {bag}: expected the one that its worker '
+                                    'wrote; start again')
+                yield from result.rows

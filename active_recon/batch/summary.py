@@ -4,13 +4,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import heapq
 import json
-from pathlib import Path
 from typing import Any
 
 from active_recon.batch.rows import Row
+from active_recon.cluster.stores import Place, whole
 from active_recon.report.embedding import compressed, plotly_script
 from active_recon.report.findings import stopped
-from active_recon.report.page import write_page
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 MOST_SHOWN = 1000
@@ -59,7 +58,7 @@ class Summary:
         else:
             heapq.heappushpop(self._worst, entry)
 
-    def write(self, path: Path, kind: str) -> None:
+    def write(self, place: Place, kind: str) -> None:
         """Write the page; raises DataError where it cannot be written."""
         environment = Environment(
             loader=PackageLoader('active_recon.batch', 'templates'), autoescape=True,
@@ -74,7 +73,8 @@ class Summary:
             rows_left=self._episodes - len(self._worst), names=list(self._charts()),
             charts=compressed(json.dumps(self._charts(), sort_keys=True).encode()),
             plotly=plotly_script())
-        write_page(page, path)
+        with whole(place) as unfinished:
+            unfinished.write_text(page, encoding='utf-8')
 
     def _charts(self) -> Mapping[str, dict[str, Any]]:
         """Return the plots that have something to show, by their titles."""

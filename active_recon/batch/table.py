@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.batch.rows import COLUMNS, Row
+from active_recon.cluster.stores import Place, whole
 from active_recon.errors import ConfigError
-from active_recon.whole_files import whole_file
 
 TABLE = 'table.parquet'
 _GROUP = 5000  # rows that are in memory at once
@@ -23,18 +23,18 @@ def parquet() -> tuple[Any, Any]:
                           f'pip install active_recon[batch] ({error})') from error
 
 
-def write_table(rows: Iterable[Row], path: Path) -> None:
+def write_table(rows: Iterable[Row], place: Place) -> None:
     """
     Write rows to a Parquet file, whole or not at all; the same rows give the same bytes.
 
-    Raises OSError where there is no room.
+    Raises as `whole`.
     """
     arrow, writing = parquet()
     types = {'string': arrow.string(), 'int32': arrow.int32(), 'double': arrow.float64(),
              'timestamp': arrow.timestamp('us', tz='UTC'), 'strings': arrow.list_(arrow.string())}
     schema = arrow.schema([(name, types[kind]) for name, (kind, _) in COLUMNS.items()])
     left = iter(rows)
-    with whole_file(path) as unfinished, writing.ParquetWriter(
+    with whole(place) as unfinished, writing.ParquetWriter(
             unfinished, schema, compression='zstd') as table:
         while group := list(islice(left, _GROUP)):
             table.write_table(arrow.Table.from_pylist(group, schema))

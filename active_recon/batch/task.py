@@ -13,6 +13,7 @@ from active_recon.bags.runs.loop_setup import Overrides
 from active_recon.bags.runs.run import RecordedRun
 from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import Topics
+from active_recon.cluster.stores import Place, Stored
 from active_recon.errors import DataError
 from active_recon.models.weights_files import weights_hash
 from active_recon.report.page import object_name
@@ -57,11 +58,11 @@ class Task:
     """
     What is done with each bag: replayed, reported or measured, and with which options.
 
-    `out` is the folder of the results, an absolute path.
+    `out` is the folder of the results: an absolute path, or a place in a store.
     """
 
     kind: str
-    out: Path
+    out: Place
     topics: Topics
     scene: Scene
     overrides: Overrides = Overrides()
@@ -84,21 +85,29 @@ class Task:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def state_of(bag: Path, identity: str) -> str:
+def state_of(bag: Place, identity: str) -> str:
     """
     Return a hash of the names, sizes and times of a bag's files, and of a task's identity.
 
     Raises DataError where there is no bag.
     """
-    if not bag.exists():
+    if isinstance(bag, Path) and not bag.exists():  # a store says so below, in one request less
         raise DataError(f'{bag}: no bag there: no such file or folder on {os.uname().nodename}',
                         'not_seen')
     text = json.dumps([identity, str(bag), files_of(bag)])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def files_of(path: Path) -> Mapping[str, tuple[int, int]]:
-    """Return size, bytes, and time of change, nanoseconds, of a file or of a folder's files."""
-    files = sorted(each for each in path.iterdir() if each.is_file()) if path.is_dir() else [
-        path] if path.exists() else []
+def files_of(place: Place) -> Mapping[str, tuple[int, int | str]]:
+    """
+    Return what tells that a file, or a folder's files, are others than before.
+
+    That is the size, bytes, and the time of change, nanoseconds; in a store its hash or its time.
+    """
+    if isinstance(place, Stored):
+        return {each.name: (each.size, each.changed)
+                for each in sorted(place.entries(), key=lambda each: each.name)
+                if not each.is_folder}
+    files = sorted(each for each in place.iterdir() if each.is_file()) if place.is_dir() else [
+        place] if place.exists() else []
     return {file.name: (file.stat().st_size, file.stat().st_mtime_ns) for file in files}

@@ -18,9 +18,10 @@ from active_recon.batch.results import BagResult, name_of
 from active_recon.batch.rows import episode_row, refusal_row, refused_row, Row
 from active_recon.batch.task import state_of, Task
 from active_recon.cluster.results import is_no_room, UNEXPECTED
-from active_recon.errors import ActiveReconError, DataError
+from active_recon.cluster.stores import at_hand, Place, whole
+from active_recon.errors import ActiveReconError, DataError, WorkError
 from active_recon.reconstructor import Reconstructor
-from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
+from active_recon.report.page import MAX_SUBJECTS, report_page
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
 
@@ -36,11 +37,12 @@ class BagDone:
     kept: bool
 
 
-def do_bag(task: Task, identity: str, bag: Path) -> BagDone:
+def do_bag(task: Task, identity: str, bag: Place) -> BagDone:
     """
     Write the result of one bag, unless it is there; what refuses the bag becomes its row.
 
-    Raises OSError, or an error that has it as its cause, where there is no room to write.
+    Raises OSError, or an error that has it as its cause, where there is no room to write, and
+    WorkError where the store of the results cannot be reached.
     """
     state = ''
     try:
@@ -49,6 +51,8 @@ def do_bag(task: Task, identity: str, bag: Path) -> BagDone:
         if kept is not None and kept.state == state:
             return BagDone(kept.refused, True)
         result = BagResult(state, rows_of(task, bag))
+    except WorkError:
+        raise
     except ActiveReconError as error:
         if is_no_room(error):
             raise
@@ -65,20 +69,21 @@ def do_bag(task: Task, identity: str, bag: Path) -> BagDone:
     return BagDone(result.refused, False)
 
 
-def rows_of(task: Task, bag: Path) -> list[Row]:
+def rows_of(task: Task, bag: Place) -> list[Row]:
     """Return a row for each episode of a bag; raises ActiveReconError where it is refused."""
-    run = read_run(bag, task.topics, task.scene)
-    run, computed, verdict = _considered(task, run)
-    if not run.episodes:
-        raise DataError(f'{bag}: no episode: expected one or more, got none', 'no_episode')
-    true = (known_truth(run) if task.truth is None
-            else task.truth.read(run, task.scene.object_size))
-    cells, placed = (true.cells, true.placed) if true else (None, '')
-    subjects = [Subject(letter, run, episode, cells, computed, placed)
-                for letter, episode in zip(letters(), run.episodes, strict=False)]
-    pages = _write_pages(task, bag, [each for each in subjects if each.views])
-    return [episode_row(str(bag), number, subject, verdict, pages.get(subject.letter, ''))
-            for number, subject in enumerate(subjects, 1)]
+    with at_hand(bag) as path:
+        run = read_run(path, task.topics, task.scene)
+        run, computed, verdict = _considered(task, run)
+        if not run.episodes:
+            raise DataError(f'{path}: no episode: expected one or more, got none', 'no_episode')
+        true = (known_truth(run) if task.truth is None
+                else task.truth.read(run, task.scene.object_size))
+        cells, placed = (true.cells, true.placed) if true else (None, '')
+        subjects = [Subject(letter, run, episode, cells, computed, placed)
+                    for letter, episode in zip(letters(), run.episodes, strict=False)]
+        pages = _write_pages(task, bag, [each for each in subjects if each.views])
+        return [episode_row(str(bag), number, subject, verdict, pages.get(subject.letter, ''))
+                for number, subject in enumerate(subjects, 1)]
 
 
 def _considered(task: Task, run: RecordedRun) -> tuple[RecordedRun, str, str]:
@@ -115,7 +120,7 @@ def _replayed(episode: ReplayedEpisode, threshold: float) -> RecordedEpisode:
     return replace(episode.recorded, views=views)
 
 
-def _write_pages(task: Task, bag: Path, subjects: list[Subject]) -> Mapping[str, str]:
+def _write_pages(task: Task, bag: Place, subjects: list[Subject]) -> Mapping[str, str]:
     """Write the pages of a bag where they are asked for; return the page of each letter."""
     if task.kind != 'report':
         return {}
@@ -123,7 +128,8 @@ def _write_pages(task: Task, bag: Path, subjects: list[Subject]) -> Mapping[str,
     for number in range(math.ceil(len(subjects) / MAX_SUBJECTS)):
         shown = subjects[number * MAX_SUBJECTS:(number + 1) * MAX_SUBJECTS]
         page = f'reports/{name_of(bag)}{f"-{number + 1}" if number else ""}.html'
-        write_page(report_page(shown), task.out / page)
+        with whole(task.out / page) as unfinished:
+            unfinished.write_text(report_page(shown), encoding='utf-8')
         pages |= dict.fromkeys((each.letter for each in shown), page)
     return pages
 

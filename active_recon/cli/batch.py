@@ -46,7 +46,7 @@ _ALL = """
     reason; OUT/summary.html the plots and links. A second start with the same OUT keeps the bags
     that are finished and unchanged. The results do not depend on the workers: processes of this
     machine, or a Ray cluster (--cluster), whose machines must see the bags and OUT at the same
-    paths.
+    paths or URLs.
 
     Example: active-recon batch {kind} archive 'fleet/**/*.mcap' --out build/batch
 """
@@ -55,11 +55,11 @@ _ALL = """
 def _work(
     kind: str,
     bags: Annotated[list[str], typer.Argument(
-        metavar='BAGS...', help='Bags, folders of bags at any depth, patterns, or file:// URLs '
-                                'of these.')],
+        metavar='BAGS...', help='Bags, folders of bags at any depth, or patterns: paths, or URLs '
+                                'of file://, s3://, gs:// and az://.')],
     out: Annotated[str, typer.Option(
         metavar='DIR', help='Folder of the table, the page, the reports and the finished '
-                            'results; a path or a file:// URL.')],
+                            'results: a path, or a URL as for BAGS.')],
     topics: 'Topics',
     scene: 'Scene',
     model: Annotated[str | None, typer.Option(
@@ -113,7 +113,7 @@ def _work(
 
 def _truth(truth: str | None, fit: bool, up: str | None, front: str | None
            ) -> 'TruthSource | None':
-    from active_recon.batch.finding import place_of
+    from active_recon.batch.finding import path_of
     from active_recon.batch.task import TruthSource
     from active_recon.objects import find_object, shipped_objects
 
@@ -121,7 +121,7 @@ def _truth(truth: str | None, fit: bool, up: str | None, front: str | None
         return None
     if truth in shipped_objects():
         return TruthSource(Path(truth), fit, up, front)
-    path = place_of(truth)
+    path = path_of('--truth', truth)
     if not path.exists():
         raise DataError(f'--truth: {truth}: expected a file, a folder, or one of '
                         f'{", ".join(shipped_objects())}')

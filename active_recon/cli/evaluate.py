@@ -8,7 +8,13 @@ import sys
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, TYPE_CHECKING
 
-from active_recon.cli.cluster_option import Cluster, reachable, workers_of
+from active_recon.cli.cluster_option import (
+    Cluster,
+    ClusterWorkers,
+    reachable,
+    require_cluster,
+    workers_of,
+)
 from active_recon.cli.evaluate_studies import print_baselines, print_latent_swap, print_yaw
 from active_recon.cli.intervals import difference, line, spread
 from active_recon.cli.progress import progress_bar
@@ -70,9 +76,7 @@ def evaluate(
              '0.0001.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     cluster: Cluster = None,
-    workers: Annotated[int | None, typer.Option(
-        min=1, help='With --cluster: episodes are measured by so many workers; default: one for '
-                    'each of its cores.')] = None,
+    workers: ClusterWorkers = None,
 ) -> None:
     """
     Measure the IoU of a model after each view, for each policy, with 95 % intervals.
@@ -85,16 +89,14 @@ def evaluate(
     Example: active-recon evaluate data/test --model runs/new/weights.safetensors
     --against runs/old/weights.safetensors --policy farthest --rows both.csv
     """
-    from active_recon.cli.evaluation_plan import EvaluationPlan, run_blocks
+    from active_recon.cli.evaluation_plan import EvaluationPlan, run_on_crew
     from active_recon.evaluation.paired import paired as between
     from active_recon.evaluation.paired import require_same_episodes, write_rows
     from active_recon.evaluation.policy_study import compare, run_all
     from active_recon.models.weights_files import find_weights, weights_hash
     import torch
 
-    if workers and not cluster:
-        raise ConfigError('--workers: no cluster: expected --cluster too, got --workers '
-                          f'{workers} alone')
+    require_cluster(cluster, workers)
     if training and validation is None:
         raise ConfigError('--training: no validation objects: expected --validation too, on which '
                           'the threshold of the mean shape is chosen, got none')
@@ -104,12 +106,12 @@ def evaluate(
                           f'{len(named)}')
     torch.set_num_threads(threads)
     plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
-                          split_file, bf16, threads)
+                          split_file, bf16)
 
     def measure(weights: Path, folder: Path | None, crew: 'Crew | None') -> _Measured:
         bundle, trial, every = plan.prepared(weights, folder, tell=True)
         if crew is not None:
-            run_blocks(plan, weights, trial, every, crew)
+            run_on_crew(plan, weights, trial, every, crew)
         return _Measured(weights, bundle, trial, run_all(trial, every, progress_bar))
 
     with ExitStack() as stack:

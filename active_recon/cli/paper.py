@@ -1,11 +1,23 @@
 """`active-recon paper`: reproduces the paper's tables and figures."""
 
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.cluster_option import (
+    Cluster,
+    ClusterWorkers,
+    require_cluster,
+    require_path,
+    workers_of,
+)
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
+
+if TYPE_CHECKING:
+    from active_recon.paper.study import Study
 
 ALL, SYSTEMS, DOCUMENT = 'all', 'systems', 'document'
 
@@ -54,6 +66,8 @@ def paper(
     again: Annotated[bool, typer.Option(
         help='Make the parts again even if their inputs have not changed. Cached measurements in '
              'MODELS/measured are still used.')] = False,
+    cluster: Cluster = None,
+    workers: ClusterWorkers = None,
 ) -> None:
     """
     Reproduce the paper's tables and figures; write each as Markdown, JSON and PNG.
@@ -65,12 +79,13 @@ def paper(
     `document` combines the existing parts in OUT/README.md, with conclusions; `all` makes
     everything.
 
+    With --cluster, each training is an item of its own, and so is each block of episodes whose
+    IoU is measured; times are measured by this process.
+
     Example: active-recon paper table1 --samples 20000 --out /tmp/results
     """
-    from active_recon.paper.document import write_document
-    from active_recon.paper.parts import PARTS, run_part
+    from active_recon.paper.parts import PARTS
     from active_recon.paper.study import Study
-    from active_recon.paper.systems import have_systems, systems
     import torch
 
     known = (*PARTS, DOCUMENT, SYSTEMS, ALL)
@@ -80,18 +95,31 @@ def paper(
     if device != 'cpu' and not (device == 'cuda' and torch.cuda.is_available()):
         raise ConfigError('--device: no such device: expected cpu, or cuda where there is a GPU, '
                           f'got {device}')
+    require_cluster(cluster, workers)
+    data, models, out = (require_path(folder) for folder in (data, models, out))
+    if cluster and device != 'cpu':
+        raise ConfigError(f'--cluster: expected --device cpu, got {device}')
     torch.set_num_threads(threads)
     study = Study(data, models, out, model, pascal3d, tuple(training or ('train',)), samples,
                   starts, seed, threads, policy_seeds, policy_starts, subset_objects, device,
                   progress=progress_bar)
     wanted = [*PARTS, DOCUMENT] if ALL in parts else list(dict.fromkeys(parts))
-    for part in wanted:
-        if part == SYSTEMS:
-            for system, weights in have_systems(study, systems(study)).items():
-                typer.echo(f'{system.label}: {weights}')
-        elif part == DOCUMENT:
-            changed = write_document(study)
-            typer.echo(f'{out / "README.md"}: {"written" if changed else "unchanged"}')
-        else:
-            made = run_part(study, part, again)
-            typer.echo(f'{out / part}.md, .json, .png: {"written" if made else "unchanged"}')
+    with workers_of(cluster, workers) if cluster else nullcontext() as crew:
+        for part in wanted:
+            _do(replace(study, crew=crew), part, again)
+
+
+def _do(study: 'Study', part: str, again: bool) -> None:
+    from active_recon.paper.document import write_document
+    from active_recon.paper.parts import run_part
+    from active_recon.paper.systems import have_systems, systems
+
+    if part == SYSTEMS:
+        for system, weights in have_systems(study, systems(study)).items():
+            typer.echo(f'{system.label}: {weights}')
+    elif part == DOCUMENT:
+        changed = write_document(study)
+        typer.echo(f'{study.out / "README.md"}: {"written" if changed else "unchanged"}')
+    else:
+        made = run_part(study, part, again)
+        typer.echo(f'{study.out / part}.md, .json, .png: {"written" if made else "unchanged"}')

@@ -85,7 +85,8 @@ def train(
         min=1, help='Number of GPUs of each machine, or of processes without a GPU.')] = 1,
     nodes: Annotated[int, typer.Option(
         min=1, help='Number of machines. Start the command on each, with the variables '
-                    'MASTER_ADDR, MASTER_PORT and NODE_RANK of Lightning Fabric.')] = 1,
+                    'MASTER_ADDR, MASTER_PORT and NODE_RANK of Lightning Fabric, or by '
+                    'torchrun.')] = 1,
     resume: Annotated[bool, typer.Option(
         help='Continue from the checkpoints in the run folder.')] = False,
 ) -> None:

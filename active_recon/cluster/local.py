@@ -7,13 +7,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 import multiprocessing
 import os
-from pathlib import Path
 import signal
 import threading
 from typing import Any
 
 from active_recon.cluster.bundles import attempt_all, Bundle, Bundles, Done
 from active_recon.cluster.results import attempt, ATTEMPTS, DIED, Result
+from active_recon.cluster.stores import Place
 
 
 class LocalCrew:
@@ -30,7 +30,7 @@ class LocalCrew:
         self.workers = workers
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any],
-            shared: Path | None = None, reads: Sequence[Path] = ()) -> Iterator[Result]:
+            shared: Place | None = None, reads: Sequence[Place] = ()) -> Iterator[Result]:
         """Yield the results in the order of their completion; see `crew.Crew`."""
         if self.workers == 1:
             for index, item in enumerate(items):

@@ -14,6 +14,7 @@ from active_recon import __version__
 from active_recon.cluster.bundles import attempt_all, Bundle, Bundles, Done
 from active_recon.cluster.results import ATTEMPTS, DIED, Outcome, Result
 from active_recon.cluster.storage import SharedFolder, Storage
+from active_recon.cluster.stores import Place
 from active_recon.errors import ConfigError, WorkError
 
 _AHEAD = 3
@@ -35,6 +36,8 @@ def connect(address: str, workers: int | None) -> tuple[Any, str]:
     except ImportError as error:
         raise ConfigError('--cluster: no Ray here: expected it installed: pip install '
                           f'active_recon[cluster] ({error})') from error
+    if address == 'auto':
+        address = os.environ.get('RAY_ADDRESS') or address
     _require_listener(address)
     own: dict[str, Any] = {}
     if address == 'local':
@@ -85,11 +88,12 @@ class RayCrew:
         return min(self._cpus(), self._most or sys.maxsize)
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any],
-            shared: Path | None = None, reads: Sequence[Path] = ()) -> Iterator[Result]:
+            shared: Place | None = None, reads: Sequence[Place] = ()) -> Iterator[Result]:
         """Yield the results in the order of their completion; see `crew.Crew`."""
         ray = self._ray
         folder = None if shared is None else SharedFolder.of(shared)
-        storage = Storage(folder, tuple(path.absolute() for path in reads))
+        storage = Storage(folder, tuple(
+            place.absolute() if isinstance(place, Path) else place for place in reads))
         function = partial(_seeing, storage, function)
         held = [ray.put(function)]
         task = ray.remote(_work)

@@ -1,4 +1,4 @@
-"""Paths that all machines of a cluster must see."""
+"""Paths and places in object stores that all machines of a cluster must see."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 import uuid
 
-from active_recon.errors import WorkError
-from active_recon.whole_files import whole_file
+from active_recon.cluster.stores import Place, whole
+from active_recon.errors import ActiveReconError, WorkError
 
 _MARK = '.shared_folder'
 
@@ -21,32 +21,33 @@ class SharedFolder:
     would be written where nobody looks for them.
     """
 
-    path: Path
+    place: Place
     mark: str
 
     @classmethod
-    def of(cls, path: Path) -> 'SharedFolder':
+    def of(cls, place: Place) -> 'SharedFolder':
         """Return the folder, made and marked; a mark that is there already is kept."""
-        path = path.resolve()
-        path.mkdir(parents=True, exist_ok=True)
-        mark = path / _MARK
-        if not mark.is_file():
-            with whole_file(mark) as unfinished:
+        place = place.resolve() if isinstance(place, Path) else place
+        mark = place / _MARK
+        try:
+            return cls(place, mark.read_text())
+        except OSError:
+            with whole(mark) as unfinished:
                 unfinished.write_text(f'{uuid.uuid4().hex}\n')
-        return cls(path, mark.read_text())
+        return cls(place, mark.read_text())
 
     def forget(self) -> None:
         """Remove the mark."""
-        (self.path / _MARK).unlink(missing_ok=True)
+        (self.place / _MARK).unlink(missing_ok=True)
 
     def require(self) -> None:
         """Raise WorkError where this machine does not see the folder."""
         try:
-            seen = (self.path / _MARK).read_text() == self.mark
+            seen = (self.place / _MARK).read_text() == self.mark
         except OSError:
             seen = False
         if not seen:
-            raise WorkError(_not_seen(self.path), 'not_seen')
+            raise WorkError(_not_seen(self.place), 'not_seen')
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Storage:
     """What workers must see: the folder that they write to, and what they read."""
 
     shared: SharedFolder | None
-    reads: tuple[Path, ...]
+    reads: tuple[Place, ...]
 
     def require(self) -> None:
         """Raise WorkError where this machine does not see one of them."""
@@ -65,11 +66,15 @@ class Storage:
 def _require(storage: Storage) -> None:
     if storage.shared is not None:
         storage.shared.require()
-    for path in storage.reads:
-        if not path.exists():
-            raise WorkError(_not_seen(path), 'not_seen')
+    for place in storage.reads:
+        try:
+            seen = place.exists()
+        except ActiveReconError as error:  # of a store: no package, or no permission
+            raise WorkError(f'{_not_seen(place)}, got: {error}', 'not_seen') from error
+        if not seen:
+            raise WorkError(_not_seen(place), 'not_seen')
 
 
-def _not_seen(path: Path) -> str:
+def _not_seen(path: Place) -> str:
     return (f'{path}: not seen by {os.uname().nodename}: expected it on storage that all machines '
             'of the cluster share')

@@ -78,6 +78,12 @@ def decision_ms(trial: Trial, contender: Contender) -> float | None:
     return float(np.median(watch.milliseconds))
 
 
+def study_contenders(trial: Trial, attentions: Sequence[nn.Module],
+                     seeds: int) -> list[Contender]:
+    """Return what `policy_study` compares."""
+    return contenders(contender_names(bool(attentions)), attentions, trial.count, seeds)
+
+
 def policy_study(trial: Trial, attentions: Sequence[nn.Module] = (), seeds: int = 5,
                  subset_objects: int = 60, reporting: Reporting = silent) -> dict[str, Any]:
     """
@@ -88,7 +94,7 @@ def policy_study(trial: Trial, attentions: Sequence[nn.Module] = (), seeds: int 
     - subset_objects: number of objects, spread over the categories, on which every sequence of
       three views is measured; 0 skips this
     """
-    every = contenders(contender_names(bool(attentions)), attentions, trial.count, seeds)
+    every = study_contenders(trial, attentions, seeds)
     runs = run_all(trial, every, reporting)
     found: dict[str, Any] = {
         'identity': trial.identity, 'objects': len(trial.views),

@@ -6,9 +6,9 @@ from typing import Any
 
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.depth_refiner import DepthRefiner, DepthRefinerConfig
+from active_recon.models.weights_bytes import weights_bytes
 from active_recon.models.weights_files import depth_path, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
-from safetensors.torch import save
 import torch
 
 KIND = 'depth-refiner'
@@ -20,8 +20,9 @@ def save_refiner(path: Path, refiner: DepthRefiner, config: DepthRefinerConfig,
     path.parent.mkdir(parents=True, exist_ok=True)
     tensors = {name: tensor.detach().cpu().half().contiguous()
                for name, tensor in refiner.state_dict().items()}
-    path.write_bytes(save(tensors, {'model': KIND, 'config': json.dumps(config.to_dict()),
-                                    'network_sha256': network_sha256}))
+    path.write_bytes(weights_bytes(tensors, {
+        'model': KIND, 'config': json.dumps(config.to_dict()),
+        'network_sha256': network_sha256}))
     path.with_suffix('.json').write_text(json.dumps({
         'model': KIND, 'config': config.to_dict(), 'network_sha256': network_sha256,
         'sha256': weights_hash(path), **card}, indent=2) + '\n')

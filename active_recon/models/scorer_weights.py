@@ -7,9 +7,9 @@ from typing import Any
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.models.weights import Bundle
+from active_recon.models.weights_bytes import weights_bytes
 from active_recon.models.weights_files import scorer_path, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
-from safetensors.torch import save
 import torch
 from torch import nn
 
@@ -24,7 +24,7 @@ def save_scorer(path: Path, scorer: ViewScorer, config: ScorerConfig, network_sh
                for name, tensor in scorer.state_dict().items()}
     facts = {'model': _KIND, 'config': json.dumps(config.to_dict()),
              'network_sha256': network_sha256}
-    path.write_bytes(save(tensors, facts))
+    path.write_bytes(weights_bytes(tensors, facts))
     path.with_suffix('.json').write_text(json.dumps({
         'model': _KIND, 'config': config.to_dict(), 'network_sha256': network_sha256,
         'sha256': weights_hash(path), **card}, indent=2) + '\n')

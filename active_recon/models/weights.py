@@ -10,9 +10,9 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry
+from active_recon.models.weights_bytes import weights_bytes
 from active_recon.models.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
-from safetensors.torch import save
 import torch
 from torch import nn
 
@@ -37,8 +37,8 @@ def save_weights(path: Path, bundle: Bundle) -> None:
                for name, tensor in module.state_dict().items()}
     config = json.dumps(bundle.config.to_dict())
     # Written here: safetensors itself writes for the owner alone
-    path.write_bytes(save(tensors, {'model': bundle.model, 'config': config,
-                                    'threshold': repr(bundle.threshold)}))
+    path.write_bytes(weights_bytes(tensors, {'model': bundle.model, 'config': config,
+                                             'threshold': repr(bundle.threshold)}))
     card = {'model': bundle.model, 'config': bundle.config.to_dict(),
             'threshold': bundle.threshold,
             'sha256': weights_hash(path), **bundle.card}

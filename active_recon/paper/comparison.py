@@ -20,7 +20,8 @@ from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.measured import measure, Measured
 from active_recon.paper.results import Claim, Column, Table
 from active_recon.paper.study import Study
-from active_recon.paper.systems import have_systems, MODEL, systems, views_seen
+from active_recon.paper.systems import have_systems, MODEL, systems
+from active_recon.paper.trainings import views_seen
 from active_recon.volumes.voxels import RESOLUTION
 import torch
 from torch.utils.flop_counter import FlopCounterMode

@@ -1,15 +1,17 @@
 """Measurements of a network and a policy on a set of objects, cached on disk."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet
+from active_recon.evaluation.blocks import run_blocks
 from active_recon.evaluation.contenders import contenders
 from active_recon.evaluation.measure import Episodes
 from active_recon.evaluation.rollouts import batches, roll_out
 from active_recon.evaluation.statistics import Values
-from active_recon.evaluation.trial import read_arrays, Trial, write_arrays
+from active_recon.evaluation.trial import Contender, read_arrays, Trial, write_arrays
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights
@@ -76,15 +78,25 @@ def measure_loss(study: Study, weights: Path, policy: str, objects: Objects,
 
 def _run(study: Study, weights: Path, policy: str,
          objects: Objects) -> tuple[Trial, str, Episodes]:
+    trial, [contender] = _prepared(study, weights, policy, objects)
+    if study.crew is not None:
+        run_blocks(partial(_prepared, study.elsewhere(), weights.absolute(), policy,
+                           objects.elsewhere()),
+                   trial, [contender], study.crew, [weights, objects.root], study.progress)
+    title = f'{weights.parent.name}, {policy}, {objects.root.name}'
+    with study.progress(title, len(trial.objects)) as advance:
+        return trial, contender.key, trial.run(contender, lambda done: advance(done, ''))
+
+
+def _prepared(study: Study, weights: Path, policy: str,
+              objects: Objects) -> tuple[Trial, list[Contender]]:
+    """Return the trial of a network on objects, and the policy as its contender."""
     bundle = load_weights(weights, study.device)
     trial = Trial(bundle.reconstruction, bundle.threshold, study.read(objects), study.starts,
                   study.views, study.seed, cache=study.models / 'measured')
     models = [bundle.attention] if bundle.attention is not None else []
-    [contender] = contenders([policy], models, study.views, seeds=1, seed=study.seed,
+    return trial, contenders([policy], models, study.views, seeds=1, seed=study.seed,
                              model=bundle.model)
-    title = f'{weights.parent.name}, {policy}, {objects.root.name}'
-    with study.progress(title, len(trial.objects)) as advance:
-        return trial, contender.key, trial.run(contender, lambda done: advance(done, ''))
 
 
 class Retaken(HeuristicPolicy):

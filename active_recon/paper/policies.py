@@ -2,24 +2,28 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from active_recon.config import LossConfig, RewardConfig
+from active_recon.evaluation.blocks import run_blocks
 from active_recon.evaluation.contenders import heuristic_names
-from active_recon.evaluation.policy_study import policy_study
+from active_recon.evaluation.policy_study import policy_study, study_contenders
 from active_recon.evaluation.statistics import Interval
-from active_recon.evaluation.trial import Trial
+from active_recon.evaluation.trial import Contender, Trial
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import read_card, weights_hash
 from active_recon.paper.claims import all_larger, headroom, larger
 from active_recon.paper.plotting import bars, canvas, curves, drawn, Picture
 from active_recon.paper.results import Cell, Claim, Column, Result, Table
 from active_recon.paper.study import Study
-from active_recon.paper.systems import MODEL, policy_training, run_plan, training_plan, TWO_STAGE
+from active_recon.paper.systems import MODEL, policy_training, training_plan, TWO_STAGE
+from active_recon.paper.trainings import train_all, Training
 from active_recon.paper.writing import provenance
 from active_recon.training.loop import TrainingConfig
 from active_recon.training.plan import Plan
+from torch import nn
 
 _OWN = 'attention'
 
@@ -32,11 +36,10 @@ def weights(study: Study) -> list[Path]:
     """
     first = study.weights
     folder = study.models / 'policies' / weights_hash(first)[:12]
-    found = [first]
-    for seed in range(1, study.policy_seeds):
-        found.append(run_plan(_plan(study, first), study.training_sets(), study.objects('val'),
-                              folder / f'seed-{seed}', study, seed))
-    return found
+    plan = _plan(study, first) if study.policy_seeds > 1 else None
+    return [first, *train_all(study, [Training(
+        plan, tuple(study.training_sets()), study.objects('val'), folder / f'seed-{seed}', seed)
+        for seed in range(1, study.policy_seeds) if plan])]
 
 
 def _plan(study: Study, first: Path) -> Plan:
@@ -60,14 +63,14 @@ def inputs(study: Study) -> dict[str, Any]:
 
 def make(study: Study) -> Result:
     """Measure all policies from the same starts."""
-    bundle = load_weights(study.weights, study.device)
-    trial = Trial(bundle.reconstruction, bundle.threshold, study.read(study.objects('test')),
-                  study.policy_starts, study.views, study.seed, bfloat16=True,
-                  cache=study.models / 'measured')
     paths = weights(study)
-    attentions = [load_weights(path, study.device).attention for path in paths]
-    found = policy_study(trial, [model for model in attentions if model is not None],
-                         study.policy_seeds, study.subset_objects, study.progress)
+    trial, attentions = _trial(study, paths)
+    if study.crew is not None:
+        run_blocks(partial(_prepared, study.elsewhere(), [path.absolute() for path in paths]),
+                   trial, study_contenders(trial, attentions, study.policy_seeds), study.crew,
+                   [*paths, study.objects('test').root], study.progress)
+    found = policy_study(trial, attentions, study.policy_seeds, study.subset_objects,
+                         study.progress)
     text = (
         f'All policies on one frozen network, in bfloat16, from {study.policy_starts} first views '
         f'of each of {found["objects"]} parametric test objects. Attention was trained under '
@@ -79,6 +82,21 @@ def make(study: Study) -> Result:
         f'starts and seeds. {found["headroom_sentence"]}')
     return Result('View policies on one frozen network', text, _tables(found), claims(found),
                   _picture(found['policies']), found)
+
+
+def _trial(study: Study, paths: Sequence[Path]) -> tuple[Trial, list[nn.Module]]:
+    """Return the trial of the study's network, and the policies that were learned on it."""
+    first, *others = [load_weights(path, study.device) for path in paths]
+    trial = Trial(first.reconstruction, first.threshold, study.read(study.objects('test')),
+                  study.policy_starts, study.views, study.seed, bfloat16=True,
+                  cache=study.models / 'measured')
+    return trial, [bundle.attention for bundle in (first, *others)
+                   if bundle.attention is not None]
+
+
+def _prepared(study: Study, paths: Sequence[Path]) -> tuple[Trial, list[Contender]]:
+    trial, attentions = _trial(study, paths)
+    return trial, study_contenders(trial, attentions, study.policy_seeds)
 
 
 def learned_from(paths: Sequence[Path]) -> str:

@@ -1,11 +1,12 @@
 """The settings that all parts share: data, models, and parameters of the measurements."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 import hashlib
 from pathlib import Path
 from typing import Any
 
+from active_recon.cluster import Crew
 from active_recon.datasets.layout import list_objects, ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.datasets.views import read_views, ViewSet
@@ -37,6 +38,10 @@ class Objects:
                             f'{self.category}, found none; `active-recon dataset build` makes '
                             'them')
         return folders
+
+    def elsewhere(self) -> 'Objects':
+        """Return the objects as a worker takes them, which begins in a folder of its own."""
+        return replace(self, root=self.root.absolute())
 
     @property
     def present(self) -> bool:
@@ -72,6 +77,7 @@ class Study:
     - device: device on which IoU is measured; table 4 and figure 10 always time a CPU
     - policy_seeds: number of trainings of the view policy, and of runs of random
     - subset_objects: number of objects on which every sequence of three views is measured
+    - crew: the workers of a cluster that train and measure; None: this process
     """
 
     data: Path = Path('data')
@@ -90,6 +96,13 @@ class Study:
     device: str = 'cpu'
     views: int = 5
     progress: Reporting = field(default=silent, compare=False)
+    crew: Crew | None = field(default=None, compare=False)
+
+    def elsewhere(self) -> 'Study':
+        """Return the study as a worker takes it, which begins in a folder of its own."""
+        model = self.model and str(find_weights(self.model).absolute())
+        return replace(self, data=self.data.absolute(), models=self.models.absolute(),
+                       out=self.out.absolute(), model=model, progress=silent, crew=None)
 
     def objects(self, name: str, category: str = '', resolution: int = RESOLUTION) -> Objects:
         """Return the objects of a folder of the data."""

@@ -1,21 +1,18 @@
 """The compared systems, all trained on the same objects and the same number of views."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from active_recon.config import LossConfig
 from active_recon.errors import WeightsError
 from active_recon.models.registry import network_entry, NETWORKS
-from active_recon.models.weights import save_weights
 from active_recon.models.weights_files import find_weights, read_card
 from active_recon.paper.study import Objects, Study
-from active_recon.reporting import by_step
-from active_recon.training.loop import make_fabric, Measured, TrainingConfig
-from active_recon.training.plan import Plan, Report, seeded, train_plan
-from active_recon.training.supervised import mean_length, steps_for
+from active_recon.paper.trainings import train_all, Training, views_seen
+from active_recon.training.loop import TrainingConfig
+from active_recon.training.plan import Plan
+from active_recon.training.supervised import steps_for
 from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
 
 BATCH, POLICY_BATCH = 32, 48
@@ -90,47 +87,19 @@ def find_system(study: Study, system: System) -> Path | None:
 
 def have_systems(study: Study, wanted: Sequence[System]) -> dict[System, Path]:
     """Return the weights of systems; train those that are missing."""
-    return {system: find_system(study, system) or train_system(
+    found = {system: find_system(study, system) for system in wanted}
+    missing = [system for system, path in found.items() if path is None]
+    trained = dict(zip(missing, train_all(study, [training_of(
         system, study.training_sets(resolution=system.resolution),
         study.objects('val', resolution=system.resolution), study.models / system.name,
-        study.samples, study) for system in wanted}
+        study.samples, study.seed) for system in missing]), strict=True))
+    return {system: path or trained[system] for system, path in found.items()}
 
 
-def train_system(system: System, training: Sequence[Objects], validation: Objects, out: Path,
-                 samples: int, study: Study) -> Path:
-    """Train a system on `samples` views unless its weights exist; return their path."""
-    return run_plan(training_plan(system, samples), training, validation, out, study, study.seed)
-
-
-def run_plan(plan: Plan, training: Sequence[Objects], validation: Objects, out: Path,
-             study: Study, seed: int) -> Path:
-    """
-    Train according to a plan unless the weights exist; return their path.
-
-    An interrupted training continues from its checkpoints in `out`.
-    """
-    weights = out / 'weights.safetensors'
-    if weights.is_file():
-        return weights
-
-    @contextmanager
-    def reporting(stage: str, steps: int) -> Iterator[Report]:
-        with study.progress(f'{out.name}: {stage}', steps) as advance:
-            reached = by_step(advance)
-
-            def report(step: int, measured: Measured) -> None:
-                reached(step, f'loss {measured["loss"]:.4f}' if measured else '')
-
-            yield report
-
-    bundle = train_plan(seeded(plan, seed), study.read(*training), study.read(validation), out,
-                        reporting, make_fabric(bfloat16=True), resume=True)
-    bundle.card.update(
-        command=study.command('systems'), generators_sha256=study.generators(), seed=seed,
-        objects=[objects.identity() for objects in training],
-        views_seen=views_seen({'model': plan.model} | bundle.card))
-    save_weights(weights, bundle)
-    return weights
+def training_of(system: System, training: Sequence[Objects], validation: Objects, out: Path,
+                samples: int, seed: int) -> Training:
+    """Return the training of a system on `samples` views."""
+    return Training(training_plan(system, samples), tuple(training), validation, out, seed)
 
 
 def training_plan(system: System, samples: int) -> Plan:
@@ -150,15 +119,3 @@ def policy_training(samples: int) -> TrainingConfig:
     steps = max(1, round(POLICY_SHARE * samples / (POLICY_BATCH * MAX_VIEWS)))
     return TrainingConfig(steps, POLICY_BATCH, POLICY_LEARNING_RATE, MAX_VIEWS, augment=False,
                           warmup_steps=min(20, steps), checkpoint_every=50, validate_every=250)
-
-
-def views_seen(card: Mapping[str, Any]) -> int | None:
-    """Return the number of training views of a reconstruction by its card; None if unknown."""
-    if 'model' in card and network_entry(card['model']).fit:
-        return None
-    training = card.get('reconstruction') or {}
-    if not {'steps', 'batch_size', 'max_views'} <= set(training):
-        return None
-    length = (training['max_views'] if card.get('scheme') == 'joint'
-              else mean_length(training['max_views'], training.get('curriculum_fraction', 0.5)))
-    return int(training['steps'] * training['batch_size'] * length)

@@ -13,7 +13,8 @@ from active_recon.paper.plotting import bars, canvas, drawn, Picture
 from active_recon.paper.results import Claim, Column, counted, plain, Result, Table
 from active_recon.paper.spreads import per_view
 from active_recon.paper.study import Study
-from active_recon.paper.systems import JOINT, System, train_system, TWO_STAGE
+from active_recon.paper.systems import JOINT, training_of, TWO_STAGE
+from active_recon.paper.trainings import train_all
 from active_recon.paper.writing import provenance
 
 CATEGORY = 'sofa'
@@ -27,13 +28,11 @@ ROWS = {'two-stage, random views': ('two-stage', 'random'),
 
 def weights(study: Study) -> dict[str, Path]:
     """Return the weights of both schemes, trained on sofas only."""
-    return {name: _train(study, system) for name, system in _SCHEMES.items()}
-
-
-def _train(study: Study, system: System) -> Path:
-    return train_system(
+    paths = train_all(study, [training_of(
         system, study.training_sets(CATEGORY), study.objects('val', CATEGORY),
-        study.models / 'table1' / system.name, study.samples, study)
+        study.models / 'table1' / system.name, study.samples, study.seed)
+        for system in _SCHEMES.values()])
+    return dict(zip(_SCHEMES, paths, strict=True))
 
 
 def inputs(study: Study) -> dict[str, Any]:

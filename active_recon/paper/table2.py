@@ -14,7 +14,8 @@ from active_recon.paper.measured import measure
 from active_recon.paper.plotting import bars, canvas, drawn, Picture
 from active_recon.paper.results import Claim, Column, Result, Table
 from active_recon.paper.study import Objects, Study
-from active_recon.paper.systems import MODEL, System, train_system
+from active_recon.paper.systems import MODEL, System, training_of
+from active_recon.paper.trainings import train_all
 from active_recon.paper.writing import provenance
 from active_recon.shapes import generators_hash
 import numpy as np
@@ -36,7 +37,8 @@ def objects(study: Study) -> dict[str, Objects]:
                                   root / part)]
     if not all(job.folder.complete for job in jobs):
         with study.progress(f'making {CATEGORY}', len(jobs)) as advance:
-            for outcome in make_dataset(jobs, workers=study.threads):
+            for outcome in make_dataset(jobs, workers=study.threads,
+                                        crew=study.crew):
                 if outcome.refusal:
                     raise DataError(f'{outcome.folder.name}: cannot be made: '
                                     f'{outcome.refusal}')
@@ -47,10 +49,11 @@ def objects(study: Study) -> dict[str, Objects]:
 def weights(study: Study) -> dict[tuple[float, float], Path]:
     """Return the weights of every pair, trained on the same motorbikes for the same time."""
     sets = objects(study)
-    return {pair: train_system(
+    paths = train_all(study, [training_of(
         System(_name(pair), _name(pair), MODEL, loss=LossConfig(*pair)), [sets['train']],
-        sets['val'], sets['val'].root.parent / _folder(pair), round(SHARE * study.samples), study)
-        for pair in published.TABLE2}
+        sets['val'], sets['val'].root.parent / _folder(pair), round(SHARE * study.samples),
+        study.seed) for pair in published.TABLE2])
+    return dict(zip(published.TABLE2, paths, strict=True))
 
 
 def inputs(study: Study) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from active_recon.models.weights_files import FOLDER, read_card, weights_hash
 from active_recon.paper.claims import sentences
 from active_recon.paper.results import Claim, Result
 from active_recon.paper.study import Objects, Study
-from active_recon.paper.systems import views_seen
+from active_recon.paper.trainings import views_seen
 from PIL import Image
 
 Inputs = Mapping[str, Any]

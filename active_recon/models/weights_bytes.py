@@ -1,0 +1,24 @@
+"""The bytes of a weights file: the same tensors and facts give the same bytes, and so one hash."""
+
+from collections.abc import Mapping
+import json
+
+from safetensors.torch import save
+from torch import Tensor
+
+_LENGTH = 8  # bytes that hold the header's length, little endian
+
+
+def weights_bytes(tensors: Mapping[str, Tensor], facts: Mapping[str, str]) -> bytes:
+    """
+    Return a safetensors file with these facts as its metadata, in the order given.
+
+    safetensors itself writes them in an order that is drawn in each process.
+    """
+    written = save(dict(tensors), dict(facts))
+    end = _LENGTH + int.from_bytes(written[:_LENGTH], 'little')
+    header = json.loads(written[_LENGTH:end])
+    header['__metadata__'] = dict(facts)
+    ordered = json.dumps(header, ensure_ascii=False, separators=(',', ':')).encode()
+    ordered += b' ' * (-len(ordered) % _LENGTH)
+    return len(ordered).to_bytes(_LENGTH, 'little') + ordered + written[end:]
