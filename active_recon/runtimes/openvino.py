@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _CONVERTER = 'openvino.tools.ovc'
-"""OpenVINO's converter of other formats, with what it reports home by: two thirds of its import."""
+"""OpenVINO's converter of other formats, which reports home too: two thirds of its import."""
 _LENGTH = 8  # bytes of the length of the metadata in what is kept
 
 
