@@ -16,11 +16,11 @@ from benchmarks.figures import Figure, interleaved
 import numpy as np
 import torch
 
-_OBJECTS, _VIEWS, _THREADS, _TURNS = 8, 5, 2, 5
+_OBJECTS, _VIEWS, _THREADS, _TURNS = 4, 5, 2, 3
 
 
 def evaluation_figures() -> list[Figure]:
-    """Measure eight chairs after each of five views, with the default network."""
+    """Measure four chairs after each of five views, with the default network."""
     torch.set_num_threads(_THREADS)
     bundle = load_weights(SHIPPED)
     with TemporaryDirectory() as folder:
