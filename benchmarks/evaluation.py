@@ -1,5 +1,6 @@
 """Objects a second of an evaluation, in torch and in exported graphs, on two threads."""
 
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -28,8 +29,8 @@ def evaluation_figures() -> list[Figure]:
                           viewing=Viewing('any', _VIEWS)))
         views = read_scene(list_objects(Path(folder)), [bundle.reconstruction]).views
     found = interleaved({
-        f'{runtime}, {"bf16" if half else "f32"}': lambda network=network_in(
-            runtime, SHIPPED, bundle, half, _THREADS), half=half: _measure(network, views, half)
+        f'{runtime}, {"bf16" if half else "f32"}': partial(
+            _measure, network_in(runtime, SHIPPED, bundle, half, _THREADS), views, half)
         for half in (False, True) for runtime in ('torch', 'openvino')}, _TURNS)
     rates = {name: _OBJECTS * 1e3 / np.array(samples) for name, samples in found.items()}
     return [*(Figure(f'evaluation, {name}', 'objects/s', samples, 0, more_is_better=True)

@@ -4,14 +4,14 @@ Rotations as matrices (3, 3) and as unit quaternions x, y, z, w.
 What scipy.spatial does for many rotations at once; its import is a third of a node's start.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-def matrix_from_quaternion(quaternion: Sequence[float]) -> NDArray[np.float64]:
+def matrix_from_quaternion(quaternion: Iterable[float]) -> NDArray[np.float64]:
     """Return the matrix (3, 3) of a quaternion x, y, z, w other than zero, of any length."""
     x, y, z, w = _normalised(quaternion)
     return np.array([
@@ -60,7 +60,7 @@ def rotation_between(start: NDArray[np.float64], end: NDArray[np.float64],
         math.sin((1 - fraction) * half) * first + math.sin(fraction * half) * last)
 
 
-def _normalised(quaternion: Sequence[float]) -> tuple[float, float, float, float]:
+def _normalised(quaternion: Iterable[float]) -> tuple[float, float, float, float]:
     x, y, z, w = map(float, quaternion)
     length = math.sqrt(x * x + y * y + z * z + w * w)
     return x / length, y / length, z / length, w / length

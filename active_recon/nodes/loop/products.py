@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from threading import Thread
 
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
@@ -21,7 +22,7 @@ from std_srvs.srv import Trigger
 
 _MESHING = ('active_recon.meshes.coloring', 'active_recon.volumes.isosurface',
             'active_recon.volumes.refinement')
-"""What makes meshes: a third of the node's start, and no mesh is asked for before a view."""
+"""What makes meshes, a third of the node's start: imported beside it, before one is asked for."""
 
 
 class Products:
@@ -33,6 +34,8 @@ class Products:
 
     def __init__(self, node: ManagedNode, reconstructor: Reconstructor, frame: str,
                  publish_mesh: bool) -> None:
+        # Not in the node's own thread, in which streams would overflow meanwhile
+        Thread(target=_import_meshing).start()
         self._reconstructor = reconstructor
         self._album = Album()
         self._known: Reconstruction | None = None
@@ -85,8 +88,6 @@ class Products:
         return self._written(output_dir, SUFFIX, 'a state', write, response)
 
     def _take(self, stamp: int, reconstruction: Reconstruction) -> None:
-        for module in _MESHING:  # in the node's own thread, once nothing waits for this view
-            import_module(module)
         self._known = reconstruction
         if self._marker is not None:
             self._marker.publish(stamp, reconstruction.grid, self._reconstructor.threshold,
@@ -108,3 +109,8 @@ class Products:
         else:
             response.success, response.message = True, str(path)
         return response
+
+
+def _import_meshing() -> None:
+    for module in _MESHING:
+        import_module(module)
