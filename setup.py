@@ -6,7 +6,8 @@ import os
 from setuptools import find_packages, setup
 
 NAME = 'active_recon'
-NODES = ('camera', 'reconstructor', 'recorder', 'turntable_camera', 'view_planner', 'viewer')
+NODES = ('camera', 'composed', 'reconstructor', 'recorder', 'turntable_camera', 'view_planner',
+         'viewer')
 EXECUTABLES = {
     'active-recon': f'{NAME}.cli.main', **{node: f'{NAME}.nodes.{node}' for node in NODES}}
 

@@ -9,6 +9,7 @@ import sys
 from benchmarks.bags import replay_figure, report_figure
 from benchmarks.converters import converter_figures
 from benchmarks.core import reconstruct_and_plan, rendering, rendering_of_candidates
+from benchmarks.evaluation import evaluation_figures
 from benchmarks.figures import Figure, reference_ms
 from benchmarks.goal import goal_figures, single_process_figures
 from benchmarks.idle import idle_figure
@@ -22,6 +23,7 @@ RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'benchmarks.json'
 PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'view': lambda: [reconstruct_and_plan()],
     'runtimes': runtime_figures,
+    'evaluation': evaluation_figures,
     'published': published_figures,
     'rendering': lambda: [rendering(1, 400), rendering(2, 100)],
     'candidates': lambda: [rendering_of_candidates(32), rendering_of_candidates(64)],

@@ -77,7 +77,7 @@ def loop_processes(single: bool = False) -> Iterator[NodeProcesses]:
             file = Path(logs, 'loop.yaml')
             file.write_text(json.dumps({f'/**/{node}': {'ros__parameters': parameters}
                                         for node, parameters in LOOP.items()}))
-            nodes.start('composed', {}, arguments=['--params-file', str(file)])
+            nodes.start('composed', {}, arguments=['--params-file', str(file)], names=list(LOOP))
         else:
             for node, parameters in LOOP.items():
                 nodes.start(node, parameters)

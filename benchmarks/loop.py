@@ -36,8 +36,8 @@ def reconstructor_figures() -> list[Figure]:
                 memory_mb = [peak_mb(process)]
     return [
         Figure('image published to occupancy received, p95', 'ms', latency_ms, 50, percentile=95),
-        Figure('reconstructor ready after its start', 's', ready, 3),
-        Figure(f'reconstructor memory, peak over {_VIEWS} views', 'MB', memory_mb, 500)]
+        Figure('reconstructor ready after its start', 's', ready, 0.5),
+        Figure(f'reconstructor memory, peak over {_VIEWS} views', 'MB', memory_mb, 150)]
 
 
 def demo_figure() -> Figure:

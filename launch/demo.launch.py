@@ -15,6 +15,7 @@ ARGUMENTS = {
         PathJoinSubstitution([SHARE, 'config', 'demo.yaml']), 'parameters file of the nodes'),
     'use_sim_time': ('false', 'whether to use the time on /clock'),
     'autostart': ('true', 'whether reconstructor and view planner activate themselves'),
+    'single_process': ('false', 'whether reconstructor and view planner share a process'),
     'log_level': ('info', 'debug, info, warn, error or fatal'),
 }
 

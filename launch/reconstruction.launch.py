@@ -2,7 +2,7 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.conditions import IfCondition
+from launch.conditions import IfCondition, UnlessCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -15,6 +15,7 @@ ARGUMENTS = {
         'parameters file of the nodes'),
     'use_sim_time': ('false', 'whether to use the time on /clock'),
     'autostart': ('true', 'whether the nodes configure and activate themselves'),
+    'single_process': ('false', 'whether reconstructor and view planner share a process'),
     'camera': ('false', 'whether to start the node camera, for a camera without a driver; its '
                'source is in params_file'),
     'record': ('true', 'whether to record a bag'),
@@ -33,19 +34,27 @@ def generate_launch_description():
         'remappings': [('camera/image_raw', value['image']),
                        ('camera/camera_info', value['camera_info']),
                        ('camera/pose', value['pose'])],
-        'arguments': ['--ros-args', '--log-level', value['log_level']],
         'output': 'screen',
     }
+    log_level = ['--ros-args', '--log-level', value['log_level']]
+    apart, together = (condition(value['single_process'])
+                       for condition in (UnlessCondition, IfCondition))
     parameters = [value['params_file'], {
         'use_sim_time': ParameterValue(value['use_sim_time'], value_type=bool)}]
     managed = [*parameters, {'autostart': ParameterValue(value['autostart'], value_type=bool)}]
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),
-        Node(executable='reconstructor', name='reconstructor', parameters=managed, **shared),
-        Node(executable='view_planner', name='view_planner', parameters=managed, **shared),
-        Node(executable='camera', name='camera', parameters=managed,
+        Node(executable='reconstructor', name='reconstructor', parameters=managed,
+             arguments=log_level, condition=apart, **shared),
+        Node(executable='view_planner', name='view_planner', parameters=managed,
+             arguments=log_level, condition=apart, **shared),
+        # Without a name here: it would be that of both nodes
+        Node(executable='composed', parameters=managed,
+             arguments=['reconstructor', 'view_planner', *log_level], condition=together,
+             **shared),
+        Node(executable='camera', name='camera', parameters=managed, arguments=log_level,
              condition=IfCondition(value['camera']), **shared),
-        Node(executable='recorder', name='recorder', parameters=parameters,
+        Node(executable='recorder', name='recorder', parameters=parameters, arguments=log_level,
              condition=IfCondition(value['record']), **shared),
     ])

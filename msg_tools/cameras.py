@@ -8,10 +8,10 @@ begin at the image's corner (the first pixel's centre is 0.5), those of ROS at t
 from active_recon.errors import MessageError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics, OBJECT_FRAME
 from active_recon.geometry.lenses import Distortion, MODELS
+from active_recon.geometry.rotations import matrix_from_quaternion, quaternion_from_matrix
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
@@ -100,14 +100,14 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
     if np.linalg.norm(position) < 1e-6:
         raise MessageError("invalid camera pose: it is at the object's centre", 'pose')
     pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+    pose[:3, :3] = matrix_from_quaternion(quaternion)
     pose[:3, 3] = position
     return pose
 
 
 def pose_to_msg(pose: NDArray[np.float64], header: Header) -> PoseStamped:
     """Return a pose, (4, 4), as a message; the header names the object frame."""
-    x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
+    x, y, z, w = quaternion_from_matrix(pose[:3, :3])
     px, py, pz = pose[:3, 3].tolist()
     return PoseStamped(header=header, pose=Pose(
         position=Point(x=px, y=py, z=pz), orientation=Quaternion(x=x, y=y, z=z, w=w)))

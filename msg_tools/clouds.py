@@ -32,6 +32,8 @@ def cloud_from_msg(msg: PointCloud2, names: Sequence[str]) -> NDArray[np.float32
     row = np.dtype({'names': list(names), 'formats': [f'{order}f4'] * len(names),
                     'offsets': [offsets[name] for name in names], 'itemsize': msg.point_step})
     table = np.frombuffer(msg.data, row, count)
+    if row == np.dtype([(name, '<f4') for name in names]):  # no other fields, in this order
+        return table.view('<f4').reshape(count, len(names))
     return np.column_stack([table[name] for name in names]).astype(np.float32)
 
 

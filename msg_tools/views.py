@@ -9,10 +9,10 @@ from typing import TypeVar
 
 from active_recon.errors import MessageError
 from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.geometry.rotations import rotation_between
 from msg_tools.camera_images import pixels_from_msg, reduced_from_msg, size_from_msg
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
 from sensor_msgs.msg import CompressedImage, Image
 
 _MAX_POSES = 1024  # five seconds of a fast tracker
@@ -219,9 +219,8 @@ class ViewJoiner:
 def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
                  fraction: float) -> NDArray[np.float64]:
     """Return the pose, (4, 4), between two: positions on the line, rotations by slerp."""
-    rotations = Rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
     pose = np.eye(4)
-    pose[:3, :3] = Slerp([0, 1], rotations)(fraction).as_matrix()
+    pose[:3, :3] = rotation_between(start[:3, :3], end[:3, :3], fraction)
     pose[:3, 3] = (1 - fraction) * start[:3, 3] + fraction * end[:3, 3]
     return pose
 

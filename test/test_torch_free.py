@@ -111,6 +111,13 @@ def last_lines(code, *arguments):
     return ended.stdout.splitlines()
 
 
+def test_the_reconstructor_starts_before_what_makes_meshes_is_there():
+    imported, = last_lines(
+        'import sys, active_recon.nodes.reconstructor\n'
+        "print({'scipy.spatial', 'trimesh', 'numpy'} & sys.modules.keys())")
+    assert imported == "{'numpy'}"
+
+
 def test_views_are_reconstructed_and_planned_without_torch():
     pytest.importorskip('openvino')
     *computed_by, with_torch = last_lines(LOOP)

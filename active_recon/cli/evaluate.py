@@ -19,6 +19,7 @@ from active_recon.cli.evaluate_studies import print_baselines, print_latent_swap
 from active_recon.cli.intervals import difference, line, spread
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import Split
+from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 from active_recon.policies import POLICIES
 import typer
@@ -75,6 +76,7 @@ def evaluate(
         help='Mixed precision, bfloat16: half the time; means differ by less than '
              '0.0001.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
+    runtime: MeasuredIn = 'torch',
     cluster: Cluster = None,
     workers: ClusterWorkers = None,
 ) -> None:
@@ -106,7 +108,7 @@ def evaluate(
                           f'{len(named)}')
     torch.set_num_threads(threads)
     plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
-                          split_file, bf16)
+                          split_file, bf16, threads, runtime)
 
     def measure(weights: Path, folder: Path | None, crew: 'Crew | None') -> _Measured:
         bundle, trial, every = plan.prepared(weights, folder, tell=True)

@@ -10,6 +10,7 @@ from active_recon.cli.reading import read_objects
 from active_recon.cluster import Crew
 from active_recon.evaluation.blocks import run_blocks
 from active_recon.evaluation.contenders import contender_names, contenders
+from active_recon.evaluation.exported_network import network_in
 from active_recon.evaluation.trial import Contender, Trial
 from active_recon.models.scorer_weights import policy_module
 from active_recon.models.weights import Bundle, load_weights
@@ -28,6 +29,8 @@ class EvaluationPlan:
     seed: int
     split_file: str | None
     bf16: bool
+    threads: int
+    runtime: str = 'torch'
 
     def prepared(self, weights: Path, cache: Path | None = None, tell: bool = False
                  ) -> tuple[Bundle, Trial, list[Contender]]:
@@ -44,7 +47,8 @@ class EvaluationPlan:
                        err=True)
         every = contenders(self.policies or contender_names(bool(attentions), oracle=False),
                            attentions, count, self.seeds, self.seed, bundle.model)
-        return bundle, Trial(bundle.reconstruction, bundle.threshold, held_out, starts, count,
+        network = network_in(self.runtime, weights, bundle, self.bf16, self.threads)
+        return bundle, Trial(network, bundle.threshold, held_out, starts, count,
                              self.seed, self.bf16, cache), every
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 from active_recon.policies import POLICIES
 import typer
@@ -53,6 +54,7 @@ def policies(
     bf16: Annotated[bool, typer.Option(
         help='Half precision where it is safe: half the time.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+    runtime: MeasuredIn = 'torch',
 ) -> None:
     """
     Measure what choosing views is worth: policies beside chance, a fixed sequence and an oracle.
@@ -75,7 +77,7 @@ def policies(
     import torch
 
     torch.set_num_threads(threads)
-    entrant, *others = load_entrants(model)
+    entrant, *others = load_entrants(model, runtime, bf16, threads)
     if others:
         raise ConfigError(f'model: several networks: expected one, got {model!r}')
     learned = _LEARNED if scorer_path(entrant.path).is_file() else []

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 import typer
 
@@ -61,6 +62,7 @@ def study(
     bf16: Annotated[bool, typer.Option(
         help='Mixed precision, bfloat16: half the time.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
+    runtime: MeasuredIn = 'torch',
 ) -> None:
     """
     Compare networks on the same posed views, by number of views, with 95 % intervals.
@@ -88,7 +90,7 @@ def study(
     torch.set_num_threads(threads)
     plan = Plan(_numbers('counts', counts), _numbers('surfaces', surfaces), seed, bf16)
     extent = Extent(category, objects, disturbed_views, disturbed_objects)
-    entrants = load_entrants(models or _those_that_ship())
+    entrants = load_entrants(models or _those_that_ship(), runtime, bf16, threads)
     if validation is not None:
         if any(validation.resolve() == each.resolve() for each in data or []):
             raise ConfigError('validation: same objects twice: expected other objects than those '

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from active_recon.datasets.views import ViewSet
 from active_recon.environment import run_episode, TimeStep
+from active_recon.evaluation.exported_network import ExportedNetwork
 from active_recon.geometry.cameras import azimuth_difference, pose_azimuths
 from active_recon.models.network import ReconstructionNetwork, State
 from active_recon.policies import Choice, Observation, Policy
@@ -167,11 +168,12 @@ class Observer:
 
     def decode(self, state: State) -> Tensor:
         """Return the logits of occupancy of a state, (B, R, R, R) float32."""
-        # 3D convolutions take two thirds of the time with channels last
-        placed = {name: part.contiguous(memory_format=torch.channels_last_3d)
-                  if part.ndim == 5 else part for name, part in state.items()}
+        if not isinstance(self._network, ExportedNetwork):
+            # torch's 3D convolutions take two thirds of the time with channels last
+            state = {name: part.contiguous(memory_format=torch.channels_last_3d)
+                     if part.ndim == 5 else part for name, part in state.items()}
         with self._precision():
-            return self._network.decode(placed).float()
+            return self._network.decode(state).float()
 
     def occupancy(self, state: State) -> Tensor:
         """Return the occupancy of a state, (B, R, R, R) in [0, 1]."""

@@ -6,6 +6,7 @@ import math
 
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera
+from active_recon.geometry.rotations import matrix_from_quaternion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,8 +44,6 @@ class FixedCamera:
         Both are in the object frame at joint angle 0. Raises ConfigError that names the parameter
         `camera_position` or `camera_orientation`.
         """
-        from scipy.spatial.transform import Rotation  # half of the start of a node without poses
-
         if len(position) != 3 or not np.isfinite(position).all() or not np.any(position):
             raise ConfigError('camera_position: invalid position: expected x, y, z of the camera '
                               'in the object frame, metres, other than 0, 0, 0, got '
@@ -54,7 +53,7 @@ class FixedCamera:
                               f"the optical frame's unit quaternion, got {list(orientation)}; "
                               'active-recon calibrate measures it')
         pose = np.eye(4)
-        pose[:3, :3] = Rotation.from_quat(orientation).as_matrix()
+        pose[:3, :3] = matrix_from_quaternion(orientation)
         pose[:3, 3] = position
         return cls(pose, direction)
 
@@ -65,12 +64,11 @@ class FixedCamera:
         Its azimuth is that at angle 0 minus the object's counter-clockwise rotation. Raises
         ViewError where the angle is not finite.
         """
-        from scipy.spatial.transform import Rotation
-
         if not math.isfinite(angle):
             raise ViewError("invalid joint position: expected a finite angle of the turntable's "
                             f'joint, got {angle}', 'joint')
+        cosine, sine = math.cos(angle), -self.direction * math.sin(angle)
         turn = np.eye(4)
-        turn[:3, :3] = Rotation.from_euler('z', -self.direction * angle).as_matrix()
+        turn[:2, :2] = [[cosine, -sine], [sine, cosine]]
         pose: NDArray[np.float64] = turn @ self.pose_at_zero
         return pose

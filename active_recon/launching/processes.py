@@ -66,10 +66,11 @@ class NodeProcesses:
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, node: str, parameters: Mapping[str, object], namespace: str = '',
-              arguments: Sequence[str] = ()) -> None:
+              arguments: Sequence[str] = (), names: Sequence[str] = ()) -> None:
         """
         Start `active_recon.nodes.<node>` with parameters and further arguments of ROS.
 
+        `names` are its own arguments, before those of ROS: the nodes that `composed` runs.
         In a namespace, for example '/cell_1', it is known here as 'cell_1.<node>'.
         """
         words = [*arguments, *(word for name, value in parameters.items()
@@ -83,7 +84,7 @@ class NodeProcesses:
             output = None if log is None else opened.enter_context(log.open('wb'))
             # In its own session it does not receive the terminal's Ctrl-C: `stop` stops it
             self._running[full_name] = subprocess.Popen(
-                [sys.executable, '-m', f'active_recon.nodes.{node}', '--ros-args', *words],
+                [sys.executable, '-m', f'active_recon.nodes.{node}', *names, '--ros-args', *words],
                 stdin=subprocess.DEVNULL, stdout=output, stderr=output and subprocess.STDOUT,
                 env=self._environment, start_new_session=True)
 

@@ -46,9 +46,11 @@ def run_up(start: Start, say: Callable[[str], None]) -> None:
     say(f'starting {", ".join(names)}; Ctrl-C stops them')
     with (suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked,
           NodeProcesses() as nodes):
-        for name in [*(['composed'] if together else []),
-                     *(name for name in names if name not in together)]:
-            nodes.start(name, {}, namespace, start.arguments())
+        if together:
+            nodes.start('composed', {}, namespace, start.arguments(), together)
+        for name in names:
+            if name not in together:
+                nodes.start(name, {}, namespace, start.arguments())
         while True:
             raise_if_asked()
             nodes.check()

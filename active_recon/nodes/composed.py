@@ -1,17 +1,16 @@
-"""The nodes of a parameters file that can share a process, in one process and one executor."""
+"""Nodes that can share a process, by their names, in one process and one executor."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
-from itertools import pairwise
-from pathlib import Path
 import sys
 
 from active_recon.errors import ConfigError
 from active_recon.nodes.runtime.life_cycle import managed, ManagedNode
 from active_recon.nodes.runtime.run import run_nodes
-from active_recon.parameters.params_file import read_params_file
+from active_recon.nodes.runtime.usage import is_help_wanted
 from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
 
 COMPOSABLE = {'reconstructor': 'ReconstructorNode', 'view_planner': 'ViewPlannerNode',
               'turntable_camera': 'TurntableCameraNode'}
@@ -23,17 +22,21 @@ The recorder, the player and the viewer may not: they would wait for the network
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the composable nodes of the file after `--params-file` until asked to stop."""
+    """Run the composable nodes that the arguments name until asked to stop."""
     given = sys.argv[1:] if args is None else args
+    if is_help_wanted(given):
+        sys.stdout.write(f'usage: composed NODE [NODE ...] [--ros-args ...]\n\n{__doc__}\n\n'
+                         f'nodes: {", ".join(COMPOSABLE)}\n')
+        return
+    run_nodes(lambda: _makers(remove_ros_args(given)), args)
 
-    def makers() -> list[Callable[[], Node]]:
-        files = [Path(file) for option, file in pairwise(given) if option == '--params-file']
-        if len(files) != 1:
-            raise ConfigError('which nodes: expected one --params-file that names them, got '
-                              f'{len(files)}')
-        return [partial(_made, name) for name in read_params_file(files[0]) if name in COMPOSABLE]
 
-    run_nodes(makers, args)
+def _makers(names: Sequence[str]) -> list[Callable[[], Node]]:
+    """Return what makes each of some nodes; raises ConfigError on others or on none."""
+    if not names or len(set(names)) < len(names) or not set(names) <= COMPOSABLE.keys():
+        raise ConfigError(f'which nodes: expected names out of {", ".join(COMPOSABLE)}, each '
+                          f'once, got {", ".join(names) or "none"}')
+    return [partial(_made, name) for name in names]
 
 
 def _made(name: str) -> Node:

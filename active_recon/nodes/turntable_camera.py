@@ -53,9 +53,10 @@ class TurntableCameraNode(QosWarnings):
         self._shown: Shown | None = first
         set_read_only_parameter(self, 'object', first.name, 'name of the first object')
         self._diagnostics = Diagnostics(self)
-        self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM_QOS)
         self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM_QOS)
         self._pose_pub = self.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
+        # Last: who discovers the images has discovered what belongs to them
+        self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM_QOS)
         if params.follows == 'view':
             self.create_subscription(PoseStamped, 'next_view', self._on_view_goal, SENSOR_QOS)
         else:

@@ -15,7 +15,6 @@ from functools import reduce
 from active_recon.policies.sight_lines import cell_lines, image_lines, SightLines
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import entr
 
 RAYS = 16
 _SIDE = 16  # cells a side that lines are drawn through
@@ -65,7 +64,8 @@ def coarse_volume(occupancy: Images, side: int = _SIDE) -> CoarseVolume:
     whole = occupancy.shape[-1]
     cells = next(count for count in range(min(side, whole), 0, -1) if whole % count == 0)
     entropy, doubtful = np.zeros_like(occupancy), (occupancy > 0) & (occupancy < 1)
-    entropy[doubtful] = entr(occupancy[doubtful]) + entr(1 - occupancy[doubtful])
+    full, empty = occupancy[doubtful], 1 - occupancy[doubtful]
+    entropy[doubtful] = -full * np.log(full) - empty * np.log(empty)
     block = whole // cells
     return CoarseVolume(_pooled(occupancy, block, np.maximum),
                         _pooled(entropy, block, np.add) / np.float32(block ** 3))

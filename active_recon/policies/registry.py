@@ -17,7 +17,6 @@ from active_recon.policies.rendered import (
     unseen_entropy,
     visible_entropy,
 )
-from active_recon.policies.scoring import ScoringPolicy
 from active_recon.runtimes import AUTO, load_policy_runtime, PolicyRuntime
 import numpy as np
 
@@ -75,6 +74,8 @@ Of all others it is a ScoringPolicy: of the scorer that `active-recon train-poli
 
 def learned_policy(model: str, runtime: PolicyRuntime) -> Policy:
     """Return the policy of the model that was trained for a network of this name."""
+    from active_recon.policies.scoring import ScoringPolicy  # a third of a command's start
+
     return LEARNED.get(model, ScoringPolicy)(runtime)
 
 

@@ -72,25 +72,37 @@ class ExportedRuntime:
         """Take in an image; see Runtime."""
         seen_from = {'pose': camera.pose[None].astype(np.float32),
                      'intrinsics': camera.intrinsics.matrix[None].astype(np.float32)}
-        encoded = self._encode.run({'image': self._channels(image), **seen_from})
-        found = self._update.run({**encoded, **seen_from, **state})
-        after = {name: found.pop(NEXT + name) for name in self._state}
-        occupancy = self._decode.run({**after, **found})['occupancy']
-        return occupancy[0], after['latent'][0], after
+        planes = image.transpose(2, 0, 1)[None] * np.float32(1 / 255)
+        known = self.update(self.encode(planes, seen_from), seen_from, state)
+        after = {name: known[name] for name in self._state}
+        return self.decode(known)[0], after['latent'][0], after
+
+    def encode(self, planes: NDArray[np.float32], seen_from: Arrays) -> NDArray[np.float32]:
+        """
+        Return the encoding of one image (1, 3 or 4, S, S) in [0, 1].
+
+        `seen_from` is its camera: `pose` (1, 4, 4) and `intrinsics` (1, 3, 3).
+        """
+        wanted = self._encode.inputs['image'][1]
+        if wanted is not None and planes.shape[1] < wanted:  # a missing mask of pixels seen is 1
+            planes = np.pad(planes, ((0, 0), (0, 1), (0, 0), (0, 0)), constant_values=1)
+        return self._encode.run({'image': planes, **seen_from})['encoded']
+
+    def update(self, encoded: NDArray[np.float32], seen_from: Arrays, state: State
+               ) -> dict[str, NDArray[np.float32]]:
+        """Return the next state after an encoded image, and with it what `decode` asks for."""
+        found = self._update.run({'encoded': encoded, **seen_from, **state})
+        return {name.removeprefix(NEXT): array for name, array in found.items()}
+
+    def decode(self, known: State) -> NDArray[np.float32]:
+        """Return the occupancy (1, R, R, R) of what `update` returned."""
+        return self._decode.run(known)['occupancy']
 
     def warm_up(self) -> None:
         """Run once, so that the first view is as fast as the others."""
         camera = orbit_camera(0.0)
         blank = np.zeros((camera.intrinsics.height, camera.intrinsics.width, 3), np.uint8)
         self.step(*network_image(blank, camera, self.spec), self.initial_state())
-
-    def _channels(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Return an image as the graph takes it: a missing mask of pixels seen is 1."""
-        wanted = self._encode.inputs['image'][1]
-        planes = np.ones((1, wanted, *image.shape[:2]), np.float32)
-        planes[0, :image.shape[2]] = image.transpose(2, 0, 1)
-        planes[0, :image.shape[2]] *= np.float32(1 / 255)
-        return planes
 
 
 class ExportedPolicyRuntime:

@@ -1,8 +1,10 @@
 """Exported graphs in OpenVINO, on the CPU; what was compiled is kept for the next start."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+import sys
 from typing import Any
 
 from active_recon.errors import ConfigError, WeightsError
@@ -22,6 +24,8 @@ from active_recon.runtimes.precision import chosen_precision
 import numpy as np
 from numpy.typing import NDArray
 
+_CONVERTER = 'openvino.tools.ovc'
+"""OpenVINO's converter of other formats, which reports home too: two thirds of its import."""
 _LENGTH = 8  # bytes of the length of the metadata in what is kept
 
 
@@ -166,11 +170,25 @@ def _metadata(model: Any) -> str | None:
 @cache
 def _core() -> Any:
     try:
-        import openvino
+        with _without(_CONVERTER):
+            import openvino
     except ImportError as error:
         raise ConfigError('runtime: openvino is not installed: expected it, as `pip install '
                           'openvino` installs it, or the runtime torch') from error
     return openvino.Core()
+
+
+@contextmanager
+def _without(module: str) -> Iterator[None]:
+    """Let an import of a module that was not imported before fail, as if it were not installed."""
+    if module in sys.modules:
+        yield
+        return
+    sys.modules[module] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        del sys.modules[module]
 
 
 def _version() -> str:

@@ -1,6 +1,7 @@
 """The voxel grid: a cube of occupancy probabilities, its measures, and its mesh."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TYPE_CHECKING
 
 from active_recon.errors import DataError
@@ -40,9 +41,8 @@ def entropy(occupancy: Any) -> Any:
 def paper_entropy(occupancy: Any) -> Any:
     """Return -sum(p log p) in nats, the paper's section 4.6: `entropy` without its second term."""
     if isinstance(occupancy, np.ndarray):
-        from scipy.special import xlogy  # slow to import, and not every node needs it
-
-        return -xlogy(occupancy, occupancy).sum((-3, -2, -1))
+        logs = np.log(occupancy, out=np.zeros_like(occupancy), where=occupancy != 0)
+        return -(occupancy * logs).sum((-3, -2, -1))
     return -occupancy.xlogy(occupancy).sum((-3, -2, -1))
 
 
@@ -106,11 +106,10 @@ class VoxelGrid:
 
     def points(self, threshold: float) -> NDArray[np.float32]:
         """Return x, y, z (metres) and occupancy of the cells above the threshold, (N, 4)."""
-        occupied = self.occupied(threshold)
-        index = places(occupied)
-        points = np.empty((len(index), 4), np.float32)
-        points[:, :3] = (index + 0.5) * self.cell_size - self.size / 2
-        points[:, 3] = self.occupancy[occupied]
+        cells = np.flatnonzero(self.occupied(threshold))
+        points = np.empty((len(cells), 4), np.float32)
+        points[:, :3] = _centres(len(self.occupancy), self.size)[cells]
+        points[:, 3] = self.occupancy.ravel()[cells]
         return points
 
     def mesh(self, threshold: float) -> 'trimesh.Trimesh':
@@ -124,6 +123,13 @@ class VoxelGrid:
         if not self.occupied(threshold).any():
             raise DataError(f'no cell is above the threshold {threshold}: there is no surface yet')
         return isosurface(self.occupancy, threshold, self.size)
+
+
+@lru_cache(maxsize=2)  # a grid and its finer one, 3 MB for 64 cells a side
+def _centres(side: int, size: float) -> NDArray[np.float32]:
+    """Return x, y, z (metres) of the cells of a cube, (side ** 3, 3), in their order in memory."""
+    along = ((np.arange(side) + 0.5) * (size / side) - size / 2).astype(np.float32)
+    return np.stack(np.meshgrid(along, along, along, indexing='ij'), axis=-1).reshape(-1, 3)
 
 
 def places(cells: NDArray[np.bool_]) -> NDArray[np.intp]:

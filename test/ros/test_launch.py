@@ -6,6 +6,7 @@ import runpy
 import sys
 from types import ModuleType
 
+from active_recon.nodes.composed import COMPOSABLE
 from active_recon.parameters.declaration import declared
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from active_recon.parameters.recorder import TOPICS
@@ -16,7 +17,7 @@ FILES = ['demo.launch.py', 'reconstruction.launch.py']
 NAMES = {  # what the files import, and from where
     'launch': ['LaunchDescription'],
     'launch.actions': ['DeclareLaunchArgument', 'IncludeLaunchDescription'],
-    'launch.conditions': ['IfCondition'],
+    'launch.conditions': ['IfCondition', 'UnlessCondition'],
     'launch.launch_description_sources': ['PythonLaunchDescriptionSource'],
     'launch.substitutions': ['LaunchConfiguration', 'PathJoinSubstitution'],
     'launch_ros': [],
@@ -62,6 +63,12 @@ def described(monkeypatch):
         str(ROOT / 'launch' / name))['generate_launch_description']()
 
 
+def run_by(node):
+    """Return the names of the nodes that a process runs."""
+    own = node.kwargs['arguments']
+    return own[:own.index('--ros-args')] or [node.kwargs['executable']]
+
+
 def arguments_of(description):
     return {each.args[0]: each.kwargs for each in description.find('DeclareLaunchArgument')}
 
@@ -81,7 +88,8 @@ def test_every_executable_that_is_started_is_installed(described, name):
     for node in nodes:
         assert node.kwargs['package'] == 'active_recon'
         assert f"'{node.kwargs['executable']}'" in installed
-        assert node.kwargs['name'] == node.kwargs['executable']
+        # A name would be that of all the nodes in a composed process
+        assert node.kwargs.get('name', 'composed') == node.kwargs['executable']
 
 
 @pytest.mark.parametrize('name', FILES)
@@ -107,10 +115,27 @@ def test_every_file_that_is_named_exists_and_is_installed(described, name):
 @pytest.mark.parametrize('name', FILES)
 def test_every_parameter_that_is_set_is_one_of_its_node(described, name):
     for node in described(name).find('Node'):
-        known = {each.name for each in declared(NODE_PARAMETERS[node.kwargs['executable']])}
-        for parameters in node.kwargs['parameters']:
-            if isinstance(parameters, dict):
-                assert parameters.keys() <= known | {'use_sim_time'}
+        for name in run_by(node):
+            known = {each.name for each in declared(NODE_PARAMETERS[name])}
+            for parameters in node.kwargs['parameters']:
+                if isinstance(parameters, dict):
+                    assert parameters.keys() <= known | {'use_sim_time'}
+
+
+def test_what_shares_a_process_is_what_would_have_processes_apart(described):
+    conditions = {}
+    for node in described('reconstruction.launch.py').find('Node'):
+        condition = node.kwargs['condition']
+        assert isinstance(condition, Made)
+        of, = (each.args[0] for each in condition.find('LaunchConfiguration'))
+        conditions.setdefault((of, type(condition).__name__), []).append(node)
+    apart, (together,) = (conditions['single_process', kind]
+                          for kind in ('UnlessCondition', 'IfCondition'))
+    assert run_by(together) == [name for node in apart for name in run_by(node)]
+    assert set(run_by(together)) <= COMPOSABLE.keys()
+    for node in apart:
+        for given in ('package', 'namespace', 'remappings', 'parameters', 'output'):
+            assert node.kwargs[given] is together.kwargs[given]
 
 
 @pytest.mark.parametrize('name', FILES)

@@ -1,12 +1,16 @@
 """A node that cannot start says why in one line, with what was expected, and ends."""
 
 import re
+import subprocess
+import sys
 
 from active_recon.models.weights_files import SHIPPED
 import numpy as np
 import pytest
 from safetensors.numpy import save_file
 import trimesh
+
+from .processes import ROOT
 
 pytestmark = pytest.mark.ros
 
@@ -37,6 +41,17 @@ def refusal(start_node, name, **parameters):
 ])
 def test_a_parameter_out_of_range_is_refused_with_its_range(start_node, name, parameters, said):
     assert re.search(f'parameters? {said}', refusal(start_node, name, **parameters))
+
+
+@pytest.mark.parametrize('named', [(), ('recorder',), ('view_planner', 'view_planner')])
+def test_nodes_that_cannot_share_a_process_are_refused_by_name(ros_domain, named):
+    ended = subprocess.run(
+        [sys.executable, '-m', 'active_recon.nodes.composed', *named, '--ros-args', '--log-level',
+         'info'], cwd=ROOT, capture_output=True, text=True)
+    assert ended.returncode == 1
+    line, = ended.stderr.splitlines()
+    assert line.endswith('which nodes: expected names out of reconstructor, view_planner, '
+                         f'turntable_camera, each once, got {", ".join(named) or "none"}')
 
 
 def missing_weights(folder):

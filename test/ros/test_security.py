@@ -19,7 +19,8 @@ from .processes import ROOT
 
 pytestmark = pytest.mark.ros
 POLICIES = ROOT / 'security' / 'policies.xml'
-NODES = {path.name for path in (ROOT / 'scripts').iterdir() if path.name != 'active-recon'}
+NODES = {path.name for path in (ROOT / 'scripts').iterdir()
+         if path.name not in ('active-recon', 'composed')}
 
 
 def test_the_policies_name_what_the_live_nodes_have_and_no_more():

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 from active_recon.errors import DataError
@@ -150,6 +151,7 @@ class _NoAliases(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
+@lru_cache(maxsize=256)  # a bag is read several times, and most channels say the same
 def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
     """
     Return the profiles in the metadata of an MCAP channel; unknown ones are left out.

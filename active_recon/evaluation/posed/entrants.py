@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from active_recon.errors import ConfigError
+from active_recon.evaluation.exported_network import network_in
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import find_weights, weights_hash
@@ -44,12 +45,13 @@ class Entrant:
         return tuple(side for side in SIDES if own in (side, 2 * side, 4 * side))
 
 
-def load_entrants(models: str) -> list[Entrant]:
+def load_entrants(models: str, runtime: str = 'torch', bfloat16: bool = False,
+                  threads: int = 2) -> list[Entrant]:
     """
     Load networks named `MODEL,MODEL,...`: each a model that ships, a file, or `NAME=FILE`.
 
-    Raises ConfigError on an empty list or where two have the same name, WeightsError where
-    weights are missing.
+    For what runs them see `network_in`, which raises too. Raises ConfigError on an empty list or
+    where two have the same name, WeightsError where weights are missing.
     """
     entrants: list[Entrant] = []
     for asked in filter(None, (part.strip() for part in models.split(','))):
@@ -60,7 +62,8 @@ def load_entrants(models: str) -> list[Entrant]:
         if any(other.name == name for other in entrants):
             raise ConfigError('models: ambiguous name: expected a different name for each, got '
                               f'{name!r} twice; name one as NAME=FILE')
-        entrants.append(Entrant(name, bundle.reconstruction, dict.fromkeys(
+        network = network_in(runtime, path, bundle, bfloat16, threads)
+        entrants.append(Entrant(name, network, dict.fromkeys(
             SIDES, bundle.threshold), weights=weights_hash(path), path=path))
     if not entrants:
         raise ConfigError('models: empty list: expected one or more, separated by commas, got '

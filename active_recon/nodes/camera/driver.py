@@ -36,8 +36,9 @@ class CameraNode(ManagedNode):
         self._opened = self._open()
         self.add_cleanup(self._give_back)
         self._diagnostics.measure_rates('images')
-        self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM_QOS)
         self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM_QOS)
+        # Last: who discovers the images has discovered what belongs to them
+        self._image_pub = self.create_publisher(Image, 'camera/image_raw', STREAM_QOS)
         width, height = self._opened.size
         self.get_logger().info(f'{self._opened.name}: {width} x {height} pixels')
         if self._lens is None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from active_recon.errors import DataError
-from active_recon.meshes.coloring import colored
 from active_recon.meshes.photos import Photo
 from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.life_cycle import ManagedNode
@@ -74,6 +73,8 @@ class MeshPublisher:
 
 def _marker(shape: _Shape) -> Marker | None:
     """Return the surface of a shape, None where it has none yet."""
+    from active_recon.meshes.coloring import colored  # see Products
+
     try:
         mesh = colored(shape.grid.mesh(shape.threshold), shape.photos)
     except DataError:

@@ -1,11 +1,12 @@
 """What comes out of an episode: its coloured mesh, in files and as a Marker, and its state."""
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
-from active_recon.meshes.coloring import colored
 from active_recon.meshes.files import write_mesh
 from active_recon.meshes.photos import Album, Photo
 from active_recon.nodes.loop.mesh_publisher import MeshPublisher
@@ -14,11 +15,14 @@ from active_recon.nodes.runtime.output import output_path
 from active_recon.nodes.runtime.run import one_line
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.saved_states import SavedState, SUFFIX, write_state
-from active_recon.volumes.refinement import refined_mesh
 from msg_tools.episodes import Episode
 import numpy as np
 from numpy.typing import NDArray
 from std_srvs.srv import Trigger
+
+_MESHING = ('active_recon.meshes.coloring', 'active_recon.volumes.isosurface',
+            'active_recon.volumes.refinement')
+"""What makes meshes, a third of the node's start: imported beside it, before one is asked for."""
 
 
 class Products:
@@ -30,6 +34,8 @@ class Products:
 
     def __init__(self, node: ManagedNode, reconstructor: Reconstructor, frame: str,
                  publish_mesh: bool) -> None:
+        # Not in the node's own thread, in which streams would overflow meanwhile
+        Thread(target=_import_meshing).start()
         self._reconstructor = reconstructor
         self._album = Album()
         self._known: Reconstruction | None = None
@@ -64,6 +70,9 @@ class Products:
                   response: Trigger.Response) -> Trigger.Response:
         """Write the coloured mesh; answer with its path, or why it was not written."""
         def write(path: Path, known: Reconstruction) -> None:
+            from active_recon.meshes.coloring import colored
+            from active_recon.volumes.refinement import refined_mesh
+
             mesh = refined_mesh(known.grid, self._reconstructor.threshold)
             write_mesh(colored(mesh, self._album.photos), path)
 
@@ -100,3 +109,8 @@ class Products:
         else:
             response.success, response.message = True, str(path)
         return response
+
+
+def _import_meshing() -> None:
+    for module in _MESHING:
+        import_module(module)
