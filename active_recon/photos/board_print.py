@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 UNIFORM = -3 * float(np.log(256))
 """Logarithm of the density of a colour, 1 / grey level^3, of which nothing is known."""
 _PIXELS_PER_MM = 2.0
+_SAMPLES = 2  # of the print in each direction of a pixel
 _TOLERATED = (0.35, 0.2, 0.12)  # of the difference of paper and ink, in each round of the fit
 _NEXT = np.ones((3, 3), np.uint8)
 _SQUARES = (0.05, 0.95)  # print below and above which a pixel is ink or paper alone
@@ -122,8 +123,14 @@ def _optical_rays(lens: Intrinsics) -> NDArray[np.float64]:
 
 
 def _printed(camera: Camera, board: Board) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return the board's print in [0, 1] as a camera sees it, (H, W), and where it is."""
-    rays = _optical_rays(camera.intrinsics) @ camera.pose[:3, :3].T
+    """
+    Return the board's print in [0, 1] as a camera sees it, (H, W), and where it is.
+
+    Pixels on the board's rim, which also show what is beside it, are not there.
+    """
+    lens = camera.intrinsics
+    finer = lens.resized(_SAMPLES * lens.width, _SAMPLES * lens.height)
+    rays = _optical_rays(finer) @ camera.pose[:3, :3].T
     with np.errstate(divide='ignore', invalid='ignore'):
         away = np.where(rays[..., 2] < 0, -camera.position[2] / rays[..., 2], np.nan)
         x = camera.position[0] + away * rays[..., 0]
@@ -133,4 +140,9 @@ def _printed(camera: Camera, board: Board) -> tuple[NDArray[np.float32], NDArray
     drawn = cv2.GaussianBlur(board.drawn(_PIXELS_PER_MM), (0, 0), 1.0).astype(np.float32) / 255
     scale = drawn.shape[1] / wide
     across, down = (np.where(there, axis * scale - 0.5, -1).astype(np.float32) for axis in (x, y))
-    return np.asarray(cv2.remap(drawn, across, down, cv2.INTER_LINEAR), np.float32), there
+    fine = cv2.remap(drawn, across, down, cv2.INTER_LINEAR)
+    size = lens.width, lens.height
+    whole = cv2.resize(there.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 1 - 1e-3
+    known = cv2.erode(whole.astype(np.uint8), _NEXT, borderValue=1) > 0
+    return (np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.float32),
+            np.asarray(known))

@@ -34,8 +34,8 @@ _BEYOND = 0.3  # weight of a photo for a cell that it shows beyond the board
 _OTHER_COLORS = 0.3
 _EDGE = 18.0  # difference of neighbours, grey levels
 _TIES = 3.0  # of neighbours without an edge, relative to a pixel's own witnesses
-_FEWEST = 500
-_NEXT = np.ones((3, 3), np.uint8)
+_FEWEST = 500  # pixels that tell the colours of the rest
+_LEAST_COVERED = 0.005  # of the board in all photos; less is dust and noise
 Logits = NDArray[np.float64]
 
 
@@ -67,8 +67,11 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
     outside = [~photo.known & ~place.outline for photo, place in zip(photos, places, strict=True)]
     if sum(int(part.sum()) for part in outside) < _FEWEST:
         outside = [~photo.known for photo in photos]
-    own = _by_color(photos, [cv2.erode(part.astype(np.uint8), _NEXT) > 0 for part in sure],
-                    outside)
+    if sum(int(part.sum()) for part in sure) < _LEAST_COVERED * sum(
+            int(photo.known.sum()) for photo in photos):
+        return ([np.zeros(photo.known.shape, np.float32) for photo in photos],
+                np.zeros((CELLS,) * 3, np.bool_))
+    own = _by_color(photos, sure, outside)
     others: list[Logits] = [np.zeros(photo.known.shape) for photo in photos]
     for _ in range(_ROUNDS):
         found = [_smooth(photo, np.where(place.outline, mine + theirs, _EXCLUDED), place.box)
