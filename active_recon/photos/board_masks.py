@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_COARSE_SIDES = (180, 240)  # of the photos in which the cube is searched, longer side, pixels
-_FINE_SIDE = 360
+_COARSE_SIDES = (240, 300)  # of the photos in which the cube is searched, longer side, pixels
+_FINE_SIDE = 400
 _COARSE_SHARE = 0.3  # of the photos that have to show a cell as the object while it is searched
 _FINE_SHARE = 0.6
 _OF_BOARD = 1.2

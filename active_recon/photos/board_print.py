@@ -18,6 +18,8 @@ _NEXT = np.ones((3, 3), np.uint8)
 _SQUARES = (0.05, 0.95)  # print below and above which a pixel is ink or paper alone
 _SHADOW = 0.6  # of the light that a shadow leaves on the paper, at least
 _BRIGHTER = 1.05
+_ON_INK = 0.35  # tolerance on ink relative to that on paper: light changes it less
+_UNCOVERED = 20  # percent of ink and of paper that an object leaves free, at least
 _ASIDE = (0.15, 0.6)  # pixels by which the print may be aside or blurred
 _LEAST_NOISE = 2.0  # grey levels
 _UNEVEN = 0.04  # of the expected brightness
@@ -98,12 +100,15 @@ def _light(image: NDArray[np.float32], printed: NDArray[np.float32], known: NDAr
     inks, papers = np.empty_like(image), np.empty_like(image)
     for channel in range(3):
         shown = image[..., channel]
-        first, last = (float(np.median(shown[part])) if part.any() else level for part, level in (
-            (known & (printed < _SQUARES[0]), 0.0), (known & (printed > _SQUARES[1]), 255.0)))
+        first, last = (float(np.percentile(shown[part], rank)) if part.any() else level
+                       for part, rank, level in (
+                           (known & (printed < _SQUARES[0]), _UNCOVERED, 0.0),
+                           (known & (printed > _SQUARES[1]), 100 - _UNCOVERED, 255.0)))
+        tolerated = (_ON_INK + (1 - _ON_INK) * printed) * max(last - first, 1.0)
         inks[..., channel], papers[..., channel] = first, last
         expected = first + printed * (last - first)
         for share in _TOLERATED:
-            fitting = known & (np.abs(shown - expected) < share * max(last - first, 1.0))
+            fitting = known & (np.abs(shown - expected) < share * tolerated)
             if fitting.sum() > 2 * terms.shape[-1]:
                 weights = np.linalg.lstsq(terms[fitting], shown[fitting], rcond=None)[0]
                 expected = terms @ weights

@@ -41,14 +41,21 @@ Logits = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where a photo shows the cells of a cube: their pixels, the cube's outline and its box."""
+    """
+    Where a photo shows a cube and its cells.
+
+    - down, across: the pixel of each cell's centre, (S^3,); shown: whether the photo has it
+    - outline: (H, W) bool, the cells that may be occupied; box: around the cube's outline
+    - closed: a disc that closes the gaps between centres; touched: one of the size of a cell
+    """
 
     down: NDArray[np.intp]
     across: NDArray[np.intp]
     shown: NDArray[np.bool_]
     outline: NDArray[np.bool_]
     box: tuple[slice, slice]
-    disc: NDArray[np.uint8]
+    closed: NDArray[np.uint8]
+    touched: NDArray[np.uint8]
 
 
 def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
@@ -96,17 +103,18 @@ def _place(camera: Camera, above: NDArray[np.bool_]) -> _Place:
     at = np.nan_to_num(np.floor(pixels), nan=-1)
     shown = (above & (depth > 0) & ((at >= 0) & (at < [lens.width, lens.height])).all(axis=1))
     across, down = np.where(shown[:, None], at, 0).astype(np.intp).T
-    reach = int(np.ceil(lens.fx / camera.distance / CELLS))
-    disc = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2))
+    cell = lens.fx / camera.distance / CELLS  # pixels
+    closed, touched = (np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2))
+                       for reach in (int(np.ceil(cell)), round(cell / 2)))
     drawn = np.zeros((lens.height, lens.width), np.uint8)
     drawn[down[shown], across[shown]] = 1
-    outline = cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, disc) > 0
+    outline = cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, closed) > 0
     corners, _ = camera.project(cube_corners())
     first, last = corners.min(axis=0) - 2, corners.max(axis=0) + 2
     left, top = np.clip(first, 0, [lens.width - 1, lens.height - 1]).astype(int)
     right, bottom = np.clip(last, [left + 1, top + 1], [lens.width, lens.height]).astype(int)
     return _Place(down, across, shown, np.asarray(outline),
-                  (slice(top, bottom), slice(left, right)), disc)
+                  (slice(top, bottom), slice(left, right)), closed, touched)
 
 
 def _by_color(photos: Sequence[SeenBoard], inside: Sequence[NDArray[np.bool_]],
@@ -140,8 +148,8 @@ def _bins(colors: NDArray[np.float32]) -> NDArray[np.intp]:
 
 
 def _votes(photo: SeenBoard, place: _Place, share: NDArray[np.float32]) -> Logits:
-    """Return the log odds by one photo that cells are the object, (S^3,)."""
-    shown = share[place.down, place.across]
+    """Return the log odds by one photo that the object touches cells, (S^3,)."""
+    shown = cv2.dilate(share, place.touched)[place.down, place.across]
     odds = np.log((_SEEN * shown + (1 - _SEEN) * (1 - shown))
                   / (_ELSEWHERE * shown + (1 - _ELSEWHERE) * (1 - shown)))
     weight = np.where(photo.known[place.down, place.across], 1.0, _BEYOND)
@@ -153,7 +161,7 @@ def _along_rays(odds: Logits, place: _Place, shape: tuple[int, ...]) -> Logits:
     drawn = np.full(shape, _EXCLUDED, np.float32)
     np.maximum.at(drawn, (place.down[place.shown], place.across[place.shown]),
                   np.clip(odds[place.shown], _EXCLUDED, 0).astype(np.float32))
-    return np.asarray(cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, place.disc), np.float64)
+    return np.asarray(cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, place.closed), np.float64)
 
 
 def _smooth(photo: SeenBoard, logits: Logits, box: tuple[slice, slice]) -> NDArray[np.float32]:
