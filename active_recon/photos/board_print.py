@@ -21,6 +21,7 @@ _BRIGHTER = 1.05
 _ON_INK = 0.35  # tolerance on ink relative to that on paper: light changes it less
 _UNCOVERED = 20  # percent of ink and of paper that an object leaves free, at least
 _ASIDE = (0.15, 0.6)  # pixels by which the print may be aside or blurred
+_BLURS = (0.5, 0.8, 1.2, 1.8)  # pixels, of photos that are not sharp
 _LEAST_NOISE = 2.0  # grey levels
 _UNEVEN = 0.04  # of the expected brightness
 _OTHER = 0.02  # share of the board's pixels that look like anything: dust, glare
@@ -63,13 +64,14 @@ def seen_board(image: NDArray[np.uint8], camera: Camera, board: Board, side: int
         none = np.zeros((rows, columns), np.float32)
         return SeenBoard(camera, small, small, known, small, none)
     ink, paper = _light(small, printed, known)
+    edges = known & (_steps(printed) > _TOLERATED[0])
+    printed = _as_sharp(printed, small, ink, paper, edges)
     expected = ink + printed[..., None] * (paper - ink)
     flat = known & (_steps(printed) < 1 - _SQUARES[1])
     noise = [max(_LEAST_NOISE, 1.48 * float(np.median(values))) if len(values) else _LEAST_NOISE
              for values in np.abs(small - expected)[flat].T]
     apart = _apart(small, ink, expected)
     step = np.stack([_steps(channel) for channel in np.moveaxis(expected, -1, 0)], axis=-1)
-    edges = known & (_steps(printed) > _TOLERATED[0])
     aside = np.median((np.abs(apart) / np.maximum(step, 1)).max(-1)[edges]) if edges.any() else 0
     variance = (np.array(noise) ** 2 + (np.clip(1.5 * aside, *_ASIDE) * step) ** 2
                 + (_UNEVEN * expected) ** 2)
@@ -78,6 +80,17 @@ def seen_board(image: NDArray[np.uint8], camera: Camera, board: Board, side: int
     even = np.clip(small * _WHITE / np.maximum(np.median(paper[known], axis=0), 1), 0, 255)
     return SeenBoard(camera, small, even.astype(np.float32), known,
                      expected.astype(np.float32), np.where(known, fit, 0).astype(np.float32))
+
+
+def _as_sharp(printed: NDArray[np.float32], image: NDArray[np.float32], ink: NDArray[np.float32],
+              paper: NDArray[np.float32], edges: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return the print, (H, W), blurred as the image fits it best at the edges of squares."""
+    if not edges.any():
+        return printed
+    blurred = [printed, *(cv2.GaussianBlur(printed, (0, 0), sigma) for sigma in _BLURS)]
+    apart = [float(np.median(np.abs(image - ink - each[..., None] * (paper - ink))[edges]))
+             for each in blurred]
+    return np.asarray(blurred[int(np.argmin(apart))], np.float32)
 
 
 def _apart(image: NDArray[np.float32], ink: NDArray[np.float32], expected: NDArray[np.float32]
