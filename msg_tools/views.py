@@ -35,7 +35,7 @@ class View:
     image_msg: Image | CompressedImage
     camera: Camera
     mask: Image | None = None
-    depth: Image | None = None
+    depth: Image | CompressedImage | None = None
 
     @cached_property
     def image(self) -> NDArray[np.uint8]:
@@ -94,7 +94,7 @@ class ViewJoiner:
         self._images: deque[_WaitingImage] = deque()
         self._intrinsics: deque[tuple[int, Intrinsics]] = deque(maxlen=_MAX_INFOS)
         self._masks: deque[tuple[int, Image]] = deque(maxlen=_MAX_WAITING)
-        self._depths: deque[tuple[int, Image]] = deque(maxlen=_MAX_WAITING)
+        self._depths: deque[tuple[int, Image | CompressedImage]] = deque(maxlen=_MAX_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
 
     def add_image(self, stamp: int, msg: Image | CompressedImage, now: float) -> None:
@@ -123,7 +123,7 @@ class ViewJoiner:
         if stamp >= self._earliest:
             self._masks.append((stamp, mask))
 
-    def add_depth(self, stamp: int, depth: Image) -> None:
+    def add_depth(self, stamp: int, depth: Image | CompressedImage) -> None:
         """Add a depth image message."""
         if stamp >= self._earliest:
             self._depths.append((stamp, depth))

@@ -3,6 +3,7 @@
 from array import array
 from dataclasses import replace
 import math
+import struct
 
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun, RecordedView
@@ -16,12 +17,13 @@ from active_recon.photos.readers import read_cameras
 from active_recon.photos.views import load_views
 from active_recon.volumes.depth_images import DepthImage
 import cv2
+from msg_tools.compressed_depth import depth_to_compressed_msg, metres_from_msg
 from msg_tools.images import depth_from_msg, depth_to_msg, image_to_msg
 from msg_tools.views import ViewJoiner
 import numpy as np
 from photo_rigs import blank_photos, PINHOLE, rig, transforms, write_transforms
 import pytest
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 MS = 1_000_000
@@ -195,3 +197,66 @@ def test_a_depth_camera_s_own_info_is_its_lens_at_the_pose_of_the_image(tmp_path
     view, = run_with_depth(tmp_path / 'own', [DepthImage(BAG_DEPTH[:48, :64], own)])
     assert view.depth.camera.intrinsics == own.intrinsics
     np.testing.assert_allclose(view.depth.camera.pose, camera.pose, atol=1e-9)
+
+
+def in_compressed_depth(metres, near=1.0, far=5.0):
+    """Return depth as compressed_depth_image_transport writes 32FC1: rint(A / metres + B)."""
+    scale = near * (near + 1)
+    offset = 1 - scale / far
+    values = np.where(metres > 0, np.rint(scale / np.where(metres > 0, metres, 1) + offset), 0)
+    packed = cv2.imencode('.png', values.astype(np.uint16))[1].tobytes()
+    return CompressedImage(format='32FC1; compressedDepth png', data=array(
+        'B', struct.pack('<iff', 1, scale, offset) + packed))
+
+
+def test_compressed_depth_comes_back_to_the_millimetre_and_so_does_its_absence():
+    metres = METRES.copy()
+    metres[0, :4] = math.nan, math.inf, 0, 70
+    msg = depth_to_compressed_msg(metres, Header(frame_id='camera'))
+    assert msg.header.frame_id == 'camera' and msg.format == '16UC1; compressedDepth png'
+    expected = metres.copy()
+    expected[0, :4] = 0
+    np.testing.assert_allclose(metres_from_msg(msg), expected, atol=0.0005 + 1e-6)
+    np.testing.assert_array_equal(  # what it has lost is lost once
+        metres_from_msg(depth_to_compressed_msg(metres_from_msg(msg), msg.header)),
+        metres_from_msg(msg))
+
+
+def test_floats_come_back_within_half_a_step_of_their_inverse():
+    near = 30.0
+    metres = METRES.copy()
+    metres[0, 0] = 0
+    found = metres_from_msg(in_compressed_depth(metres, near))
+    assert found[0, 0] == 0
+    there = metres > 0
+    scale = near * (near + 1)
+    assert (np.abs(1 / found[there] - 1 / metres[there]) <= 0.5 / scale + 1e-6).all()
+
+
+def test_either_message_gives_the_same_metres():
+    raw = in_millimetres(METRES)
+    np.testing.assert_array_equal(metres_from_msg(raw), metres_from_msg(
+        depth_to_compressed_msg(depth_from_msg(raw), Header())))
+
+
+@pytest.mark.parametrize(('change', 'said'), [
+    ({'format': '16UC1; compressedDepth rvl'}, 'set png as the format of its publisher'),
+    ({'format': 'rgb8; jpeg compressed bgr8'}, 'unknown compressed depth: expected'),
+    ({'data': array('B', b'short')}, 'unreadable: expected a header of 12 bytes'),
+    ({'data': array('B', bytes(12) + b'\x89PNG\r\n\x1a\n' + bytes(40))}, 'of 16 bits'),
+    ({'data': array('B', bytes(12) + b'\x89PNG\r\n\x1a\n' + bytes(8) + b'\xff' * 8)}, 'too large'),
+    ({'data': array('B', bytes(12) + cv2.imencode('.png', np.zeros((2, 2), np.uint8))[1].tobytes()
+                    )}, '16 bits and one channel')])
+def test_other_compressed_messages_are_no_depth(change, said):
+    msg = depth_to_compressed_msg(METRES, Header())
+    for name, value in change.items():
+        setattr(msg, name, value)
+    with pytest.raises(MessageError, match=said):
+        metres_from_msg(msg)
+
+
+def test_floats_without_their_scale_are_no_depth():
+    msg = in_compressed_depth(METRES)
+    msg.data = array('B', bytes(12) + bytes(msg.data)[12:])
+    with pytest.raises(MessageError, match='without its scale'):
+        metres_from_msg(msg)

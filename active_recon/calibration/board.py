@@ -17,6 +17,8 @@ DICTIONARIES = tuple(sorted(name.removeprefix('DICT_').lower() for name in dir(c
 PIXELS_PER_MM = 12
 _MARGIN = 0.5  # white margin of the printed board, in squares
 _FEWEST_CORNERS = 6
+_ENOUGH_CORNERS = 12  # below, corners beside a single marker are taken as well
+_ASIDE = 0.01  # of the image's longer side: farther from the others' plane a corner is another's
 _SIDE = 60  # side of a square that the detector reliably finds, pixels
 
 
@@ -120,6 +122,8 @@ class Board:
             raise DataError(f'{name}: another board: expected one of {self.columns} x {self.rows} '
                             f'squares with markers 0 to {known - 1}, got marker '
                             f'{max(unknown)}; give the number of squares by --squares')
+        if markers is not None and (ids is None or len(ids) < _ENOUGH_CORNERS):
+            corners, ids = self._beside_one_marker(image)
         if ids is None or len(ids) < _FEWEST_CORNERS:
             return None
         ids = np.asarray(ids).ravel()
@@ -128,6 +132,21 @@ class Board:
         return Detection(name, self.corners[ids],
                          np.asarray(corners, np.float64).reshape(-1, 2) + self._first_pixel,
                          (image.shape[1], image.shape[0]))
+
+    def _beside_one_marker(self, image: NDArray[np.uint8]
+                           ) -> tuple[NDArray[np.float32] | None, NDArray[np.int32] | None]:
+        """Return corners and ids where an object covers most of the board, None without any."""
+        lenient = cv2.aruco.CharucoParameters()
+        lenient.minMarkers = 1
+        corners, ids, *_ = cv2.aruco.CharucoDetector(self._charuco, lenient).detectBoard(image)
+        if ids is None or len(ids) < _FEWEST_CORNERS:
+            return None, None
+        places = self.corners[np.ravel(ids), :2]
+        _, fitting = cv2.findHomography(places, np.asarray(corners, np.float64).reshape(-1, 2),
+                                        cv2.RANSAC, _ASIDE * max(image.shape[:2]))
+        kept = np.ravel(fitting).astype(np.bool_) if fitting is not None else np.zeros(
+            len(places), np.bool_)
+        return np.asarray(corners)[kept], np.asarray(ids)[kept]
 
 
 @dataclass(frozen=True, eq=False)

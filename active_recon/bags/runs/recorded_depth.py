@@ -6,16 +6,22 @@ from typing import Any
 
 from active_recon.bags.runs.run import RecordedEpisode
 from active_recon.bags.storage.bag import Bag
-from active_recon.bags.storage.message_types import CAMERA_INFO, IMAGE, read_message
+from active_recon.bags.storage.message_types import (
+    CAMERA_INFO,
+    COMPRESSED_IMAGE,
+    IMAGE,
+    read_message,
+)
 from active_recon.errors import DataError, MessageError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.parameters.reconstructor import ReconstructorParameters
 from active_recon.volumes.depth_images import DepthImage
 from msg_tools.cameras import intrinsics_from_msg
-from msg_tools.images import depth_from_msg
+from msg_tools.compressed_depth import metres_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 
 DEPTH_ROLE, DEPTH_INFO_ROLE = 'camera/depth/image_raw', 'camera/depth/camera_info'
+_COMPRESSED = '/compressedDepth'
 
 
 def with_depth(episodes: Sequence[RecordedEpisode], bag: Bag, namespace: str,
@@ -42,8 +48,9 @@ def _nearest(bag: Bag, topics: Sequence[str], cameras: Mapping[int, Camera],
     nearest: dict[int, tuple[int, Any]] = {}
     lens: Intrinsics | None = None
     depth, info = topics
-    for message in bag.messages({depth, info}):
-        wanted = IMAGE if message.topic == depth else CAMERA_INFO
+    kinds = {depth: IMAGE, f'{depth}{_COMPRESSED}': COMPRESSED_IMAGE, info: CAMERA_INFO}
+    for message in bag.messages(set(kinds)):
+        wanted = kinds[message.topic]
         if message.type_name != wanted:
             raise DataError(f'{message.topic}: not the type of a depth camera: expected {wanted}, '
                             f'got {message.type_name}', 'topics')
@@ -60,7 +67,7 @@ def _nearest(bag: Bag, topics: Sequence[str], cameras: Mapping[int, Camera],
     for stamp, (_, msg) in nearest.items():
         camera = cameras[stamp]
         try:
-            found[stamp] = DepthImage(depth_from_msg(msg),
+            found[stamp] = DepthImage(metres_from_msg(msg),
                                       camera if lens is None else Camera(camera.pose, lens))
         except MessageError:
             continue

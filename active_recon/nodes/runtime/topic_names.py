@@ -5,7 +5,8 @@ from collections.abc import Iterable, Mapping
 from active_recon.nodes.runtime.parameters import set_read_only_parameter
 from rclpy.node import Node
 
-TRANSPORT_SUFFIXES = {'camera/image_raw': ('', '/compressed')}
+TRANSPORT_SUFFIXES = {'camera/image_raw': ('', '/compressed'),
+                      'camera/depth/image_raw': ('', '/compressedDepth')}
 """Suffixes of the topics that carry the same images, one for each transport."""
 NAMES = 'names'
 """The parameter: a list of NAME:=TOPIC, the node's own name and the full name."""
