@@ -106,7 +106,8 @@ def test_what_stands_out_beyond_the_board_is_found(mesh):
     found, _, cube = board_views(views_of(images, low), BOARD, None)
     beyond = [mask & ~seen_board(image, camera, BOARD, 640).known
               for image, mask, camera in zip(images, masks, low, strict=True)]
-    assert np.mean([part.sum() / mask.sum() for part, mask in zip(beyond, masks)]) > 0.1
+    assert np.mean([part.sum() / mask.sum()
+                    for part, mask in zip(beyond, masks, strict=True)]) > 0.1
     assert np.mean([iou(view.mask[None], true[None])
                     for view, true in zip(found, masks, strict=True)]) > 0.85
     assert 0.95 * SIZE < cube.side < 1.4 * SIZE
