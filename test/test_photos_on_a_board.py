@@ -55,7 +55,7 @@ def test_the_print_fits_where_the_board_is_seen_and_not_where_the_object_is(take
         seen = seen_board(image, camera, BOARD, max(image.shape))
         covered = seen.known & (seen.fit < UNIFORM)
         there = seen.known & mask
-        assert (covered & there).sum() > 0.85 * there.sum()
+        assert (covered & there).sum() > 0.8 * there.sum()
         assert (covered & ~mask).sum() < 0.05 * there.sum()
 
 
@@ -91,8 +91,8 @@ def test_a_mask_never_leaves_the_projected_cube(taken, cameras):
 def test_an_object_of_the_colour_of_ink_or_of_paper_is_found(cameras, mesh, level):
     painted = mesh.copy()
     painted.visual.face_colors = [level, level, level, 255]
-    images, masks = photographed(painted, cameras)
-    found, _, _ = board_views(views_of(images, cameras), BOARD, None)
+    images, masks = photographed(painted, cameras[:4])
+    found, _, _ = board_views(views_of(images, cameras[:4]), BOARD, None)
     for view, true in zip(found, masks, strict=True):
         assert iou(view.mask[None], true[None]) > 0.6
 
