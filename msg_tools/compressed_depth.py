@@ -1,8 +1,8 @@
 """
 Depth as image_transport's plugin `compressed_depth_image_transport` compresses it.
 
-A header of 12 bytes (its kind, and two floats A and B) goes before a PNG image of 16 bits. Depth of
-16UC1 is stored as it is; of 32FC1 as rint(A / metres + B), 0 where there is none.
+A header of 12 bytes (its kind, and two floats A and B) goes before a PNG image of 16 bits. Depth
+of 16UC1 is stored as it is; of 32FC1 as rint(A / metres + B), 0 where there is none.
 """
 
 import array

@@ -5,6 +5,7 @@ from dataclasses import replace
 import math
 import struct
 
+from active_recon.bags.runs import run_writing
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun, RecordedView
 from active_recon.bags.runs.run_writing import write_run
@@ -19,6 +20,7 @@ from active_recon.volumes.depth_images import DepthImage
 import cv2
 from msg_tools.compressed_depth import depth_to_compressed_msg, metres_from_msg
 from msg_tools.images import depth_from_msg, depth_to_msg, image_to_msg
+from msg_tools.loop import depth_to_msgs
 from msg_tools.views import ViewJoiner
 import numpy as np
 from photo_rigs import blank_photos, PINHOLE, rig, transforms, write_transforms
@@ -197,6 +199,18 @@ def test_a_depth_camera_s_own_info_is_its_lens_at_the_pose_of_the_image(tmp_path
     view, = run_with_depth(tmp_path / 'own', [DepthImage(BAG_DEPTH[:48, :64], own)])
     assert view.depth.camera.intrinsics == own.intrinsics
     np.testing.assert_allclose(view.depth.camera.pose, camera.pose, atol=1e-9)
+
+
+def test_compressed_depth_in_a_bag_is_read_as_raw_depth_is(tmp_path, monkeypatch):
+    def compressed(stamp, depth):
+        (_, raw), = depth_to_msgs(stamp, depth).items()
+        return {'camera/depth/image_raw/compressedDepth':
+                depth_to_compressed_msg(depth_from_msg(raw), raw.header)}
+
+    monkeypatch.setattr(run_writing, 'depth_to_msgs', compressed)
+    found = run_with_depth(tmp_path / 'bag', [DepthImage(BAG_DEPTH), None])
+    assert [view.depth is None for view in found] == [False, True]
+    np.testing.assert_allclose(found[0].depth.metres, BAG_DEPTH, atol=0.0005 + 1e-6)
 
 
 def in_compressed_depth(metres, near=1.0, far=5.0):

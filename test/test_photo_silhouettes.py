@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 import math
+import sys
 
 from active_recon.errors import ConfigError, DataError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.photos import matting
 from active_recon.photos.backgrounds import grabcut, named, off_plain, separated, shown_image
 from active_recon.photos.conventions import conventions, looks_right, misreading
 from active_recon.photos.cube import Cube, first_cube, meeting_point, upward
@@ -20,7 +22,7 @@ from active_recon.photos.integrating import even_choice
 from active_recon.photos.views import PhotoView, view_of
 from active_recon.volumes.voxelisation import voxelise
 import numpy as np
-from photo_scene import cameras, CENTRE, on_plain, rendered, SIDE, thing
+from photo_scene import cameras, CENTRE, LENS, on_plain, rendered, SIDE, thing
 import pytest
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -185,3 +187,37 @@ def test_a_photo_that_is_seen_through_by_nothing_has_no_mask():
     camera = Camera(orbit_camera(0.0).pose, Intrinsics(9, 9, 4, 3, 8, 6))
     view = view_of('it', np.full((6, 8, 4), 255, np.uint8), camera)
     assert isinstance(view, PhotoView) and view.mask is None and math.isfinite(camera.distance)
+
+
+@pytest.fixture
+def without_rembg(monkeypatch):
+    matting._loaded.cache_clear()
+    monkeypatch.setitem(sys.modules, 'rembg', None)  # as if it were not installed
+    yield
+    matting._loaded.cache_clear()
+
+
+def test_without_rembg_its_background_names_what_to_install(without_rembg):
+    view = PhotoView('a', np.zeros((4, 6, 3), np.uint8), Camera(np.eye(4), LENS))
+    with pytest.raises(ConfigError, match=r'install it by: pip install "rembg\[cpu\]"'):
+        separated(view, 'rembg')
+
+
+def test_a_stand_in_for_rembg_is_asked_for_masks_alone_and_with_one_network(
+        without_rembg, monkeypatch, tmp_path):
+    (tmp_path / 'rembg.py').write_text(
+        'def new_session():\n    return object()\n\n\n'
+        'def remove(image, session, only_mask):\n'
+        '    assert only_mask\n    sessions.add(session)\n    return image[..., 0]\n\n\n'
+        'sessions = set()\n')
+    monkeypatch.delitem(sys.modules, 'rembg')
+    monkeypatch.syspath_prepend(tmp_path)
+    image = np.zeros((4, 6, 3), np.uint8)
+    image[1:3, 2:5, 0] = 255
+    for _ in range(2):
+        found = separated(PhotoView('a', image, Camera(np.eye(4), LENS)), 'rembg')
+        np.testing.assert_array_equal(found.mask, image[..., 0] > 0)
+    assert found.mask_source == 'rembg' and len(sys.modules['rembg'].sessions) == 1
+    with pytest.raises(ViewError, match='no object: expected one that rembg tells'):
+        separated(PhotoView('b', np.zeros_like(image), Camera(np.eye(4), LENS)), 'rembg')
+    monkeypatch.delitem(sys.modules, 'rembg')

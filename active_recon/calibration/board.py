@@ -122,31 +122,32 @@ class Board:
             raise DataError(f'{name}: another board: expected one of {self.columns} x {self.rows} '
                             f'squares with markers 0 to {known - 1}, got marker '
                             f'{max(unknown)}; give the number of squares by --squares')
-        if markers is not None and (ids is None or len(ids) < _ENOUGH_CORNERS):
-            corners, ids = self._beside_one_marker(image)
-        if ids is None or len(ids) < _FEWEST_CORNERS:
+        numbers = np.empty(0, np.intp) if ids is None else np.asarray(ids, np.intp).ravel()
+        pixels = np.asarray(corners if len(numbers) else np.empty(0), np.float64).reshape(-1, 2)
+        if markers is not None and len(numbers) < _ENOUGH_CORNERS:
+            numbers, pixels = self._beside_one_marker(image)
+        if len(numbers) < _FEWEST_CORNERS or self._charuco.checkCharucoCornersCollinear(
+                numbers.astype(np.int32)):
             return None
-        ids = np.asarray(ids).ravel()
-        if self._charuco.checkCharucoCornersCollinear(ids):
-            return None
-        return Detection(name, self.corners[ids],
-                         np.asarray(corners, np.float64).reshape(-1, 2) + self._first_pixel,
+        return Detection(name, self.corners[numbers], pixels + self._first_pixel,
                          (image.shape[1], image.shape[0]))
 
     def _beside_one_marker(self, image: NDArray[np.uint8]
-                           ) -> tuple[NDArray[np.float32] | None, NDArray[np.int32] | None]:
-        """Return corners and ids where an object covers most of the board, None without any."""
+                           ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return ids and pixels of the corners where an object covers most of the board."""
         lenient = cv2.aruco.CharucoParameters()
         lenient.minMarkers = 1
         corners, ids, *_ = cv2.aruco.CharucoDetector(self._charuco, lenient).detectBoard(image)
         if ids is None or len(ids) < _FEWEST_CORNERS:
-            return None, None
-        places = self.corners[np.ravel(ids), :2]
-        _, fitting = cv2.findHomography(places, np.asarray(corners, np.float64).reshape(-1, 2),
-                                        cv2.RANSAC, _ASIDE * max(image.shape[:2]))
-        kept = np.ravel(fitting).astype(np.bool_) if fitting is not None else np.zeros(
-            len(places), np.bool_)
-        return np.asarray(corners)[kept], np.asarray(ids)[kept]
+            return np.empty(0, np.intp), np.empty((0, 2))
+        numbers, pixels = np.ravel(ids).astype(np.intp), np.asarray(corners, np.float64)
+        pixels = pixels.reshape(-1, 2)
+        _, fitting = cv2.findHomography(self.corners[numbers, :2], pixels, cv2.RANSAC,
+                                        _ASIDE * max(image.shape[:2]))
+        kept = np.zeros(len(numbers), np.bool_)
+        if fitting is not None:
+            kept = np.ravel(fitting).astype(np.bool_)
+        return numbers[kept], pixels[kept]
 
 
 @dataclass(frozen=True, eq=False)

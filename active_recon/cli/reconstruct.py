@@ -59,7 +59,7 @@ def reconstruct(
              'format.')] = None,
     background: Annotated[str, typer.Option(
         help='auto (masks, alpha, else the network), plain (by the colour of a plain '
-             'background), network, or grabcut.')] = 'auto',
+             'background), network, grabcut, or rembg (if installed).')] = 'auto',
     masks: Annotated[Path | None, typer.Option(
         help='Folder of masks named like the photos, bright on the object.')] = None,
     views: Annotated[int | None, typer.Option(

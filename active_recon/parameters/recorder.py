@@ -7,8 +7,9 @@ from active_recon.parameters.declaration import parameter
 DIAGNOSTICS = '/diagnostics'
 TOPICS = ('camera/image_raw', 'camera/image_raw/compressed', 'camera/camera_info', 'camera/pose',
           'camera/mask', 'camera/depth/image_raw', 'camera/depth/image_raw/compressedDepth',
-          'camera/depth/camera_info', 'view', 'view_image', 'occupancy', 'probabilities', 'latent', 'entropy', 'quality', 'episode',
-          'next_view', 'next_azimuth', 'azimuth_scores', 'goal_reason', 'done', DIAGNOSTICS)
+          'camera/depth/camera_info', 'view', 'view_image', 'occupancy', 'probabilities', 'latent',
+          'entropy', 'quality', 'episode', 'next_view', 'next_azimuth', 'azimuth_scores',
+          'goal_reason', 'done', DIAGNOSTICS)
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,19 @@ from active_recon.acquisition.background import COLOR_TOLERANCE, on_white
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.framing import cube_corners
+from active_recon.photos.matting import rembg_mask
 from active_recon.photos.views import PhotoView
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-BACKGROUNDS = ('auto', 'plain', 'network', 'grabcut')
+BACKGROUNDS = ('auto', 'plain', 'network', 'grabcut', 'rembg')
 """
 `auto`: the object on white by its mask from a file or alpha channel; without one as `network`,
 and where the background is plain, cells that only show it are cut off. `plain`: on white by the
 colour of a plain background. `network`: the photo as it is, of which the network finds the
-silhouette itself. `grabcut`: on white by GrabCut, begun from the projected cube.
+silhouette itself. `grabcut`: on white by GrabCut, begun from the projected cube. `rembg`: on
+white by the package of that name.
 """
 _FRAME = 0.0125  # width of the photo's edge that is looked at, relative to its longer side
 _PLAIN_SHARE = 0.75  # of the edge: the object may reach over the rest
@@ -32,7 +34,7 @@ def separated(view: PhotoView, background: str) -> PhotoView:
     Return the view with the mask that a background asks for before the cube is known.
 
     Raises ConfigError on an unknown background, ViewError where there is nothing before a plain
-    one.
+    one, or rembg finds nothing.
     """
     if background not in BACKGROUNDS:
         raise ConfigError(f'background: unknown value: expected one of {", ".join(BACKGROUNDS)}, '
@@ -40,6 +42,8 @@ def separated(view: PhotoView, background: str) -> PhotoView:
     if background == 'auto' and view.mask is not None:
         return view
     view = replace(view, mask=None, mask_source='')
+    if background == 'rembg':
+        return replace(view, mask=rembg_mask(view.image), mask_source='rembg')
     if background not in ('auto', 'plain'):
         return view
     mask = off_plain(view.image)
@@ -78,8 +82,8 @@ def shown_image(view: PhotoView, camera: Camera, size: float, background: str
     Return the photo as the network is shown it, (H, W, 3) uint8 RGB, and what removed its back.
 
     `camera` is the view's in the object frame, `size` the side of the cube there. The second is
-    'masks', 'alpha', 'plain', 'grabcut', or 'network' where nothing was removed, 'network and
-    plain' where what only shows a plain background will be cut off.
+    'masks', 'alpha', 'board', 'plain', 'rembg', 'grabcut', or 'network' where nothing was removed,
+    'network and plain' where what only shows a plain background will be cut off.
     """
     if view.mask_source == 'plain' and background == 'auto':
         return view.image, 'network and plain'
@@ -139,6 +143,7 @@ def named(sources: Sequence[str]) -> str:
     words = {'masks': 'masks from files', 'alpha': 'alpha channels',
              'board': 'what covers the printed board',
              'plain': "the plain background's colour", 'grabcut': 'GrabCut',
+             'rembg': "rembg's masks",
              'network and plain': "the network's own silhouettes, cut by a plain background's "
              'colour', 'network': "the network's own silhouettes"}
     counts = {source: sources.count(source) for source in words if source in sources}

@@ -11,6 +11,7 @@ models", CVPR 2005.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.framing import cube_corners
@@ -104,8 +105,9 @@ def _place(camera: Camera, above: NDArray[np.bool_]) -> _Place:
     shown = (above & (depth > 0) & ((at >= 0) & (at < [lens.width, lens.height])).all(axis=1))
     across, down = np.where(shown[:, None], at, 0).astype(np.intp).T
     cell = lens.fx / camera.distance / CELLS  # pixels
-    closed, touched = (np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2))
-                       for reach in (int(np.ceil(cell)), round(cell / 2)))
+    closed, touched = (np.asarray(cv2.getStructuringElement(
+        cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2), np.uint8)
+        for reach in (math.ceil(cell), round(cell / 2)))
     drawn = np.zeros((lens.height, lens.width), np.uint8)
     drawn[down[shown], across[shown]] = 1
     outline = cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, closed) > 0

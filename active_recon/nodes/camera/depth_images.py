@@ -68,7 +68,8 @@ class DepthImages:
             self._intrinsics = intrinsics_from_msg(msg)
 
 
-def depth_image(msg: Image | CompressedImage, camera: Camera, intrinsics: Intrinsics | None) -> DepthImage:
+def depth_image(msg: Image | CompressedImage, camera: Camera,
+                intrinsics: Intrinsics | None) -> DepthImage:
     """
     Return the depth in a message beside an image of `camera`.
 
