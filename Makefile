@@ -46,7 +46,7 @@ test: ready  ## style, types, documentation, every test but the long ones; ARGS 
 	@echo '== testing; the long tests run with `make test-full`'
 	@$(TEST) -m 'not slow' $(ARGS)
 
-test-full: ready  ## every test, high counts and soak too
+test-full: ready .venv/full  ## every test, high counts and soak too
 	@echo '== testing everything'
 	@$(TEST) $(ARGS)
 
@@ -113,6 +113,13 @@ clean:  ## forget .venv and what was built
 	@echo '== installing active_recon and what it needs'
 	@rm -rf build
 	@$(PIP) install --no-compile --no-build-isolation -c constraints.txt '.[doc,lint,test]'
+	@rm -rf build active_recon.egg-info
+	@touch $@
+
+# The long tests have a store's server besides.
+.venv/full: .venv/installed
+	@echo '== installing what the long tests need'
+	@$(PIP) install --no-compile --no-build-isolation -c constraints.txt '.[test-full]'
 	@rm -rf build active_recon.egg-info
 	@touch $@
 
