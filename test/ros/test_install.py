@@ -98,8 +98,9 @@ def test_ament_index_finds_the_package(install, tmp_path):
     assert Path(found.strip()) == install.prefix
 
 
-def test_executables_are_the_six_nodes_and_the_command(install):
-    assert {path.name for path in install.executables.iterdir()} == NODES | {'active-recon'}
+def test_executables_are_the_nodes_alone_and_composed_and_the_command(install):
+    assert {path.name for path in install.executables.iterdir()} == NODES | {
+        'active-recon', 'composed'}
     assert all(os.access(path, os.X_OK) for path in install.executables.iterdir())
 
 
