@@ -16,7 +16,7 @@ from active_recon.nodes.camera.images import CameraImages
 from active_recon.nodes.camera.monitor import CameraMonitor
 from active_recon.nodes.camera.pose_sources import check_pose_source, subscribe_poses
 from active_recon.nodes.camera.reference_capture import ReferenceCapture
-from active_recon.nodes.loop.products import Products
+from active_recon.nodes.loop.products import meshing_imported, Products
 from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPublisher
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
@@ -71,7 +71,8 @@ class ReconstructorNode(ManagedNode):
         self.add_cleanup(self._capture.clear)
         publish_topic_names(self, TOPICS)
         check_pose_source(params)
-        self._reconstructor = self._load(params)
+        with meshing_imported():
+            self._reconstructor = self._load(params)
         self._joiner = ViewJoiner(
             params.max_pose_gap, masks=self._background.how == 'mask',
             max_depth_gap=params.max_depth_gap if params.use_depth else None)

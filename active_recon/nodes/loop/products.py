@@ -1,6 +1,7 @@
 """What comes out of an episode: its coloured mesh, in files and as a Marker, and its state."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -22,7 +23,7 @@ from std_srvs.srv import Trigger
 
 _MESHING = ('active_recon.meshes.coloring', 'active_recon.volumes.isosurface',
             'active_recon.volumes.refinement')
-"""What makes meshes, a third of the node's start: imported beside it, before one is asked for."""
+"""What makes meshes, a third of the node's start; see `meshing_imported`."""
 
 
 class Products:
@@ -34,8 +35,6 @@ class Products:
 
     def __init__(self, node: ManagedNode, reconstructor: Reconstructor, frame: str,
                  publish_mesh: bool) -> None:
-        # Not in the node's own thread, in which streams would overflow meanwhile
-        Thread(target=_import_meshing).start()
         self._reconstructor = reconstructor
         self._album = Album()
         self._known: Reconstruction | None = None
@@ -111,6 +110,16 @@ class Products:
         return response
 
 
-def _import_meshing() -> None:
-    for module in _MESHING:
-        import_module(module)
+@contextmanager
+def meshing_imported() -> Iterator[None]:
+    """
+    Import what makes meshes while the body runs; it is there once the body ends.
+
+    A node does so before it subscribes: streams would overflow while it imports.
+    """
+    beside = Thread(target=lambda: [import_module(module) for module in _MESHING])
+    beside.start()
+    try:
+        yield
+    finally:
+        beside.join()
