@@ -87,7 +87,7 @@ def test_a_mask_never_leaves_the_projected_cube(taken, cameras):
         assert view.mask.any() and not (view.mask & ~grown).any()
 
 
-@pytest.mark.parametrize('level', [10, 245])
+@pytest.mark.parametrize('level', [10, pytest.param(245, marks=pytest.mark.slow)])
 def test_an_object_of_the_colour_of_ink_or_of_paper_is_found(cameras, mesh, level):
     painted = mesh.copy()
     painted.visual.face_colors = [level, level, level, 255]
