@@ -48,7 +48,8 @@ def connect(address: str, workers: int | None) -> tuple[Any, str]:
         own['_node_ip_address'] = address.partition(':')[0]
     try:
         context = ray.init(address, logging_level='ERROR', log_to_driver=False, **own)
-    except (ConnectionError, TimeoutError, RuntimeError, ValueError, ImportError) as error:
+    except (ConnectionError, TimeoutError, RuntimeError, ValueError, ImportError,
+            ray.exceptions.RayError) as error:
         reason = (str(error).splitlines() or [''])[0]
         raise ConfigError(_nobody(address, reason)) from error
     shown = context.dashboard_url
