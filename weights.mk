@@ -1,7 +1,7 @@
 # The default weights from scratch: `make weights MESHES=FOLDER`, resumable at every step.
 #
 # Renders the training data, trains the network, its view policy, the tables of its quality and its
-# depth refiner, and puts all of it, exported, into ./weights. What stands is not made again, an
+# depth refiner, and puts all of it, exported, into RUN/weights. What stands is not made again, an
 # interrupted training continues. The numbers below are of the weights that ship; fewer are faster.
 #
 #   MESHES    folder with manifest.csv of real models (docs/data-sources.csv); without, none are used

@@ -14,6 +14,7 @@ from active_recon.quality.silhouettes import SeenView
 from active_recon.reconstructor import Progress, Reconstruction, Reconstructor
 from active_recon.volumes.depth_evidence import no_evidence
 from active_recon.volumes.voxels import VoxelGrid
+from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import safe_open, SafetensorError
@@ -61,10 +62,9 @@ def write_state(saved: SavedState, reconstructor: Reconstructor, path: Path) -> 
     facts = {**_facts(reconstructor), 'format': _FORMAT, 'views': str(progress.view_count),
              'quality': json.dumps(known.quality and asdict(known.quality))}
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f'.{path.name}.part')
-    save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()}, unfinished,
-              facts)
-    unfinished.replace(path)
+    with whole_file(path) as unfinished:
+        save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()},
+                  unfinished, facts)
 
 
 def read_state(path: Path, reconstructor: Reconstructor) -> SavedState:

@@ -20,7 +20,7 @@ _UNREADABLE = (OSError, ValueError, SyntaxError, PIL.Image.DecompressionBombErro
 
 def pixels_from_msg(msg: Image | CompressedImage) -> NDArray[np.uint8]:
     """Return the image, (height, width, 3) uint8 RGB; raises MessageError if it is invalid."""
-    return compressed_image_from_msg(msg) if _is_compressed(msg) else image_from_msg(msg)
+    return compressed_image_from_msg(msg) if is_compressed(msg) else image_from_msg(msg)
 
 
 def reduced_from_msg(msg: Image | CompressedImage, by: int) -> NDArray[np.uint8]:
@@ -30,7 +30,7 @@ def reduced_from_msg(msg: Image | CompressedImage, by: int) -> NDArray[np.uint8]
     That is a JPEG image, decoded to (ceil(height / by), ceil(width / by), 3); `by` is 1, 2, 4 or
     8. Any other image is returned whole. Raises MessageError as `pixels_from_msg` does.
     """
-    if by > 1 and _is_compressed(msg):
+    if by > 1 and is_compressed(msg):
         image = _open(msg)
         if image.format == 'JPEG' and image.mode in ('RGB', 'L'):
             return _decoded(msg, _REDUCED[by])
@@ -43,7 +43,7 @@ def size_from_msg(msg: Image | CompressedImage) -> tuple[int, int]:
 
     Raises MessageError if its header is invalid.
     """
-    if not _is_compressed(msg):
+    if not is_compressed(msg):
         return image_size_from_msg(msg)
     header = _open(msg)
     return header.height, header.width
@@ -68,7 +68,8 @@ def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
         raise _decoding_error(msg, str(error)) from error
 
 
-def _is_compressed(msg: Image | CompressedImage) -> bool:
+def is_compressed(msg: Image | CompressedImage) -> bool:
+    """Return whether a message is a CompressedImage, by its fields."""
     return hasattr(msg, 'format')  # messages from a bag are of another class
 
 

@@ -9,8 +9,9 @@ import array
 import struct
 
 from active_recon.errors import MessageError
+from active_recon.volumes.depth_images import MM_PER_METRE
 import cv2
-from msg_tools.camera_images import MAX_PIXELS
+from msg_tools.camera_images import is_compressed, MAX_PIXELS
 from msg_tools.images import depth_from_msg
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,11 @@ _PNG_START = b'\x89PNG\r\n\x1a\n'
 _PNG_SIZE = struct.Struct('>II')
 _AT_SIZE = 16  # bytes of a PNG file before its width and height
 _MOST_MM = 65535
-_MILLIMETRES = 1000
 
 
 def metres_from_msg(msg: Image | CompressedImage) -> NDArray[np.float32]:
     """Return depth in metres, (height, width), of either message; raises MessageError."""
-    compressed = hasattr(msg, 'format')  # messages from a bag are of another class
-    return depth_from_compressed_msg(msg) if compressed else depth_from_msg(msg)
+    return depth_from_compressed_msg(msg) if is_compressed(msg) else depth_from_msg(msg)
 
 
 def depth_from_compressed_msg(msg: CompressedImage) -> NDArray[np.float32]:
@@ -60,7 +59,7 @@ def depth_from_compressed_msg(msg: CompressedImage) -> NDArray[np.float32]:
                            'channel', 'depth')
     stored = np.asarray(values, np.float32)
     if encoding == '16UC1':
-        return stored / np.float32(_MILLIMETRES)
+        return stored / np.float32(MM_PER_METRE)
     _, scale, offset = _HEADER.unpack_from(data)
     if not (0 < scale < np.inf and np.isfinite(offset)):
         raise MessageError('compressed depth without its scale: expected two finite numbers in '
@@ -76,7 +75,7 @@ def depth_to_compressed_msg(metres: NDArray[np.floating], header: Header) -> Com
 
     What 16 bits cannot hold, from 65.5 metres on, becomes no value, as NaN and infinity do.
     """
-    millimetres = np.nan_to_num(np.rint(np.asarray(metres, np.float64) * _MILLIMETRES),
+    millimetres = np.nan_to_num(np.rint(np.asarray(metres, np.float64) * MM_PER_METRE),
                                 posinf=0, neginf=0)
     kept = np.where((millimetres > 0) & (millimetres <= _MOST_MM), millimetres, 0)
     _, packed = cv2.imencode('.png', kept.astype(np.uint16))

@@ -5,6 +5,7 @@ import re
 from typing import Any
 
 from active_recon.errors import MessageError
+from active_recon.volumes.depth_images import MM_PER_METRE
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ MASK_ENCODINGS = ('mono8', '8UC1')
 DEPTH_ENCODINGS: dict[str, np.dtype[Any]] = {
     encoding: np.dtype(kind) for encoding, kind in (
         ('16UC1', np.uint16), ('mono16', np.uint16), ('32FC1', np.float32))}
-_MILLIMETRES = 1000  # in a metre, of depth in 16 bits
 _TO_RGB = {'bgr8': cv2.COLOR_BGR2RGB, '8UC3': cv2.COLOR_BGR2RGB, 'mono8': cv2.COLOR_GRAY2RGB,
            'rgba8': cv2.COLOR_RGBA2RGB, 'bgra8': cv2.COLOR_BGRA2RGB}
 
@@ -105,7 +105,7 @@ def depth_from_msg(msg: Image) -> NDArray[np.float32]:
                            f'{msg.encoding!r}', 'depth')
     kind = DEPTH_ENCODINGS[msg.encoding]
     values = _pixels(msg, kind, 1)[..., 0].astype(np.float32)
-    return values if kind == _FLOAT else values / np.float32(_MILLIMETRES)
+    return values if kind == _FLOAT else values / np.float32(MM_PER_METRE)
 
 
 def depth_to_msg(metres: NDArray[np.floating], header: Header) -> Image:

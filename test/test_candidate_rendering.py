@@ -5,6 +5,7 @@ import math
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.policies.candidate_rendering import coarse_volume, in_sight, render_candidates
 from active_recon.policies.sight_lines import cell_lines, image_lines
+from faded_volumes import some_volume
 import numpy as np
 import pytest
 
@@ -20,15 +21,6 @@ def rendered(occupancy, poses=None, taken=None):
     """Return what the ring sees of one volume (R, R, R)."""
     return render_candidates(coarse_volume(occupancy[None].astype(np.float32)),
                              ring() if poses is None else poses, taken)
-
-
-def some_volume(seed=0, side=32):
-    """Return probabilities of a blob that fades out, (side, side, side)."""
-    across = (np.arange(side) + 0.5) / side - 0.5
-    x, y, z = np.meshgrid(across - 0.1, 1.5 * across, across + 0.05, indexing='ij')
-    rng = np.random.default_rng(seed)
-    blurred = 1 / (1 + np.exp(25 * (np.sqrt(x ** 2 + y ** 2 + z ** 2) - 0.3)))
-    return (blurred * rng.uniform(0.5, 1, blurred.shape)).astype(np.float32)
 
 
 def hits(poses, low, high, rays=16):

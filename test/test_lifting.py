@@ -16,10 +16,10 @@ from active_recon.models.lifted import (
     summarise,
 )
 from active_recon.models.lifting import Lifting, LiftingConfig
-from active_recon.models.lifting_decoder import Conv3d, depth_to_space, space_to_depth
 from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras
 from active_recon.models.visibility import add_visible, visible_mean
+from active_recon.models.volume_unet import Conv3d, depth_to_space, space_to_depth
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import config_hash, read_metadata, SHIPPED
 import numpy as np

@@ -118,6 +118,12 @@ def test_the_reconstructor_starts_before_what_makes_meshes_is_there():
     assert imported == "{'numpy'}"
 
 
+def test_nodes_are_started_by_a_process_without_ros():
+    imported, = last_lines('import sys, active_recon.launching.up\n'
+                           "print({'active_recon.launching.up', 'rclpy'} & sys.modules.keys())")
+    assert imported == "{'active_recon.launching.up'}"
+
+
 def test_views_are_reconstructed_and_planned_without_torch():
     pytest.importorskip('openvino')
     *computed_by, with_torch = last_lines(LOOP)

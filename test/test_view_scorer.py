@@ -19,6 +19,7 @@ from active_recon.policies.candidate_rendering import (
 )
 from active_recon.policies.scoring import ScoringPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
+from faded_volumes import some_volume
 import numpy as np
 import pytest
 import torch
@@ -40,15 +41,6 @@ def poses(azimuths, elevation=0.5, distance=2.1):
     elevations = np.broadcast_to(elevation, len(azimuths))
     return np.array([[orbit_camera(azimuth, height, distance).pose
                       for azimuth, height in zip(azimuths, elevations, strict=True)]])
-
-
-def some_volume(seed=0, side=32):
-    """Return probabilities of a blob that fades out, with nothing alike, (side, side, side)."""
-    across = (np.arange(side) + 0.5) / side - 0.5
-    x, y, z = np.meshgrid(across - 0.1, 1.5 * across, across + 0.05, indexing='ij')
-    rng = np.random.default_rng(seed)
-    blurred = 1 / (1 + np.exp(25 * (np.sqrt(x ** 2 + y ** 2 + z ** 2) - 0.3)))
-    return (blurred * rng.uniform(0.5, 1, blurred.shape)).astype(np.float32)
 
 
 def observed(volumes, taken, candidates):

@@ -10,7 +10,7 @@ from active_recon.batch.rows import Row
 from active_recon.cluster.stores import Place, whole
 from active_recon.report.embedding import compressed, plotly_script
 from active_recon.report.findings import stopped
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 MOST_SHOWN = 1000
 """Rows on the page, of each of the two lists; the table has all of them."""
@@ -61,7 +61,8 @@ class Summary:
     def write(self, place: Place, kind: str) -> None:
         """Write the page; raises DataError where it cannot be written."""
         environment = Environment(
-            loader=PackageLoader('active_recon.batch', 'templates'), autoescape=True,
+            loader=ChoiceLoader([PackageLoader(f'active_recon.{room}', 'templates')
+                                 for room in ('batch', 'report')]), autoescape=True,
             trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
         refused = self._refusals.total()
         page = environment.get_template('summary.html').render(

@@ -73,7 +73,7 @@ def evaluate(
     cache: Annotated[Path | None, typer.Option(
         help='Folder that caches episodes, so that an interrupted run can continue.')] = None,
     bf16: Annotated[bool, typer.Option(
-        help='Mixed precision, bfloat16: half the time; means differ by less than '
+        help='Mixed precision, bfloat16: takes less time; means differ by less than '
              '0.0001.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     runtime: MeasuredIn = 'torch',

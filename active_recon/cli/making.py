@@ -150,7 +150,7 @@ def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Vie
     rejected = []
     with workers_of(cluster, workers) as crew, progress_bar(title, len(jobs)) as advance:
         outcomes = make_dataset(jobs, samples, 1, fine, viewing, depth, crew, reads)
-        for outcome in told(outcomes, crew, advance, lambda outcome: bool(outcome.refusal)):
+        for outcome in told(outcomes, crew, advance):
             if outcome.refusal:
                 rejected.append(outcome)
     rejected.sort(key=lambda outcome: (outcome.folder.category, outcome.folder.name))

@@ -52,7 +52,7 @@ def policies(
     out: Annotated[Path, typer.Option(
         help='Folder where policies.json and policies.md go.')] = Path('study'),
     bf16: Annotated[bool, typer.Option(
-        help='Half precision where it is safe: half the time.')] = True,
+        help='Half precision where it is safe: takes less time.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     runtime: MeasuredIn = 'torch',
 ) -> None:

@@ -60,7 +60,7 @@ def study(
         help='Folder for study.json, study.md and a PNG file for each set.')] = Path('study'),
     seed: Annotated[int, typer.Option(help='Seed of objects, views and disturbances.')] = 0,
     bf16: Annotated[bool, typer.Option(
-        help='Mixed precision, bfloat16: half the time.')] = True,
+        help='Mixed precision, bfloat16: takes less time.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     runtime: MeasuredIn = 'torch',
 ) -> None:

@@ -86,8 +86,7 @@ def train_depth(
                                         for name, value in measured.items()))
 
             train_depth(refiner, network, views, training,
-                        Run(fabric, checkpoint, report, resume and checkpoint.is_file()),
-                        {'network_sha256': digest})
+                        Run(fabric, checkpoint, report, resume), {'network_sha256': digest})
     except TrainingStoppedError as stopped:
         typer.echo(str(stopped))
         raise typer.Exit(130) from None

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 import time
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from active_recon.cluster.crew import Crew
 from active_recon.reporting import Advance
@@ -11,9 +11,17 @@ Found = TypeVar('Found')
 _COUNT_EVERY = 2.0  # seconds between two looks at the number of workers
 
 
+def _has_refusal(result: Any) -> bool:
+    return bool(result.refusal)
+
+
 def told(results: Iterable[Found], crew: Crew, advance: Advance,
-         refused: Callable[[Found], bool]) -> Iterator[Found]:
-    """Pass results on, and report each with the rate, the workers and the refused items so far."""
+         refused: Callable[[Found], bool] = _has_refusal) -> Iterator[Found]:
+    """
+    Pass results on, and report each with the rate, the workers and the refused items so far.
+
+    By default those are refused whose `refusal` says why.
+    """
     begun = time.monotonic()
     counted, workers = -_COUNT_EVERY, 0
     failures = 0

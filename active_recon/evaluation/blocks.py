@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from active_recon.cluster import Crew, Result
+from active_recon.cluster import Crew
 from active_recon.cluster.telling import told
 from active_recon.errors import WorkError
 from active_recon.evaluation.measure import Episodes
@@ -37,14 +37,10 @@ def run_blocks(prepare: Prepare, trial: Trial, every: Sequence[Contender], crew:
                       torch.get_num_threads())
     with reporting('measuring', len(items)) as advance:
         results = crew.map(measure, items, reads=reads)
-        for result in told(results, crew, advance, _was_refused):
+        for result in told(results, crew, advance):
             if result.refusal:
                 raise WorkError(f'{" ".join(map(str, items[result.index]))}: {result.refusal}')
             write_arrays(paths[items[result.index]], **vars(result.value))
-
-
-def _was_refused(result: Result) -> bool:
-    return bool(result.refusal)
 
 
 def _measure_block(prepare: Prepare, identity: Sequence[tuple[str, Any]], threads: int,

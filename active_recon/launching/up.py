@@ -8,7 +8,7 @@ import time
 
 from active_recon.interrupts import held_interrupts
 from active_recon.launching.processes import NodeProcesses
-from active_recon.nodes.composed import COMPOSABLE
+from active_recon.nodes.runtime.composable import COMPOSABLE
 from active_recon.parameters.params_file import read_params_file
 
 _CHECK_EVERY_S = 0.1

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.encoder import group_norm
-from active_recon.models.lifting_decoder import depth_to_space, Residual3d, space_to_depth
+from active_recon.models.volume_unet import depth_to_space, space_to_depth, VolumeUnet
 import torch
 from torch import nn, Tensor
 from torch.nn import functional
@@ -37,7 +37,7 @@ class DepthRefinerConfig(Config):
                               f'{self.to_dict()}')
 
 
-class DepthRefiner(nn.Module):
+class DepthRefiner(VolumeUnet):
     """
     Corrects occupancy by depth evidence, with a U-Net at 32, 16, 8 and 4 cells a side.
 
@@ -48,18 +48,12 @@ class DepthRefiner(nn.Module):
 
     def __init__(self, features: int, head: int, channels: tuple[int, int, int]) -> None:
         super().__init__()
-        at_16, at_8, at_4 = channels
+        at_16 = channels[0]
         self.features = features
         self.enter_32 = nn.Sequential(nn.Conv3d(8 * _SEEN, head, 1), nn.ReLU())
         self.enter_16 = nn.Conv3d(features + 1, at_16, 1)
         self.to_16, self.norm_16 = nn.Conv3d(head, at_16, 2, stride=2), group_norm(at_16)
-        self.down_16 = Residual3d(at_16, 1)
-        self.to_8 = nn.Sequential(nn.Conv3d(at_16, at_8, 2, stride=2), group_norm(at_8), nn.ReLU())
-        self.down_8 = Residual3d(at_8, 1)
-        self.to_4 = nn.Sequential(nn.Conv3d(at_8, at_4, 2, stride=2), group_norm(at_4), nn.ReLU())
-        self.at_4 = Residual3d(at_4, 2)
-        self.from_4, self.up_8 = nn.Conv3d(at_4, 8 * at_8, 1), Residual3d(at_8, 1)
-        self.from_8, self.up_16 = nn.Conv3d(at_8, 8 * at_16, 1), Residual3d(at_16, 1)
+        self.add_unet(channels, (1, 1, 2, 1, 1))
         self.to_32, self.skip_32 = nn.Conv3d(at_16, 8 * head, 1), nn.Conv3d(head, head, 1)
         self.mix_32 = nn.Sequential(nn.Conv3d(head, head, 1), nn.ReLU())
         self.to_64 = nn.Conv3d(head, 8 * _LEARNED, 1)
@@ -87,12 +81,8 @@ class DepthRefiner(nn.Module):
         at_32 = self.enter_32(blocks)
         mean = torch.cat([total / count.clamp(min=1), count.clamp(max=1)], dim=1)
         at_16 = functional.relu(self.norm_16(self.to_16(at_32) + self.enter_16(mean)))
-        at_16 = self.down_16(at_16)
-        at_8 = self.down_8(self.to_8(at_16))
-        at_4 = self.at_4(self.to_4(at_8))
-        at_8 = self.up_8(at_8 + depth_to_space(self.from_4(at_4)))
-        at_16 = self.up_16(at_16 + depth_to_space(self.from_8(at_8)))
-        at_32 = functional.relu(depth_to_space(self.to_32(at_16)) + self.skip_32(at_32))
+        worked = self.unet(at_16)
+        at_32 = functional.relu(depth_to_space(self.to_32(worked)) + self.skip_32(at_32))
         learned, more, free, near = depth_to_space(self.to_64(self.mix_32(at_32))).unbind(dim=1)
         corrected = (logits + learned + more * given[:, 0] - free * seen[:, 1]
                      + near * seen[:, 3])

@@ -6,19 +6,12 @@ from importlib import import_module
 import sys
 
 from active_recon.errors import ConfigError
+from active_recon.nodes.runtime.composable import COMPOSABLE
 from active_recon.nodes.runtime.life_cycle import managed, ManagedNode
 from active_recon.nodes.runtime.run import run_nodes
 from active_recon.nodes.runtime.usage import is_help_wanted
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
-
-COMPOSABLE = {'reconstructor': 'ReconstructorNode', 'view_planner': 'ViewPlannerNode',
-              'turntable_camera': 'TurntableCameraNode'}
-"""
-The class of each node that may share a process with others.
-
-The recorder, the player and the viewer may not: they would wait for the network, or it for them.
-"""
 
 
 def main(args: list[str] | None = None) -> None:

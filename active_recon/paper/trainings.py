@@ -56,7 +56,7 @@ def train_all(study: Study, trainings: Sequence[Training]) -> list[Path]:
         with study.progress('training', len(missing)) as advance:
             results = study.crew.map(train, [each.elsewhere() for each in missing], study.models,
                                      [study.data])
-            for result in told(results, study.crew, advance, lambda result: bool(result.refusal)):
+            for result in told(results, study.crew, advance):
                 if result.refusal:
                     raise WorkError(f'{missing[result.index].out}: {result.refusal}', result.kind)
     return [each.weights for each in trainings]

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from active_recon.errors import DataError
+from active_recon.volumes.depth_images import MM_PER_METRE
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 FOLDER, SUFFIX = 'depth', '_depth'
 """Of the depth of `a.jpg`: `depth/a.png`, or `a_depth.png` beside it."""
 _ENDINGS = ('.png', '.tif', '.tiff')
-_MILLIMETRES = 1000  # in a metre
 _SHAPE_OFF = 0.01
 
 
@@ -50,6 +50,6 @@ def read_depth(path: Path, width: int, height: int) -> NDArray[np.float32]:
     if abs(stored.shape[1] * height - width * stored.shape[0]) > _SHAPE_OFF * stored.size:
         raise DataError(f'{path.name}: depth of another size: expected {width} x {height} pixels '
                         f'or the same shape, got {stored.shape[1]} x {stored.shape[0]}')
-    metres = stored.astype(np.float32) / (_MILLIMETRES if stored.dtype == np.uint16 else 1)
+    metres = stored.astype(np.float32) / (MM_PER_METRE if stored.dtype == np.uint16 else 1)
     sized = cv2.resize(metres, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(np.where(np.isfinite(sized), sized, 0), np.float32)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.views import PhotoView
 from active_recon.quality.silhouettes import cube_outline, eroded, silhouette
+from active_recon.volumes.voxels import cell_centers
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ def depth_in_masks(views: Sequence[PhotoView], cameras: Sequence[Camera],
     sides of the cube. The depth of a cell in a view is the distance of its projected centre from
     the mask's edge, negative outside of the mask. What no photo with a mask shows is at infinity.
     """
-    centres = _centres(side)
+    centres = cell_centers(side)
     least = np.full(len(centres), np.inf, np.float32)
     for view, camera in zip(views, cameras, strict=True):
         if view.mask is None:
@@ -59,11 +60,6 @@ def ceiling(depths: NDArray[np.float32], threshold: float) -> NDArray[np.float32
     return np.asarray(np.interp(depths + TOUCHED, [-1, 0, 1], [0, threshold, 1]), np.float32)
 
 
-def _centres(side: int) -> NDArray[np.float64]:
-    axis = (np.arange(side) + 0.5) / side - 0.5
-    return np.stack(np.meshgrid(axis, axis, axis, indexing='ij'), axis=-1).reshape(-1, 3)
-
-
 def _distances(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return the distance of each pixel of a mask from those that are not in it, pixels."""
     if mask.all():  # nothing is not in it
@@ -92,7 +88,7 @@ def seen_cells(cameras: Sequence[Camera], side: int) -> NDArray[np.bool_]:
 
     The cells are those of the unit cube about the origin; lengths in sides of the cube.
     """
-    centres = _centres(side)
+    centres = cell_centers(side)
     count = np.zeros(len(centres), np.int64)
     for camera in cameras:
         pixels, depth = camera.project(centres)

@@ -17,6 +17,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.geometry.framing import cube_corners
 from active_recon.photos.board_print import SeenBoard, UNIFORM
 from active_recon.photos.cube import Cube
+from active_recon.volumes.voxels import cell_centers
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -98,9 +99,7 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
 def _place(camera: Camera, above: NDArray[np.bool_]) -> _Place:
     """Return where a camera, lengths in sides of the cube, shows its cells that are `above`."""
     lens = camera.intrinsics
-    axis = (np.arange(CELLS) + 0.5) / CELLS - 0.5
-    centres = np.stack(np.meshgrid(axis, axis, axis, indexing='ij'), axis=-1).reshape(-1, 3)
-    pixels, depth = camera.project(centres)
+    pixels, depth = camera.project(cell_centers(CELLS))
     at = np.nan_to_num(np.floor(pixels), nan=-1)
     shown = (above & (depth > 0) & ((at >= 0) & (at < [lens.width, lens.height])).all(axis=1))
     across, down = np.where(shown[:, None], at, 0).astype(np.intp).T

@@ -5,7 +5,7 @@ import math
 
 from active_recon.policies.base import Observation
 from active_recon.policies.candidate_rendering import coarse_volume, in_sight
-from active_recon.policies.sight_lines import cell_centers
+from active_recon.volumes.voxels import cell_centers
 import numpy as np
 from numpy.typing import NDArray
 

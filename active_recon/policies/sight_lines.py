@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 import math
 
+from active_recon.volumes.voxels import cell_centers
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,12 +46,6 @@ def cell_lines(pose: NDArray[np.float64], side: int) -> SightLines:
     A line ends before the cell that it leads to: it crosses what may hide it.
     """
     return _cell_lines(np.ascontiguousarray(pose[:3, 3], np.float64).tobytes(), side)
-
-
-def cell_centers(side: int) -> NDArray[np.float64]:
-    """Return the centres of all cells of a grid, (S ** 3, 3) of a unit cube, in flat order."""
-    along = (np.arange(side) + 0.5) / side - 0.5
-    return np.stack(np.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
 
 
 @lru_cache(maxsize=8)

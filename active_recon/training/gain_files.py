@@ -86,7 +86,7 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
     keep = partial(_keep, entrant, collecting, out, policy, torch.get_num_threads())
     workers = crew or LocalCrew(1)
     results = workers.map(keep, folders, out, sorted({folder.root for folder in folders}))
-    for result in told(results, workers, advance, lambda result: bool(result.refusal)):
+    for result in told(results, workers, advance):
         if result.refusal and result.kind not in _LEFT_OUT:
             raise WorkError(f'{folders[result.index].name}: {result.refusal}', result.kind)
     files = [path for folder in folders if (path := _file(out, folder)).is_file()]

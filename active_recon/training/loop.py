@@ -72,8 +72,8 @@ class Run:
     """
     Where a training runs, where its checkpoint is, and what is called as it goes.
 
-    `report` is called after every step with the step and what was measured, `show` after every
-    validation with the step.
+    With `resume` it continues from the checkpoint, if there is one. `report` is called after every
+    step with the step and what was measured, `show` after every validation with the step.
     """
 
     fabric: Fabric
@@ -132,7 +132,7 @@ def train_steps(
                             weight_decay=weight_decay)
     wrapped, optimizer = fabric.setup(learner, raw)
     begun = Checkpoint(0, settings, [])
-    if run.resume:
+    if run.resume and run.checkpoint_path.is_file():
         begun = resume_checkpoint(run.checkpoint_path, trained, raw, settings)
     schedule = torch.optim.lr_scheduler.LambdaLR(raw, lambda done: lr_factor(
         begun.step + done, config.steps, config.warmup_steps))

@@ -96,8 +96,7 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
     attention: Any = entry.policy(config) if entry.policy and (plan.joint or plan.policy) else None
 
     def run(stage: str, report: Report) -> Run:
-        path = out / f'{stage}.safetensors'
-        return Run(fabric, path, report, resume and path.is_file(),
+        return Run(fabric, out / f'{stage}.safetensors', report, resume,
                    show=lambda step: show(stage, step, network))
 
     if plan.joint and attention is not None:

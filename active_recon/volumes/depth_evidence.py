@@ -1,7 +1,7 @@
 """What depth images say of each cell: how often it was seen free, at a surface, or behind one."""
 
 from active_recon.geometry.cameras import Camera
-from active_recon.volumes.voxels import FINE_RESOLUTION
+from active_recon.volumes.voxels import cell_centers, FINE_RESOLUTION
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,13 +50,12 @@ def _along(side: int) -> NDArray[np.float64]:
 
 def _projected(camera: Camera, side: int) -> tuple[NDArray[np.float32], ...]:
     """Return column, row and depth of the cells' centres, (R, R, R) each; 0 behind the camera."""
-    along = _along(side)
     if camera.intrinsics.distortion is not None:
-        centers = np.stack(np.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
-        pixels, depth = camera.project(centers)
+        pixels, depth = camera.project(cell_centers(side))
         shape = (side, side, side)
         return (*(np.nan_to_num(each, nan=-1).reshape(shape).astype(np.float32)
                   for each in pixels.T), depth.reshape(shape).astype(np.float32))
+    along = _along(side)
     rows = camera.intrinsics.matrix @ camera.object_to_camera[:3]
     across, down, depth = (
         ((row[0] * along + row[3])[:, None] + row[1] * along).astype(np.float32)[:, :, None]

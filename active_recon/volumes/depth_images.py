@@ -8,7 +8,8 @@ from active_recon.geometry.framing import cube_corners
 import numpy as np
 from numpy.typing import NDArray
 
-_THOUSAND = 1000
+MM_PER_METRE = 1000
+"""Depth images of 16 bits are in millimetres."""
 _LEAST_WITHIN = 0.01  # share of the values before the cube that have to lie in it
 _MARGIN = 0.25  # sides of the cube, before and behind it, that count as in it here
 
@@ -69,9 +70,9 @@ def _require_fitting(depth: NDArray[np.float32], camera: Camera, object_size: fl
     if _fits(found, near, far):
         return
     hint = '; are its unit, its scale and its alignment with the image right?'
-    if _fits(found * _THOUSAND, near, far):
+    if _fits(found * MM_PER_METRE, near, far):
         hint = '; metres read as millimetres? 16 bits are millimetres, floats are metres'
-    elif _fits(found / _THOUSAND, near, far):
+    elif _fits(found / MM_PER_METRE, near, far):
         hint = '; millimetres read as metres? 16 bits are millimetres, floats are metres'
     raise ViewError(
         "depth contradicts the camera: expected distances in the object's cube, "

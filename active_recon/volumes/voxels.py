@@ -125,6 +125,12 @@ class VoxelGrid:
         return isosurface(self.occupancy, threshold, self.size)
 
 
+def cell_centers(side: int) -> NDArray[np.float64]:
+    """Return the centres of all cells of a grid, (S ** 3, 3) of a unit cube, in flat order."""
+    along = (np.arange(side) + 0.5) / side - 0.5
+    return np.stack(np.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
+
+
 @lru_cache(maxsize=2)  # a grid and its finer one, 3 MB for 64 cells a side
 def _centres(side: int, size: float) -> NDArray[np.float32]:
     """Return x, y, z (metres) of the cells of a cube, (side ** 3, 3), in their order in memory."""

@@ -13,7 +13,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import io
 import ipaddress
 import json
-import os
 from pathlib import Path
 import secrets
 import socket
@@ -26,6 +25,7 @@ from active_recon.photos.files import HEIC_ADVICE
 from active_recon.viewer.address import HOST
 from active_recon.watching.upload_page import PAGE
 from active_recon.watching.watcher import Progress, Verdicts
+from active_recon.whole_files import whole_file
 import cv2
 from PIL import Image
 
@@ -82,9 +82,8 @@ class UploadServer(ThreadingHTTPServer):
                       for each in _SUFFIXES.values()):
                 number += 1
             name = f'phone-{number:04}{suffix}'
-            begun = self._folder / f'.{name}.part'
-            begun.write_bytes(photo)
-            os.replace(begun, self._folder / name)
+            with whole_file(self._folder / name) as begun:
+                begun.write_bytes(photo)
         return name
 
     def close(self) -> None:

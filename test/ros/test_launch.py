@@ -6,7 +6,7 @@ import runpy
 import sys
 from types import ModuleType
 
-from active_recon.nodes.composed import COMPOSABLE
+from active_recon.nodes.runtime.composable import COMPOSABLE
 from active_recon.parameters.declaration import declared
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from active_recon.parameters.recorder import TOPICS

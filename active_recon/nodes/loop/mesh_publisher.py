@@ -73,7 +73,7 @@ class MeshPublisher:
 
 def _marker(shape: _Shape) -> Marker | None:
     """Return the surface of a shape, None where it has none yet."""
-    from active_recon.meshes.coloring import colored  # see Products
+    from active_recon.meshes.coloring import colored  # see `meshing_imported`
 
     try:
         mesh = colored(shape.grid.mesh(shape.threshold), shape.photos)

@@ -1,14 +1,6 @@
 'use strict';
 (async () => {
-  const inflated = async (id) => {
-    const packed = Uint8Array.from(atob(document.getElementById(id).textContent),
-      (letter) => letter.charCodeAt(0));
-    const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip'));
-    return new Response(plain).text();
-  };
-  const script = document.createElement('script');
-  script.textContent = await inflated('plotly');
-  document.head.append(script);
+  await plotlyLoaded();
   const drawn = JSON.parse(await inflated('drawn'));
   const config = { displayModeBar: false, responsive: true, scrollZoom: false };
   const dark = matchMedia('(prefers-color-scheme: dark)');

@@ -1,0 +1,85 @@
+"""Weights that belong beside a network's: a file of their own, for one network only."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from active_recon.config import Config
+from active_recon.errors import ConfigError, WeightsError
+from active_recon.models.weights_bytes import weights_bytes
+from active_recon.models.weights_files import weights_hash
+from safetensors import safe_open, SafetensorError
+import torch
+from torch import nn
+
+Module = TypeVar('Module', bound=nn.Module)
+
+
+@dataclass(frozen=True)
+class Companion(Generic[Module]):
+    """
+    A module that was trained for the weights of one network.
+
+    - kind: what its files call themselves
+    - build: makes it of its config's mapping, with fresh weights
+    - half: whether its weights are stored in half precision; they are read as float32
+    - no_such, of_others: what is said of a file that is of another kind, and of one that was
+      trained for other weights; advice: what to do about the latter
+    """
+
+    kind: str
+    build: Callable[[dict[str, Any]], Module]
+    no_such: str
+    of_others: str
+    advice: str
+    half: bool = False
+
+    def save(self, path: Path, module: Module, config: Config, network_sha256: str,
+             card: dict[str, Any]) -> None:
+        """Write `path` (.safetensors) for a network's weights, and the card beside it."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        dtype = torch.float16 if self.half else torch.float32
+        tensors = {name: _in(dtype, tensor.detach().cpu()).contiguous()
+                   for name, tensor in module.state_dict().items()}
+        path.write_bytes(weights_bytes(tensors, {
+            'model': self.kind, 'config': json.dumps(config.to_dict()),
+            'network_sha256': network_sha256}))
+        path.with_suffix('.json').write_text(json.dumps({
+            'model': self.kind, 'config': config.to_dict(), 'network_sha256': network_sha256,
+            'sha256': weights_hash(path), **card}, indent=2) + '\n')
+
+    def read(self, path: Path, network_sha256: str, device: str = 'cpu') -> Module:
+        """
+        Return the module in a file, for the network whose weights have a hash; it is not trained.
+
+        Raises WeightsError where the file is not whole or of another kind, and where it was
+        trained for other weights.
+        """
+        try:
+            with safe_open(path, framework='pt', device=device) as stored:
+                facts = stored.metadata() or {}
+                tensors = {name: _in(torch.float32, stored.get_tensor(name))
+                           for name in stored.keys()}  # noqa: SIM118
+        except (SafetensorError, OSError) as error:
+            raise WeightsError(f'{path}: no whole safetensors file: {error}') from error
+        if facts.get('model') != self.kind:
+            raise WeightsError(f'{path}: {self.no_such}, got {facts.get("model")!r}')
+        if facts.get('network_sha256') != network_sha256:
+            raise WeightsError(
+                f'{path}: {self.of_others}: expected one trained for {network_sha256[:12]}, got '
+                f'one for {facts.get("network_sha256", "none")[:12]}; {self.advice}')
+        try:
+            with torch.device('meta'):
+                module = self.build(json.loads(facts['config']))
+            module.load_state_dict(tensors, assign=True)
+        except (KeyError, ValueError, TypeError, RuntimeError, ConfigError) as error:
+            raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
+        module.requires_grad_(False)
+        return module.eval()
+
+
+def _in(dtype: torch.dtype, tensor: torch.Tensor) -> torch.Tensor:
+    """Return a tensor in a precision; whole numbers stay as they are."""
+    return tensor.to(dtype) if tensor.is_floating_point() else tensor
