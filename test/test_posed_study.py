@@ -83,6 +83,15 @@ def test_the_truth_itself_has_the_best_scores(carving):
     assert diagrams['calibration_error'][0].sum() == truth.near.sum()
 
 
+def test_precision_and_recall_make_the_iou(carving):
+    truth = a_target()
+    logits = np.random.default_rng(0).normal(0, 2, (64,) * 3).astype(np.float32)
+    scores, _ = scored(logits + 4 * truth.cells[64], truth, carving, 1, surfaces=False)
+    assert 0 < scores['precision'] < scores['recall'] < 1
+    assert 1 / scores['iou_64'] == pytest.approx(
+        1 / scores['precision'] + 1 / scores['recall'] - 1, rel=1e-5)
+
+
 def test_temperatures_are_those_of_the_number_of_views(carving):
     truth = a_target()
     logits = np.random.default_rng(0).normal(0, 2, (64,) * 3).astype(np.float32)
@@ -96,7 +105,9 @@ def test_temperatures_are_those_of_the_number_of_views(carving):
 
 def test_what_is_not_there_is_said_to_be_the_worst(carving):
     scores, _ = scored(np.full((64,) * 3, -9, np.float32), a_target(), carving, 1, surfaces=True)
-    assert scores['iou_64'] == scores['f_score_2'] == scores['thin_recall'] == 0
+    for name in ('iou_64', 'f_score_2', 'thin_recall', 'recall'):
+        assert scores[name] == 0, name
+    assert math.isnan(scores['precision'])
     assert scores['chamfer'] == pytest.approx(math.sqrt(3))
 
 

@@ -77,8 +77,9 @@ def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: 
 
     - `iou_*`: at the entrant's threshold; `own_iou_*`: at the threshold chosen for the object;
       `expected_iou`: the expected IoU there
-    - `brier` and the diagram `calibration_error`, near the surface, and `thin_recall`: if the
-      truth has the resolution of the logits
+    - `brier` and the diagram `calibration_error`, near the surface, `thin_recall`, and
+      `precision` (NaN where no cell is said to be occupied) and `recall` of all occupied cells:
+      if the truth has the resolution of the logits
     - with the prefix `tempered_`: of logits divided by the entrant's temperatures, if it has any;
       for the object's threshold, by those fitted to cells anywhere
     - those of `SurfaceScores`, with `surfaces`
@@ -101,7 +102,9 @@ def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: 
     scores |= iou_scores(whole, truth, entrant.sides, entrant.thresholds)
     threshold = entrant.thresholds[max(entrant.sides)]
     if len(logits) == truth.finest:
-        scores['thin_recall'] = recall(whole > threshold, truth.thin)
+        found, wanted = whole > threshold, truth.cells[truth.finest]
+        scores |= {'thin_recall': recall(found, truth.thin),
+                   'precision': recall(wanted, found), 'recall': recall(found, wanted)}
     if surfaces and truth.surface is not None:
         scores |= asdict(surface_scores(voxel_surface(whole, threshold), truth.surface))
     return scores, diagrams

@@ -135,6 +135,8 @@ def _set_tables(figures: Mapping[str, Any]) -> list[str]:
             ('f_score_1', 'F-score at 1 % of the cube'), ('f_score_2', 'F-score at 2 %'),
             ('chamfer', 'Chamfer distance, sides of the cube'),
             ('normal_consistency', 'Normal consistency'), ('thin_recall', 'Recall of thin parts'),
+            ('precision', 'Precision at the finest cells'),
+            ('recall', 'Recall at the finest cells'),
             ('own_iou_64', 'IoU at 64 cells at the threshold of each object'),
             ('own_iou_32', 'IoU at 32 cells at the threshold of each object'),
             ('expected_iou', 'IoU that the network expects there'),
