@@ -15,6 +15,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 MOST_SHOWN = 1000
 """Rows on the page, of each of the two lists; the table has all of them."""
 _BINS = 20  # of IoU in [0, 1]
+_FEW = 6  # counts for which an axis has a mark at every number
 
 
 class Summary:
@@ -64,6 +65,7 @@ class Summary:
             loader=ChoiceLoader([PackageLoader(f'active_recon.{room}', 'templates')
                                  for room in ('batch', 'report')]), autoescape=True,
             trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
+        environment.filters['stopped'] = stopped
         refused = self._refusals.total()
         page = environment.get_template('summary.html').render(
             kind=kind, episodes=self._episodes, refused=refused, warned=self._warned,
@@ -86,7 +88,7 @@ class Summary:
         for title, counts in (('views', self._views), ('why it stopped', self._stops),
                               ('why it was refused', self._refusals)):
             found = sorted(counts.items())
-            drawn.append((title, [name for name, _ in found], [count for _, count in found]))
+            drawn.append((title, [str(name) for name, _ in found], [count for _, count in found]))
         return {title: _bars(title, x, y) for title, x, y in drawn if any(y)}
 
 
@@ -97,5 +99,7 @@ def _bars(title: str, x: Sequence[Any], y: Sequence[int]) -> dict[str, Any]:
         'data': [{'type': 'bar', 'x': list(x), 'y': list(y),
                   'hovertemplate': f'%{{x}}: %{{y}} {number}<extra></extra>'}],
         'layout': {'height': 260, 'margin': {'l': 58, 'r': 12, 't': 12, 'b': 44},
-                   'xaxis': {'title': {'text': title}, 'fixedrange': True},
-                   'yaxis': {'title': {'text': number}, 'fixedrange': True}}}
+                   'xaxis': {'title': {'text': title}, 'fixedrange': True,
+                             'type': 'category' if isinstance(x[0], str) else 'linear'},
+                   'yaxis': {'title': {'text': number}, 'fixedrange': True,
+                             **({'dtick': 1} if max(y) < _FEW else {})}}}
