@@ -75,7 +75,7 @@ html: .venv/installed
 
 bench: .venv/installed  ## the figures of doc/benchmarks.md, measured here
 	@echo '== measuring'
-	@$(BIN)/python -m benchmarks $(ARGS)
+	@$(BIN)/python -m benchmarks --keep $(ARGS)
 
 soak: .venv/installed  ## an hour of the loop, for docs/soak.md; ARGS='--minutes 5' for less
 	@echo '== soaking'

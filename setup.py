@@ -76,6 +76,7 @@ setup(
             'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
             'sphinx-copybutton>=0.5.2'],
         'export': ['onnx>=1.17,<2'],
+        'int8': ['nncf>=3,<4', 'onnx>=1.17,<2'],
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'onnxruntime': ['onnxruntime>=1.20,<2'],
         's3': ['s3fs>=2025.2'],

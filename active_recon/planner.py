@@ -24,7 +24,7 @@ from active_recon.policies.automatic import SWEEP
 from active_recon.policies.reasons import goal_reason, GoalReason
 from active_recon.policies.stopping import StoppingRule
 from active_recon.quality.quality import Quality
-from active_recon.runtimes import AUTO
+from active_recon.runtimes import AUTO, State
 from active_recon.volumes.voxels import turned, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,11 @@ class PlannerView:
     entropy: float
     volume: VoxelGrid | None = None
     quality: Quality | None = None
+
+    def is_of(self, other: 'PlannerView') -> bool:
+        """Whether it is the same view, whatever its entropy and quality."""
+        return (self.latent is other.latent and self.camera is other.camera
+                and self.volume is other.volume)
 
 
 class Planner:
@@ -138,6 +143,7 @@ class Planner:
         self._failed: list[Camera] = []
         self._stopped = False
         self._goal: Goal | None = None
+        self._early: tuple[PlannerView, Choice, State] | None = None
 
     def go_on_from(self, other: 'Planner') -> None:
         """
@@ -167,6 +173,27 @@ class Planner:
         """
         self._aim_first(camera)
         return self.plan()
+
+    def expect_view(self, latent: NDArray[np.float32], camera: Camera,
+                    volume: VoxelGrid | None = None) -> None:
+        """
+        Let the policy choose after a view before all of it is known, for `add_view` to take up.
+
+        The arguments are those of `add_view`, and the same objects are to be given to it; then it
+        decides as it would have without this. Policies that look at the latent alone are quick,
+        and some draw numbers: they choose in `add_view`.
+        """
+        self._early = None
+        if not self._policy.wants_volume:
+            return
+        view = PlannerView(latent, camera, math.nan, volume)
+        try:
+            candidates = self._places.candidates(camera)
+            choice, state = self._policy.choose(
+                self._observed([*self._views, view], candidates), self._state)
+        except ViewError:
+            return  # which `add_view` tells
+        self._early = view, choice, state
 
     def add_view(self, latent: NDArray[np.float32], camera: Camera, entropy: float,
                  volume: VoxelGrid | None = None, quality: Quality | None = None) -> Decision:
@@ -244,20 +271,30 @@ class Planner:
 
     def _choose(self, views: Sequence[PlannerView]) -> None:
         """Let the policy choose after the last of some views."""
+        last, early = views[-1], self._early
+        self._early = None
+        seen = self._observed(views, self._candidates)
+        if early is not None and early[0].is_of(last):
+            _, self._choice, self._state = early
+        else:
+            self._choice, self._state = self._policy.choose(seen, self._state)
+        if last.quality is not None and last.quality.suspect:
+            self._choice, _ = self._sweep.choose(seen, {})
+
+    def _observed(self, views: Sequence[PlannerView],
+                  candidates: Sequence[OrbitCamera]) -> Observation:
+        """Return what the policy sees after the last of some views."""
         last = views[-1]
         if last.volume is None and self._policy.wants_volume:
             raise ViewError('no probabilities: expected them beside the latent, as this policy '
                             'looks at them, got none', 'volume')
         unit = 1.0 if last.volume is None else 1 / last.volume.size
-        taken, candidates = (
+        taken, places = (
             np.stack([each.turned(-self._yaw).scaled(unit).pose for each in cameras])[None]
-            for cameras in ([view.camera for view in views], self._candidates))
+            for cameras in ([view.camera for view in views], candidates))
         volume = None if last.volume is None else turned(
             last.volume.occupancy, -self._yaw)[None]
-        seen = Observation(last.latent[None], taken, candidates, volume)
-        self._choice, self._state = self._policy.choose(seen, self._state)
-        if last.quality is not None and last.quality.suspect:
-            self._choice, _ = self._sweep.choose(seen, {})
+        return Observation(last.latent[None], taken, places, volume)
 
     def _aim_first(self, camera: Camera) -> None:
         """Make the best of a camera that no policy chose."""

@@ -33,7 +33,7 @@ def evaluation_figures() -> list[Figure]:
             _measure, network_in(runtime, SHIPPED, bundle, half, _THREADS), views, half)
         for half in (False, True) for runtime in ('torch', 'openvino')}, _TURNS)
     rates = {name: _OBJECTS * 1e3 / np.array(samples) for name, samples in found.items()}
-    return [*(Figure(f'evaluation, {name}', 'objects/s', samples, 0, more_is_better=True)
+    return [*(Figure(f'evaluation, {name}', 'objects/s', samples, None, more_is_better=True)
               for name, samples in rates.items()),
             *(Figure(f'evaluation, openvino beside torch, {precision}', 'times',
                      rates[f'openvino, {precision}'] / rates[f'torch, {precision}'], 3,

@@ -9,12 +9,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Figure:
-    """A measured quantity: its samples in `unit`, what of them is judged, and the goal."""
+    """A measured quantity: its samples in `unit`, what of them is judged, and any goal."""
 
     name: str
     unit: str
     samples: Sequence[float]
-    goal: float
+    goal: float | None
     percentile: float = 50.0
     more_is_better: bool = False
 
@@ -31,7 +31,9 @@ class Figure:
 
     @property
     def reached(self) -> bool:
-        """Whether the goal is reached."""
+        """Whether the goal is reached, if there is one."""
+        if self.goal is None:
+            return True
         return self.value >= self.goal if self.more_is_better else self.value <= self.goal
 
 

@@ -1,12 +1,14 @@
 """
-What bf16 does to the IoU of the default network.
+What bf16 and int8 do to the IoU of the default network, and to the time of a view.
 
-`python -m benchmarks.precision data/test` reconstructs 60 objects of a dataset from five random
-views each, in f32 and in bf16, and prints the IoU after every view and their differences.
+`python -m benchmarks.precision data/val` reconstructs 104 objects of a dataset from five random
+views each, on one thread, in every precision in turns. It prints the IoU after each view, how much
+it differs from that in f32, and the time of a view as a ratio to that in f32.
 """
 
 from pathlib import Path
 import sys
+import time
 
 from active_recon.datasets.layout import list_objects, ObjectFolder
 from active_recon.geometry.canonical import network_image
@@ -15,7 +17,8 @@ from active_recon.volumes.rendering import composite
 from active_recon.volumes.voxels import iou
 import numpy as np
 
-_OBJECTS, _VIEWS = 60, 5
+_OBJECTS, _VIEWS = 104, 5
+_PRECISIONS = ('f32', 'bf16', 'int8')
 
 
 def main() -> None:
@@ -24,27 +27,41 @@ def main() -> None:
     folders = list_objects(Path(sys.argv[1]))
     chosen = [folders[index] for index in rng.permutation(len(folders))[:_OBJECTS]]
     runtimes = [load_runtime(None, 'openvino', threads=1, precision=precision)
-                for precision in ('f32', 'bf16')]
-    found = np.array([_ious(folder, runtimes, rng.permutation(24)[:_VIEWS]) for folder in chosen])
-    apart = found[:, 1] - found[:, 0]
-    for name, values in (('f32', found[:, 0].mean(0)), ('bf16', found[:, 1].mean(0)),
-                         ('mean difference', apart.mean(0)),
-                         ('largest difference', np.abs(apart).max(0))):
-        print(f'{name:<20}', *(f'{value:.5f}' for value in values))  # noqa: T201
-
-
-def _ious(folder: ObjectFolder, runtimes: list[Runtime], order: np.ndarray) -> np.ndarray:
-    """Return the IoU of each runtime after each of some views, (runtimes, views)."""
-    truth = folder.voxels(64).occupied(0.5)
-    views = [(composite(folder.image(index), 255), folder.cameras()[index]) for index in order]
-    rows = []
+                for precision in _PRECISIONS]
     for runtime in runtimes:
-        state, row = runtime.initial_state(), []
-        for view in views:
-            occupancy, _, state = runtime.step(*network_image(*view, runtime.spec), state)
-            row.append(float(iou(occupancy > runtime.threshold, truth)))
-        rows.append(row)
-    return np.array(rows)
+        runtime.warm_up()
+    found = np.array([_measured(folder, runtimes, rng) for folder in chosen])
+    ious, spent = found[..., 0], found[..., 1]  # (objects, precisions, views)
+    for index, precision in enumerate(_PRECISIONS):
+        apart = ious[:, index] - ious[:, 0]
+        bound = 1.96 * apart.mean(1).std() / len(apart) ** 0.5
+        _print(f'{precision}: IoU', ious[:, index].mean(0))
+        _print(f'{precision}: mean difference from f32', apart.mean(0))
+        _print(f'{precision}: that over all views, 95 %', [apart.mean(), bound])
+        _print(f'{precision}: largest difference', np.abs(apart).max(0))
+        _print(f'{precision}: time beside f32, median and 5 to 95 %',
+               np.percentile(spent[:, index] / spent[:, 0], [50, 5, 95]))
+
+
+def _measured(folder: ObjectFolder, runtimes: list[Runtime],
+              rng: np.random.Generator) -> list[list[tuple[float, float]]]:
+    """Return the IoU and the ms of each view in each runtime, (runtimes, views, 2)."""
+    truth, cameras = folder.voxels(64).occupied(0.5), folder.cameras()
+    states = [runtime.initial_state() for runtime in runtimes]
+    rows: list[list[tuple[float, float]]] = [[] for _ in runtimes]
+    for index in rng.permutation(len(cameras))[:_VIEWS]:
+        view = composite(folder.image(index), 255), cameras[index]
+        for number, runtime in enumerate(runtimes):
+            taken = network_image(*view, runtime.spec)
+            start = time.perf_counter()
+            occupancy, _, states[number] = runtime.step(*taken, states[number])
+            spent = 1e3 * (time.perf_counter() - start)
+            rows[number].append((float(iou(occupancy > runtime.threshold, truth)), spent))
+    return rows
+
+
+def _print(name: str, values: object) -> None:
+    print(f'{name:<45}', *(f'{value:.4f}' for value in np.asarray(values)))  # noqa: T201
 
 
 if __name__ == '__main__':

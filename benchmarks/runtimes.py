@@ -12,7 +12,7 @@ from active_recon.geometry.canonical import network_image
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_runtime
-from active_recon.runtimes.precision import has_bf16
+from active_recon.runtimes.precision import has_bf16, has_int8
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
@@ -32,7 +32,7 @@ print(peak_mb(os.getpid()))
 
 
 def runtime_figures() -> list[Figure]:
-    """Return the figures of torch, and of openvino in f32 and, where the CPU has it, bf16."""
+    """Return the figures of torch, and of openvino in f32, and bf16 and int8 if the CPU can."""
     return [*_views(1), *_views(2), *_plans(24, 1), *_plans(200, 20), *_starts()]
 
 
@@ -40,6 +40,7 @@ def _views(threads: int) -> Iterator[Figure]:
     """Encode, update and decode, from the network's image to the occupancy of 64 cells."""
     ways = [('torch', 'f32'), ('openvino', 'f32')]
     ways += [('openvino', 'bf16')] if has_bf16() else []
+    ways += [('openvino', 'int8')] if has_int8() else []
     taken = _taken()
     tasks = {}
     for name, precision in ways:

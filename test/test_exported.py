@@ -6,9 +6,13 @@ import math
 import shutil
 import sys
 
+from active_recon.datasets.layout import list_objects
+from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.exporting.export import export
+from active_recon.exporting.quantization import quantize
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, Intrinsics, orbit_camera
+from active_recon.geometry.canonical import network_image
 from active_recon.models.attention import AttentionModel
 from active_recon.models.candidate_looks import look
 from active_recon.models.registry import network_entry
@@ -19,8 +23,18 @@ from active_recon.models.weights_files import scorer_path, SHIPPED, weights_hash
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_policy_runtime, load_runtime, REMARK
 from active_recon.runtimes.compiled_cache import VARIABLE
-from active_recon.runtimes.graph_files import graph_path, KEY, NETWORK_PARTS, POLICY_PART
-from active_recon.runtimes.precision import has_bf16
+from active_recon.runtimes.graph_files import (
+    DECODE_PART,
+    graph_path,
+    INT8_PART,
+    KEY,
+    NETWORK_PARTS,
+    POLICY_PART,
+)
+from active_recon.runtimes.precision import has_bf16, has_int8
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
+from active_recon.volumes.voxels import iou
 from command_line import command
 import numpy as np
 import pytest
@@ -127,6 +141,66 @@ def test_half_precision_moves_hardly_a_cell():
                    for precision in ('f32', 'bf16'))
     assert 0 < np.abs(half - exact).max() < 0.05
     assert np.abs(half - exact).mean() < 1e-3
+
+
+def occupied(precision, weights=None):
+    """Return what is occupied, (views, 64, 64, 64), after each of some views of the chair."""
+    runtime = load_runtime(weights, 'openvino', threads=1, precision=precision)
+    renderer = Renderer(load_mesh(SHIPPED.parents[1] / 'objects' / 'chair.glb'))
+    state, found = runtime.initial_state(), []
+    for azimuth in (0.3, 2.0, 4.0):
+        camera = orbit_camera(azimuth)
+        image = composite(renderer.render(camera), 255)
+        occupancy, _, state = runtime.step(*network_image(image, camera, runtime.spec), state)
+        found.append(occupancy > runtime.threshold)
+    return np.array(found), runtime.provenance['computed_by']
+
+
+@pytest.mark.skipif(not has_int8(), reason='this processor has no sums of 8-bit products')
+def test_integers_hardly_change_an_object():
+    (exact, _), (found, told) = occupied('f32'), occupied('int8')
+    assert ', int8 with ' in told
+    assert 0 < (found != exact).sum() < 0.1 * exact.sum()
+    assert all(iou(*pair) > 0.9 for pair in zip(found, exact, strict=True))
+
+
+def test_the_integers_that_ship_belong_to_the_weights_that_ship():
+    whole, integers = (metadata(onnx.load(graph_path(None, part)))
+                       for part in (DECODE_PART, INT8_PART))
+    assert (integers.pop('part'), whole.pop('part')) == (INT8_PART, DECODE_PART)
+    assert integers == whole
+    assert whole['weights_sha256'] == weights_hash()
+
+
+@pytest.mark.skipif(not has_int8(), reason='this processor has no sums of 8-bit products')
+def test_weights_without_integers_are_told_and_auto_goes_on_without_them(exported):
+    with pytest.raises(WeightsError, match='not quantised: expected lifting-decode-int8.onnx bes'):
+        load_runtime(exported['lifting'], 'openvino', precision='int8')
+    instead = load_runtime(exported['lifting'], precision='int8', threads=1).provenance
+    assert instead['computed_by'].startswith('torch') and 'not quantised' in instead[REMARK]
+
+
+@pytest.mark.parametrize(('model', 'words'), [
+    ('ptn', 'ptn: not quantised: expected the network lifting'),
+    ('lifting', r"nncf is not installed: expected it, as `pip install 'active_recon\[int8\]'`")])
+def test_another_network_is_not_quantised_nor_anything_without_nncf(
+        exported, monkeypatch, model, words):
+    monkeypatch.setitem(sys.modules, 'nncf', None)
+    with pytest.raises(ConfigError, match=words):
+        quantize(exported[model], [])
+
+
+@pytest.mark.slow
+def test_integers_made_anew_hardly_change_an_object(tmp_path):
+    pytest.importorskip('nncf', reason="needs nncf: pip install 'active_recon[int8]'")
+    for path in SHIPPED.parent.glob('lifting*'):
+        shutil.copy(path, tmp_path)
+    list(make_dataset(shape_jobs('chair', range(8), tmp_path / 'data'), 1))
+    weights = tmp_path / SHIPPED.name
+    made = quantize(weights, list_objects(tmp_path / 'data'))
+    assert made == graph_path(weights, INT8_PART)
+    found, exact = occupied('int8', weights)[0], occupied('f32')[0]
+    assert all(iou(*pair) > 0.9 for pair in zip(found, exact, strict=True))
 
 
 @pytest.mark.parametrize('library', LIBRARIES)
@@ -283,6 +357,7 @@ def test_weights_that_were_not_exported_are_told_with_what_to_do(tmp_path, libra
     ('openvino', {'precision': 'half'}, 'precision: unknown value: expected one of auto, f32'),
     ('openvino', {'device': 'cuda'}, 'device: not for exported graphs: expected cpu, got cuda'),
     ('onnxruntime', {'precision': 'bf16'}, 'bf16 is not for the runtime onnxruntime'),
+    ('onnxruntime', {'precision': 'int8'}, 'int8 is not for the runtime onnxruntime'),
     ('onnxruntime', {'device': 'cuda'}, 'device: cuda not available: expected one that this'),
     ('torch', {'precision': 'bf16'}, 'bf16 is not for the runtime torch'),
     ('tensorflow', {}, 'runtime: unknown value: expected one of auto, openvino, torch, onnxr')])
@@ -291,10 +366,13 @@ def test_what_a_runtime_has_not_is_refused(library, wrong, words):
         load_runtime(None, library, **wrong)
 
 
-def test_bf16_is_refused_where_the_processor_would_imitate_it(monkeypatch):
-    monkeypatch.setattr('active_recon.runtimes.precision.has_bf16', lambda: False)
-    with pytest.raises(ConfigError, match='bf16 is not in this processor: expected avx512_bf16'):
-        load_runtime(None, 'openvino', precision='bf16')
+@pytest.mark.parametrize(('precision', 'expected'), [
+    ('bf16', 'avx512_bf16'), ('int8', 'avx512_vnni, avx_vnni or amx_int8')])
+def test_what_the_processor_would_imitate_is_refused(monkeypatch, precision, expected):
+    monkeypatch.setattr('active_recon.runtimes.precision._flags', lambda: frozenset({'avx2'}))
+    with pytest.raises(ConfigError, match=f'{precision} is not in this processor: expected '
+                                          f'{expected}'):
+        load_runtime(None, 'openvino', precision=precision)
 
 
 @pytest.mark.parametrize('library', LIBRARIES)

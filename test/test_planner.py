@@ -356,6 +356,53 @@ def test_a_goal_has_a_reason_where_the_policy_looks_at_the_volume():
     assert blind.reason() is None
 
 
+def some_cells(seed):
+    """Return a block somewhere in a grid, uncertain here and there."""
+    cells = np.zeros((32,) * 3, np.float32)
+    cells[8 + seed:22, 10:22, 10 + seed:22] = 0.3 + 0.1 * seed
+    return VoxelGrid(cells)
+
+
+def goals_of(expect, policy='unseen_entropy'):
+    """Return the azimuths that a planner chooses, with some views expected before they come."""
+    planner = Planner.load(policy, seed=3, max_views=9, entropy_tolerance=0)
+    camera, azimuths = planner.first_goal(orbit_camera(0.5)).camera, []
+    for number in range(3):
+        grid = some_cells(number)
+        expect(planner, camera, grid)
+        camera = planner.add_view(LATENT, camera, 10.0, grid).goal.camera
+        azimuths.append(camera.azimuth)
+    return azimuths
+
+
+@pytest.mark.parametrize('policy', ['unseen_entropy', 'random', 'farthest'])
+def test_a_view_that_was_expected_is_planned_as_any_other(policy):
+    never = goals_of(lambda *_: None, policy)
+    assert goals_of(lambda planner, camera, grid: planner.expect_view(
+        LATENT, camera, grid), policy) == never
+    assert goals_of(lambda planner, camera, grid: planner.expect_view(
+        LATENT, orbit_camera(4.0), some_cells(3)), policy) == never
+
+
+def test_a_view_that_was_expected_is_not_chosen_after_twice():
+    class Counting(Looking):
+        chosen = 0
+
+        def choose(self, seen, state):
+            self.chosen += 1
+            return super().choose(seen, state)
+
+    policy, camera, grid = Counting(), orbit_camera(0.5), some_cells(1)
+    planner = Planner(policy, 9, 0)
+    planner.expect_view(LATENT, camera)  # without its volume: `add_view` tells
+    assert policy.chosen == 0
+    planner.expect_view(LATENT, camera, grid)
+    planner.add_view(LATENT, camera, 10.0, grid)
+    assert policy.chosen == 1
+    planner.add_view(LATENT, camera, 10.0, grid)
+    assert policy.chosen == 2
+
+
 class Gainful:
     """A policy that looks at the volume and expects a gain of each of its candidates."""
 

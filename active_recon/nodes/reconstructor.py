@@ -21,6 +21,7 @@ from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPubli
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.deferred_work import DeferredWork
+from active_recon.nodes.runtime.freed_memory import give_back_freed_memory
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.runtime.parameters import Commit, Parameters, set_read_only_parameter
 from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
@@ -73,6 +74,7 @@ class ReconstructorNode(ManagedNode):
         check_pose_source(params)
         with meshing_imported():
             self._reconstructor = self._load(params)
+        give_back_freed_memory()
         self._joiner = ViewJoiner(
             params.max_pose_gap, masks=self._background.how == 'mask',
             max_depth_gap=params.max_depth_gap if params.use_depth else None)

@@ -76,7 +76,8 @@ class ViewPlannerNode(ManagedNode):
         subscribe_camera = (inputs.subscribe if math.isnan(self._params.values.start_azimuth)
                             else self.create_subscription)
         self._cameras = subscribe_camera(PoseStamped, 'camera/pose', self._on_camera, SENSOR_QOS)
-        self._views = ViewSynchronizer(self, self._frame, self._diagnostics, self._decide)
+        self._views = ViewSynchronizer(
+            self, self._frame, self._diagnostics, self._decide, self._expect)
         if self._planner.wants_volume:
             self._views.subscribe_volume(self._params.values.object_size)
         inputs.subscribe(Header, 'episode', self._on_episode, LATCHED_QOS)
@@ -196,6 +197,11 @@ class ViewPlannerNode(ManagedNode):
                 return None
             elevation = CANONICAL_ELEVATION
         return orbit_camera(params.start_azimuth, elevation)
+
+    def _expect(self, view: PlannerView) -> None:
+        """Let the policy choose while the reconstructor judges the quality."""
+        if self._episode is not None:
+            self._planner.expect_view(view.latent, view.camera, view.volume)
 
     def _decide(self, stamp: int, view: PlannerView) -> None:
         if self._episode is None:

@@ -10,9 +10,11 @@ from active_recon.geometry.canonical import network_image, NetworkSpec
 from active_recon.models.weights_files import depth_path, scorer_path, SHIPPED, weights_hash
 from active_recon.runtimes.base import State
 from active_recon.runtimes.graph_files import (
+    DECODE_PART,
     DEPTH_PART,
     graph_path,
     GraphMetadata,
+    INT8_PART,
     NETWORK_PARTS,
     NEXT,
     POLICY_PART,
@@ -70,12 +72,17 @@ class ExportedRuntime:
     def step(self, image: NDArray[np.uint8], camera: Camera,
              state: State) -> tuple[NDArray[np.float32], NDArray[np.float32], State]:
         """Take in an image; see Runtime."""
+        known = self.known_after(image, camera, state)
+        after = {name: known[name] for name in self._state}
+        return self.decode(known)[0], after['latent'][0], after
+
+    def known_after(self, image: NDArray[np.uint8], camera: Camera,
+                    state: State) -> dict[str, NDArray[np.float32]]:
+        """Return the next state after an image, and with it what `decode` asks for."""
         seen_from = {'pose': camera.pose[None].astype(np.float32),
                      'intrinsics': camera.intrinsics.matrix[None].astype(np.float32)}
         planes = image.transpose(2, 0, 1)[None] * np.float32(1 / 255)
-        known = self.update(self.encode(planes, seen_from), seen_from, state)
-        after = {name: known[name] for name in self._state}
-        return self.decode(known)[0], after['latent'][0], after
+        return self.update(self.encode(planes, seen_from), seen_from, state)
 
     def encode(self, planes: NDArray[np.float32], seen_from: Arrays) -> NDArray[np.float32]:
         """
@@ -146,14 +153,20 @@ def first_state(described: Mapping[str, tuple[Sequence[int], float]], batch: int
             for name, (shape, value) in described.items()}
 
 
-def open_network(weights: Path | None, open_graph: OpenGraph) -> ExportedRuntime:
-    """Return the exported network beside weights; None: of those that ship. WeightsError."""
+def open_network(weights: Path | None, open_graph: OpenGraph,
+                 int8: bool = False) -> ExportedRuntime:
+    """
+    Return the exported network beside weights; None: of those that ship.
+
+    `int8`: with the decoder of that precision. Raises WeightsError.
+    """
     weights = weights or SHIPPED
     digest = weights_hash(weights)
     # The update adds up over views, which half precision is too coarse for
     graphs, told = {}, {}
     for part in NETWORK_PARTS:
-        graphs[part], told[part] = _opened(weights, part, digest, open_graph, part != 'update')
+        file = INT8_PART if int8 and part == DECODE_PART else part
+        graphs[part], told[part] = _opened(weights, file, digest, open_graph, part != 'update')
     if any(each.facts != told['update'].facts for each in told.values()):
         raise WeightsError(f'{graph_path(weights, "update")}: exported at another time than the '
                            'parts beside it; export the weights anew')
@@ -191,6 +204,9 @@ def _opened(weights: Path, part: str, digest: str, open_graph: OpenGraph,
             half: bool) -> tuple[Graph, GraphMetadata]:
     path = graph_path(weights, part)
     if not path.is_file():
+        if part == INT8_PART:
+            raise WeightsError(f'{weights.name}: not quantised: expected {path.name} beside it, '
+                               'which `active-recon export --int8` makes; take bf16 or f32')
         raise WeightsError(f'{weights.name}: not exported: expected {path.name} beside it, which '
                            '`active-recon export` makes; the runtime torch needs none')
     graph = open_graph(path, half)

@@ -20,7 +20,7 @@ from active_recon.runtimes.exported import (
     open_policy,
 )
 from active_recon.runtimes.graph_files import KEY
-from active_recon.runtimes.precision import chosen_precision
+from active_recon.runtimes.precision import chosen_precision, has_bf16, INT8
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,7 +70,7 @@ def load_network(weights: Path | None, device: str, threads: int | None,
                  precision: str) -> ExportedRuntime:
     """Return the network of exported weights; see `load_runtime`."""
     opener = _Opener(threads, chosen_precision(precision, device))
-    loaded = open_network(weights, opener)
+    loaded = open_network(weights, opener, opener.is_int8)
     loaded.provenance = {**loaded.provenance, **opener.provenance}
     return loaded
 
@@ -99,8 +99,11 @@ class _Opener:
     """Opens graphs for a number of threads, None for all cores, and a precision."""
 
     def __init__(self, threads: int | None, precision: str) -> None:
-        self._precision, self._asked = precision, threads
-        self._threads, self._remark = threads or 0, ''
+        self.is_int8 = precision == INT8
+        # What is no integer in a graph of int8 is as small as the processor has it
+        self._float = ('bf16' if has_bf16() else 'f32') if self.is_int8 else precision
+        self._precision = f'int8 with {self._float}' if self.is_int8 else precision
+        self._asked, self._threads, self._remark = threads, threads or 0, ''
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -112,7 +115,7 @@ class _Opener:
         """Return the graph in a file; see OpenGraph."""
         # Several processes share a robot's cores: none may be bound to one of them
         settings: dict[str, Any] = {
-            'INFERENCE_PRECISION_HINT': self._precision if half else 'f32', 'NUM_STREAMS': 1,
+            'INFERENCE_PRECISION_HINT': self._float if half else 'f32', 'NUM_STREAMS': 1,
             'PERFORMANCE_HINT': 'LATENCY', 'ENABLE_CPU_PINNING': False,
             **({'INFERENCE_NUM_THREADS': self._asked} if self._asked else {})}
         try:

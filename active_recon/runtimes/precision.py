@@ -5,17 +5,19 @@ from pathlib import Path
 
 from active_recon.errors import ConfigError
 
-PRECISIONS = ('auto', 'f32', 'bf16')
-"""`auto` is f32."""
+INT8 = 'int8'
+PRECISIONS = ('auto', 'f32', 'bf16', INT8)
+"""`auto` is f32; int8 are the convolutions of the decoder, beside bf16 where it is there."""
 _HALF = {'avx512_bf16', 'amx_bf16'}
+_INTEGERS = {'avx512_vnni', 'avx_vnni', 'amx_int8'}
 
 
 def chosen_precision(asked: str, device: str = 'cpu') -> str:
     """
-    Return f32 or bf16, by what is asked for and what the processor has.
+    Return f32, bf16 or int8, by what is asked for and what the processor has.
 
-    Raises ConfigError on another word, on a device that is not the CPU, and on bf16 where the
-    processor would only imitate it, which takes longer than f32.
+    Raises ConfigError on another word, on a device that is not the CPU, and on bf16 or int8 where
+    the processor would only imitate it, which takes longer than f32.
     """
     require_precision(asked)
     if device != 'cpu':
@@ -24,6 +26,9 @@ def chosen_precision(asked: str, device: str = 'cpu') -> str:
     if asked == 'bf16' and not has_bf16():
         raise ConfigError('precision: bf16 is not in this processor: expected avx512_bf16 or '
                           'amx_bf16, found neither; take f32')
+    if asked == INT8 and not has_int8():
+        raise ConfigError('precision: int8 is not in this processor: expected avx512_vnni, '
+                          'avx_vnni or amx_int8, found none; take f32')
     return 'f32' if asked == 'auto' else asked
 
 
@@ -37,16 +42,27 @@ def require_precision(asked: str) -> None:
 def require_f32(asked: str, runtime: str) -> None:
     """Raise ConfigError on a precision that a runtime, which computes in f32, has not."""
     require_precision(asked)
-    if asked == 'bf16':
-        raise ConfigError(f'precision: bf16 is not for the runtime {runtime}: expected openvino, '
-                          'which takes weights that `active-recon export` exported, or f32')
+    if asked not in ('auto', 'f32'):
+        raise ConfigError(f'precision: {asked} is not for the runtime {runtime}: expected '
+                          'openvino, which takes weights that `active-recon export` exported, or '
+                          'f32')
+
+
+def has_bf16() -> bool:
+    """Return whether the processor computes with bf16."""
+    return bool(_HALF & _flags())
+
+
+def has_int8() -> bool:
+    """Return whether the processor sums products of 8-bit integers at once."""
+    return bool(_INTEGERS & _flags())
 
 
 @cache
-def has_bf16() -> bool:
-    """Return whether the processor computes with bf16."""
+def _flags() -> frozenset[str]:
+    """Return what the processor says that it has; nothing where it does not say."""
     try:
         lines = Path('/proc/cpuinfo').read_text().splitlines()
     except OSError:
-        return False
-    return any(_HALF & set(line.split()) for line in lines if line.startswith('flags'))
+        return frozenset()
+    return frozenset(word for line in lines if line.startswith('flags') for word in line.split())

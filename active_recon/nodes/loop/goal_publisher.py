@@ -52,8 +52,8 @@ class GoalPublisher:
         header = Header(stamp=stamp_from_nanoseconds(self._last_stamp), frame_id=self._frame)
         self._open = (view_goal_to_msg(goal.camera, header),
                        azimuth_goal_to_msg(goal.camera.azimuth, header))
+        self.repeat()  # the camera may begin to move; the scores are for people
         self._scores_pub.publish(scores_to_msg(goal.candidates, goal.scores, header))
-        self.repeat()
 
     def publish_reason(self, reason: GoalReason) -> None:
         """Publish why the last goal is worth its view."""

@@ -29,17 +29,19 @@ class ViewSynchronizer:
     """
     Joins `latent`, `view` and `entropy`, which arrive in any order while the node is active.
 
-    With them goes the `quality` of their stamp, for which they wait while it has a publisher.
+    With them goes the `quality` of their stamp, for which they wait while it has a publisher;
+    `on_waiting` is called with the last view when it begins to wait.
     `on_view` is called with the stamp (nanoseconds) and the view when all parts have arrived,
     unless it is older than the episode. `last` keeps the last one: it may arrive before the
     message of the episode that it belongs to.
     """
 
     def __init__(self, node: ManagedNode, frame: str, diagnostics: Diagnostics,
-                 on_view: Callable[[int, PlannerView], None]) -> None:
+                 on_view: Callable[[int, PlannerView], None],
+                 on_waiting: Callable[[PlannerView], None]) -> None:
         self._node = node
         self._diagnostics = diagnostics
-        self._on_view = on_view
+        self._on_view, self._on_waiting = on_view, on_waiting
         self._parts = ['latent', 'camera', 'entropy']
         self._joiner = StampJoiner(self._parts)
         self._begin = 0
@@ -109,6 +111,8 @@ class ViewSynchronizer:
         if parts is not None:
             self._waiting[stamp] = parts
             self._hand_over()
+            if stamp in self._waiting and stamp == max(self._waiting):
+                self._on_waiting(PlannerView(**parts))
 
     def _on_quality(self, msg: DiagnosticArray) -> None:
         with self._diagnostics.rejecting():
