@@ -38,7 +38,7 @@ demo: .venv/installed  ## the loop over ROS 2 on a real model; ARGS='--views 3' 
 
 golden: .venv/installed  ## the golden run anew, once weights or loop have changed
 	@rm -rf build/golden
-	@$(BIN)/active-recon demo --views 4 --output-dir build/golden
+	@$(BIN)/active-recon demo --views 4 --precision f32 --output-dir build/golden
 	@rm -rf bags/golden/run && mkdir -p bags/golden/run
 	@mv build/golden/*/*.mcap build/golden/*/metadata.yaml bags/golden/run/
 

@@ -31,7 +31,7 @@ from active_recon.runtimes.graph_files import (
     NETWORK_PARTS,
     POLICY_PART,
 )
-from active_recon.runtimes.precision import has_bf16, has_int8
+from active_recon.runtimes.precision import chosen_precision, has_bf16, has_int8
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import iou
@@ -106,7 +106,8 @@ def answers(runtime):
 @pytest.mark.parametrize('library', LIBRARIES)
 @pytest.mark.parametrize('model', [*CASES, 'visibility', '2d3d-attention', 'shipped'])
 def test_a_runtime_answers_as_torch_does_after_every_view(exported, model, library):
-    theirs, ours = (load_runtime(exported[model], name, threads=1) for name in ('torch', library))
+    theirs, ours = (load_runtime(exported[model], name, threads=1, precision='f32')
+                    for name in ('torch', library))
     assert (ours.spec, ours.threshold) == (theirs.spec, theirs.threshold)
     expected, found = answers(theirs), answers(ours)
     np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=1e-3)
@@ -373,6 +374,12 @@ def test_what_the_processor_would_imitate_is_refused(monkeypatch, precision, exp
     with pytest.raises(ConfigError, match=f'{precision} is not in this processor: expected '
                                           f'{expected}'):
         load_runtime(None, 'openvino', precision=precision)
+
+
+@pytest.mark.parametrize(('has', 'expected'), [('amx_bf16', 'bf16'), ('avx512f', 'f32')])
+def test_a_network_is_computed_in_bf16_where_the_processor_has_it(monkeypatch, has, expected):
+    monkeypatch.setattr('active_recon.runtimes.precision._flags', lambda: frozenset({has}))
+    assert chosen_precision('auto') == expected
 
 
 @pytest.mark.parametrize('library', LIBRARIES)

@@ -279,6 +279,17 @@ def test_goals_of_a_replay_stand_where_the_recorded_parameters_say(recorded, ele
     assert (camera.elevation, camera.distance) == pytest.approx((elevation, distance))
 
 
+@pytest.mark.parametrize(('asked', 'told', 'expected'), [
+    ('auto', 'openvino 1, bf16, a processor, 1 threads', 'bf16'),
+    ('auto', 'openvino 1, f32, a processor, 1 threads', 'f32'),
+    ('int8', 'openvino 1, int8 with bf16, a processor, 1 threads', 'int8')])
+def test_a_replay_computes_in_the_precision_that_auto_was(asked, told, expected):
+    run = replace(run_of([]), parameters={'reconstructor': {'precision': asked}},
+                  provenance={'weights_sha256': weights_hash(SHIPPED), 'computed_by': told})
+    assert recorded_setup(run).precision == expected
+    assert recorded_setup(replace(run, provenance={})).precision == asked
+
+
 def test_a_replay_computes_with_the_threads_of_the_run_and_leaves_torch_as_it_was(monkeypatch):
     before, set_to = torch.get_num_threads(), []
     setup = recorded_setup(replace(run_of([]), parameters={

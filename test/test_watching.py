@@ -27,7 +27,7 @@ from typer.testing import CliRunner
 from watched_photos import orbit, with_focal, written
 
 SOURCE = BoardCameras(BOARD)
-_SAME = 2e-3  # the search for the lens ends a little elsewhere in each run
+_SAME = 1e-2  # the search for the lens ends a little elsewhere in each run, and bf16 rounds
 
 
 @pytest.fixture(scope='module')

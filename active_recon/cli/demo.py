@@ -6,6 +6,7 @@ from typing import Annotated
 from active_recon.cli.policy_option import policy_option
 from active_recon.interrupts import held_interrupts
 from active_recon.policies import AUTO_POLICY
+from active_recon.runtimes.precision import PRECISIONS
 import typer
 
 
@@ -20,6 +21,9 @@ def demo(
         help='Name of a model that ships, or a weights file; the policy attention needs '
              'lifting or 2d3d-attention.')
     ] = None,
+    precision: Annotated[str, typer.Option(
+        help=f"The network's numbers: {', '.join(PRECISIONS)}; auto: bf16 where the processor has "
+             'it, else f32.')] = 'auto',
     seed: Annotated[int, typer.Option(
         min=0, help='Seed of the first view and of the policy random.')] = 0,
     output_dir: Annotated[Path, typer.Option(
@@ -37,7 +41,8 @@ def demo(
             from active_recon.objects import find_object
 
         folder = run_demo(
-            Demo(find_object(object_name), views, policy, seed, output_dir, view, model),
+            Demo(find_object(object_name), views, policy, seed, output_dir, view, model,
+                 precision),
             console)
     except KeyboardInterrupt:
         console.print('interrupted; the nodes are stopped and the bag is closed')

@@ -17,6 +17,7 @@ from active_recon.launching.demo_monitor import demo_monitor, DemoMonitor
 from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.models.weights_files import find_weights
 from active_recon.policies import AUTO_POLICY, policy_in_use
+from active_recon.runtimes.precision import require_precision
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.voxelisation import voxelise
@@ -37,8 +38,8 @@ class Demo:
     """
     What to show: a mesh file, the number of views, the policy that chooses them, and its seed.
 
-    `model` is a weights file, or a model whose weights ship; None: the default. With `view` the
-    loop is shown in the browser, too, and runs until Ctrl-C.
+    `model` is a weights file, or a model whose weights ship; None: the default. `precision` is
+    that of the network. With `view` the loop is shown in the browser, too, and runs until Ctrl-C.
     """
 
     mesh: Path
@@ -48,6 +49,7 @@ class Demo:
     output_dir: Path = Path('bags')
     view: bool = False
     model: str | None = None
+    precision: str = 'auto'
 
 
 def run_demo(demo: Demo, console: Console) -> Path:
@@ -58,6 +60,7 @@ def run_demo(demo: Demo, console: Console) -> Path:
     where the loop stalls. The nodes are stopped and the bag is closed in any case.
     """
     # An error here is clearer than one in two nodes
+    require_precision(demo.precision)
     in_use = policy_in_use(demo.policy, find_weights(demo.model))
     if in_use.warning:
         console.print(in_use.warning, soft_wrap=True)
@@ -77,12 +80,12 @@ def run_demo(demo: Demo, console: Console) -> Path:
 
         console.print('starting the recorder, the turntable camera, the reconstructor and the '
                       f'view planner on ROS domain {environment["ROS_DOMAIN_ID"]}')
-        weights = {'weights': demo.model} if demo.model else {}
+        network = {'precision': demo.precision, **({'weights': demo.model} if demo.model else {})}
         nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
                                  'record_at_start': False})
         # A tolerance of 0 prevents an early end: all requested views are taken.
         nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
-                                     'max_views': demo.views, 'entropy_tolerance': 0.0, **weights})
+                                     'max_views': demo.views, 'entropy_tolerance': 0.0, **network})
         folder = Path(monitor.trigger('start', _START_S, check))
         if demo.view:
             _open_page(nodes, monitor, console, check)
@@ -91,7 +94,7 @@ def run_demo(demo: Demo, console: Console) -> Path:
                                              'start_azimuth': _start_azimuth(demo)})
             # Goals only: `auto` takes views by separation until it has discovered the planner.
             nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal',
-                                          **weights})
+                                          **network})
             _follow(monitor, demo, title, console, check)
             saved = Path(monitor.trigger('save_mesh', _ANSWER_S, check))
             saved.replace(folder / f'{demo.mesh.stem}{saved.suffix}')

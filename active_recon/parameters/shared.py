@@ -27,7 +27,8 @@ class NetworkParameters:
         AUTO, 'library that runs the network; auto is openvino where its weights are exported, '
         'else torch', choices=RUNTIME_CHOICES)
     precision: str = parameter(
-        'auto', 'numbers that the network computes with; auto is f32, int8 the fastest',
+        'auto', 'numbers that the network computes with; auto is bf16 where the processor has it, '
+        'else f32; int8 is the fastest',
         choices=PRECISIONS)
 
 

@@ -7,7 +7,8 @@ from active_recon.errors import ConfigError
 
 INT8 = 'int8'
 PRECISIONS = ('auto', 'f32', 'bf16', INT8)
-"""`auto` is f32; int8 are the convolutions of the decoder, beside bf16 where it is there."""
+"""`auto` is bf16 where the processor has it, else f32; int8 are the convolutions of the decoder,
+beside what `auto` is."""
 _HALF = {'avx512_bf16', 'amx_bf16'}
 _INTEGERS = {'avx512_vnni', 'avx_vnni', 'amx_int8'}
 
@@ -29,7 +30,9 @@ def chosen_precision(asked: str, device: str = 'cpu') -> str:
     if asked == INT8 and not has_int8():
         raise ConfigError('precision: int8 is not in this processor: expected avx512_vnni, '
                           'avx_vnni or amx_int8, found none; take f32')
-    return 'f32' if asked == 'auto' else asked
+    if asked != 'auto':
+        return asked
+    return 'bf16' if has_bf16() else 'f32'
 
 
 def require_precision(asked: str) -> None:

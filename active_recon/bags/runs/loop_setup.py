@@ -120,7 +120,16 @@ def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: b
         planner['weights'] = found if same else find_weights(own or None)
     return LoopSetup(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
                     of_reconstructor.get('threads', 1), _runtime(of_reconstructor),
-                    of_reconstructor.get('precision', 'auto'))
+                    _precision(run, of_reconstructor))
+
+
+def _precision(run: RecordedRun, parameters: Mapping[str, Any]) -> str:
+    """Return the precision that a run was computed in, also where what was asked for was auto."""
+    asked = parameters.get('precision', 'auto')
+    if asked != 'auto' or 'weights_sha256' not in run.provenance:
+        return str(asked)
+    # Bags before there was a choice do not tell it
+    return 'bf16' if ', bf16,' in run.provenance.get('computed_by', '') else 'f32'
 
 
 def _runtime(parameters: Mapping[str, Any]) -> str:
