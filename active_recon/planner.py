@@ -1,7 +1,7 @@
 """A policy and the state of one episode: the core of the view planner's node."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
@@ -149,7 +149,9 @@ class Planner:
         """
         Take over what another planner has seen of the episode, as if it had always been this one.
 
-        Raises ViewError where this planner's policy cannot use it, and then is good for nothing.
+        Volumes before the last are not kept, so a policy that looks at them chooses after the last
+        alone. Raises ViewError where this planner's policy cannot use it, and then is good for
+        nothing.
         """
         self._views = list(other._views)
         self._failed, self._stopped = list(other._failed), other._stopped
@@ -159,7 +161,8 @@ class Planner:
                     and self._places == other._places):
                 self._choice, self._state = other._choice, other._state
             else:
-                for count in range(1, len(self._views) + 1):
+                whole = len(self._views)
+                for count in range(whole if self._policy.wants_volume else 1, whole + 1):
                     self._choose(self._views[:count])
             self._aim(self._views[-1].camera)
         elif other._first is not None:
@@ -207,7 +210,9 @@ class Planner:
                             f'{entropy}', 'latent')
         before = self._candidates
         self._look_from(camera)
-        views = [*self._views, PlannerView(latent, camera, entropy, volume, quality)]
+        # A volume takes a megabyte, and only the last is looked at
+        views = [*self._views[:-1], *(replace(view, volume=None) for view in self._views[-1:]),
+                 PlannerView(latent, camera, entropy, volume, quality)]
         try:
             self._choose(views)
         except ViewError:

@@ -50,7 +50,7 @@ def demo_figure() -> Figure:
                            cwd=folder, stdout=subprocess.DEVNULL,
                            env={**os.environ, 'PYTHONPATH': str(Path(__file__).parents[1])})
             spent.append(time.monotonic() - start)
-    return Figure('the whole demo', 's', spent, 60)
+    return Figure('the whole demo', 's', spent, 10)
 
 
 @contextmanager

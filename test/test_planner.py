@@ -1,6 +1,8 @@
 """The planner: where next, when it is enough, and in whose frame."""
 
+import gc
 import math
+import weakref
 
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import TimedMotion
@@ -464,3 +466,27 @@ def test_a_motion_weight_has_no_unit_and_takes_nothing_off_a_gain():
     _, decision = after_one_view(ring({180: 0.15}), min_gain=0.1, motion_weight=50.0)
     assert abs(azimuth_difference(decision.goal.camera.azimuth, 0)) < 0.3
     assert (decision.goal.gain, decision.goal.worth) == pytest.approx((0.01, 0.15))
+
+
+def test_only_the_last_volume_of_an_episode_is_kept():
+    planner = Planner.load('unseen_entropy', max_views=9, entropy_tolerance=0)
+    camera, kept = planner.first_goal(orbit_camera(0.5)).camera, []
+    for number in range(4):
+        grid = some_cells(number)
+        kept.append(weakref.ref(grid))
+        camera = planner.add_view(LATENT, camera, 10.0, grid).goal.camera
+        del grid
+    gc.collect()
+    assert [each() is not None for each in kept] == [False, False, False, True]
+
+
+def test_a_policy_that_looks_at_volumes_goes_on_from_the_last():
+    def policy():
+        return Planner.load('unseen_entropy', seed=3, max_views=9, entropy_tolerance=0)
+
+    before, camera = policy(), orbit_camera(0.5)
+    for number in range(3):
+        camera = before.add_view(LATENT, camera, 10.0, some_cells(number)).goal.camera
+    after = policy()
+    after.go_on_from(before)
+    assert after.plan().camera.azimuth == before.plan().camera.azimuth
