@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+import math
 from typing import TypeVar
 
 from active_recon.errors import MessageError
@@ -19,6 +20,8 @@ _MAX_POSES = 1024  # five seconds of a fast tracker
 _MAX_INFOS = 256  # of a fast camera while its images are late
 _MAX_WAITING = 32  # images
 _MAX_WAITING_BYTES = 1 << 28  # of all waiting images
+NOT_BEGUN = 'not_begun'
+"""Kind of the error of an image from just before the first pose or camera info."""
 Part = TypeVar('Part')
 
 
@@ -73,6 +76,9 @@ class ViewJoiner:
     the same way for the mask of its stamp, but is joined without it too; with a `max_depth_gap`
     of 0 seconds or more also for the nearest depth image within that. `max_pose_gap` may be
     changed at any time.
+
+    Streams begin one after the other: an image from up to `patience` seconds before the first
+    pose or camera info is no fault of the camera's, and its error is of the kind `NOT_BEGUN`.
     """
 
     def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False,
@@ -96,6 +102,8 @@ class ViewJoiner:
         self._masks: deque[tuple[int, Image]] = deque(maxlen=_MAX_WAITING)
         self._depths: deque[tuple[int, Image | CompressedImage]] = deque(maxlen=_MAX_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
+        self._first_intrinsics: float = math.inf
+        self._first_pose: float = math.inf
 
     def add_image(self, stamp: int, msg: Image | CompressedImage, now: float) -> None:
         """
@@ -117,6 +125,7 @@ class ViewJoiner:
     def add_intrinsics(self, stamp: int, intrinsics: Intrinsics) -> None:
         if stamp >= self._earliest:
             self._intrinsics.append((stamp, intrinsics))
+            self._first_intrinsics = min(self._first_intrinsics, stamp)
 
     def add_mask(self, stamp: int, mask: Image) -> None:
         """Add the mask message of the image of that stamp."""
@@ -134,6 +143,7 @@ class ViewJoiner:
             return
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
         del self._poses[:-_MAX_POSES]
+        self._first_pose = min(self._first_pose, stamp)
 
     @property
     def is_waiting(self) -> bool:
@@ -191,7 +201,7 @@ class ViewJoiner:
             found = (f'the last is of {_seconds(self._intrinsics[-1][0])}' if self._intrinsics
                      else 'none received')
             raise MessageError(f"no camera info of the image's stamp, {_seconds(stamp)}: {found}",
-                               'no_camera_info')
+                               self._kind('no_camera_info', stamp, self._first_intrinsics))
         return intrinsics
 
     def _pose_at(self, stamp: int, late: bool) -> NDArray[np.float64] | None:
@@ -213,7 +223,12 @@ class ViewJoiner:
                  else 'none received')
         raise MessageError(
             f'no pose for the image of {_seconds(stamp)}: expected one of its stamp, or one '
-            f'before and one after it within {self.max_pose_gap:g} s, {found}', 'no_pose')
+            f'before and one after it within {self.max_pose_gap:g} s, {found}',
+            self._kind('no_pose', stamp, self._first_pose))
+
+    def _kind(self, kind: str, stamp: int, first: float) -> str:
+        """Return the kind of error of an image that lacks a part of which `first` is the first."""
+        return NOT_BEGUN if 0 < first - stamp <= self._patience * 1e9 else kind
 
 
 def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],

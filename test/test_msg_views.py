@@ -7,7 +7,7 @@ from active_recon.errors import MessageError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from msg_tools.images import image_to_msg
 from msg_tools.joins import StampJoiner
-from msg_tools.views import interpolated, ViewJoiner
+from msg_tools.views import interpolated, NOT_BEGUN, ViewJoiner
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image
@@ -94,10 +94,38 @@ def test_an_image_without_any_pose_is_refused_after_a_while():
 
 def test_an_image_without_camera_info_is_refused_once_later_info_came():
     joiner = ViewJoiner(max_pose_gap=0.1)
-    joiner.add_image(0, IMAGE, 0.0)
-    joiner.add_pose(0, pose(1.0))
-    joiner.add_intrinsics(1, CANONICAL_INTRINSICS)
+    joiner.add_intrinsics(0, CANONICAL_INTRINSICS)
+    joiner.add_image(1, IMAGE, 0.0)
+    joiner.add_pose(1, pose(1.0))
+    joiner.add_intrinsics(2, CANONICAL_INTRINSICS)
     assert only_error(joiner).kind == 'no_camera_info'
+
+
+@pytest.mark.parametrize(('missing', 'kind'), [('pose', 'no_pose'),
+                                               ('camera info', 'no_camera_info')])
+def test_an_image_from_just_before_its_streams_begin_is_no_fault_of_theirs(missing, kind):
+    joiner = ViewJoiner(max_pose_gap=0.1, patience=0.5)
+
+    def send(stamp, whole=True):
+        if whole or missing != 'camera info':
+            joiner.add_intrinsics(stamp, CANONICAL_INTRINSICS)
+        if whole or missing != 'pose':
+            joiner.add_pose(stamp, pose(1.0))
+        joiner.add_image(stamp, IMAGE, 0.0)
+
+    send(499 * MS, whole=False)
+    send(500 * MS, whole=False)
+    send(1000 * MS)
+    before, begun, view = drain(joiner)
+    assert (before.kind, begun.kind, view.stamp) == (kind, NOT_BEGUN, 1000 * MS)
+    send(1033 * MS, whole=False)
+    send(1200 * MS)
+    lost, view = drain(joiner)
+    assert (lost.kind, view.stamp) == (kind, 1200 * MS)
+    joiner.clear()
+    send(1233 * MS, whole=False)
+    send(1266 * MS)
+    assert drain(joiner)[0].kind == NOT_BEGUN
 
 
 @pytest.mark.parametrize('order', list(permutations(range(4))))
@@ -177,7 +205,7 @@ def test_what_is_late_of_the_last_episode_never_gets_into_a_view(late):
     if late == 'pose':  # between two of them the image's would be interpolated
         joiner.add_pose(99 * MS, pose(1.0))
         joiner.add_pose(101 * MS, pose(1.1))
-        assert only_error(joiner, 1.0).kind == 'no_pose'
+        assert only_error(joiner, 1.0).kind == NOT_BEGUN
         return
     joiner.add_pose(100 * MS, pose(1.0))
     joiner.add_intrinsics(99 * MS, CANONICAL_INTRINSICS)

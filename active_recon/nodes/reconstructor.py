@@ -38,7 +38,7 @@ from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.images import mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.views import View, ViewJoiner
+from msg_tools.views import NOT_BEGUN, View, ViewJoiner
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
@@ -231,16 +231,22 @@ class ReconstructorNode(ManagedNode):
     def _process_joined(self) -> None:
         """Select the newest joined image that is to be a view."""
         for view in self._joiner.joined(time.monotonic()):
-            if isinstance(view, MessageError):
-                self._diagnostics.reject(view)
-            elif not self._gate.wants(view.camera, view.stamp,
-                                      self.count_publishers(self._goals.topic_name) > 0):
+            if isinstance(view, View):
+                self._select(view)
+            elif view.kind == NOT_BEGUN:
                 self._diagnostics.count('images_unused')
             else:
-                if self._pending is not None:
-                    self._diagnostics.count('dropped/overtaken')
-                self._pending = view
-                self._deferred.schedule()
+                self._diagnostics.reject(view)
+
+    def _select(self, view: View) -> None:
+        if not self._gate.wants(view.camera, view.stamp,
+                                self.count_publishers(self._goals.topic_name) > 0):
+            self._diagnostics.count('images_unused')
+            return
+        if self._pending is not None:
+            self._diagnostics.count('dropped/overtaken')
+        self._pending = view
+        self._deferred.schedule()
 
     def _take_pending_view(self) -> None:
         view, self._pending = self._pending, None

@@ -190,7 +190,7 @@ def flood(bench, camera, size):
     bench.within(5.0, lambda: (counted() - before)['views'])
     since = counted() - before
     lost = sum(since[key] for key in (
-        'dropped/unheard', 'refused/no_camera_info', 'refused/no_pose'))
+        'dropped/unheard', 'images_unused', 'refused/no_camera_info', 'refused/no_pose'))
     return None if lost or not since['views'] else (stamps(images)[-2], since)
 
 

@@ -1,5 +1,6 @@
 """Which images the reconstructor takes in when nobody plans, over real DDS."""
 
+from collections import Counter
 import math
 
 from active_recon.geometry.cameras import Camera
@@ -52,6 +53,22 @@ def test_views_are_taken_where_the_camera_stands_apart_from_the_last(shared_benc
         assert nanoseconds_from_stamp(views[-1].header.stamp) in stamps
         shared_bench.until(lambda end=stamps[-1]: shared_bench.now() > end, 'the next stamps')
     assert azimuths(views) == pytest.approx([0.5, 1.5, 3.0])
+
+
+def test_an_image_from_just_before_the_first_pose_is_unused_and_not_refused(
+        shared_bench, camera, views):
+    before = Counter(shared_bench.counts('reconstructor'))
+    image, info, _ = camera.messages()
+    camera.send(image, info)
+    stand(camera, shared_bench, 0.5)
+    shared_bench.until(lambda: views, 'the view')
+
+    def counted():
+        since = Counter(shared_bench.counts('reconstructor')) - before
+        return since if since['views'] else None
+
+    since = shared_bench.until(counted, 'the view to be counted')
+    assert since['images_unused'] and not since['refused/no_pose']
 
 
 def test_an_image_between_two_poses_is_seen_from_between_them(shared_bench, camera, views):

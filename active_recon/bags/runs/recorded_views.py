@@ -16,7 +16,7 @@ from active_recon.errors import DataError, MessageError, ViewError
 from active_recon.geometry.cameras import azimuth_difference, Camera, OrbitCamera
 from active_recon.geometry.view_distance import view_distance
 from msg_tools.episodes import Episode
-from msg_tools.views import View
+from msg_tools.views import NOT_BEGUN, View
 
 _ROUNDING = 1e-9  # rad
 
@@ -66,7 +66,11 @@ def gated_views(stream: CameraStream, gate: ViewGate,
             views.append(_view(view, None, stream, None, scene))
         except ViewError as error:
             refusal = refusal or str(error)
-            counters[f'refused/{error.kind}'] += 1
+            if error.kind == NOT_BEGUN:
+                counters['images'] += 1
+                counters['images_unused'] += 1
+            else:
+                counters[f'refused/{error.kind}'] += 1
             continue
         counters['images'] += 1
         gate.took(view.camera)
