@@ -66,11 +66,7 @@ def gated_views(stream: CameraStream, gate: ViewGate,
             views.append(_view(view, None, stream, None, scene))
         except ViewError as error:
             refusal = refusal or str(error)
-            if error.kind == NOT_BEGUN:
-                counters['images'] += 1
-                counters['images_unused'] += 1
-            else:
-                counters[f'refused/{error.kind}'] += 1
+            counters['unjoined' if error.kind == NOT_BEGUN else f'refused/{error.kind}'] += 1
             continue
         counters['images'] += 1
         gate.took(view.camera)
@@ -81,6 +77,8 @@ def gated_views(stream: CameraStream, gate: ViewGate,
     if not views:
         raise DataError('no image became a view: expected a camera that stops, got '
                         f'{counters["images"]} images of a moving one', 'no_views')
+    if unjoined := counters.pop('unjoined', 0):
+        counters.update(images=unjoined, images_unused=unjoined)
     counters['views'] = len(views)
     return RecordedEpisode('', views[0].stamp, None, views, ''), dict(counters)
 
