@@ -51,17 +51,21 @@ class DemoMonitor(LoopClient):
         return self._subscriber.observer.state
 
     def has_views(self, count: int) -> bool:
-        """Return whether so many views have been taken."""
+        """Return whether so many views have been received."""
         return len(self.state.views) >= count
 
-    def until(self, condition: Callable[[], bool], budget_s: float, awaited: str,
-              meanwhile: Callable[[], None]) -> None:
-        """Read messages until the condition holds; ActiveReconError after the budget."""
+    def is_done(self) -> bool:
+        """Return whether the planner has ended the episode."""
+        return self.state.done != ''
+
+    def within(self, condition: Callable[[], bool], budget_s: float,
+               meanwhile: Callable[[], None]) -> bool:
+        """Read messages until the condition holds or the budget is used."""
         def update() -> None:
             self._subscriber.update()
             meanwhile()
 
-        super().until(condition, budget_s, awaited, update)
+        return super().within(condition, budget_s, update)
 
 
 @contextmanager

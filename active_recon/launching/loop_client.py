@@ -25,13 +25,20 @@ class LoopClient:
     def until(self, condition: Callable[[], bool], budget_s: float, awaited: str,
               meanwhile: Callable[[], None]) -> None:
         """Spin until the condition holds; ActiveReconError after the budget."""
+        if not self.within(condition, budget_s, meanwhile):
+            raise ActiveReconError(f'timed out: expected {awaited} within {budget_s:g} s, '
+                                   'but it did not arrive')
+
+    def within(self, condition: Callable[[], bool], budget_s: float,
+               meanwhile: Callable[[], None]) -> bool:
+        """Spin until the condition holds or the budget is used; return whether it holds."""
         deadline = time.monotonic() + budget_s
         while not condition():
             if time.monotonic() > deadline:
-                raise ActiveReconError(f'timed out: expected {awaited} within {budget_s:g} s, '
-                                       'but it did not arrive')
+                return False
             self._executor.spin_once(timeout_sec=_SPIN_S)
             meanwhile()
+        return True
 
     def trigger(self, service: str, budget_s: float, meanwhile: Callable[[], None]) -> str:
         """Call a Trigger service and return its message; ActiveReconError where it fails."""
