@@ -14,13 +14,16 @@ STEPS ?= 10000
 DEVICES ?= 2
 PARAMETRIC ?= --train 320 --val 8
 THINGS ?= --category thing --train 6000 --val 0
-TURNTABLE ?= --train 16 --val 4
-TURNTABLE_THINGS ?= --category thing --train 200 --val 0
+TURNTABLE ?= --train 60 --val 12
+TURNTABLE_THINGS ?= --category thing --train 800 --val 0
+DOME ?= --train 30 --val 5
+DOME_THINGS ?= --category thing --train 400 --val 0
 DEEP ?= --train 40 --val 8
 DEEP_THINGS ?= --category thing --train 500 --val 0
-POLICY ?= --objects 200
+POLICY ?= --objects 270 --epochs 20 --workers 2 --threads 1
 DEPTH_STEPS ?= 1500
 FAULTS ?= unknown pose object_size mask
+KINDS ?= even attention
 
 AR ?= .venv/bin/active-recon
 BUILD := $(AR) dataset build
@@ -49,6 +52,11 @@ $(RUN)/turn.rendered:
 	$(BUILD) $(RUN)/turn $(TURNTABLE) $(NO_TEST) --fine
 	$(BUILD) $(RUN)/turn_things $(TURNTABLE_THINGS) $(NO_TEST) --fine
 	@touch $@
+$(RUN)/dome.rendered:
+	@mkdir -p $(RUN)
+	$(BUILD) $(RUN)/dome $(DOME) $(NO_TEST) --fine --cameras dome
+	$(BUILD) $(RUN)/dome_things $(DOME_THINGS) $(NO_TEST) --fine --cameras dome
+	@touch $@
 $(RUN)/deep.rendered:
 	@mkdir -p $(RUN)
 	$(BUILD) $(RUN)/deep $(DEEP) $(NO_TEST) $(ANY) --depth
@@ -59,6 +67,8 @@ $(RUN)/real_train.rendered:
 	$(AR) render $(MESHES)/manifest.csv $(RUN)/real_train --split train --explicit-licence \
 		$(ANY) --depth
 	$(AR) render $(MESHES)/manifest.csv $(RUN)/turn_real --split train --explicit-licence --fine
+	$(AR) render $(MESHES)/manifest.csv $(RUN)/dome_real --split train --explicit-licence --fine \
+		--cameras dome
 	@touch $@
 $(RUN)/real_val.rendered:
 	@mkdir -p $(RUN)
@@ -74,25 +84,36 @@ $(NETWORK).safetensors: $(RUN)/data.rendered $(RUN)/things.rendered $(REAL:%=$(R
 		--warmup-steps 100 --checkpoint-every 100 --devices $(DEVICES) --threads 1 --resume
 
 # What belongs to it: the view policy, the quality's tables, the depth refiner
-$(RUN)/policy/weights-scorer.safetensors: $(NETWORK).safetensors $(RUN)/turn.rendered
+$(RUN)/policy/weights-scorer.safetensors: $(NETWORK).safetensors $(RUN)/turn.rendered \
+		$(RUN)/dome.rendered
 	$(AR) train-policy $(RUN)/turn/train $(RUN)/turn_things/train $(REAL:%=$(RUN)/turn_real) \
-		--validation $(RUN)/turn/val --model $(NETWORK).safetensors --out $(RUN)/policy $(POLICY)
+		$(RUN)/dome/train $(RUN)/dome_things/train $(REAL:%=$(RUN)/dome_real) \
+		--validation $(RUN)/turn/val --validation $(RUN)/dome/val \
+		--model $(NETWORK).safetensors --out $(RUN)/policy $(POLICY)
+	@cp $(RUN)/policy/weights-scorer.* $(RUN)/lifting
 
 MEASURE = $(AR) quality measure --model $(NETWORK).safetensors
 JUDGED := $(if $(REAL_VAL),$(RUN)/real_val,$(RUN)/turn/val)
 $(RUN)/quality/known-%.npz: $(NETWORK).safetensors $(RUN)/turn.rendered
 	@mkdir -p $(@D)
-	$(MEASURE) $(RUN)/$*/train $@
+	$(MEASURE) $(RUN)/$*/train $@ --views 6
+$(RUN)/quality/known-turn_real.npz: $(NETWORK).safetensors $(RUN)/real_train.rendered
+	@mkdir -p $(@D)
+	$(MEASURE) $(RUN)/turn_real $@ --views 6
 $(RUN)/quality/judged.npz: $(NETWORK).safetensors $(RUN)/turn.rendered \
 		$(REAL_VAL:%=$(RUN)/%.rendered)
 	@mkdir -p $(@D)
 	$(MEASURE) $(JUDGED) $@ --views 6
+$(RUN)/quality/judged-by-%.npz: $(RUN)/quality/judged.npz $(RUN)/policy/weights-scorer.safetensors
+	$(MEASURE) $(JUDGED) $@ --views 6 --kind $*
 $(RUN)/quality/judged-%.npz: $(RUN)/quality/judged.npz
 	$(MEASURE) $(JUDGED) $@ --views 6 --fault $*
-$(NETWORK)-quality.json: $(RUN)/quality/known-turn.npz $(RUN)/quality/known-turn_things.npz \
-		$(RUN)/quality/judged.npz $(FAULTS:%=$(RUN)/quality/judged-%.npz)
+KNOWN := turn turn_things $(REAL:%=turn_real)
+$(NETWORK)-quality.json: $(KNOWN:%=$(RUN)/quality/known-%.npz) \
+		$(RUN)/quality/judged.npz $(FAULTS:%=$(RUN)/quality/judged-%.npz) \
+		$(KINDS:%=$(RUN)/quality/judged-by-%.npz)
 	$(AR) quality fit --model $(NETWORK).safetensors --out $@ \
-		$(patsubst %,--known %,$(filter %known-turn.npz %known-turn_things.npz,$^)) \
+		$(patsubst %,--known %,$(filter $(RUN)/quality/known%,$^)) \
 		$(patsubst %,--calibration %,$(filter $(RUN)/quality/judged%,$^))
 
 $(RUN)/depth/weights-depth.safetensors: $(NETWORK).safetensors $(RUN)/deep.rendered

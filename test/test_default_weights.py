@@ -20,8 +20,8 @@ ROOT = Path(__file__).parent.parent
 CHAIRS, THING = '--category chair --train 2 --val 2', '--category thing --train 1 --val 0'
 TINY = {
     'AR': f'{sys.executable} -m active_recon.cli.main', 'STEPS': 1, 'DEVICES': 1, 'DEPTH_STEPS': 1,
-    'PARAMETRIC': CHAIRS, 'TURNTABLE': CHAIRS, 'DEEP': CHAIRS,
-    'THINGS': THING, 'TURNTABLE_THINGS': THING, 'DEEP_THINGS': THING,
+    'PARAMETRIC': CHAIRS, 'TURNTABLE': CHAIRS, 'DOME': CHAIRS, 'DEEP': CHAIRS,
+    'THINGS': THING, 'TURNTABLE_THINGS': THING, 'DOME_THINGS': THING, 'DEEP_THINGS': THING,
     'POLICY': '--objects 2 --rounds 1 --starts 1 --views 2 --epochs 1'}
 
 

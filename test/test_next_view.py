@@ -27,6 +27,7 @@ from active_recon.evaluation.next_view.study import (
     run_episodes,
 )
 from active_recon.evaluation.next_view.summary import markdown
+from active_recon.evaluation.next_view.swapping import swapped_row, turned
 from active_recon.evaluation.next_view.watching import Ahead, Walk, WatchedObject
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import read_scene
@@ -282,15 +283,51 @@ def test_a_sequence_found_on_objects_is_measured_like_a_policy(scene, carving):
     assert '| sequence |' in text and 'ahead of uniform' in text
 
 
-def test_swapped_looks_at_the_next_object_and_only_there(scene, carving, monkeypatch):
+@pytest.mark.parametrize('name', ['swapped', 'swapped_turned'])
+def test_swapped_looks_at_another_object_and_only_there(scene, carving, monkeypatch, name):
     monkeypatch.setattr(study, '_LOOKS_ELSEWHERE', 'visible_entropy')
-    episodes = Episodes(('visible_entropy', 'swapped'), 1, 3, bfloat16=False)
+    monkeypatch.setattr(study, 'turned', lambda views, rng: views)
+    episodes = Episodes(('visible_entropy', name), 1, 3, bfloat16=False)
     lone = replace(scene, views=some_objects(scene.views, torch.tensor([1])),
                    truths={32: scene.truths[32][1:2]})
     same = run_episodes(lone, carving, episodes)
-    np.testing.assert_array_equal(same.other['swapped'], same.other['visible_entropy'])
+    np.testing.assert_array_equal(same.other[name], same.other['visible_entropy'])
     found = run_episodes(scene, carving, episodes)
-    assert (found.motion['swapped'] != found.motion['visible_entropy']).any()
+    assert (found.motion[name] != found.motion['visible_entropy']).any()
+
+
+def test_what_is_swapped_in_is_another_object_of_the_set_and_each_comes_once():
+    for count in (2, 3, 8, 61):
+        rows = [swapped_row(row, count) for row in range(count)]
+        assert sorted(rows) == list(range(count))
+        assert all(row != other for row, other in enumerate(rows))
+
+
+def test_cameras_see_of_a_turned_object_what_others_saw(scene):
+    views = some_objects(scene.views, torch.tensor([1]))
+    found = {}
+    for seed in range(40):
+        images = turned(views, np.random.default_rng(seed)).images
+        steps = [step for step in range(24)
+                 if torch.equal(images, views.images.roll(step, dims=1))]
+        assert steps  # the cameras are 15 degrees apart, in order
+        found.setdefault(steps[0], seed)
+    assert len(found) > 10
+
+
+def test_an_object_turned_by_azimuth_is_seen_so_from_every_elevation(tmp_path):
+    dome = some_objects(read_scene(list_objects(made(tmp_path, 'dome', ['lamp'])),
+                                   [Carving(0)]).views, torch.tensor([0]))
+    images = turned(dome, np.random.default_rng(3)).images
+    rings = [part.reshape(1, 4, 12, *part.shape[2:]) for part in (images, dome.images)]
+    assert any(torch.equal(rings[0], rings[1].roll(step, dims=2)) for step in range(1, 12))
+
+
+def test_an_object_among_cameras_that_are_no_grid_cannot_be_turned(scene):
+    odd = some_views(some_objects(scene.views, torch.tensor([1])), np.array([0, 1, 5, 12]))
+    with pytest.raises(DataError, match='expected a grid of azimuths'):
+        for seed in range(9):
+            turned(odd, np.random.default_rng(seed))
 
 
 def test_without_a_gap_nothing_has_a_share_of_it():

@@ -13,7 +13,7 @@ from active_recon.evaluation.quality.faults import (
     wrong_size,
 )
 from active_recon.evaluation.quality.fitting import fit
-from active_recon.evaluation.quality.measuring import halves, measure, Measured
+from active_recon.evaluation.quality.measuring import halves, measure, Measured, orders_of
 from active_recon.evaluation.quality.promises import (
     BROKEN,
     Episodes,
@@ -26,6 +26,8 @@ from active_recon.evaluation.quality.study import study
 from active_recon.evaluation.quality.summary import markdown
 from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.weights_files import SHIPPED, weights_hash
+from active_recon.policies import Choice
+from active_recon.policies.geometric import HeuristicPolicy
 from active_recon.quality.features import FEATURES
 from active_recon.quality.tables import QualityTables
 from command_line import command, refusal
@@ -194,6 +196,32 @@ def test_measured_are_all_objects_after_every_view(seen):
     np.testing.assert_allclose(alone.numbers, found.numbers[:2], atol=1e-5)
     spoilt = measure(seen, network, 0.1, 2, fault='mask')
     assert np.isnan(spoilt.iou).all() and set(spoilt.fault) == {'mask'}
+
+
+class Recalled(HeuristicPolicy):
+    """Takes the views of an order, (N, T)."""
+
+    def __init__(self, order):
+        self._order = order
+
+    def choose(self, seen, state):
+        wanted = self._order[:, seen.taken.shape[1], None]
+        return Choice((np.arange(seen.candidates.shape[1]) == wanted).astype(np.float32)), state
+
+
+def test_a_policy_chooses_the_views_after_the_first(seen):
+    torch.manual_seed(0)
+    network = Lifting.from_config(LiftingConfig((8, 8, 8, 8), 8, 8, 4, 4, (8, 8, 8), 8)).eval()
+    order = orders_of(seen, 'random', 3, 0)
+    drawn = measure(seen, network, 0.1, 3)
+    same = measure(seen, network, 0.1, 3, 'attention', policy=Recalled(order))
+    np.testing.assert_array_equal(same.numbers, drawn.numbers)
+    assert set(same.kind) == {'attention'}
+    other = measure(seen, network, 0.1, 3, 'attention', policy=Recalled(order[:, [0, 2, 1]]))
+    at_two = drawn.count == 2
+    assert (other.numbers[at_two] != drawn.numbers[at_two]).any()
+    np.testing.assert_allclose(other.iou[drawn.count == 3], drawn.iou[drawn.count == 3],
+                               atol=1e-6)  # the same views, in another order
 
 
 def test_the_commands_fit_tables_and_test_them_on_the_other_half(tmp_path, monkeypatch):

@@ -2,7 +2,7 @@
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID, MOST_VIEWS
-from active_recon.models.view_scorer import Looked, ScorerConfig
+from active_recon.models.view_scorer import Looked, ScorerConfig, ViewScorer
 from active_recon.training.looked import joined, looked_states, LookedStates, mirrored, spreads
 from active_recon.training.scorer import (
     calibrate,
@@ -149,6 +149,13 @@ def test_a_state_shows_its_views_taken_and_all_views_as_candidates():
     np.testing.assert_allclose(seen.taken[0], gains.poses[[1, 4]])
     assert seen.candidates.shape == (1, 6, 4, 4)
     np.testing.assert_allclose(gains.gains[0, 2], gains.after[0, 2] - gains.iou[0])
+
+
+def test_a_scorer_gives_the_means_of_its_patches_the_scores_of_whole_grids():
+    scorer = ViewScorer.from_config(SMALL).eval()
+    whole, means = (looked_states(measured(), patches).looked for patches in (GRID, SMALL.patches))
+    assert means.grids.shape[-3:] == (SMALL.patches,) * 3
+    assert_close(scorer.scores(means), scorer.scores(whole), atol=1e-5, rtol=1e-4)
 
 
 def test_looked_states_know_their_views_and_mirror_twice_to_themselves():

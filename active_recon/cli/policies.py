@@ -30,11 +30,11 @@ def policies(
     names: Annotated[str | None, typer.Option(
         '--policies', help=f'Policies, separated by commas, out of {", ".join(POLICIES)}, '
         'sequence (the best that is the same for all objects, found on --training), swapped '
-        '(attention, shown the volume of another object), peeking, oracle and together '
-        '(which see what no robot does; together tries all pairs of second and third views); '
-        'NAME@COST is a policy whose motion costs so much IoU a second. Default: all but swapped '
-        'and together, attention only where the model has a learned policy, sequence only with '
-        '--training.')] = None,
+        '(attention, shown the volume of another object), swapped_turned (of that object, turned '
+        'by a drawn angle), peeking, oracle and together (which see what no robot does; together '
+        'tries all pairs of second and third views); NAME@COST is a policy whose motion costs so '
+        'much IoU a second. Default: all but the swapped ones and together, attention only where '
+        'the model has a learned policy, sequence only with --training.')] = None,
     training: Annotated[Path | None, typer.Option(
         help='Folder of other objects, on which the sequence is found.')] = None,
     objects: Annotated[int, typer.Option(

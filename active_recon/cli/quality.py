@@ -22,7 +22,9 @@ def measure(
                                               'at the resolution of the network.')],
     out: Annotated[Path, typer.Argument(help='The npz file to write.')],
     views: Annotated[int, typer.Option(min=1, help='Views of each object.')] = 5,
-    kind: Annotated[str, typer.Option(help="Order of the views: 'random' or 'even'.")] = 'random',
+    kind: Annotated[str, typer.Option(
+        help="Order of the views: 'random', 'even', or 'attention': those that the learned policy "
+             'of the weights chooses.')] = 'random',
     fault: Annotated[str | None, typer.Option(
         help='Spoil the views: unknown (noise), pose, object_size, mask.')] = None,
     objects: Annotated[int | None, typer.Option(
@@ -40,10 +42,11 @@ def measure(
     from active_recon.datasets.views import read_views
     from active_recon.evaluation.posed.scene import chosen_folders
     from active_recon.evaluation.quality.faults import FAULTS
-    from active_recon.evaluation.quality.measuring import KINDS, Measured
+    from active_recon.evaluation.quality.measuring import KINDS, LEARNED, Measured
     from active_recon.evaluation.quality.measuring import measure as measured
     from active_recon.models.weights import load_weights
     from active_recon.models.weights_files import find_weights
+    from active_recon.policies import load_policy, PolicyOptions
     import torch
 
     for name, value, known in (('kind', kind, KINDS), ('fault', fault or '', ('', *FAULTS))):
@@ -51,8 +54,11 @@ def measure(
             raise ConfigError(f'--{name}: unknown value: expected one of '
                               f'{", ".join(filter(None, known))}, got {value!r}')
     torch.set_num_threads(threads)
-    bundle = load_weights(find_weights(model))
+    weights = find_weights(model)
+    bundle = load_weights(weights)
     network = bundle.reconstruction
+    policy = load_policy(LEARNED, PolicyOptions(
+        views=views, weights=weights, threads=threads)) if kind == LEARNED else None
     folders = chosen_folders(list_objects(data), None, objects, seed)
     parts = []
     with progress_bar(f'measuring {data.name}', len(folders)) as advance:
@@ -60,7 +66,7 @@ def measure(
             some = read_views(folders[at:at + _BATCH], resolution=network.resolution,
                               image_size=network.image_size, framed=True)
             parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
-                                  seed + at))
+                                  seed + at, policy))
             advance(len(some), '')
     Measured.joined(parts).write(out)
     typer.echo(f'wrote {out}')
@@ -102,7 +108,8 @@ def fit(
 @quality.command()
 def study(
     files: Annotated[list[Path] | None, typer.Argument(
-        help='Measured objects that nothing was fitted to; each file is a set.')] = None,
+        help='Measured objects that nothing was fitted to: one set, with and without faults.')
+    ] = None,
     halved: Annotated[list[Path] | None, typer.Option(
         help='The files that `fit` was calibrated on: the other half of them is one set.')] = None,
     out: Annotated[Path, typer.Option(
@@ -114,7 +121,8 @@ def study(
     """
     Test what is said of quality on objects that nothing was fitted to.
 
-    Example: active-recon quality study test.npz --halved real.npz --halved real-pose.npz
+    Example: active-recon quality study test.npz test-pose.npz --halved real.npz --halved
+    real-pose.npz
     """
     from active_recon.evaluation.quality.measuring import halves, Measured
     from active_recon.evaluation.quality.study import study as studied
@@ -126,7 +134,9 @@ def study(
         raise ConfigError('study: nothing to measure: expected files of `quality measure`, or '
                           '--halved with some, got neither')
     found = QualityTables.read(tables or tables_path(find_weights(model)))
-    sets = {path.stem: Measured.read(path) for path in files or []}
+    sets = {}
+    if files:
+        sets[files[0].stem] = Measured.joined([Measured.read(path) for path in files])
     if halved:
         together = Measured.joined([Measured.read(path) for path in halved])
         sets[f'{halved[0].stem}, second half'] = together.rows(~halves(together))

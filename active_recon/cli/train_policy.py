@@ -94,7 +94,8 @@ def train_policy(
     told: list[dict[str, Any]] = []
     for number in range(1, rounds + 1):
         with workers_of(cluster, workers) as crew:
-            source = _Source(entrant, collecting, reachable(out, cluster), crew, counts)
+            source = _Source(entrant, collecting, config.patches, reachable(out, cluster), crew,
+                             counts)
             learned += source.states(data, number, scorer)
             held_out += source.states(validation, number, scorer)
         train, test = joined(learned), joined(held_out)
@@ -119,10 +120,10 @@ def train_policy(
 class _Source:
     """Where states come from; `counts` gets the number of objects of each folder and round."""
 
-    def __init__(self, entrant: 'Entrant', collecting: 'Collecting', out: Path, crew: 'Crew',
-                 counts: dict[str, int]) -> None:
-        self._entrant, self._collecting, self._out = entrant, collecting, out
-        self._crew, self._counts = crew, counts
+    def __init__(self, entrant: 'Entrant', collecting: 'Collecting', patches: int, out: Path,
+                 crew: 'Crew', counts: dict[str, int]) -> None:
+        self._entrant, self._collecting, self._patches = entrant, collecting, patches
+        self._out, self._crew, self._counts = out, crew, counts
 
     def states(self, folders: list[Path], number: int,
                scorer: 'ViewScorer | None') -> list['LookedStates']:
@@ -142,5 +143,5 @@ class _Source:
                 files = collect_gains(drawn, self._entrant, self._collecting, kept, policy,
                                       advance, self._crew)
             self._counts[f'{folder}, round {number}'] = len(files)
-            found += [looked_states(ViewGains.load(file)) for file in files]
+            found += [looked_states(ViewGains.load(file), self._patches) for file in files]
         return found

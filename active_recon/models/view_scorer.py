@@ -25,7 +25,7 @@ class ScorerConfig(Config):
     """
 
     patches: int = 4
-    hidden: int = 128
+    hidden: int = 256
     members: int = 3
     dropout: float = 0.3
 
@@ -44,7 +44,8 @@ class Looked(NamedTuple):
     """
     What K candidates look at, of B objects: `candidate_looks.Looks` in tensors.
 
-    - grids: (B, K, CHANNELS, GRID, GRID, GRID); facts: (B, K, FACTS)
+    - grids: (B, K, CHANNELS, GRID, GRID, GRID), or the means of the scorer's patches of them
+    - facts: (B, K, FACTS)
     - views: (B,) int64, the number of views taken, at most MOST_VIEWS
     """
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from active_recon.models.candidate_looks import look
+from active_recon.models.candidate_looks import GRID, look
 from active_recon.models.view_scorer import Looked
 from active_recon.policies.candidate_rendering import coarse_volume
 from active_recon.training.view_gains import ViewGains
@@ -34,8 +34,12 @@ class LookedStates:
         return LookedStates(Looked(*(part[index] for part in self.looked)), self.gains[index])
 
 
-def looked_states(measured: ViewGains) -> LookedStates:
-    """Return the states of one object."""
+def looked_states(measured: ViewGains, patches: int = GRID) -> LookedStates:
+    """
+    Return the states of one object, with grids of the means of so many patches a side.
+
+    A scorer of so many patches is told no more of them, and learns in less time and memory.
+    """
     found = []
     for row in range(len(measured)):
         seen = measured.observation(row)
@@ -44,7 +48,9 @@ def looked_states(measured: ViewGains) -> LookedStates:
         found.append(look(volume.occupancy, volume.entropy, seen.taken, seen.candidates))
     grids, facts, views = (torch.from_numpy(np.concatenate(parts))
                            for parts in zip(*found, strict=True))
-    return LookedStates(Looked(grids, facts, views.long()), torch.from_numpy(measured.gains))
+    told = grids.reshape(*grids.shape[:3], *(patches, grids.shape[-1] // patches) * 3).mean(
+        dim=(-1, -3, -5))  # (S, K, C, patches, patches, patches)
+    return LookedStates(Looked(told, facts, views.long()), torch.from_numpy(measured.gains))
 
 
 def joined(parts: Sequence[LookedStates]) -> list[LookedStates]:

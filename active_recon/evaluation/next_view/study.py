@@ -15,6 +15,7 @@ from active_recon.evaluation.next_view.choosing import (
 )
 from active_recon.evaluation.next_view.fixed_sequence import find_sequence, FixedSequence, Offsets
 from active_recon.evaluation.next_view.renderings import another_rendering
+from active_recon.evaluation.next_view.swapping import swapped_row, turned
 from active_recon.evaluation.next_view.watching import Ahead, WatchedObject
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import Scene
@@ -30,9 +31,9 @@ from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
 import numpy as np
 import torch
 
-ORACLE, PEEKING, SEQUENCE, SWAPPED = 'oracle', 'peeking', 'sequence', 'swapped'
-TOGETHER = 'together'
-_LOOKS_ELSEWHERE = 'attention'  # the policy that `swapped` is
+ORACLE, PEEKING, SEQUENCE, TOGETHER = 'oracle', 'peeking', 'sequence', 'together'
+SWAPPED, SWAPPED_TURNED = 'swapped', 'swapped_turned'
+_LOOKS_ELSEWHERE = 'attention'  # the policy that these two are
 _WORTH: dict[str, Callable[[Ahead], Values]] = {
     ORACLE: lambda ahead: ahead.iou, PEEKING: lambda ahead: ahead.expected}
 _ON_BOTH = ('random', ORACLE)  # the gap between them is told on either rendering
@@ -43,8 +44,9 @@ class Episodes:
     """
     What is run of every object.
 
-    - policies: names of the registry, `sequence`, `swapped`, `peeking`, `oracle` and `together`,
-      see `chosen_together`; NAME@COST is a policy with a `motion_cost`, see `chosen_by`
+    - policies: names of the registry, `sequence`, `swapped`, `swapped_turned`, `peeking`, `oracle`
+      and `together`, see `chosen_together`; NAME@COST is a policy with a `motion_cost`, see
+      `chosen_by`
     - starts: first views of each object, drawn; count: views of an episode
     - seeds: how often a policy that draws is run
     - seed: draws the starts, the renderings and what policies draw
@@ -85,7 +87,7 @@ class Found:
 
 def known_names() -> list[str]:
     """Return what can be measured: all policies, learned ones if there are any, and more."""
-    return [*POLICIES, SEQUENCE, SWAPPED, PEEKING, ORACLE, TOGETHER]
+    return [*POLICIES, SEQUENCE, SWAPPED, SWAPPED_TURNED, PEEKING, ORACLE, TOGETHER]
 
 
 def find_offsets(scene: Scene, entrant: Entrant, episodes: Episodes,
@@ -112,8 +114,9 @@ def run_episodes(scene: Scene, entrant: Entrant, episodes: Episodes,
         own, other = (_watched(scene, entrant, episodes, row, 2 * episodes.seed + rendering)
                       for rendering in range(2))
         for name in episodes.policies:
-            looked_at = own if name != SWAPPED else _watched(
-                scene, entrant, episodes, (row + 1) % len(scene), 2 * episodes.seed)
+            looked_at = own if name not in (SWAPPED, SWAPPED_TURNED) else _watched(
+                scene, entrant, episodes, swapped_row(row, len(scene)), 2 * episodes.seed,
+                np.random.default_rng([episodes.seed, row, 1]) if name == SWAPPED_TURNED else None)
             orders = [[_order(name, looked_at, start, [episodes.seed, seed, row, start], entrant,
                               episodes, offsets)
                        for seed in range(_seeds(name, episodes))]
@@ -193,7 +196,8 @@ def _parted(name: str) -> tuple[str, float]:
 def _policy(name: str, seed: Sequence[int], entrant: Entrant, episodes: Episodes,
             offsets: Offsets | None) -> Policy:
     if name != SEQUENCE:
-        return load_policy(_LOOKS_ELSEWHERE if name == SWAPPED else name, PolicyOptions(
+        looks_elsewhere = name in (SWAPPED, SWAPPED_TURNED)
+        return load_policy(_LOOKS_ELSEWHERE if looks_elsewhere else name, PolicyOptions(
             np.random.default_rng(seed), episodes.count, entrant.path))
     if offsets is None:
         raise ConfigError('sequence: none was found: expected training objects to find one on')
@@ -211,13 +215,15 @@ def _starts(scene: Scene, episodes: Episodes, row: int) -> list[int]:
 
 
 def _watched(scene: Scene, entrant: Entrant, episodes: Episodes, row: int,
-             rendering: int | None) -> WatchedObject:
-    """Return one object of a set under a rendering; None: as it was rendered."""
+             rendering: int | None, turn: np.random.Generator | None = None) -> WatchedObject:
+    """Return one object of a set under a rendering, None: as it was; `turn` draws its yaw."""
     shown = scene.shown_to(entrant.network)
     if shown is None:
         raise ConfigError(f'{entrant.name}: cannot be shown these views: expected a network that '
                           'takes any cameras, such as lifting')
     views = some_objects(shown, torch.tensor([row]))
+    if turn is not None:
+        views = turned(views, turn)
     if rendering is not None:
         views = another_rendering(views, 100_000 * rendering + row)
     side = max(side for side in entrant.sides if side in scene.truths)

@@ -17,8 +17,10 @@ def markdown(result: Mapping[str, Any]) -> str:
              'takes the one after which the IoU with the truth is highest, `peeking` the one '
              'after which the network itself expects the highest IoU, `together` the best two '
              'further views of all pairs, and then as the oracle; no robot has any of them. '
-             '`swapped` is the learned policy, shown the volume of another object. The motion '
-             'takes a second a radian around either axis; NAME@COST takes its cost in IoU off.']
+             '`swapped` is the learned policy, shown the volume of an object half the set '
+             'further on, `swapped_turned` of that one turned by a drawn angle, since the objects '
+             'of a set face the same way. The motion takes a second a radian around either axis; '
+             'NAME@COST takes its cost in IoU off.']
     if 'sequence' in result:
         offsets = ', '.join(f'{azimuth:g} at {elevation:g}'
                             for azimuth, elevation in result['sequence']['offsets_deg'])

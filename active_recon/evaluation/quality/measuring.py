@@ -1,19 +1,21 @@
 """Roll-outs of a frozen network: what its quality is judged by after each view, and the truth."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self
 
 from active_recon.datasets.views import ViewSet
+from active_recon.environment import run_episode, TimeStep
 from active_recon.errors import DataError
 from active_recon.evaluation.posed.walking import even_orders, Order
 from active_recon.evaluation.quality.faults import FAULTS, sources_of
 from active_recon.evaluation.quality.shells import HOLLOW, hollow_share
-from active_recon.evaluation.rollouts import Observer
+from active_recon.evaluation.rollouts import Observer, RenderedObjects, Seen
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.geometry.view_distance import pose_directions
 from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.policies import Policy
 from active_recon.quality.features import features
 from active_recon.quality.latents import pooled
 from active_recon.quality.silhouettes import SeenView
@@ -22,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 import torch
 
-KINDS = ('random', 'even')
+LEARNED = 'attention'
+KINDS = ('random', 'even', LEARNED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +36,8 @@ class Measured:
     - numbers: (N, F), the features; latents: (N, D), pooled; iou: (N,) with the truth, NaN where a
       fault makes it meaningless; hollow: (N,), see `hollow_share`
     - count: (N,), views so far; episode: (N,), the same for all of one episode
-    - object, source: (N,), names; fault: (N,), '' for none; kind: (N,), random or even orders
+    - object, source: (N,), names; fault: (N,), '' for none; kind: (N,), of KINDS, what chose the
+      views
     """
 
     numbers: NDArray[np.float64]
@@ -83,10 +87,14 @@ class Measured:
 
 
 def orders_of(views: ViewSet, kind: str, count: int, seed: int) -> Order:
-    """Return the first `count` views of each object, (N, count), in an order of a kind."""
+    """
+    Return the first `count` views of each object, (N, count): evenly spread, or in random order.
+
+    Of what a policy chooses, the first ones alone are taken from it.
+    """
     shape = views.poses.shape[:2]
     rng = np.random.default_rng([seed, 20])
-    if kind == 'random':
+    if kind != 'even':
         return np.stack([rng.permutation(shape[1])[:count] for _ in range(shape[0])])
     first = rng.integers(shape[1], size=shape[0])
     return even_orders(pose_directions(views.poses.numpy()), count, first)
@@ -94,24 +102,27 @@ def orders_of(views: ViewSet, kind: str, count: int, seed: int) -> Order:
 
 @torch.inference_mode()
 def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, count: int,
-            kind: str = 'random', fault: str = '', seed: int = 0) -> Measured:
+            kind: str = 'random', fault: str = '', seed: int = 0,
+            policy: Policy | None = None) -> Measured:
     """
     Measure the objects of a set after 1 to `count` views each, all at once.
 
-    Raises DataError where the network keeps no foreground, from which silhouettes are had.
+    A policy chooses the views after the first of each; `kind` is then its name. Raises DataError
+    where the network keeps no foreground, from which silhouettes are had.
     """
     shown = FAULTS[fault](views, seed) if fault else views
-    order = orders_of(shown, kind, min(count, shown.poses.shape[1]), seed)
+    count = min(count, shown.poses.shape[1])
+    order = torch.from_numpy(orders_of(shown, kind, count, seed))
     observer, objects = Observer(network, shown), torch.arange(len(shown))
-    state = observer.initial_state(len(shown))
-    if 'foreground' not in state:
+    if 'foreground' not in observer.initial_state(len(shown)):
         raise DataError('quality: a network without a foreground: expected one that keeps the '
                         'foreground of each view in its state, as `lifting` does')
     seen: list[list[SeenView]] = [[] for _ in objects]
     found: list[tuple[NDArray[np.float64], NDArray[np.float64], float, int, int]] = []
-    for number, chosen in enumerate(order.T, 1):
-        at = torch.from_numpy(chosen)
-        state = observer.update(objects, at, state)
+    shows = RenderedObjects(observer, objects)
+    choose = _ordered(order) if policy is None else _chosen_by(policy, observer, shows)
+    for number, step in enumerate(run_episode(shows, order[:, 0], choose, count), 1):
+        state, at = step.known.state, step.known.chosen[:, -1]
         foreground = state['foreground'].cpu().numpy()
         for row, camera in enumerate(_cameras(shown.cameras(objects, at), shown.image_size)):
             seen[row].append(SeenView(camera, *foreground[row]))
@@ -131,6 +142,25 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
         np.array([f'{name} {kind} {fault} {seed}' for name in names])[at_row], names[at_row],
         np.array(sources_of(views.folders))[at_row], np.full(len(rows), fault, '<U16'),
         np.full(len(rows), kind, '<U16'))
+
+
+def _ordered(order: torch.Tensor) -> Callable[[TimeStep[torch.Tensor, Seen]], torch.Tensor]:
+    return lambda step: order[:, step.known.chosen.shape[1]]
+
+
+def _chosen_by(policy: Policy, observer: Observer, shows: RenderedObjects) -> Callable[
+        [TimeStep[torch.Tensor, Seen]], torch.Tensor]:
+    memory = policy.initial_state(len(shows.objects))
+
+    def choose(step: TimeStep[torch.Tensor, Seen]) -> torch.Tensor:
+        nonlocal memory
+        state = step.known.state
+        volume = observer.occupancy(state) if policy.wants_volume else None
+        choice, memory = policy.choose(
+            shows.observation(state['latent'], step.known, volume), memory)
+        return shows.view_of(choice)
+
+    return choose
 
 
 def _cameras(cameras: Cameras, size: int) -> Iterator[Camera]:
