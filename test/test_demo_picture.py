@@ -1,9 +1,10 @@
 """The picture of a run: where things stand on it, and that it shows what it was given."""
 
+from functools import cache
 import math
 
 from active_recon.demo.drawing import PAPER
-from active_recon.demo.picture import COLUMNS, run_picture, TILE, turntable_plan
+from active_recon.demo.picture import COLUMNS, run_picture, TILE, turntable_plan, voxel_tile
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.view_colors import view_color
 from active_recon.viewer.view_result import ViewResult
@@ -52,6 +53,16 @@ def test_picture_has_room_for_every_view_and_the_truth(views, rows):
     assert rows * 2 * TILE < picture.shape[0] < (rows + 1) * 2 * TILE + 200
 
 
+def test_picture_is_the_same_from_tiles_drawn_as_the_views_came_in():
+    views = [seen(n / 4, VoxelGrid(TRUTH.occupancy * (n > 0))) for n in range(3)]
+    draw = cache(voxel_tile)
+    for view in views:
+        draw(view.occupied, height_range(TRUTH))
+    picture = run_picture('a run', views, CONE, TRUTH, draw)
+    assert draw.cache_info().misses == len(views)
+    np.testing.assert_array_equal(picture, run_picture('a run', views, CONE, TRUTH))
+
+
 def test_empty_occupancy_and_an_image_not_heard_leave_their_tiles_empty():
     empty = VoxelGrid(np.zeros_like(TRUTH.occupancy))
     view = ViewResult(0, orbit_camera(0.0), None, 0.0, 0.01, empty, 0.0)
@@ -66,6 +77,18 @@ def test_boxes_stand_where_their_cells_are():
     boxes = voxel_boxes(VoxelGrid(occupancy, size=4.0), (0, 31))
     np.testing.assert_allclose(boxes.centroid, [15.5 / 32, -15.5 / 32, 0.5 / 32])
     assert boxes.volume == pytest.approx((0.93 / 32) ** 3)
+
+
+def test_faces_turned_away_from_the_viewpoint_are_never_seen():
+    camera = orbit_camera(math.radians(30), elevation=math.radians(25))
+    heights = height_range(TRUTH)
+    every = voxel_boxes(TRUTH, heights)
+    facing = voxel_boxes(TRUTH, heights, camera.position)
+    assert len(facing.faces) == len(every.faces) // 2  # three of a box's six sides
+    seen_all, seen_facing = (composite(Renderer(boxes).render(camera, 3), 255).astype(int)
+                             for boxes in (every, facing))
+    assert (seen_all != 255).any()
+    assert (np.abs(seen_all - seen_facing).max(axis=2) > 2).mean() < 1e-3  # of ties at an edge
 
 
 def test_heights_span_the_occupied_layers():

@@ -6,7 +6,12 @@ from active_recon.acquisition.goal_places import Dome, goal_places
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import AZIMUTHS, Camera, orbit_camera
-from active_recon.geometry.view_distance import direction_distance, nearest_camera, view_distance
+from active_recon.geometry.view_distance import (
+    direction_distance,
+    nearest_camera,
+    nearest_cameras,
+    view_distance,
+)
 from active_recon.parameters.view_planner import ViewPlannerParameters
 from active_recon.planner import Planner
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
@@ -77,6 +82,15 @@ def test_no_goal_ever_stands_where_the_camera_cannot_go(kind, where):
             else:
                 place = camera.azimuth, camera.elevation, camera.distance
                 assert place in {(0.0, 0.2, 0.9), (1.5, 1.1, 0.7), (3.0, -0.4, 0.9)}
+
+
+def test_the_nearest_camera_is_at_the_smallest_view_distance_and_of_equals_the_first():
+    places = [orbit_camera(azimuth, 0.3) for azimuth in (*AZIMUTHS, *AZIMUTHS)]
+    cameras = [orbit_camera(0.37 * step, 0.1 * step) for step in range(12)]
+    assert list(nearest_cameras(cameras, places)) == [
+        min(range(len(AZIMUTHS)), key=lambda place, camera=camera: view_distance(
+            places[place], camera)) for camera in cameras]
+    assert len(nearest_cameras([], places)) == 0
 
 
 @pytest.mark.parametrize('kind', POLICIES)

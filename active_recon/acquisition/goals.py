@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost
 from active_recon.geometry.cameras import Camera
-from active_recon.geometry.view_distance import nearest_camera
+from active_recon.geometry.view_distance import nearest_camera, nearest_cameras
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,9 +60,8 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
         nearest = np.insert(nearest, 0, nearest_camera(wanted.camera, candidates))
         scores = np.append(scores.max(), scores)
     azimuths = np.array([option.azimuth for option in options])
-    is_failed, is_taken = (
-        np.isin(nearest, [nearest_camera(each, candidates) for each in cameras])
-        for cameras in (failed, taken))
+    is_failed, is_taken = (np.isin(nearest, nearest_cameras(cameras, candidates))
+                           for cameras in (failed, taken))
     is_open = limits.allows(azimuths) & ~is_failed
     if not is_open.any():
         return None

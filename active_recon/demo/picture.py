@@ -1,6 +1,6 @@
 """One picture of a run: the views around the turntable, and the occupancy after each."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 
 from active_recon.demo.drawing import centred, PAPER, paste, QUIET, text
@@ -30,8 +30,17 @@ _HEADER = 84
 _LOOK_FROM = math.radians(35)  # azimuth from which the occupancies are drawn
 
 
+DrawVoxels = Callable[[VoxelGrid, tuple[int, int]], NDArray[np.uint8]]
+"""`voxel_tile`, or what remembers its results."""
+
+
+def voxel_tile(grid: VoxelGrid, heights: tuple[int, int]) -> NDArray[np.uint8]:
+    """Return the cells above 0, (TILE, TILE, 3) uint8 RGB; `heights` as in `voxel_boxes`."""
+    return voxel_picture(grid, heights, _tile_camera(), PAPER)
+
+
 def run_picture(title: str, views: Sequence[ViewResult], mesh: trimesh.Trimesh,
-                truth: VoxelGrid) -> NDArray[np.uint8]:
+                truth: VoxelGrid, draw: DrawVoxels = voxel_tile) -> NDArray[np.uint8]:
     """
     Return the picture, (H, W, 3) uint8 RGB: left the turntable from above, right the views.
 
@@ -48,7 +57,7 @@ def run_picture(title: str, views: Sequence[ViewResult], mesh: trimesh.Trimesh,
         left = _PLAN + 2 * _MARGIN + index % COLUMNS * TILE
         top = _HEADER + index // COLUMNS * _BLOCK
         if index < len(views):
-            _draw_view(picture, left, top, index + 1, views[index], heights)
+            _draw_view(picture, left, top, index + 1, views[index], heights, draw)
         else:
             _draw_truth(picture, left, top, mesh, truth, heights)
     return picture
@@ -97,7 +106,7 @@ def _around(azimuth: float, radius: float) -> tuple[int, int]:
 
 
 def _draw_view(picture: NDArray[np.uint8], left: int, top: int, number: int, view: ViewResult,
-               heights: tuple[int, int]) -> None:
+               heights: tuple[int, int], draw: DrawVoxels) -> None:
     middle = left + TILE // 2
     if view.image is not None:
         side = TILE - 20
@@ -108,7 +117,7 @@ def _draw_view(picture: NDArray[np.uint8], left: int, top: int, number: int, vie
     caption = f'{number}   {math.degrees(view.camera.azimuth):.0f}°'
     centred(picture, caption, middle, top + TILE + 18, 19, view_color(number))
     if view.occupied is not None:
-        paste(picture, _voxel_tile(view.occupied, heights), left, top + TILE + 26)
+        paste(picture, draw(view.occupied, heights), left, top + TILE + 26)
     if view.iou is not None:
         expected = f', expected {view.quality.expected_iou:.2f}' if view.quality else ''
         centred(picture, f'IoU {view.iou:.2f}{expected}', middle, top + _BLOCK - 32, 19)
@@ -119,12 +128,8 @@ def _draw_truth(picture: NDArray[np.uint8], left: int, top: int, mesh: trimesh.T
     middle = left + TILE // 2
     paste(picture, _rendered(mesh), left, top)
     centred(picture, 'the object', middle, top + TILE + 18, 19)
-    paste(picture, _voxel_tile(truth, heights), left, top + TILE + 26)
+    paste(picture, voxel_tile(truth, heights), left, top + TILE + 26)
     centred(picture, 'its voxels', middle, top + _BLOCK - 32, 19)
-
-
-def _voxel_tile(grid: VoxelGrid, heights: tuple[int, int]) -> NDArray[np.uint8]:
-    return voxel_picture(grid, heights, _tile_camera(), PAPER)
 
 
 def _rendered(mesh: trimesh.Trimesh) -> NDArray[np.uint8]:

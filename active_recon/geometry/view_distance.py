@@ -28,8 +28,16 @@ def direction_distance(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
 
 def nearest_camera(camera: Camera, cameras: Sequence[Camera]) -> int:
     """Return the index of the camera with the smallest `view_distance`; of equals the first."""
-    directions = np.array([each.direction for each in cameras])
-    return int(direction_distance(directions, camera.direction).argmin())
+    return int(nearest_cameras([camera], cameras)[0])
+
+
+def nearest_cameras(cameras: Sequence[Camera], among: Sequence[Camera]) -> NDArray[np.int64]:
+    """Return the `nearest_camera` among some of each camera, (N,)."""
+    if not cameras:
+        return np.zeros(0, np.int64)
+    own, others = (pose_directions(np.stack([each.pose for each in one]))
+                   for one in (cameras, among))
+    return np.asarray(direction_distance(own[:, None], others).argmin(axis=1))
 
 
 def pose_directions(poses: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -104,15 +104,15 @@ def cells_in_sight(pose: NDArray[np.floating], occupancy: Array, rays: int,
     samples, seen_at = _own_samples(
         np.ascontiguousarray(pose, np.float32).tobytes(), len(occupancy), rays, steps)
     free = np.append(1 - occupancy.ravel(), np.float32(1))[samples]  # (steps, lines)
-    passing = np.empty_like(free)
-    passing[0] = 1
-    np.cumprod(free[:-1], axis=0, out=passing[1:])
+    passing = np.ones_like(free)
+    for step in range(1, steps):  # NumPy's cumprod takes several times as long
+        np.multiply(passing[step - 1], free[step - 1], out=passing[step])
     return passing.ravel()[seen_at]
 
 
 @lru_cache(maxsize=64)
 def _own_samples(pose: bytes, side: int, rays: int,
-                 steps: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+                 steps: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """
     Return a camera's samples, and at which of them it sees each cell; kept from plan to plan.
 
@@ -129,4 +129,4 @@ def _own_samples(pose: bytes, side: int, rays: int,
     step = ((np.linalg.norm(away, axis=-1) - frames.distance[0]) / RADIUS + 1) / 2 * steps
     column, row = (each.clip(0, rays - 1).astype(np.int32) for each in (column, row))
     seen_at = (step.clip(0, steps - 1).astype(np.int32) * rays + row) * rays + column
-    return samples, seen_at
+    return samples.astype(np.intp), seen_at.astype(np.intp)

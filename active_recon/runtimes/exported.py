@@ -1,6 +1,7 @@
 """Exported networks and policies, whatever library runs their graphs."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
 
@@ -162,11 +163,16 @@ def open_network(weights: Path | None, open_graph: OpenGraph,
     """
     weights = weights or SHIPPED
     digest = weights_hash(weights)
-    # The update adds up over views, which half precision is too coarse for
-    graphs, told = {}, {}
-    for part in NETWORK_PARTS:
+
+    def opened(part: str) -> tuple[Graph, GraphMetadata]:
         file = INT8_PART if int8 and part == DECODE_PART else part
-        graphs[part], told[part] = _opened(weights, file, digest, open_graph, part != 'update')
+        # The update adds up over views, which half precision is too coarse for
+        return _opened(weights, file, digest, open_graph, part != 'update')
+
+    with ThreadPoolExecutor(len(NETWORK_PARTS)) as pool:  # a node's start waits for little else
+        parts = dict(zip(NETWORK_PARTS, pool.map(opened, NETWORK_PARTS), strict=True))
+    graphs = {part: graph for part, (graph, _) in parts.items()}
+    told = {part: metadata for part, (_, metadata) in parts.items()}
     if any(each.facts != told['update'].facts for each in told.values()):
         raise WeightsError(f'{graph_path(weights, "update")}: exported at another time than the '
                            'parts beside it; export the weights anew')

@@ -104,6 +104,7 @@ class _Opener:
         self._float = ('bf16' if has_bf16() else 'f32') if self.is_int8 else precision
         self._precision = f'int8 with {self._float}' if self.is_int8 else precision
         self._asked, self._threads, self._remark = threads, threads or 0, ''
+        _core()  # imported before the threads that open graphs
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -126,7 +127,7 @@ class _Opener:
         taken = _taken(read_compiled(kept), settings)
         if taken is None:
             taken = compiled, metadata = _compiled(path, exported, settings)
-            self._remark = write_compiled(kept, _packed(compiled, metadata))
+            self._remark = write_compiled(kept, _packed(compiled, metadata)) or self._remark
         compiled, metadata = taken
         self._threads = int(compiled.get_property('INFERENCE_NUM_THREADS'))
         return OpenVinoGraph(compiled, metadata)

@@ -17,12 +17,14 @@ def height_range(grid: VoxelGrid) -> tuple[int, int]:
     return (layers[0], layers[-1]) if len(layers) else (0, grid.occupancy.shape[2] - 1)
 
 
-def voxel_boxes(grid: VoxelGrid, heights: tuple[int, int]) -> trimesh.Trimesh | None:
+def voxel_boxes(grid: VoxelGrid, heights: tuple[int, int],
+                viewpoint: NDArray[np.float64] | None = None) -> trimesh.Trimesh | None:
     """
     Return a mesh with a box for each cell above 0, coloured by height; None for an empty grid.
 
     `heights` are the layers (z indices) at both ends of the colour map. The grid is scaled to
-    side 1.
+    side 1. With a `viewpoint`, (3,) and outside the boxes, faces that are turned away from it are
+    left out: half of the mesh, and none that could be seen from there.
     """
     index = np.argwhere(grid.occupied(0))
     if len(index) == 0:
@@ -37,8 +39,12 @@ def voxel_boxes(grid: VoxelGrid, heights: tuple[int, int]) -> trimesh.Trimesh | 
     share = np.clip((index[:, 2] - low) / max(high - low, 1), 0, 1)
     shades = np.rint(40 + 200 * share).astype(np.uint8)
     rgb = cv2.applyColorMap(shades, cv2.COLORMAP_VIRIDIS).reshape(-1, 3)[:, ::-1]
-    return trimesh.Trimesh(vertices, faces, face_colors=np.repeat(rgb, len(box.faces), axis=0),
-                           process=False)
+    colors = np.repeat(rgb, len(box.faces), axis=0)
+    if viewpoint is not None:
+        # (cells, 12): whether the viewpoint is on the outer side of a face's plane
+        towards = (viewpoint - centers) @ box.face_normals.T > _GAP / side / 2
+        faces, colors = faces[towards.ravel()], colors[towards.ravel()]
+    return trimesh.Trimesh(vertices, faces, face_colors=colors, process=False)
 
 
 def voxel_picture(grid: VoxelGrid, heights: tuple[int, int], camera: Camera,
@@ -49,5 +55,5 @@ def voxel_picture(grid: VoxelGrid, heights: tuple[int, int], camera: Camera,
     `camera` is in sides of the grid; `background` is RGB in [0, 255].
     """
     ground = np.full((camera.intrinsics.height, camera.intrinsics.width, 3), background, np.uint8)
-    boxes = voxel_boxes(grid, heights)
+    boxes = voxel_boxes(grid, heights, camera.position)
     return ground if boxes is None else composite(Renderer(boxes).render(camera, 3), ground)

@@ -54,8 +54,11 @@ def test_a_demo_whose_planner_is_done_waits_no_longer_for_views_that_were_missed
     stamp = publish_view(bench, truth)
     done = bench.node.create_publisher(Header, 'done', LATCHED_QOS)
     done.publish(done_to_msg(stamp, 'max_views'))
-    follow_loop(monitor, Demo(Path('chair.ply'), views), 'chair', console, lambda: None)
-    assert [view.stamp for view in monitor.state.views] == [stamp]
+    shown_views = []
+    follow_loop(monitor, Demo(Path('chair.ply'), views), 'chair', console, lambda: None,
+                shown_views.append)
+    assert shown_views == list(monitor.state.views)
+    assert [view.stamp for view in shown_views] == [stamp]
     shown = console.file.getvalue()
     assert 'done (max_views)' in shown
     assert said in shown if said else 'did not reach' not in shown
