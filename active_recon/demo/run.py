@@ -96,6 +96,8 @@ def run_demo(demo: Demo, console: Console) -> Path:
                       f'view planner on ROS domain {environment["ROS_DOMAIN_ID"]}')
         nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
                                  'record_at_start': False})
+        nodes.start('turntable_camera', {'mesh': demo.mesh, 'speed': _SPEED,
+                                         'start_azimuth': _start_azimuth(demo)})
         # A tolerance of 0 prevents an early end: all requested views are taken.
         nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
                                      'max_views': demo.views, 'entropy_tolerance': 0.0, **network})
@@ -103,8 +105,7 @@ def run_demo(demo: Demo, console: Console) -> Path:
         if demo.view:
             _open_page(nodes, monitor, console, check)
         try:
-            nodes.start('turntable_camera', {'mesh': demo.mesh, 'speed': _SPEED,
-                                             'start_azimuth': _start_azimuth(demo)})
+            # Last: the bag is to hold all that it hears and tells.
             # Goals only: `auto` takes views by separation until it has discovered the planner.
             nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal',
                                           **network})

@@ -1,5 +1,6 @@
 """ROS node of the reconstructor: views in, the object's occupancy out; it owns the episode."""
 
+from contextlib import nullcontext
 from functools import partial
 import math
 from pathlib import Path
@@ -16,7 +17,9 @@ from active_recon.nodes.camera.images import CameraImages
 from active_recon.nodes.camera.monitor import CameraMonitor
 from active_recon.nodes.camera.pose_sources import check_pose_source, subscribe_poses
 from active_recon.nodes.camera.reference_capture import ReferenceCapture
-from active_recon.nodes.loop.products import meshing_imported, Products
+from active_recon.nodes.loop.mesh_publisher import meshing_imported
+from active_recon.nodes.loop.mesh_saver import MeshSaver
+from active_recon.nodes.loop.products import no_view_before, Products, Write
 from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPublisher
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
@@ -64,6 +67,7 @@ class ReconstructorNode(ManagedNode):
         self._params = Parameters(self, ReconstructorParameters)
         self._params.on_change(self._change)
         self._capture = ReferenceCapture(self)
+        self._saver = MeshSaver(self, self._mesh_writer)
 
     def configure(self) -> None:
         """Load the network, create publishers and services."""
@@ -72,7 +76,7 @@ class ReconstructorNode(ManagedNode):
         self.add_cleanup(self._capture.clear)
         publish_topic_names(self, TOPICS)
         check_pose_source(params)
-        with meshing_imported():
+        with meshing_imported() if params.publish_mesh else nullcontext():
             self._reconstructor = self._load(params)
         give_back_freed_memory()
         self._joiner = ViewJoiner(
@@ -97,7 +101,6 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.set_value('Weights SHA-256', provenance.get('weights_sha256', ''))
         tell_of_runtime(self._diagnostics, provenance)
         self.create_service(Trigger, 'start_episode', self._on_start)
-        self.create_service(Trigger, 'save_mesh', self._on_save)
         self.create_service(Trigger, 'save_state', self._on_save_state)
         self.create_service(Trigger, 'load_state', self._on_load_state)
 
@@ -125,6 +128,11 @@ class ReconstructorNode(ManagedNode):
         self._camera_timer = RestingTimer(
             self, 0.1, self._monitor.update, lambda: self._monitor.sees)
         self.add_cleanup(self._monitor.reset)
+
+    def destroy_node(self) -> None:
+        """Wait for a mesh that is being written, then free everything."""
+        self._saver.close()
+        super().destroy_node()
 
     def _free_network(self) -> None:
         del self._reconstructor, self._products, self._joiner
@@ -318,10 +326,12 @@ class ReconstructorNode(ManagedNode):
         response.message = self._episode.id
         return response
 
-    def _on_save(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Answer with the path of the mesh."""
+    def _mesh_writer(self) -> Write:
+        """Return what writes the mesh of the shape now, where there is one."""
+        if not self.is_configured:
+            return no_view_before('a mesh')
         params = self._params.values
-        return self._products.save_mesh(Path(params.output_dir), params.mesh_format, response)
+        return self._products.mesh_writer(Path(params.output_dir), params.mesh_format)
 
     def _on_save_state(self, _request: Trigger.Request,
                        response: Trigger.Response) -> Trigger.Response:

@@ -1,12 +1,18 @@
 """The reconstructor's service `save_mesh`, and a camera that publishes best effort."""
 
 from pathlib import Path
+import threading
 
+from active_recon.nodes.loop.mesh_saver import MeshSaver
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 import pytest
 from rclpy.qos import qos_profile_sensor_data
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
 import trimesh
 
-from .conftest import FakeCamera
+from .conftest import BUDGET_S, FakeCamera
 
 pytestmark = pytest.mark.ros
 
@@ -36,3 +42,59 @@ def test_a_mesh_that_cannot_be_written_is_said_and_survived(start_node, bench, t
     assert not answer.success
     assert 'was not written' in answer.message
     camera.show()
+
+
+def test_images_become_views_while_a_mesh_is_made(bench):
+    making, made = threading.Event(), threading.Event()
+
+    def write(response):
+        making.set()
+        made.wait(BUDGET_S)
+        response.success, response.message = True, 'a path'
+        return response
+
+    saver = MeshSaver(bench.node, lambda: write)
+    client = bench.node.create_client(Trigger, 'save_mesh')
+    bench.until(client.service_is_ready, 'the service')
+    heard = []
+    bench.node.create_subscription(Header, 'meanwhile', heard.append, 10)
+    publisher = bench.node.create_publisher(Header, 'meanwhile', 10)
+    answer = client.call_async(Trigger.Request())
+    bench.until(making.is_set, 'the mesh')
+    publisher.publish(Header())
+    bench.until(lambda: heard, 'a message')
+    assert not answer.done()
+    made.set()
+    bench.until(answer.done, 'the answer')
+    assert answer.result().success and answer.result().message == 'a path'
+    saver.close()
+
+
+def test_a_mesh_being_made_is_written_whole_though_the_node_ends(start_node, bench, tmp_path):
+    folder = tmp_path / 'meshes'
+    node = start_node('reconstructor', take_views='all', threshold=0.01, output_dir=folder)
+    FakeCamera(bench).show()
+    client = bench.node.create_client(Trigger, 'save_mesh')
+    bench.until(client.service_is_ready, 'the service')
+    client.call_async(Trigger.Request())
+    bench.until(folder.exists, 'the beginning of the file')
+    assert node.stop() == 0
+    path, = folder.iterdir()
+    assert len(trimesh.load(path, force='mesh').faces) > 0
+
+
+@pytest.mark.parametrize(('transitions', 'later'), [
+    (['deactivate'], 'meshes'), (['deactivate', 'cleanup'], 'no view in this episode yet')])
+def test_a_mesh_is_answered_though_the_node_changes_its_state(
+        start_node, bench, tmp_path, transitions, later):
+    start_node('reconstructor', take_views='all', threshold=0.01, output_dir=tmp_path / 'meshes')
+    FakeCamera(bench).show()
+    client = bench.node.create_client(Trigger, 'save_mesh')
+    bench.until(client.service_is_ready, 'the service')
+    answer = client.call_async(Trigger.Request())
+    for transition in transitions:
+        assert bench.ask(ChangeState, 'reconstructor/change_state', ChangeState.Request(
+            transition=Transition(label=transition))).success
+    bench.until(answer.done, 'the answer')
+    assert answer.result().success and Path(answer.result().message).exists()
+    assert later in bench.call('save_mesh').message

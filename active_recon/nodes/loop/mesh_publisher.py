@@ -1,8 +1,11 @@
 """Publishes the coloured surface as a Marker, beside the loop and not in its way."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
+from threading import Thread
 from typing import Any
 
 from active_recon.errors import DataError
@@ -18,6 +21,23 @@ from visualization_msgs.msg import Marker
 
 PERIOD_S = 1.0
 """Surfaces are at least so far apart."""
+_MESHING = ('active_recon.meshes.coloring', 'active_recon.volumes.isosurface')
+"""What makes surfaces, half a second of a node's start; see `meshing_imported`."""
+
+
+@contextmanager
+def meshing_imported() -> Iterator[None]:
+    """
+    Import what makes surfaces while the body runs; it is there once the body ends.
+
+    A node that publishes them does so before it subscribes: else its first views would be slow.
+    """
+    beside = Thread(target=lambda: [import_module(module) for module in _MESHING])
+    beside.start()
+    try:
+        yield
+    finally:
+        beside.join()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,7 @@
 """What comes out of an episode: its coloured mesh, in files and as a Marker, and its state."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from importlib import import_module
+from collections.abc import Callable
 from pathlib import Path
-from threading import Thread
 
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
@@ -21,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from std_srvs.srv import Trigger
 
-_MESHING = ('active_recon.meshes.coloring', 'active_recon.volumes.isosurface',
-            'active_recon.volumes.refinement')
-"""What makes meshes, a third of the node's start; see `meshing_imported`."""
+Write = Callable[[Trigger.Response], Trigger.Response]
+"""Writes a file, fills in the answer with its path, or why it was not written, and returns it."""
 
 
 class Products:
@@ -65,17 +61,18 @@ class Products:
         self._last_camera = saved.last_camera
         self._take(self._episode.begin, saved.reconstruction)
 
-    def save_mesh(self, output_dir: Path, suffix: str,
-                  response: Trigger.Response) -> Trigger.Response:
-        """Write the coloured mesh; answer with its path, or why it was not written."""
+    def mesh_writer(self, output_dir: Path, suffix: str) -> Write:
+        """Return what writes the coloured mesh of the shape now; any thread may call it."""
+        photos, threshold = self._album.photos, self._reconstructor.threshold
+
         def write(path: Path, known: Reconstruction) -> None:
+            # Not before the first mesh: they take a third of a node's start, and 70 MB
             from active_recon.meshes.coloring import colored
             from active_recon.volumes.refinement import refined_mesh
 
-            mesh = refined_mesh(known.grid, self._reconstructor.threshold)
-            write_mesh(colored(mesh, self._album.photos), path)
+            write_mesh(colored(refined_mesh(known.grid, threshold), photos), path)
 
-        return self._written(output_dir, f'.{suffix}', 'a mesh', write, response)
+        return self._writer(output_dir, f'.{suffix}', 'a mesh', write)
 
     def save_state(self, output_dir: Path, response: Trigger.Response) -> Trigger.Response:
         """Write the state of the episode; answer with its path, or why it was not written."""
@@ -84,7 +81,7 @@ class Products:
             write_state(SavedState(self._reconstructor.progress, known, self._album.photos,
                                    self._last_camera), self._reconstructor, path)
 
-        return self._written(output_dir, SUFFIX, 'a state', write, response)
+        return self._writer(output_dir, SUFFIX, 'a state', write)(response)
 
     def _take(self, stamp: int, reconstruction: Reconstruction) -> None:
         self._known = reconstruction
@@ -92,34 +89,31 @@ class Products:
             self._marker.publish(stamp, reconstruction.grid, self._reconstructor.threshold,
                                  self._album.photos)
 
-    def _written(self, output_dir: Path, suffix: str, what: str,
-                 write: Callable[[Path, Reconstruction], None],
-                 response: Trigger.Response) -> Trigger.Response:
-        """Write a file of the episode; raises ConfigError where its name leaves the folder."""
-        if self._known is None:
-            response.message = f'no view in this episode yet: expected one before {what}'
+    def _writer(self, output_dir: Path, suffix: str, what: str,
+                write: Callable[[Path, Reconstruction], None]) -> Write:
+        """Return what writes a file of the episode, if it has a view."""
+        known = self._known
+        if known is None:
+            return no_view_before(what)
+        path = output_path(
+            output_dir, f'{self._episode.id}-{self._reconstructor.view_count}{suffix}')
+
+        def written(response: Trigger.Response) -> Trigger.Response:
+            try:
+                write(path, known)
+            except (DataError, OSError) as error:
+                response.message = f'{path} was not written: {one_line(error)}'
+            else:
+                response.success, response.message = True, str(path)
             return response
-        name = f'{self._episode.id}-{self._reconstructor.view_count}{suffix}'
-        path = output_path(output_dir, name)
-        try:
-            write(path, self._known)
-        except (DataError, OSError) as error:
-            response.message = f'{path} was not written: {one_line(error)}'
-        else:
-            response.success, response.message = True, str(path)
+
+        return written
+
+
+def no_view_before(what: str) -> Write:
+    """Return what answers that there is no view to write `what` of."""
+    def refused(response: Trigger.Response) -> Trigger.Response:
+        response.message = f'no view in this episode yet: expected one before {what}'
         return response
 
-
-@contextmanager
-def meshing_imported() -> Iterator[None]:
-    """
-    Import what makes meshes while the body runs; it is there once the body ends.
-
-    A node does so before it subscribes: streams would overflow while it imports.
-    """
-    beside = Thread(target=lambda: [import_module(module) for module in _MESHING])
-    beside.start()
-    try:
-        yield
-    finally:
-        beside.join()
+    return refused
