@@ -1,16 +1,15 @@
 """The demo from start to end: start the nodes, observe the loop, save the results."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 import time
 
-from active_recon.demo.picture import DrawVoxels, run_picture, voxel_tile
 from active_recon.demo.table import loop_table, motion_line
 from active_recon.geometry.cameras import wrap_azimuth
 from active_recon.interrupts import held_interrupts
@@ -21,17 +20,10 @@ from active_recon.policies import AUTO_POLICY, policy_in_use
 from active_recon.runtimes.precision import require_precision
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.viewer.view_result import ViewResult
-from active_recon.volumes.boxes import height_range
-from active_recon.volumes.meshes import load_mesh
-from active_recon.volumes.voxelisation import voxelise
-from active_recon.volumes.voxels import VoxelGrid
-import cv2
 import numpy as np
 from rich.console import Console, RenderableType
 from rich.live import Live
-import trimesh
 
-_LIKELY_RESOLUTION = 64
 _SPEED = 2.0  # rad/s of the turntable, twice as fast as by default: it is what most time goes to
 _START_S = 60.0  # also where the machine is busy
 _VIEW_S = 60.0
@@ -71,29 +63,12 @@ def run_demo(demo: Demo, console: Console) -> Path:
     if in_use.warning:
         console.print(in_use.warning, soft_wrap=True)
     demo = replace(demo, policy=in_use.name)
-    mesh = load_mesh(demo.mesh)
-    truth = cache(partial(voxelise, mesh))
-    truth(_LIKELY_RESOLUTION)  # later it would delay the loop's messages
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
     title = f'{demo.mesh.stem}: {demo.views} views, policy {demo.policy}'
-    draw = cache(voxel_tile)
     network = {'precision': demo.precision, **({'weights': demo.model} if demo.model else {})}
     with (held_interrupts() as raise_if_asked, TemporaryDirectory() as logs,
-          NodeProcesses(Path(logs), environment) as nodes,
-          demo_monitor(lambda resolution: truth(resolution).occupied(0.5)) as monitor,
-          ThreadPoolExecutor(1) as beside):
-        def check() -> None:
-            raise_if_asked()
-            nodes.check()
-
-        def draw_beside(view: ViewResult) -> None:
-            if view.occupied is not None:
-                resolution = len(view.occupied.occupancy)
-                beside.submit(draw, view.occupied, height_range(truth(resolution)))
-
-        console.print('starting the recorder, the turntable camera, the reconstructor and the '
-                      f'view planner on ROS domain {environment["ROS_DOMAIN_ID"]}')
+          NodeProcesses(Path(logs), environment) as nodes):
         nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
                                  'record_at_start': False})
         nodes.start('turntable_camera', {'mesh': demo.mesh, 'speed': _SPEED,
@@ -101,34 +76,38 @@ def run_demo(demo: Demo, console: Console) -> Path:
         # A tolerance of 0 prevents an early end: all requested views are taken.
         nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
                                      'max_views': demo.views, 'entropy_tolerance': 0.0, **network})
-        folder = Path(monitor.trigger('start', _START_S, check))
-        if demo.view:
-            _open_page(nodes, monitor, console, check)
-        try:
-            # Last: the bag is to hold all that it hears and tells.
-            # Goals only: `auto` takes views by separation until it has discovered the planner.
-            nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal',
-                                          **network})
-            follow_loop(monitor, demo, title, console, check, draw_beside)
-        finally:  # what there is of a run that was interrupted, too
-            picture = beside.submit(_save_picture, folder / 'run.png', title,
-                                    monitor.state.views, mesh, truth, draw)
-        saved = Path(monitor.trigger('save_mesh', _ANSWER_S, check))
-        saved.replace(folder / f'{demo.mesh.stem}{saved.suffix}')
-        monitor.trigger('stop', _ANSWER_S, check)
-        picture.result()
-        if demo.view:
-            _keep_running(nodes, console)
+        # The nodes start meanwhile: what reads and draws meshes takes half a second to import
+        from active_recon.demo.known_object import KnownObject
+
+        known = KnownObject(demo.mesh)
+        console.print('starting the recorder, the turntable camera, the reconstructor and the '
+                      f'view planner on ROS domain {environment["ROS_DOMAIN_ID"]}')
+
+        def check() -> None:
+            raise_if_asked()
+            nodes.check()
+
+        with demo_monitor(known.occupied) as monitor, ThreadPoolExecutor(1) as beside:
+            folder = Path(monitor.trigger('start', _START_S, check))
+            if demo.view:
+                _open_page(nodes, monitor, console, check)
+            try:
+                # Last: the bag is to hold all that it hears and tells.
+                # Goals only: `auto` takes views by separation until it has discovered the planner.
+                nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal',
+                                              **network})
+                follow_loop(monitor, demo, title, console, check,
+                            lambda view: beside.submit(known.draw, view))
+            finally:  # what there is of a run that was interrupted, too
+                picture = beside.submit(known.save_picture, folder / 'run.png', title,
+                                        monitor.state.views)
+            saved = Path(monitor.trigger('save_mesh', _ANSWER_S, check))
+            saved.replace(folder / f'{demo.mesh.stem}{saved.suffix}')
+            monitor.trigger('stop', _ANSWER_S, check)
+            picture.result()
+            if demo.view:
+                _keep_running(nodes, console)
     return demo.output_dir / folder.name
-
-
-def _save_picture(file: Path, title: str, views: Sequence[ViewResult], mesh: trimesh.Trimesh,
-                  truth: Callable[[int], VoxelGrid], draw: DrawVoxels) -> None:
-    """Write the picture of a run that has a view."""
-    if views and views[-1].occupied is not None:
-        side = len(views[-1].occupied.occupancy)
-        picture = run_picture(f'active_recon: {title}', views, mesh, truth(side), draw)
-        cv2.imwrite(str(file), picture[..., ::-1])
 
 
 def _open_page(nodes: NodeProcesses, monitor: DemoMonitor, console: Console,
@@ -156,7 +135,7 @@ def _start_azimuth(demo: Demo) -> float:
 
 
 def follow_loop(monitor: DemoMonitor, demo: Demo, title: str, console: Console,
-                check: Callable[[], None], on_view: Callable[[ViewResult], None]) -> None:
+                check: Callable[[], None], on_view: Callable[[ViewResult], object]) -> None:
     """
     Show each view as it is taken, until the planner is done; call `on_view` with it.
 
