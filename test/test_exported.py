@@ -313,7 +313,7 @@ FAULTS = [
     ('decode', lambda data: b'', 'no whole ONNX file'),
     ('encode', {'weights_sha256': 'f' * 64}, 'exported from other weights: expected .*, got fff'),
     ('encode', {'part': 'decode'}, 'another part of a network: expected encode, got decode'),
-    ('update', {'format': 99}, 'another format of exported files: expected 1, got 99; export'),
+    ('update', {'format': 99}, 'another format of exported files: expected 2, got 99; export'),
     ('update', {'state': {'hull': [[2, 32, 32, 32], 0.0]}}, 'contradicts its metadata: expected'),
     ('update', {'state': 7}, 'its metadata cannot be read'),
     ('decode', {'facts': {'resolution': 8}}, 'exported at another time than the parts beside'),

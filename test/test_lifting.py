@@ -6,9 +6,11 @@ import math
 
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.models import volume_unet
 from active_recon.models.lifted import (
     aggregate,
     cell_centers,
+    child_matrices,
     initial_statistics,
     projected,
     projection,
@@ -19,7 +21,7 @@ from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras
 from active_recon.models.visibility import add_visible, visible_mean
-from active_recon.models.volume_unet import Conv3d, depth_to_space, space_to_depth
+from active_recon.models.volume_unet import Conv3d, depth_to_space, finer, space_to_depth
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import config_hash, read_metadata, SHIPPED
 import numpy as np
@@ -124,6 +126,8 @@ def test_the_state_turns_by_a_quarter_with_the_frame_and_the_cameras(lifting):
     turned = VIEWS.turned(torch.full((3,), math.pi / 2))
     here = lifting.update_from_maps(maps, VIEWS, lifting.initial_state(3))
     there = lifting.update_from_maps(maps, turned, lifting.initial_state(3))
+    for state in (here, there):
+        state['hull'] = depth_to_space(state['hull'])  # (3, 2, 64, 64, 64)
     for name in ('fine_sum', 'fine_count', 'hull'):
         assert_close(torch.rot90(here[name], 1, (2, 3)), there[name], rtol=0, atol=1e-3)
 
@@ -136,6 +140,15 @@ def test_points_are_projected_as_the_camera_projects_them():
     np.testing.assert_allclose(depth[0].numpy(), depths, atol=1e-5)
 
 
+def test_the_halves_of_cells_are_the_cells_of_a_grid_of_twice_as_many():
+    matrices = projection(VIEWS, 128)
+    where, depth = projected(child_matrices(matrices, 4), 4)
+    fine_where, fine_depth = projected(matrices, 8)
+    assert_close(depth_to_space(depth.reshape(3, 8, 4, 4, 4)).flatten(1), fine_depth)
+    assert_close(depth_to_space(where.reshape(3, 8, 4, 4, 4, 2).permute(0, 5, 1, 2, 3, 4)
+                                .reshape(3, 16, 4, 4, 4)).flatten(2).transpose(1, 2), fine_where)
+
+
 def test_a_map_is_sampled_at_the_centres_of_its_pixels():
     maps = torch.arange(16.0).reshape(1, 1, 4, 4)
     centers = torch.tensor([[[-0.75, -0.75], [0.75, -0.75], [-0.25, 0.75]]])
@@ -146,8 +159,9 @@ def test_view_statistics_are_mean_deviation_and_extremes():
     known = initial_statistics(1, 1, 1, torch.device('cpu'))
     for value, weight in ((3.0, 1.0), (7.0, 0.0), (-1.0, 1.0)):
         known = aggregate(known, torch.full((1, 1, 1), value), torch.full((1, 1, 1), weight))
-    mean, deviation, highest, lowest, inverse = summarise(known).flatten().tolist()
-    assert (mean, highest, lowest, inverse) == (1, 3, -1, 0.5)
+    statistics, inverse = summarise(known)
+    mean, deviation, highest, lowest = statistics.flatten().tolist()
+    assert (mean, highest, lowest, inverse.item()) == (1, 3, -1, 0.5)
     assert deviation == pytest.approx((4 + 0.01) ** 0.5)
 
 
@@ -198,6 +212,14 @@ def test_depth_to_space_inverts_space_to_depth():
     assert space_to_depth(cells)[1, 8 + 5, 1, 2, 3] == cells[1, 1, 3, 4, 7]  # 5 is x and z
 
 
+def test_a_graph_has_the_same_finer_cells_by_a_transposed_convolution(monkeypatch):
+    layer, cells = torch.nn.Conv3d(3, 16, 1), torch.rand(1, 3, 4, 4, 4)
+    expected = finer(layer, cells)
+    assert expected.shape == (1, 2, 8, 8, 8)
+    monkeypatch.setattr(volume_unet, 'is_traced', lambda: True)
+    assert_close(finer(layer, cells), expected)
+
+
 @torch.inference_mode()
 def test_a_cell_beyond_a_silhouette_is_emptier_by_the_hull_alone(lifting):
     for part in (lifting.decoder.to_64, lifting.decoder.to_32):
@@ -236,7 +258,8 @@ def test_weights_with_a_temperature_for_each_number_of_views_still_load(lifting)
     loaded.load_state_dict({**weights, 'temperatures': torch.linspace(1, 2, count)})
     for views, temperature in ((1, 1.0), (2, 1 + 1 / (count - 1))):
         state = after(lifting, some_images(2), VIEWS, range(views))
-        assert_close(loaded.decode(state), lifting.logits(state).logits / temperature)
+        logits = depth_to_space(lifting.logits(state).logits)[:, 0]
+        assert_close(loaded.decode(state), logits / temperature)
 
 
 @torch.inference_mode()

@@ -20,8 +20,7 @@ class ExportedNetwork(ReconstructionNetwork):
     """
     A network in graphs of one object each, run row by row; it has no parameters.
 
-    What tells it from others is a buffer: the hash of its weights, and what runs it. A state has,
-    after the first view, what its decoder asks for too.
+    What tells it from others is a buffer: the hash of its weights, and what runs it.
     """
 
     def __init__(self, runtime: ExportedRuntime) -> None:

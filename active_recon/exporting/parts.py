@@ -73,7 +73,7 @@ class _Update(nn.Module):
                 *known: Tensor) -> tuple[Tensor, ...]:
         state = self.network.update(
             encoded, Cameras(pose, intrinsics), dict(zip(self.names, known, strict=True)))
-        return (*(state[name] for name in self.names), *_added(self.network, state).values())
+        return tuple(state[name] for name in self.names)
 
 
 class _Decode(nn.Module):
@@ -81,9 +81,8 @@ class _Decode(nn.Module):
         super().__init__()
         self.network, self.names = network, names
 
-    def forward(self, *summary: Tensor) -> Tensor:
-        return self.network.decode_summary(
-            dict(zip(self.names, summary, strict=True))).sigmoid()
+    def forward(self, *known: Tensor) -> Tensor:
+        return self.network.decode(dict(zip(self.names, known, strict=True))).sigmoid()
 
 
 class _Refine(nn.Module):
@@ -122,12 +121,11 @@ def network_parts(network: ReconstructionNetwork) -> dict[str, Part]:
     encode = _Encode(network)
     encoded = encode(image, **camera)
     after = network.update(encoded, Cameras(*camera.values()), state)
-    summary = network.summarise(after)
     return {
         'encode': Part(encode, {'image': image, **camera}, ['encoded'], {}),
         'update': Part(_Update(network, list(state)), {'encoded': encoded, **camera, **state},
-                       [*(NEXT + name for name in state), *_added(network, after)], {}),
-        'decode': Part(_Decode(network, list(summary)), summary, ['occupancy'], {})}
+                       [NEXT + name for name in state], {}),
+        'decode': Part(_Decode(network, list(after)), after, ['occupancy'], {})}
 
 
 @torch.no_grad()
@@ -156,12 +154,6 @@ def depth_part(refiner: DepthRefiner) -> Part:
               'count': torch.ones(1, 1, *coarse),
               'total': torch.zeros(1, refiner.features, *coarse)}
     return Part(_for_graphs(module), inputs, ['refined'], {})
-
-
-def _added(network: ReconstructionNetwork, state: State) -> State:
-    """Return what the decoder gets that is not in the state under the same name."""
-    return {name: part for name, part in network.summarise(state).items()
-            if part is not state.get(name)}
 
 
 def _for_graphs(network: Network) -> Network:

@@ -17,8 +17,11 @@ import numpy as np
 
 OBJECTS, VIEWS = 60, 5
 """How many objects of a dataset calibrate the ranges of the integers, and views of each."""
-_IN_FLOAT = ('fine_in', 'skip_32', 'to_64')
-"""Layers of one cell at 32 a side: they take less time in float than to convert what they get."""
+_IN_FLOAT = (r'/(?!decoder/)[^/]*$', r'/decoder/[^/]*$', '.*skip_32.*', '.*to_64.*')
+"""
+What is before the U-Net, whose nodes belong to no layer, and layers of one cell after it: they
+take less time in float than to convert what they get.
+"""
 _BACKGROUNDS = (255, 255, 0, 128)
 _QUANTISED = 'lifting'
 
@@ -42,12 +45,12 @@ def quantize(weights: Path, objects: Sequence[ObjectFolder], folder: Path | None
     graph = _whole(onnx.load(graph_path(weights, DECODE_PART)))
     names = [each.name for each in graph.graph.input]
     runtime = load_network(weights, 'cpu', None, 'f32')
-    given = [{name: known[name] for name in names} for known in _decoded(runtime, objects)]
+    given = [{name: state[name] for name in names} for state in _decoded(runtime, objects)]
     # One range for each channel, the same on both sides of 0: faster, and nearer to float
     found = nncf.quantize(
         graph, nncf.Dataset(given), subset_size=len(given),
         preset=nncf.QuantizationPreset.PERFORMANCE,
-        ignored_scope=nncf.IgnoredScope(patterns=[f'.*{layer}.*' for layer in _IN_FLOAT]),
+        ignored_scope=nncf.IgnoredScope(patterns=list(_IN_FLOAT)),
         advanced_parameters=nncf.AdvancedQuantizationParameters(disable_bias_correction=True))
     for told in found.metadata_props:
         if told.key == KEY:
@@ -67,11 +70,10 @@ def _decoded(runtime: ExportedRuntime, objects: Sequence[ObjectFolder]) -> Itera
         state = runtime.initial_state()
         for count, index in enumerate(rng.permutation(len(cameras))[:VIEWS]):
             image = composite(objects[number].image(index), background)
-            known = runtime.known_after(
+            state = runtime.state_after(
                 *network_image(image, cameras[index], runtime.spec), state)
-            state = {name: known[name] for name in state}
             if count % 2 == 0:
-                yield known
+                yield state
 
 
 def _whole(graph: Any) -> Any:

@@ -54,7 +54,9 @@ def border_evenness(distance: Tensor, images: Tensor) -> Tensor:
 def _border(images: Tensor) -> Tensor:
     """Return 1 along the edge of the seen pixels, two pixels wide, else 0, (B, 1, S, S)."""
     seen = seen_pixels(images) > 0.5
-    inner = -functional.max_pool2d(-seen.float(), 5, 1, 2)
+    # A square is the same along one axis and then the other, in less time
+    inner = -functional.max_pool2d(
+        functional.max_pool2d(-seen.float(), (5, 1), 1, (2, 0)), (1, 5), 1, (0, 2))
     padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
     return (seen & (padded < 0.5)).float()
 

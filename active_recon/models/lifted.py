@@ -55,6 +55,21 @@ def projected(matrices: Tensor, side: int) -> tuple[Tensor, Tensor]:
     return found.reshape(len(z), -1, 2), depth
 
 
+def child_matrices(matrices: Tensor, side: int) -> Tensor:
+    """
+    Return matrices that project the 8 halves of each of a grid's cells instead of the cell.
+
+    Takes (B, 3, 4) and returns (8 B, 3, 4), to be used by `projected` with the same `side`: row
+    8 b + i is for half i of object b, in the order of `depth_to_space`.
+    """
+    along = torch.tensor([-0.25, 0.25], device=matrices.device) / side
+    offsets = torch.stack(torch.meshgrid(along, along, along, indexing='ij')).reshape(3, 8)
+    with torch.autocast(matrices.device.type, enabled=False):  # half precision is too coarse
+        moved = (matrices[:, :, :3] @ offsets + matrices[:, :, 3:]).transpose(1, 2)  # (B, 8, 3)
+    turned = matrices[:, None, :, :3].expand(-1, 8, -1, -1)
+    return torch.cat([turned, moved[..., None]], dim=3).flatten(0, 1)
+
+
 def _and_one(rows: Tensor) -> Tensor:
     """Return rows (B, K, N) as columns, with one more that is 1, (B, N, K + 1)."""
     return torch.cat([rows, torch.ones_like(rows[:, :1])], dim=1).transpose(1, 2)
@@ -196,15 +211,16 @@ class _Reduce(torch.autograd.Function):
         return gradient, None
 
 
-def summarise(statistics: Mapping[str, Tensor]) -> Tensor:
+def summarise(statistics: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
     """
-    Return the decoder's input, (B, 4 C + 1, side, side, side), of view statistics.
+    Return the decoder's inputs, (B, 4 C, side, side, side) and (B, 1, ...), of view statistics.
 
-    The channels are mean, standard deviation, maximum and minimum over the views, and 1 / count,
-    which is 0 for a cell that no view saw.
+    The first are mean, standard deviation, maximum and minimum over the views, the second is
+    1 / count, which is 0 for a cell that no view saw. They are apart because processors are fast
+    with multiples of 32 channels.
     """
     inverse = 1 / statistics['count'].clamp(min=1)
     mean = statistics['sum'] * inverse
     variance = (statistics['sum_squares'] * inverse - mean * mean).clamp(min=0)
     return torch.cat([mean, (variance + _MIN_VARIANCE).sqrt(), statistics['max'],
-                      statistics['min'], inverse * statistics['count'].clamp(max=1)], dim=1)
+                      statistics['min']], dim=1), inverse * statistics['count'].clamp(max=1)

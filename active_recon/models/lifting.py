@@ -7,6 +7,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.lifted import (
     aggregate,
+    child_matrices,
     GeometricLift,
     initial_statistics,
     Lift,
@@ -25,6 +26,7 @@ from active_recon.models.lifting_encoder import (
 )
 from active_recon.models.network import Cameras, init_occupancy_bias, ReconstructionNetwork, State
 from active_recon.models.visibility import add_visible, visible_mean
+from active_recon.models.volume_unet import depth_to_space
 import torch
 from torch import Tensor
 from torch.nn import functional
@@ -86,13 +88,14 @@ class Lifting(ReconstructionNetwork):
     Lifts each view's features to the cells that project onto them; decodes statistics over views.
 
     The state has a fixed size and does not depend on the order of the views: count, sum, sum of
-    squares, maximum and minimum of the lifted features at 16 and 32 cells a side; at 64, the two
-    lowest foreground logits at a cell's projection, less 6 (`hull`); and the number of views, by
-    which the calibration is chosen. With `visibility`, each view and cell at 16 also get
-    a logit, and the state two sums more (see `add_visible`). `foreground`, (B, 2, 64, 64), is what
-    the last view showed: the foreground's probability and the share of each pixel that was seen;
-    the occupancy does not depend on it. All of it is 0 before the first view, and cells that a
-    camera does not see (outside its image, behind it) stay as they are.
+    squares, maximum and minimum of the lifted features at 16 and 32 cells a side; the lowest and
+    the second lowest foreground logits at the projections of the 8 cells in each cell at 32,
+    less 6 (`hull`); and the number of views, by which the calibration is chosen. With
+    `visibility`, each view and cell at 16 also get a logit, and the state two sums more (see
+    `add_visible`). `foreground`, (B, 2, 64, 64), is what the last view showed: the foreground's
+    probability and the share of each pixel that was seen; the occupancy does not depend on it.
+    All of it is 0 before the first view, and cells that a camera does not see (outside its image,
+    behind it) stay as they are.
     The network needs no front.
     """
 
@@ -129,11 +132,10 @@ class Lifting(ReconstructionNetwork):
         coarse = initial_statistics(batch, self._coarse_channels, COARSE_SIDE, device)
         fine = initial_statistics(batch, self._fine_channels, FINE_SIDE, device)
         visible = {'visible_weight': coarse['count'], 'visible_sum': coarse['sum']}
-        side = self.resolution
         return {'views': torch.zeros(batch, 1, device=device),
                 **_named('coarse', coarse), **_named('fine', fine),
                 **(visible if self._visibility else {}),
-                'hull': torch.zeros(batch, 2, side, side, side, device=device),
+                'hull': torch.zeros(batch, 16, *(FINE_SIDE,) * 3, device=device),
                 'foreground': torch.zeros(batch, 2, FINE, FINE, device=device),
                 'latent': torch.zeros(batch, self._coarse_channels, _LATENT_SIDE, _LATENT_SIDE,
                                       device=device)}
@@ -183,32 +185,19 @@ class Lifting(ReconstructionNetwork):
         That is Platt scaling with a second input: scale * logit + weight * evidence + bias, where
         the evidence is the log of the lowest foreground probability over the views.
         """
-        return self.decode_summary(self.summarise(state))
-
-    def summarise(self, state: State) -> State:
-        """Return the statistics over views as the decoder takes them, `hull` and `views`."""
-        coarse = summarise(_of('coarse', state))
-        if self._visibility:
-            visible = visible_mean(state['visible_weight'], state['visible_sum'])
-            coarse = torch.cat([coarse, visible], dim=1)
-        return {'coarse': coarse, 'fine': summarise(_of('fine', state)), 'hull': state['hull'],
-                'views': state['views']}
-
-    def decode_summary(self, summary: State) -> Tensor:
-        """Return the calibrated logits by what `summarise` returned."""
-        count = (summary['views'][:, 0].long() - 1).clamp(0, _COUNTS - 1)
-        scale, weight, bias = self.calibration[count].T[..., None, None, None]  # (B, 1, 1, 1)
-        found = self._decoded(summary)
-        calibrated: Tensor = scale * found.logits + weight * found.evidence + bias
-        return calibrated
+        count = (state['views'][:, 0].long() - 1).clamp(0, _COUNTS - 1)
+        scale, weight, bias = self.calibration[count].T[..., None, None, None, None]
+        found = self.logits(state)
+        return depth_to_space(scale * found.logits + weight * found.evidence + bias)[:, 0]
 
     def logits(self, state: State) -> Decoded:
         """Return what the decoder gives, before calibration."""
-        return self._decoded(self.summarise(state))
-
-    def _decoded(self, summary: State) -> Decoded:
-        found: Decoded = self.decoder(
-            summary['coarse'], summary['fine'], summary['hull'] + NO_EVIDENCE)
+        coarse, coarse_rest = summarise(_of('coarse', state))
+        if self._visibility:
+            visible = visible_mean(state['visible_weight'], state['visible_sum'])
+            coarse_rest = torch.cat([coarse_rest, visible], dim=1)
+        found: Decoded = self.decoder((coarse, coarse_rest), summarise(_of('fine', state)),
+                                      state['hull'] + NO_EVIDENCE)
         return found
 
     def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
@@ -231,13 +220,14 @@ class Lifting(ReconstructionNetwork):
     @torch.no_grad()
     def _carved(self, foreground: Tensor, matrices: Tensor, hull: Tensor) -> Tensor:
         """Return `hull` updated by the foreground logits of T more views, (T * B, 1, h, w)."""
-        where, depth = projected(matrices, self.resolution)
+        where, depth = projected(child_matrices(matrices, FINE_SIDE), FINE_SIDE)
+        where = where.reshape(len(foreground), -1, 2)  # (T * B, 8 * 32 ** 3, 2)
         # Zeros come in beyond the image, where there is no evidence
         found = sampled(foreground.float().clamp(-NO_EVIDENCE, NO_EVIDENCE) - NO_EVIDENCE, where)
-        found = torch.where(depth[:, None] > 0, found, 0)
-        least, second = hull[:, :1], hull[:, 1:]
+        found = torch.where(depth.reshape(found.shape) > 0, found, 0)
+        least, second = hull[:, :8], hull[:, 8:]
         for each in torch.split(found, len(hull)):
-            new = each.reshape(least.shape)  # (B, 1, 64, 64, 64)
+            new = each.reshape(least.shape)  # (B, 8, 32, 32, 32)
             least, second = torch.minimum(least, new), torch.minimum(
                 second, torch.maximum(least, new))
         return torch.cat([least, second], dim=1)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from active_recon.models.encoder import group_norm
-from active_recon.models.volume_unet import depth_to_space, is_traced, space_to_depth, VolumeUnet
+from active_recon.models.volume_unet import finer, is_traced, VolumeUnet
 import torch
 from torch import nn, Tensor
 from torch.nn import functional
@@ -14,10 +14,10 @@ _INITIAL_BIAS = (0.5, 0.5, -2.0)  # of the layer at 64 cells
 
 class Decoded(NamedTuple):
     """
-    What the decoder gives for B objects.
+    What the decoder gives for B objects; see `depth_to_space` for the order of the 8 cells in one.
 
-    - logits: of occupancy, (B, 64, 64, 64); coarse: (B, 32, 32, 32)
-    - evidence: log of the lowest foreground probability over the views, (B, 64, 64, 64)
+    - logits: of occupancy at 64 cells a side, (B, 8, 32, 32, 32); coarse: at 32, (B, 32, 32, 32)
+    - evidence: log of the lowest foreground probability over the views, (B, 8, 32, 32, 32)
     """
 
     logits: Tensor
@@ -53,34 +53,42 @@ class HullUnet(VolumeUnet):
         self.to_64.bias = nn.Parameter(torch.tensor(_INITIAL_BIAS).repeat_interleave(8))
         self.logit_32 = nn.Conv3d(head, 1, 1)
 
-    def forward(self, coarse: Tensor, fine: Tensor, hull: Tensor) -> Decoded:
+    def forward(self, coarse: tuple[Tensor, Tensor], fine: tuple[Tensor, Tensor],
+                hull: Tensor) -> Decoded:
         """
         Decode view statistics.
 
-        Takes view statistics (B, coarse, 16, 16, 16) and (B, fine, 32, 32, 32), and the two
-        lowest foreground logits over all views, (B, 2, 64, 64, 64).
+        Takes view statistics and what goes with them, (B, ..., 16, 16, 16) twice and (B, ..., 32,
+        32, 32) twice, and the lowest and the second lowest foreground logits over all views of
+        the 8 cells in each cell at 32, (B, 16, 32, 32, 32).
         """
-        # By the 2 x 2 x 2 cells in each cell at 32, which costs less than that order at 64
-        carved = -functional.softplus(-space_to_depth(hull))  # logsigmoid, of least and second
+        carved = -functional.softplus(-hull)  # logsigmoid
         least, second = carved[:, :8], carved[:, 8:]
-        entered = self.fine_in(torch.cat([fine, least], dim=1))
-        at_16: Tensor = self.enter[1:](self._entered(coarse, entered))
+        # Convolutions of parts are added instead of one of the parts side by side: joining them,
+        # and numbers of channels that are no multiple of 32, take longer
+        of_fine, of_rest = _split(self.fine_in[0], fine[0])
+        rest = torch.cat([fine[1], least.to(fine[1].dtype)], dim=1)
+        entered = self.fine_in[1:](of_fine + functional.conv3d(rest, of_rest))
+        of_coarse, weights = _split(self.enter[0], coarse[0])
+        of_rest, blocks = torch.split(
+            weights, [coarse[1].shape[1], 8 * entered.shape[1]], dim=1)
+        blocks = blocks.reshape(len(blocks), -1, 2, 2, 2)
+        at_16: Tensor = self.enter[1:](of_coarse + functional.conv3d(coarse[1], of_rest)
+                                       + functional.conv3d(entered, blocks, stride=2))
         # Inference takes two thirds of the time, training more; no graph can be exported with it
         if not (self.training or is_traced()):
             at_16 = at_16.contiguous(memory_format=torch.channels_last_3d)
         worked = self.unet(at_16)
-        at_32 = functional.relu(depth_to_space(self.to_32(worked)) + self.skip_32(entered))
+        at_32 = functional.relu(finer(self.to_32, worked) + self.skip_32(entered))
         learned, *scales = self.to_64(at_32).split(8, dim=1)  # (B, 8, 32, 32, 32) each
         logits = learned + least + (functional.softplus(scales[0]) * least
                                     + functional.softplus(scales[1]) * second)
-        logits, evidence = (depth_to_space(each)[:, 0] for each in (logits, least))
-        return Decoded(logits, self.logit_32(at_32)[:, 0], evidence)
+        return Decoded(logits, self.logit_32(at_32)[:, 0], least)
 
-    def _entered(self, coarse: Tensor, fine: Tensor) -> Tensor:
-        """Return `enter`'s convolution of coarse cells beside blocks of 2 x 2 x 2 finer ones."""
-        layer = self.enter[0]
-        assert isinstance(layer, nn.Conv3d)
-        own, blocks = torch.split(layer.weight, [coarse.shape[1], 8 * fine.shape[1]], dim=1)
-        blocks = blocks.reshape(len(blocks), -1, 2, 2, 2)
-        return (functional.conv3d(coarse, own, layer.bias)
-                + functional.conv3d(fine, blocks, stride=2))
+
+def _split(layer: nn.Module, first: Tensor) -> tuple[Tensor, Tensor]:
+    """Return a convolution of its first channels, and its weights for the others."""
+    assert isinstance(layer, nn.Conv3d)
+    count = first.shape[1]
+    own, others = torch.split(layer.weight, [count, layer.in_channels - count], dim=1)
+    return functional.conv3d(first, own, layer.bias), others

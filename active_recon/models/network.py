@@ -120,18 +120,6 @@ class ReconstructionNetwork(nn.Module, ABC):
     def decode(self, state: State) -> Tensor:
         """Return the occupancy's logits, (B, R, R, R), indexed [x, y, z]."""
 
-    def summarise(self, state: State) -> State:
-        """
-        Return what the decoder gets of a state: all of it, where a network does not say less.
-
-        An exported network computes this in float32, also where encoder and decoder are not.
-        """
-        return state
-
-    def decode_summary(self, summary: State) -> Tensor:
-        """Return the logits by what `summarise` returned, (B, R, R, R)."""
-        return self.decode(summary)
-
     def step(self, images: Tensor, cameras: Cameras, state: State) -> State:
         """Encode one view of each object, and return the updated state."""
         return self.update(self.encode(images, cameras), cameras, state)

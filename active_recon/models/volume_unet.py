@@ -64,6 +64,21 @@ def depth_to_space(cells: Tensor) -> Tensor:
         batch, channels // 8, 2 * n, 2 * n, 2 * n)
 
 
+def finer(layer: nn.Conv3d, cells: Tensor) -> Tensor:
+    """
+    Return `depth_to_space` of a 1 x 1 x 1 convolution of cells.
+
+    In a graph it is the transposed convolution with the same products, which moves nothing.
+    """
+    if not is_traced():
+        return depth_to_space(layer(cells))
+    channels, side = layer.out_channels // 8, cells.shape[2]
+    kernel = layer.weight.reshape(channels, 2, 2, 2, -1).permute(4, 0, 1, 2, 3)
+    assert layer.bias is not None
+    bias = layer.bias.reshape(1, channels, 2, 2, 2).repeat(1, 1, side, side, side)
+    return functional.conv_transpose3d(cells, kernel, stride=2) + bias
+
+
 class VolumeUnet(nn.Module):
     """
     What networks have in common that work with a U-Net at 16, 8 and 4 cells a side.
@@ -93,8 +108,8 @@ class VolumeUnet(nn.Module):
         at_16 = self.down_16(at_16)
         at_8 = self.down_8(self.to_8(at_16))
         at_4 = self.at_4(self.to_4(at_8))
-        at_8 = self.up_8(at_8 + depth_to_space(self.from_4(at_4)))
-        found: Tensor = self.up_16(at_16 + depth_to_space(self.from_8(at_8)))
+        at_8 = self.up_8(at_8 + finer(self.from_4, at_4))
+        found: Tensor = self.up_16(at_16 + finer(self.from_8, at_8))
         return found
 
 

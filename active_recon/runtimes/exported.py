@@ -73,13 +73,11 @@ class ExportedRuntime:
     def step(self, image: NDArray[np.uint8], camera: Camera,
              state: State) -> tuple[NDArray[np.float32], NDArray[np.float32], State]:
         """Take in an image; see Runtime."""
-        known = self.known_after(image, camera, state)
-        after = {name: known[name] for name in self._state}
-        return self.decode(known)[0], after['latent'][0], after
+        after = self.state_after(image, camera, state)
+        return self.decode(after)[0], after['latent'][0], after
 
-    def known_after(self, image: NDArray[np.uint8], camera: Camera,
-                    state: State) -> dict[str, NDArray[np.float32]]:
-        """Return the next state after an image, and with it what `decode` asks for."""
+    def state_after(self, image: NDArray[np.uint8], camera: Camera, state: State) -> State:
+        """Return the next state after an image."""
         seen_from = {'pose': camera.pose[None].astype(np.float32),
                      'intrinsics': camera.intrinsics.matrix[None].astype(np.float32)}
         planes = image.transpose(2, 0, 1)[None] * np.float32(1 / 255)
@@ -96,15 +94,14 @@ class ExportedRuntime:
             planes = np.pad(planes, ((0, 0), (0, 1), (0, 0), (0, 0)), constant_values=1)
         return self._encode.run({'image': planes, **seen_from})['encoded']
 
-    def update(self, encoded: NDArray[np.float32], seen_from: Arrays, state: State
-               ) -> dict[str, NDArray[np.float32]]:
-        """Return the next state after an encoded image, and with it what `decode` asks for."""
+    def update(self, encoded: NDArray[np.float32], seen_from: Arrays, state: State) -> State:
+        """Return the next state after an encoded image."""
         found = self._update.run({'encoded': encoded, **seen_from, **state})
         return {name.removeprefix(NEXT): array for name, array in found.items()}
 
-    def decode(self, known: State) -> NDArray[np.float32]:
-        """Return the occupancy (1, R, R, R) of what `update` returned."""
-        return self._decode.run(known)['occupancy']
+    def decode(self, state: State) -> NDArray[np.float32]:
+        """Return the occupancy (1, R, R, R) of a state after a view."""
+        return self._decode.run(state)['occupancy']
 
     def warm_up(self) -> None:
         """Run once, so that the first view is as fast as the others."""
@@ -226,7 +223,7 @@ def _require_parts(weights: Path, graphs: Mapping[str, Graph], told: GraphMetada
     camera = {'pose', 'intrinsics'}
     size, resolution = told.facts['image_size'], told.facts['resolution']
     given = {'encode': {'image', *camera}, 'update': {'encoded', *camera, *told.state},
-             'decode': {*told.state, *graphs['update'].outputs}}
+             'decode': {*told.state}}
     gives = {'encode': ['encoded'], 'update': [], 'decode': ['occupancy']}
     for part, graph in graphs.items():
         path = graph_path(weights, part)

@@ -9,7 +9,7 @@ from typing import Any
 from active_recon.errors import WeightsError
 from active_recon.models.weights_files import SHIPPED
 
-FORMAT = 1
+FORMAT = 2  # in 1 the update also gave what it had summed up for the decoder
 KEY = 'active_recon'
 """The key of a file's metadata, JSON text, among those of ONNX."""
 NEXT = 'next_'

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.calibration import fit_logistic
 from active_recon.models.lifting import Lifting
+from active_recon.models.volume_unet import depth_to_space
 import numpy as np
 import torch
 
@@ -42,7 +43,8 @@ def calibrate(network: Lifting, validation: ViewSet,
                                      validation.cameras(objects, view), state)
                 found = network.logits(state)
             inputs[count].append(np.stack([
-                np.take_along_axis(each.float().flatten(1).numpy(), cells, 1).ravel()
+                np.take_along_axis(depth_to_space(each.float()).flatten(1).numpy(), cells,
+                                   1).ravel()
                 for each in (found.logits, found.evidence)], axis=1))
         advance(min(len(truth) * _BATCH, len(chosen)))
     whole = np.concatenate(truth)

@@ -6,6 +6,7 @@ from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.models.lifting import Lifting
 from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.models.volume_unet import depth_to_space
 from active_recon.training.loop import (
     Draw,
     Measured,
@@ -42,7 +43,7 @@ class LiftingLearner(nn.Module):
             self.network.initial_state(len(voxels)))
         logits, coarse_logits, _ = self.network.logits(state)
         with torch.autocast(logits.device.type, enabled=False):
-            volume = volume_loss(logits.float(), voxels, self._kind)
+            volume = volume_loss(depth_to_space(logits.float())[:, 0], voxels, self._kind)
             coarse = volume_loss(coarse_logits.float(),
                                  functional.max_pool3d(voxels[:, None], 2)[:, 0], self._kind)
             silhouette = self._silhouette_loss(maps.foreground.float(), alpha.flatten(0, 1),
