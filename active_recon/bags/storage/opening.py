@@ -7,7 +7,6 @@ from active_recon.bags.storage.compression import COMPRESSION_MODES, StoredFiles
 from active_recon.bags.storage.files import mcap_files
 from active_recon.bags.storage.mcap_bag import McapBag
 from active_recon.bags.storage.metadata import yaml_mapping
-from active_recon.bags.storage.sqlite3_bag import Sqlite3Bag
 from active_recon.errors import DataError
 from mcap.writer import MCAP0_MAGIC
 
@@ -20,15 +19,22 @@ def open_bag(path: Path) -> Bag:
         raise DataError(f'{path}: no bag there: no such file or folder')
     if not path.is_dir():
         alone = StoredFiles([path])
-        return McapBag(path, alone) if _is_mcap(path) else Sqlite3Bag(path, alone)
+        return McapBag(path, alone) if _is_mcap(path) else _sqlite3_bag(path, alone)
     if (path / 'metadata.yaml').exists():
         storage, named = _described(path)
-        return McapBag(path, named) if storage == 'mcap' else Sqlite3Bag(path, named)
+        return McapBag(path, named) if storage == 'mcap' else _sqlite3_bag(path, named)
     files = mcap_files(path)
     if not files:
         raise DataError(f'{path}: no bag in this folder: it has neither metadata.yaml nor an '
                         'MCAP file')
     return McapBag(path, StoredFiles(files))
+
+
+def _sqlite3_bag(path: Path, files: StoredFiles) -> Bag:
+    # What reads databases takes as long to import as a bag of MCAP to read
+    from active_recon.bags.storage.sqlite3_bag import Sqlite3Bag
+
+    return Sqlite3Bag(path, files)
 
 
 def _is_mcap(path: Path) -> bool:
