@@ -34,6 +34,7 @@ from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.saved_states import read_state
+import cv2
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import is_compressed, pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
@@ -140,6 +141,7 @@ class ReconstructorNode(ManagedNode):
     def _load(self, params: ReconstructorParameters) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
         # One thread by default: more would wait for the slowest of the loop's busy cores
+        cv2.setNumThreads(params.threads)
         reconstructor = Reconstructor.load(
             find_weights(params.weights or None), params.device, params.object_size,
             params.object_yaw, _given(params.threshold), params.threads, params.runtime,

@@ -119,8 +119,9 @@ def _pooled(values: Images, block: int, join: Callable[[Images, Images], Images]
     return np.ascontiguousarray(values)
 
 
-def _passing(lines: SightLines, occupancy: Images) -> Images:
-    passing: Images = np.multiply.reduce((1 - by_place(occupancy)).take(lines.cells), axis=0)
+def _passing(cells: NDArray[np.unsignedinteger], occupancy: Images) -> Images:
+    """Return what passes all cells (C, L) of L lines, (L,)."""
+    passing: Images = np.multiply.reduce((1 - by_place(occupancy)).take(cells), axis=0)
     return passing
 
 
