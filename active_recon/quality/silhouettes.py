@@ -116,7 +116,8 @@ def silhouette(points: NDArray[np.float64], camera: Camera) -> Mask:
 
 def cube_outline(camera: Camera) -> Mask:
     """Return the pixels whose rays meet the unit cube about the origin, (height, width)."""
-    rays, position = np.moveaxis(camera.ray_directions(), -1, 0), camera.position[:, None, None]
+    rays = np.ascontiguousarray(np.moveaxis(camera.ray_directions(), -1, 0))
+    position = camera.position[:, None, None]
     with np.errstate(divide='ignore', invalid='ignore'):
         near, far = ((side - position) / rays for side in (-0.5, 0.5))
     # A ray in the plane of a face is NaN there: the opposite face, which it misses, counts
