@@ -55,7 +55,13 @@ def seen_within(target: Camera, image: NDArray[np.uint8], camera: Camera,
     for band, (x, y) in _bands(camera, target, fine):
         _place(columns[band], x, left, across, width)
         _place(rows[band], y, top, down, height)
-    return _shrunk(_sampled(window, columns, rows, beyond), size, size), within
+    # OpenCV samples four channels in a third of the time of three, and to the same bits
+    padded = cv2.cvtColor(window, cv2.COLOR_RGB2RGBA) if image.shape[2:] == (3,) else window
+    sampled = _shrunk(np.asarray(cv2.remap(
+        padded, columns, rows, cv2.INTER_LINEAR, borderMode=beyond), np.uint8), size, size)
+    if padded is not window:
+        sampled = np.asarray(cv2.cvtColor(sampled, cv2.COLOR_RGBA2RGB), np.uint8)
+    return sampled, within
 
 
 def reduction(target: Camera, camera: Camera) -> int:
@@ -82,18 +88,6 @@ def depth_seen_by(target: Camera, depth: NDArray[np.float32],
     inside = (column >= 0) & (column < lens.width) & (row >= 0) & (row < lens.height)
     taken = turned[np.where(inside, row, 0), np.where(inside, column, 0)]
     return np.where(inside & (taken > 0), taken, 0).astype(np.float32)
-
-
-def _sampled(image: NDArray[np.uint8], columns: NDArray[np.float32], rows: NDArray[np.float32],
-             beyond: int) -> NDArray[np.uint8]:
-    """Return an image's pixels at columns and rows, (S, S) each, between pixels by their mean."""
-    if image.shape[2:] != (3,):
-        return np.asarray(cv2.remap(image, columns, rows, cv2.INTER_LINEAR, borderMode=beyond),
-                          np.uint8)
-    # OpenCV takes four channels at once, in a third of the time of three and to the same bits
-    four = cv2.remap(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA), columns, rows, cv2.INTER_LINEAR,
-                     borderMode=beyond)
-    return np.asarray(cv2.cvtColor(four, cv2.COLOR_RGBA2RGB), np.uint8)
 
 
 def _place(places: NDArray[np.float32], seen: NDArray[np.float64], first: int, scale: float,
