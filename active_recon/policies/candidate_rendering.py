@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 RAYS = 16
-_SIDE = 16  # cells a side that lines are drawn through
+COARSE_SIDE = 16
+"""Cells a side that lines are drawn through, at most."""
 
 Images = NDArray[np.float32]
 
@@ -59,7 +60,7 @@ class CandidateImages:
     unseen: Images
 
 
-def coarse_volume(occupancy: Images, side: int = _SIDE) -> CoarseVolume:
+def coarse_volume(occupancy: Images, side: int = COARSE_SIDE) -> CoarseVolume:
     """Return volumes (B, R, R, R) in at most `side` cells a side, as many as divide R."""
     whole = occupancy.shape[-1]
     cells = next(count for count in range(min(side, whole), 0, -1) if whole % count == 0)
