@@ -1,6 +1,7 @@
 """A policy and the state of one episode: the core of the view planner's node."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
@@ -177,6 +178,21 @@ class Planner:
         self._aim_first(camera)
         return self.plan()
 
+    def expect_camera(self, camera: Camera, size: float) -> None:
+        """
+        Let the policy prepare for the view of a camera before its reconstruction is known.
+
+        `size` is the side of the volume to come, metres. Nothing is decided: a policy that has
+        something to compute of the cameras alone offers `prepare`, with their poses as in an
+        Observation, and keeps what it finds.
+        """
+        prepare = getattr(self._policy, 'prepare', None)
+        if prepare is None:
+            return
+        with suppress(ViewError):  # which `add_view` tells
+            prepare(self._poses([camera], 1 / size)[0],
+                    self._poses(self._places.candidates(camera), 1 / size))
+
     def expect_view(self, latent: NDArray[np.float32], camera: Camera,
                     volume: VoxelGrid | None = None) -> None:
         """
@@ -294,12 +310,15 @@ class Planner:
             raise ViewError('no probabilities: expected them beside the latent, as this policy '
                             'looks at them, got none', 'volume')
         unit = 1.0 if last.volume is None else 1 / last.volume.size
-        taken, places = (
-            np.stack([each.turned(-self._yaw).scaled(unit).pose for each in cameras])[None]
-            for cameras in ([view.camera for view in views], candidates))
+        taken, places = (self._poses(cameras, unit)[None]
+                         for cameras in ([view.camera for view in views], candidates))
         volume = None if last.volume is None else turned(
             last.volume.occupancy, -self._yaw)[None]
         return Observation(last.latent[None], taken, places, volume)
+
+    def _poses(self, cameras: Sequence[Camera], unit: float) -> NDArray[np.float64]:
+        """Return the poses of cameras as a policy sees them, (N, 4, 4), lengths times `unit`."""
+        return np.stack([each.turned(-self._yaw).scaled(unit).pose for each in cameras])
 
     def _aim_first(self, camera: Camera) -> None:
         """Make the best of a camera that no policy chose."""

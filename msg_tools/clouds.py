@@ -42,7 +42,8 @@ def cloud_to_msg(table: NDArray[np.float32], names: Sequence[str], header: Heade
     count, columns = table.shape
     fields = [PointField(name=name, offset=4 * index, datatype=PointField.FLOAT32, count=1)
               for index, name in enumerate(names)]
-    data = array.array('B', np.ascontiguousarray(table, np.float32).tobytes())
+    data = array.array('B')
+    data.frombytes(np.ascontiguousarray(table, np.float32).reshape(-1).view(np.uint8).data)
     return PointCloud2(header=header, height=1, width=count, fields=fields, is_bigendian=False,
                        point_step=4 * columns, row_step=4 * columns * count, data=data,
                        is_dense=bool(np.isfinite(table).all()))

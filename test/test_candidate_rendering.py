@@ -156,9 +156,9 @@ def test_a_line_of_sight_goes_from_cell_to_neighbouring_cell():
 
 def test_a_line_to_a_cell_ends_before_it_and_the_nearest_cells_are_behind_nothing():
     pose = orbit_camera(0.41, 0.37).pose
-    lines = cell_lines(pose, SIDE)
-    assert not (lines.cells == np.arange(SIDE ** 3)).any()
-    count = (lines.cells < SIDE ** 3).sum(axis=0)
+    cells = cell_lines(pose, SIDE)
+    assert not (cells == np.arange(SIDE ** 3)).any()
+    count = (cells < SIDE ** 3).sum(axis=0)
     corner = np.ravel_multi_index((SIDE - 1,) * 3, (SIDE,) * 3)
     assert count[corner] == 0 and count[0] > SIDE
 

@@ -1,6 +1,7 @@
 """Voxels, episodes and stamps between ROS and the core."""
 
-from active_recon.errors import MessageError
+from active_recon.errors import DataError, MessageError
+from active_recon.volumes.point_grids import grid_from_points
 from active_recon.volumes.voxels import PUBLISHED_FLOOR, VoxelGrid
 from msg_tools.clouds import cloud_from_msg, cloud_to_msg
 from msg_tools.episodes import (
@@ -33,6 +34,26 @@ def test_a_cloud_of_64_cells_a_side_is_read_as_such():
         msg = voxel_grid_to_msg(fine, threshold, Header())
         np.testing.assert_array_equal(
             voxel_grid_from_msg(msg, 0.4).occupancy, fine.above(threshold).occupancy)
+
+
+def test_the_points_of_a_cloud_may_be_in_any_order_but_each_only_once():
+    points, rng = GRID.points(0.5), np.random.default_rng(2)
+    for several in (points, points[::-1], rng.permutation(points)):
+        np.testing.assert_array_equal(
+            grid_from_points(several, 0.4).occupancy, GRID.above(0.5).occupancy)
+        with pytest.raises(DataError, match='several points in a cell'):
+            grid_from_points(np.concatenate([several, several[7:8]]), 0.4)
+    with pytest.raises(DataError, match='several points in a cell'):
+        grid_from_points(points.repeat(2, axis=0), 0.4)
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize('column', range(4))
+def test_a_point_with_a_number_that_is_not_finite_is_refused(column, value):
+    points = GRID.points(0.5)
+    points[3, column] = value
+    with pytest.raises(DataError, match='out of the cube|invalid occupancy'):
+        grid_from_points(points, 0.4)
 
 
 def test_a_cloud_without_points_says_nothing_of_its_cells():

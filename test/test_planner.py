@@ -8,8 +8,9 @@ from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import TimedMotion
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, Camera, orbit_camera
+from active_recon.models import candidate_looks, sight
 from active_recon.planner import Planner
-from active_recon.policies import Choice
+from active_recon.policies import Choice, scoring
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
 from active_recon.runtimes.torch import TorchPolicyRuntime
@@ -384,6 +385,28 @@ def test_a_view_that_was_expected_is_planned_as_any_other(policy):
         LATENT, camera, grid), policy) == never
     assert goals_of(lambda planner, camera, grid: planner.expect_view(
         LATENT, orbit_camera(4.0), some_cells(3)), policy) == never
+
+
+@pytest.mark.parametrize('yaw', [0.0, 0.3])
+def test_a_policy_that_has_prepared_for_a_camera_has_its_lines_of_sight_and_chooses_the_same(yaw):
+    size, camera = 0.2, orbit_camera(1.234, 0.321, 0.4)
+    grid = VoxelGrid(some_cells(1).occupancy, size)
+    goals = []
+    for told in (True, False):
+        planner = Planner.load('attention', object_yaw=yaw, distance=0.4, entropy_tolerance=0)
+        scoring._look_at_nothing.cache_clear()
+        sight._own_samples.cache_clear()
+        candidate_looks._means.cache_clear()
+        if told:
+            planner.expect_camera(camera, size)
+        computed = [kept.cache_info().misses for kept in (
+            sight._own_samples, candidate_looks._means)]
+        assert computed == [told, told]
+        goals.append(planner.add_view(LATENT, camera, 10.0, grid).goal)
+        assert [kept.cache_info().misses for kept in (
+            sight._own_samples, candidate_looks._means)] == [1, 1]
+    np.testing.assert_array_equal(goals[0].scores, goals[1].scores)
+    np.testing.assert_array_equal(goals[0].camera.pose, goals[1].camera.pose)
 
 
 def test_a_view_that_was_expected_is_not_chosen_after_twice():

@@ -57,6 +57,18 @@ def test_what_is_left_of_a_cube_lacks_its_outermost_cells_and_those_at_the_borde
     assert eroded(np.ones((4,) * 3, bool)).sum() == 8
 
 
+@pytest.mark.parametrize('shape', [(9, 6, 7), (7, 9, 6)])
+def test_a_cell_stays_where_its_six_neighbours_are_there_whatever_the_order_in_memory(shape):
+    cells = np.random.default_rng(0).random(shape) < 0.9
+    around, left = np.pad(cells, 1), cells.copy()
+    for axis in range(3):
+        for step in (-1, 1):
+            left &= np.roll(around, step, axis)[1:-1, 1:-1, 1:-1]
+    assert left.any()
+    for order in ((0, 1, 2), (2, 0, 1)):
+        np.testing.assert_array_equal(eroded(cells.transpose(order)), left.transpose(order))
+
+
 @pytest.mark.parametrize('camera', CAMERAS)
 def test_the_surface_casts_the_silhouette_of_all_cells_and_leaves_no_hole(camera):
     cells = ball()

@@ -174,15 +174,16 @@ class Camera:
         the camera (a depth of 0 or less) are meaningless.
         """
         transform = self.object_to_camera
-        optical = np.asarray(points, np.float64) @ transform[:3, :3].T + transform[:3, 3]
+        # (3, N): what is done to a coordinate runs through memory in order
+        optical = transform[:3, :3] @ np.asarray(points, np.float64).T + transform[:3, 3:]
         if self.intrinsics.distortion is not None:
-            depth = np.where(optical[:, 2:] > 0, optical[:, 2:], np.nan)
-            distorted = self.intrinsics.distortion.distort(optical[:, :2] / depth)
+            depth = np.where(optical[2] > 0, optical[2], np.nan)
+            distorted = self.intrinsics.distortion.distort((optical[:2] / depth).T)
             lens = self.intrinsics
-            return distorted * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[:, 2]
-        image = optical @ self.intrinsics.matrix.T
+            return distorted * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[2]
+        image = self.intrinsics.matrix @ optical
         with np.errstate(divide='ignore', invalid='ignore'):
-            return image[:, :2] / image[:, 2:], optical[:, 2]
+            return (image[:2] / image[2]).T, optical[2]
 
     def ray_directions(self, samples: int = 1) -> NDArray[np.float64]:
         """

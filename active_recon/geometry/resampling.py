@@ -5,6 +5,7 @@ The image is warped as if everything in it were on the plane through the centre 
 other camera. This is exact at every depth if both cameras have the same position.
 """
 
+from collections.abc import Callable, Iterator
 import math
 
 from active_recon.geometry.cameras import Camera
@@ -20,8 +21,10 @@ SAMPLE_EVERY = 1.5
 """Largest distance of two samples in pixels: stripes of a pixel are not skipped."""
 REDUCTIONS = (8, 4, 2, 1)
 """By how much a JPEG image can be reduced while it is decoded."""
+_BAND = 64
+"""Rows of an image whose coordinates are computed at a time, to stay in the processor's cache."""
 _Places = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Coordinates across and down an image, (S, S) each."""
+"""Coordinates across and down an image, (S, S) each, or (rows, S) of some of its rows."""
 
 
 def seen_by(target: Camera, image: NDArray[np.uint8], camera: Camera,
@@ -48,11 +51,17 @@ def seen_within(target: Camera, image: NDArray[np.uint8], camera: Camera,
     window = _shrunk(image[top:bottom, left:right], width, height)
     across, down = width / (right - left), height / (bottom - top)
     fine = size * _samples((x * across, y * down))
-    # OpenCV's (0, 0) is the centre of the first pixel, ours its corner
-    x, y = _seen(camera, target, fine)
-    sampled = cv2.remap(window, _places(x, left, across, width), _places(y, top, down, height),
-                        cv2.INTER_LINEAR, borderMode=beyond)
-    return _shrunk(np.asarray(sampled, np.uint8), size, size), within
+    columns, rows = np.empty((2, fine, fine), np.float32)
+    for band, (x, y) in _bands(camera, target, fine):
+        _place(columns[band], x, left, across, width)
+        _place(rows[band], y, top, down, height)
+    # OpenCV samples four channels in a third of the time of three, and to the same bits
+    padded = cv2.cvtColor(window, cv2.COLOR_RGB2RGBA) if image.shape[2:] == (3,) else window
+    sampled = _shrunk(np.asarray(cv2.remap(
+        padded, columns, rows, cv2.INTER_LINEAR, borderMode=beyond), np.uint8), size, size)
+    if padded is not window:
+        sampled = np.asarray(cv2.cvtColor(sampled, cv2.COLOR_RGBA2RGB), np.uint8)
+    return sampled, within
 
 
 def reduction(target: Camera, camera: Camera) -> int:
@@ -81,24 +90,48 @@ def depth_seen_by(target: Camera, depth: NDArray[np.float32],
     return np.where(inside & (taken > 0), taken, 0).astype(np.float32)
 
 
-def _places(seen: NDArray[np.float64], first: int, scale: float, count: int
-            ) -> NDArray[np.float32]:
-    """Return coordinates as OpenCV counts them in a window, scaled and kept beside its pixels."""
-    places = seen - first
-    places *= scale
-    places -= 0.5
-    return np.asarray(places.clip(-1, count, out=places), np.float32)
+def _place(places: NDArray[np.float32], seen: NDArray[np.float64], first: int, scale: float,
+           count: int) -> None:
+    """Set coordinates to those seen in a window, scaled and kept beside its pixels."""
+    seen -= first
+    seen *= scale
+    seen -= 0.5  # OpenCV's (0, 0) is the centre of the first pixel, ours its corner
+    seen.clip(-1, count, out=seen)
+    places[...] = seen
+
+
+def _bands(camera: Camera, target: Camera, size: int) -> Iterator[tuple[slice, _Places]]:
+    """Yield the camera's pixel coordinates of size x size target pixels, some rows at a time."""
+    some_rows = _seen_rows(camera, target, size)
+    for first in range(0, size, _BAND):
+        band = slice(first, first + _BAND)
+        yield band, some_rows(band)
 
 
 def _seen(camera: Camera, target: Camera, size: int) -> _Places:
     """Return the camera's pixel coordinates of size x size target pixels."""
+    return _seen_rows(camera, target, size)(slice(None))
+
+
+def _seen_rows(camera: Camera, target: Camera, size: int) -> Callable[[slice], _Places]:
+    """Return what `_seen` does of the rows that it is asked for, each once."""
     if camera.intrinsics.distortion is None and np.array_equal(camera.position, target.position):
         fine = Camera(target.pose, target.intrinsics.resized(size, size))  # fifty times as fast
-        across = np.arange(size) + 0.5
-        x, y, depth = (row[0] * across + (row[1] * across + row[2])[:, None]
-                       for row in turn_between(camera, fine))
-        np.copyto(depth, -1e-9, where=depth <= 0)
-        return np.divide(x, depth, out=x), np.divide(y, depth, out=y)
+        turn, across = turn_between(camera, fine), np.arange(size) + 0.5
+
+        def turned_rows(band: slice) -> _Places:
+            x, y, depth = (row[0] * across + (row[1] * across[band] + row[2])[:, None]
+                           for row in turn)
+            np.copyto(depth, -1e-9, where=depth <= 0)
+            return np.divide(x, depth, out=x), np.divide(y, depth, out=y)
+
+        return turned_rows
+    x, y = _projected(camera, target, size)
+    return lambda band: (x[band], y[band])
+
+
+def _projected(camera: Camera, target: Camera, size: int) -> _Places:
+    """Return what `_seen` does of any two cameras."""
     rays = Camera(target.pose, target.intrinsics.resized(size, size)).ray_directions()
     pixels, depth = camera.project((target.position + target.distance * rays).reshape(-1, 3))
     pixels[depth <= 0] = -1e9  # nowhere in the image
@@ -139,14 +172,25 @@ def _few_pixels(count: int, size: int) -> int:
 
 def _samples(seen: _Places) -> int:
     """Return the number of samples along each side of a target pixel that avoids aliasing."""
-    return min(max(1, math.ceil(_apart(seen) / SAMPLE_EVERY)), _MOST_SAMPLES)
+    squares = _squared_steps(seen)
+    fewest, most = (_samples_for(math.sqrt(end)) for end in (squares.min(), squares.max()))
+    return most if fewest == most else _samples_for(_apart(seen))
+
+
+def _samples_for(apart: float) -> int:
+    return min(max(1, math.ceil(apart / SAMPLE_EVERY)), _MOST_SAMPLES)
 
 
 def _apart(seen: _Places) -> float:
     """Return the usual distance of neighbours in the camera's image, in its pixels."""
-    steps = np.concatenate([np.hypot(*(np.diff(each, axis=axis) for each in seen)).ravel()
-                            for axis in (0, 1)])
-    return float(np.median(steps, overwrite_input=True))
+    return float(np.median(np.sqrt(_squared_steps(seen)), overwrite_input=True))
+
+
+def _squared_steps(seen: _Places) -> NDArray[np.float64]:
+    """Return the squared distances of all neighbours in the camera's image, in its pixels."""
+    x, y = seen
+    return np.concatenate([(np.diff(x, axis=axis) ** 2 + np.diff(y, axis=axis) ** 2).ravel()
+                           for axis in (0, 1)])
 
 
 def _shrunk(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:

@@ -34,8 +34,9 @@ from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.saved_states import read_state
+import cv2
 from geometry_msgs.msg import PoseStamped
-from msg_tools.camera_images import pixels_from_msg
+from msg_tools.camera_images import is_compressed, pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
@@ -140,6 +141,7 @@ class ReconstructorNode(ManagedNode):
     def _load(self, params: ReconstructorParameters) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
         # One thread by default: more would wait for the slowest of the loop's busy cores
+        cv2.setNumThreads(params.threads)
         reconstructor = Reconstructor.load(
             find_weights(params.weights or None), params.device, params.object_size,
             params.object_yaw, _given(params.threshold), params.threads, params.runtime,
@@ -285,7 +287,9 @@ class ReconstructorNode(ManagedNode):
     def _prepared(self, view: View) -> tuple[NDArray[np.uint8], Camera, bool]:
         """Return what is reconstructed with, its camera, and whether a background is removed."""
         if self._background.how == 'as_is':  # then nothing needs more pixels than the network
-            return *view.reduced(self._reconstructor.reduction(view.camera)), False
+            by = (self._reconstructor.reduction(view.camera)
+                  if is_compressed(view.image_msg) else 1)
+            return *view.reduced(by), False
         mask = None if view.mask is None else mask_from_msg(view.mask)
         image = self._background.cleared(view.image, mask, self._capture.reference)
         return image, view.camera, True

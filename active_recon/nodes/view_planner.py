@@ -77,7 +77,7 @@ class ViewPlannerNode(ManagedNode):
                             else self.create_subscription)
         self._cameras = subscribe_camera(PoseStamped, 'camera/pose', self._on_camera, SENSOR_QOS)
         self._views = ViewSynchronizer(
-            self, self._frame, self._diagnostics, self._decide, self._expect)
+            self, self._frame, self._diagnostics, self._decide, self._expect, self._prepare)
         if self._planner.wants_volume:
             self._views.subscribe_volume(self._params.values.object_size)
         inputs.subscribe(Header, 'episode', self._on_episode, LATCHED_QOS)
@@ -197,6 +197,10 @@ class ViewPlannerNode(ManagedNode):
                 return None
             elevation = CANONICAL_ELEVATION
         return orbit_camera(params.start_azimuth, elevation)
+
+    def _prepare(self, camera: Camera) -> None:
+        """Let the policy prepare while the reconstructor makes its clouds."""
+        self._planner.expect_camera(camera, self._params.values.object_size)
 
     def _expect(self, view: PlannerView) -> None:
         """Let the policy choose while the reconstructor judges the quality."""

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 RAYS = 16
-_SIDE = 16  # cells a side that lines are drawn through
+COARSE_SIDE = 16
+"""Cells a side that lines are drawn through, at most."""
 
 Images = NDArray[np.float32]
 
@@ -59,16 +60,19 @@ class CandidateImages:
     unseen: Images
 
 
-def coarse_volume(occupancy: Images, side: int = _SIDE) -> CoarseVolume:
+def coarse_volume(occupancy: Images, side: int = COARSE_SIDE) -> CoarseVolume:
     """Return volumes (B, R, R, R) in at most `side` cells a side, as many as divide R."""
     whole = occupancy.shape[-1]
     cells = next(count for count in range(min(side, whole), 0, -1) if whole % count == 0)
-    entropy, doubtful = np.zeros_like(occupancy), (occupancy > 0) & (occupancy < 1)
-    full, empty = occupancy[doubtful], 1 - occupancy[doubtful]
+    entropy = np.zeros(occupancy.size, occupancy.dtype)
+    doubtful = np.flatnonzero((occupancy > 0) & (occupancy < 1))
+    full = occupancy.ravel().take(doubtful)
+    empty = 1 - full
     entropy[doubtful] = -full * np.log(full) - empty * np.log(empty)
     block = whole // cells
     return CoarseVolume(_pooled(occupancy, block, np.maximum),
-                        _pooled(entropy, block, np.add) / np.float32(block ** 3))
+                        _pooled(entropy.reshape(occupancy.shape), block, np.add)
+                        / np.float32(block ** 3))
 
 
 def render_candidates(volume: CoarseVolume, candidates: NDArray[np.float64],
@@ -116,11 +120,9 @@ def _pooled(values: Images, block: int, join: Callable[[Images, Images], Images]
     return np.ascontiguousarray(values)
 
 
-def _passing(lines: SightLines, occupancy: Images) -> Images:
-    passing = np.ones(lines.cells.shape[1], np.float32)
-    free = 1 - by_place(occupancy)
-    for cells in lines.cells:
-        passing *= free[cells]
+def _passing(cells: NDArray[np.unsignedinteger], occupancy: Images) -> Images:
+    """Return what passes all cells (C, L) of L lines, (L,)."""
+    passing: Images = np.multiply.reduce((1 - by_place(occupancy)).take(cells), axis=0)
     return passing
 
 

@@ -1,14 +1,17 @@
 """The learned policy of a lifting network: the expected gain of IoU of every candidate."""
 
+from functools import lru_cache
 import math
 
 from active_recon.models.candidate_looks import look
 from active_recon.policies.base import Choice, distance_to_taken, Observation
-from active_recon.policies.candidate_rendering import coarse_volume
+from active_recon.policies.candidate_rendering import COARSE_SIDE, coarse_volume
 from active_recon.runtimes import PolicyRuntime, State
 import numpy as np
+from numpy.typing import NDArray
 
 _LESS = np.float32(1e-6)
+_PREPARED = 16  # views, with their candidates
 _SAME = math.radians(10)
 """Angle to a view taken below which a candidate is worth the less, the nearer it is."""
 
@@ -32,6 +35,10 @@ class ScoringPolicy:
         """Return the model's state before any view."""
         return self._runtime.initial_state(batch)
 
+    def prepare(self, camera: NDArray[np.float64], candidates: NDArray[np.float64]) -> None:
+        """Compute the lines of sight that `choose` will ask for; see `Planner.expect_camera`."""
+        _look_at_nothing(camera.tobytes(), candidates.tobytes())
+
     def choose(self, seen: Observation, state: State) -> tuple[Choice, State]:
         """Return expected gains of IoU as scores; see Policy."""
         assert seen.occupancy is not None
@@ -43,3 +50,11 @@ class ScoringPolicy:
         new = np.minimum(distance_to_taken(seen) / _SAME, 1)
         scores = least + (gains - least) * new - _LESS * (1 - new)
         return Choice(scores.astype(np.float32), is_gain=True), state
+
+
+@lru_cache(maxsize=_PREPARED)
+def _look_at_nothing(camera: bytes, candidates: bytes) -> None:
+    """Let `look` compute its lines of sight, which it keeps; once for cameras that come again."""
+    nothing = np.zeros((1, *(COARSE_SIDE,) * 3), np.float32)
+    look(nothing, nothing, *(np.frombuffer(poses).reshape(1, -1, 4, 4)
+                             for poses in (camera, candidates)))

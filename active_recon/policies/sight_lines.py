@@ -39,11 +39,12 @@ def image_lines(poses: NDArray[np.float64], side: int, rays: int) -> SightLines:
     return _image_lines(np.ascontiguousarray(poses, np.float64).tobytes(), side, rays)
 
 
-def cell_lines(pose: NDArray[np.float64], side: int) -> SightLines:
+def cell_lines(pose: NDArray[np.float64], side: int) -> NDArray[np.unsignedinteger]:
     """
-    Return the lines from a camera, (4, 4), to the centres of all cells, in flat order.
+    Return the cells of the lines from a camera, (4, 4), to all cells' centres, in flat order.
 
-    A line ends before the cell that it leads to: it crosses what may hide it.
+    They are as in SightLines, (C, side ** 3). A line ends before the cell that it leads to: it
+    crosses what may hide it.
     """
     return _cell_lines(np.ascontiguousarray(pose[:3, 3], np.float64).tobytes(), side)
 
@@ -66,14 +67,13 @@ def _image_lines(poses: bytes, side: int, rays: int) -> SightLines:
                     towards.reshape(-1, 3), side)
 
 
-@lru_cache(maxsize=64)
-def _cell_lines(position: bytes, side: int) -> SightLines:
+@lru_cache(maxsize=64)  # of 0.3 MB each, where places among the cells fit in 16 bits
+def _cell_lines(position: bytes, side: int) -> NDArray[np.unsignedinteger]:
     centers = cell_centers(side)
     origin = np.frombuffer(position)
-    lines = _crossed(np.broadcast_to(origin, centers.shape), centers - origin, side)
-    own = lines.cells == np.arange(side ** 3)
-    cells = np.where(np.logical_or.accumulate(own, axis=0), side ** 3, lines.cells)
-    return SightLines(cells.astype(np.int32), lines.entries)
+    cells = _crossed(np.broadcast_to(origin, centers.shape), centers - origin, side).cells
+    own = np.logical_or.accumulate(cells == np.arange(side ** 3), axis=0)
+    return np.where(own, side ** 3, cells).astype(np.min_scalar_type(side ** 3))
 
 
 def _crossed(origins: NDArray[np.float64], towards: NDArray[np.float64],
@@ -83,15 +83,21 @@ def _crossed(origins: NDArray[np.float64], towards: NDArray[np.float64],
     towards = np.where(np.abs(towards) < 1e-12, 1e-12, towards)
     planes = np.arange(side + 1) / side - 0.5
     at = (planes - origins[:, :, None]) / towards[:, :, None]  # (L, 3, side + 1)
-    ends = np.sort(at[:, :, [0, -1]], axis=2)
-    enter, leave = ends[:, :, 0].max(axis=1).clip(min=0), ends[:, :, 1].min(axis=1)
-    cuts = np.sort(at.reshape(len(at), -1).clip(enter[:, None], np.maximum(
-        enter, leave)[:, None]), axis=1)
+    first, last = at[:, :, 0], at[:, :, -1]
+    enter = np.minimum(first, last).max(axis=1).clip(min=0)
+    leave = np.maximum(np.maximum(first, last).min(axis=1), enter)
+    cuts = np.sort(at.reshape(len(at), -1).clip(enter[:, None], leave[:, None]), axis=1)
     crossed = np.diff(cuts, axis=1) > _SHORTEST
-    middle = origins[:, None] + ((cuts[:, 1:] + cuts[:, :-1]) / 2)[..., None] * towards[:, None]
-    x, y, z = np.moveaxis(np.floor((middle + 0.5) * side).astype(np.int64), -1, 0).clip(
-        0, side - 1)
-    cells = np.where(crossed, (x * side + y) * side + z, side ** 3)
+    middle = (cuts[:, 1:] + cuts[:, :-1]) / 2
+    cells = np.zeros(middle.shape, np.int32)
+    for axis in range(3):
+        where = middle * towards[:, axis, None]
+        where += origins[:, axis, None]
+        where += 0.5
+        where *= side
+        cells *= side
+        cells += where.clip(0, side - 1, out=where).astype(np.int32)
+    cells[~crossed] = side ** 3
     order = np.argsort(~crossed, axis=1, kind='stable')[:, :max(int(crossed.sum(1).max()), 1)]
     lines = SightLines(
         np.ascontiguousarray(np.take_along_axis(cells, order, axis=1).T, np.int32),

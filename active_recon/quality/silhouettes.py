@@ -31,9 +31,31 @@ class SeenView:
         return Camera(self.camera.pose, self.camera.intrinsics.resized(side, side))
 
     @cached_property
+    def known(self) -> Mask:
+        """The pixels of S x S that the camera's image holds."""
+        return np.asarray(self.seen > 0.5)
+
+    @cached_property
+    def shown(self) -> Mask:
+        """The known pixels that show the object."""
+        return (self.foreground > 0.5) & self.known
+
+    @cached_property
     def outline(self) -> Mask:
-        """The pixels of S x S whose rays meet the cube."""
-        return cube_outline(self.sized_camera)
+        """The known pixels whose rays meet the cube."""
+        return cube_outline(self.sized_camera) & self.known
+
+    @cached_property
+    def within(self) -> Mask:
+        """The pixels that show the object within the outline."""
+        return self.shown & self.outline
+
+    @cached_property
+    def shares(self) -> tuple[float, float, float]:
+        """What of `Agreement` no reconstruction changes: outside, unsure and filled."""
+        doubt = (np.abs(self.foreground - 0.5) < 0.3) & self.outline
+        return (_share(self.shown & ~self.outline, self.shown), _share(doubt, self.outline),
+                _share(self.within, self.outline))
 
 
 @dataclass(frozen=True)
@@ -61,14 +83,16 @@ def eroded(cells: Mask) -> Mask:
     """
     Return the cells (R, R, R) all of whose six neighbours are there too.
 
-    This is what scipy's `binary_erosion` returns, in a fifteenth of its time: every view needs it.
+    This is what scipy's `binary_erosion` returns, in a fiftieth of its time: every view needs it.
     """
-    left = cells.copy()
-    for axis in range(3):
-        own, kept = np.moveaxis(cells, axis, 0), np.moveaxis(left, axis, 0)
-        kept[1:] &= own[:-1]
-        kept[:-1] &= own[1:]
-        kept[[0, -1]] = False  # nothing is outside of the grid
+    left = np.array(cells, order='C')
+    kept, own = left.reshape(-1), cells.ravel()
+    # Also from the end of a row to the begin of the next one: neither stays
+    for step in (1, cells.shape[2], cells.shape[1] * cells.shape[2]):
+        kept[step:] &= own[:-step]
+        kept[:-step] &= own[step:]
+    for end in (0, -1):  # nothing is outside of the grid
+        left[end] = left[:, end] = left[:, :, end] = False
     return left
 
 
@@ -84,32 +108,32 @@ def silhouette(points: NDArray[np.float64], camera: Camera) -> Mask:
     pixels, depth = camera.project(points)
     x, y = pixels.T
     inside = (depth > 0) & (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
-    mask[y[inside].astype(np.intp) * lens.width + x[inside].astype(np.intp)] = True
+    if not inside.all():
+        x, y = x[inside], y[inside]
+    mask[y.astype(np.intp) * lens.width + x.astype(np.intp)] = True
     return mask.reshape(lens.height, lens.width)
 
 
 def cube_outline(camera: Camera) -> Mask:
     """Return the pixels whose rays meet the unit cube about the origin, (height, width)."""
-    rays = camera.ray_directions()
+    rays = np.ascontiguousarray(np.moveaxis(camera.ray_directions(), -1, 0))
+    position = camera.position[:, None, None]
     with np.errstate(divide='ignore', invalid='ignore'):
-        ends = np.stack([(side - camera.position) / rays for side in (-0.5, 0.5)])
-    enter, leave = np.nanmin(ends, axis=0).max(axis=-1), np.nanmax(ends, axis=0).min(axis=-1)
+        near, far = ((side - position) / rays for side in (-0.5, 0.5))
+    # A ray in the plane of a face is NaN there: the opposite face, which it misses, counts
+    enter, leave = np.fmin(near, far).max(axis=0), np.fmax(near, far).min(axis=0)
     return np.asarray((enter <= leave) & (leave > 0))
 
 
 def agreement(points: NDArray[np.float64], view: SeenView) -> Agreement:
     """Compare the silhouette of a shape's surface points (N, 3) with what a view showed."""
-    known = view.seen > 0.5
-    predicted = silhouette(points, view.sized_camera) & known
-    shown = (view.foreground > 0.5) & known
-    outline = view.outline & known
-    within = shown & outline
-    doubt = (np.abs(view.foreground - 0.5) < 0.3) & outline
+    predicted, within = silhouette(points, view.sized_camera) & view.known, view.within
+    outside, unsure, filled = view.shares
     return Agreement(
         iou=_share(predicted & within, predicted | within, 1.0),
-        missed=_share(within & ~predicted, within), extra=_share(predicted & ~shown, predicted),
-        outside=_share(shown & ~outline, shown), unsure=_share(doubt, outline),
-        filled=_share(within, outline))
+        missed=_share(within & ~predicted, within),
+        extra=_share(predicted & ~view.shown, predicted),
+        outside=outside, unsure=unsure, filled=filled)
 
 
 def _share(part: Mask, whole: Mask, empty: float = 0.0) -> float:

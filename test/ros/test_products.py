@@ -8,6 +8,7 @@ from msg_tools.stamps import nanoseconds_from_stamp
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from safetensors import safe_open
 from visualization_msgs.msg import Marker
 
 from .conftest import FakeCamera
@@ -47,6 +48,8 @@ def test_an_episode_goes_on_from_its_file_in_another_process(start, bench):
     camera.show()
     saved = Path(bench.call('save_state').message)
     assert saved.name.endswith('-2.state.safetensors')
+    with safe_open(saved, framework='np') as state:  # at once, with a photograph of each view
+        assert sum(name.startswith('image/') for name in state.keys()) == 2  # noqa: SIM118
     first.stop()
     start(state_file=saved.name)
     before = len(camera.occupancy)

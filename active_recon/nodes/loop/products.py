@@ -1,6 +1,7 @@
 """What comes out of an episode: its coloured mesh, in files and as a Marker, and its state."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from active_recon.errors import DataError
@@ -10,6 +11,7 @@ from active_recon.meshes.photos import Album, Photo
 from active_recon.nodes.loop.mesh_publisher import MeshPublisher
 from active_recon.nodes.runtime.life_cycle import ManagedNode
 from active_recon.nodes.runtime.output import output_path
+from active_recon.nodes.runtime.resting_timer import RestingTimer
 from active_recon.nodes.runtime.run import one_line
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.saved_states import SavedState, SUFFIX, write_state
@@ -18,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from std_srvs.srv import Trigger
 
+DEVELOP_S = 0.05
+"""Time after a view at which its photograph is made: the planner has then chosen its goal."""
 Write = Callable[[Trigger.Response], Trigger.Response]
 """Writes a file, fills in the answer with its path, or why it was not written, and returns it."""
 
@@ -33,6 +37,9 @@ class Products:
                  publish_mesh: bool) -> None:
         self._reconstructor = reconstructor
         self._album = Album()
+        self._undeveloped: Callable[[], Photo] | None = None
+        self._timer = RestingTimer(
+            node, DEVELOP_S, self._develop, lambda: self._undeveloped is not None)
         self._known: Reconstruction | None = None
         self._last_camera: Camera | None = None
         self._marker = MeshPublisher(node, frame) if publish_mesh else None
@@ -43,14 +50,16 @@ class Products:
         """Forget the episode before."""
         self._episode = episode
         self._album.clear()
-        self._known = self._last_camera = None
+        self._undeveloped = self._known = self._last_camera = None
         if self._marker is not None:
             self._marker.clear(episode.begin)
 
     def add_view(self, stamp: int, image: NDArray[np.uint8], camera: Camera,
                  reconstruction: Reconstruction) -> None:
         """Keep the image (H, W, 3) uint8 of a view, at a stamp in nanoseconds, and its result."""
-        self._album.add(Photo.of(image, camera, self._reconstructor.object_size))
+        self._develop()
+        self._undeveloped = partial(Photo.of, image, camera, self._reconstructor.object_size)
+        self._timer.wake()
         self._last_camera = camera
         self._take(stamp, reconstruction)
 
@@ -63,7 +72,7 @@ class Products:
 
     def mesh_writer(self, output_dir: Path, suffix: str) -> Write:
         """Return what writes the coloured mesh of the shape now; any thread may call it."""
-        photos, threshold = self._album.photos, self._reconstructor.threshold
+        photos, threshold = self._photos(), self._reconstructor.threshold
 
         def write(path: Path, known: Reconstruction) -> None:
             # Not before the first mesh: they take a third of a node's start, and 70 MB
@@ -78,7 +87,7 @@ class Products:
         """Write the state of the episode; answer with its path, or why it was not written."""
         def write(path: Path, known: Reconstruction) -> None:
             assert self._last_camera is not None
-            write_state(SavedState(self._reconstructor.progress, known, self._album.photos,
+            write_state(SavedState(self._reconstructor.progress, known, self._photos(),
                                    self._last_camera), self._reconstructor, path)
 
         return self._writer(output_dir, SUFFIX, 'a state', write)(response)
@@ -87,7 +96,18 @@ class Products:
         self._known = reconstruction
         if self._marker is not None:
             self._marker.publish(stamp, reconstruction.grid, self._reconstructor.threshold,
-                                 self._album.photos)
+                                 self._photos())
+
+    def _photos(self) -> Sequence[Photo]:
+        """Return the photographs of all views so far."""
+        self._develop()
+        return self._album.photos
+
+    def _develop(self) -> None:
+        """Make the photograph of the last view, where it is not made yet."""
+        if self._undeveloped is not None:
+            self._album.add(self._undeveloped())
+            self._undeveloped = None
 
     def _writer(self, output_dir: Path, suffix: str, what: str,
                 write: Callable[[Path, Reconstruction], None]) -> Write:

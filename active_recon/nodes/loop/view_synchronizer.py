@@ -30,7 +30,8 @@ class ViewSynchronizer:
     Joins `latent`, `view` and `entropy`, which arrive in any order while the node is active.
 
     With them goes the `quality` of their stamp, for which they wait while it has a publisher;
-    `on_waiting` is called with the last view when it begins to wait.
+    `on_waiting` is called with the last view when it begins to wait, and `on_camera` with its
+    camera, which arrives before.
     `on_view` is called with the stamp (nanoseconds) and the view when all parts have arrived,
     unless it is older than the episode. `last` keeps the last one: it may arrive before the
     message of the episode that it belongs to.
@@ -38,10 +39,11 @@ class ViewSynchronizer:
 
     def __init__(self, node: ManagedNode, frame: str, diagnostics: Diagnostics,
                  on_view: Callable[[int, PlannerView], None],
-                 on_waiting: Callable[[PlannerView], None]) -> None:
+                 on_waiting: Callable[[PlannerView], None],
+                 on_camera: Callable[[Camera], None]) -> None:
         self._node = node
         self._diagnostics = diagnostics
-        self._on_view, self._on_waiting = on_view, on_waiting
+        self._on_view, self._on_waiting, self._on_camera = on_view, on_waiting, on_camera
         self._parts = ['latent', 'camera', 'entropy']
         self._joiner = StampJoiner(self._parts)
         self._begin = 0
@@ -107,6 +109,8 @@ class ViewSynchronizer:
         if stamp < self._begin:
             self._diagnostics.count('dropped/last_episode')
             return
+        if name == 'camera':
+            self._on_camera(part)
         parts = self._joiner.add(name, stamp, part)
         if parts is not None:
             self._waiting[stamp] = parts
