@@ -1,6 +1,7 @@
 """Exported networks in the place of torch's, where networks are measured."""
 
 from dataclasses import replace
+import pickle
 
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import WeightsError
@@ -62,6 +63,16 @@ def states_of(network, views):
     for view in (0, 2, 1):
         state = observer.update(objects, torch.full_like(objects, view), state)
         yield observer, state
+
+
+@torch.inference_mode()
+def test_an_exported_network_is_opened_anew_in_another_process(weights, posed_views):
+    own = measured(weights, 'openvino')
+    other = pickle.loads(pickle.dumps(own))
+    for (first, found), (second, again) in zip(
+            states_of(own, posed_views), states_of(other, posed_views), strict=True):
+        torch.testing.assert_close(first.occupancy(found), second.occupancy(again))
+    torch.testing.assert_close(own.provenance, other.provenance)
 
 
 def test_an_exported_network_is_measured_as_in_torch(weights, posed_views):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 from active_recon.cli.cluster_option import Cluster, reachable, workers_of
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 import typer
 
@@ -51,6 +52,7 @@ def train_policy(
     workers: Annotated[int, typer.Option(
         min=1, help='Processes that measure gains; with --cluster so many of its cores.')] = 1,
     cluster: Cluster = None,
+    runtime: MeasuredIn = 'torch',
 ) -> None:
     """
     Train a view policy for a frozen network: which view adds most IoU.
@@ -80,7 +82,7 @@ def train_policy(
     import torch
 
     torch.set_num_threads(threads)
-    entrant, *others = load_entrants(model)
+    entrant, *others = load_entrants(model, runtime, bf16, threads)
     if others or entrant.network.needs_front:
         raise ConfigError('--model: no such network: expected one that takes any cameras, such as '
                           f'lifting, got {model!r}')

@@ -1,7 +1,9 @@
 """Networks that were exported as graphs, in the place of torch's where nothing is learned."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.weights import Bundle
@@ -20,17 +22,22 @@ class ExportedNetwork(ReconstructionNetwork):
     """
     A network in graphs of one object each, run row by row; it has no parameters.
 
-    What tells it from others is a buffer: the hash of its weights, and what runs it.
+    What tells it from others is a buffer: the hash of its weights, and what runs it. `opened`
+    opens the graphs, once more where the network is sent to another process.
     """
 
-    def __init__(self, runtime: ExportedRuntime) -> None:
+    def __init__(self, runtime: ExportedRuntime, opened: 'Callable[[], ExportedNetwork]') -> None:
         super().__init__()
-        self._runtime = runtime
+        self._runtime, self._opened = runtime, opened
         spec = runtime.spec
         self.image_size, self.resolution = spec.image_size, spec.resolution
         self.needs_front = spec.needs_front
         told = ' '.join(runtime.provenance[name] for name in ('weights_sha256', 'computed_by'))
         self.register_buffer('provenance', torch.tensor(list(told.encode()), dtype=torch.uint8))
+
+    def __reduce__(self) -> 'tuple[Callable[[], ExportedNetwork], tuple[()]]':
+        """Return what opens the network anew: graphs cannot be sent."""
+        return self._opened, ()
 
     def initial_state(self, batch: int) -> State:
         """Return the state before any view of so many objects."""
@@ -75,10 +82,16 @@ def network_in(runtime: str, weights: Path, bundle: Bundle, bfloat16: bool,
     if runtime == 'torch':
         return bundle.reconstruction
     half = bfloat16 and has_bf16() and runtime != 'onnxruntime'
-    loaded = load_runtime(weights, runtime, threads=threads,
-                          precision='bf16' if half else 'f32')
-    return ExportedNetwork(loaded) if isinstance(
-        loaded, ExportedRuntime) else bundle.reconstruction
+    found = _exported(weights, runtime, threads, 'bf16' if half else 'f32')
+    return bundle.reconstruction if found is None else found
+
+
+def _exported(weights: Path, runtime: str, threads: int, precision: str) -> Any:
+    """Return the network of exported weights; None where the runtime that was chosen is torch."""
+    loaded = load_runtime(weights, runtime, threads=threads, precision=precision)
+    return ExportedNetwork(loaded, partial(
+        _exported, weights, runtime, threads, precision)) if isinstance(
+            loaded, ExportedRuntime) else None
 
 
 def _rows(values: Tensor) -> Iterator[NDArray[np.float32]]:
