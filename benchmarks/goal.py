@@ -26,9 +26,12 @@ LOOP = {
 
 def goal_figures() -> list[Figure]:
     """Send raw images of 640 x 480 pixels; time the occupancy and the goal of each."""
-    with loop_processes() as nodes, _camera() as send:
-        pids = [nodes.pid(node) for node in LOOP]
-        return [*_measured(send, pids, ''), memory_figure(pids, '')]
+    figures = []
+    for threads, where in ((1, ''), (2, ', threads: 2')):
+        with loop_processes(threads=threads) as nodes, _camera() as send:
+            pids = [nodes.pid(node) for node in LOOP]
+            figures += [*_measured(send, pids, where), memory_figure(pids, where)]
+    return figures
 
 
 def single_process_figures() -> list[Figure]:
@@ -68,18 +71,19 @@ def cpu_seconds(pids: list[int]) -> float:
 
 
 @contextmanager
-def loop_processes(single: bool = False) -> Iterator[NodeProcesses]:
+def loop_processes(single: bool = False, threads: int = 1) -> Iterator[NodeProcesses]:
     """Start reconstructor and planner, each in a process or in one, in a domain of their own."""
+    loop = {node: {**parameters, 'threads': threads} for node, parameters in LOOP.items()}
     environment = private_environment()
     os.environ.update(environment)
     with TemporaryDirectory() as logs, NodeProcesses(Path(logs), environment) as nodes:
         if single:
             file = Path(logs, 'loop.yaml')
             file.write_text(json.dumps({f'/**/{node}': {'ros__parameters': parameters}
-                                        for node, parameters in LOOP.items()}))
+                                        for node, parameters in loop.items()}))
             nodes.start('composed', {}, arguments=['--params-file', str(file)], names=list(LOOP))
         else:
-            for node, parameters in LOOP.items():
+            for node, parameters in loop.items():
                 nodes.start(node, parameters)
         deadline = time.monotonic() + _BUDGET_S
         while ''.join(log.read_text() for log in Path(logs).glob('*.txt')).count(

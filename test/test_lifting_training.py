@@ -112,23 +112,23 @@ def test_poses_are_off_by_a_degree_and_a_hundredth_at_most(seen_anyhow):
     (Lifting, TINY, train_lifting, 'seen_anyhow'),
     (Network2d3dPosed, TINY_POSED, train_reconstruction, 'seen_coarsely')],
     ids=['lifting', '2d3d-posed'])
-def test_a_training_that_was_cut_off_goes_on_as_if_it_was_not(
+def test_a_training_that_was_cut_off_goes_on_as_if_it_was_not_whoever_draws(
         network_class, config, train, views, tmp_path, request):
     seen = request.getfixturevalue(views)
 
-    def learned(path, until=None, resume=False):
+    def learned(path, until=None, resume=False, draw_threads=0):
         torch.manual_seed(0)
         network = network_class.from_config(config)
         train(network, seen,
               TrainingConfig(4, 2, 3e-3, 2, bfloat16=False, warmup_steps=1, checkpoint_every=2,
                              validate_every=100), LOSS,
-              Run(make_fabric(False), path, lambda step, measured: None, resume, until),
-              lambda model: {})
+              Run(make_fabric(False), path, lambda step, measured: None, resume, until,
+                  draw_threads=draw_threads), lambda model: {})
         return network
 
     whole = learned(tmp_path / 'whole.safetensors')
     learned(tmp_path / 'cut.safetensors', until=2)
-    resumed = learned(tmp_path / 'cut.safetensors', resume=True)
+    resumed = learned(tmp_path / 'cut.safetensors', resume=True, draw_threads=2)
     for name, weight in whole.state_dict().items():
         assert_close(resumed.state_dict()[name], weight, rtol=1e-4, atol=1e-5)
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from active_recon.config import Config
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.interrupts import held_interrupts
+from active_recon.training.ahead import drawn_ahead
 from active_recon.training.allocation import keep_freed_memory
 from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
 from lightning_fabric import Fabric
@@ -17,6 +19,7 @@ import torch
 from torch import nn, Tensor
 
 Measured = dict[str, float]
+_MOST_DRAW_THREADS = 8
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,7 @@ class Run:
 
     With `resume` it continues from the checkpoint, if there is one. `report` is called after every
     step with the step and what was measured, `show` after every validation with the step.
+    `draw_threads` draw batches ahead, see `drawn_ahead`; None: as many as `threads_to_draw` tells.
     """
 
     fabric: Fabric
@@ -82,6 +86,7 @@ class Run:
     resume: bool = False
     until: int | None = None  # stops early, as an interrupted training does
     show: Callable[[int], None] = lambda step: None
+    draw_threads: int | None = None
 
 
 def make_fabric(bfloat16: bool, devices: int = 1, nodes: int = 1) -> Fabric:
@@ -95,6 +100,13 @@ def make_fabric(bfloat16: bool, devices: int = 1, nodes: int = 1) -> Fabric:
     return Fabric(accelerator='auto', devices=devices, num_nodes=nodes,
                   strategy='ddp' if devices * nodes > 1 else 'auto',
                   precision='bf16-mixed' if bfloat16 else '32-true')
+
+
+def threads_to_draw(fabric: Fabric) -> int:
+    """Return how many threads draw batches: none on a CPU, where the steps need all cores."""
+    if fabric.device.type == 'cpu':
+        return 0
+    return min(_MOST_DRAW_THREADS, max(1, (os.cpu_count() or 1) // fabric.world_size - 1))
 
 
 def lr_factor(step: int, steps: int, warmup_steps: int = 200) -> float:
@@ -138,8 +150,9 @@ def train_steps(
         begun.step + done, config.steps, config.warmup_steps))
     learner.train()
     with held_interrupts() as raise_if_asked:
-        for step in range(begun.step, min(config.steps, run.until or config.steps)):
-            drawn = draw(step)
+        steps = range(begun.step, min(config.steps, run.until or config.steps))
+        threads = threads_to_draw(fabric) if run.draw_threads is None else run.draw_threads
+        for step, drawn in drawn_ahead(draw, steps, threads):
             losses = wrapped(*fabric.to_device(drawn.arguments))
             _refuse_divergence(fabric, step, losses['loss'], views, drawn.objects)
             optimizer.zero_grad(set_to_none=True)
