@@ -214,6 +214,18 @@ def test_as_many_views_are_read_as_every_object_has(made, tmp_path):
     assert mixed.images.shape[:2] == (5, 3)
 
 
+def test_fewer_views_of_a_turntable_are_still_all_around_and_each_with_its_own_camera(
+        made, views, tmp_path):
+    list(make_dataset(shape_jobs('lamp', range(1), tmp_path), 1, fine=True))
+    folders = list_objects(tmp_path)
+    whole = read_views(folders, resolution=64, image_size=128, framed=True)
+    mixed = read_views([*list_objects(made), *folders], resolution=64, image_size=128, framed=True)
+    every_sixth = slice(0, 24, 6)  # the others have four views
+    torch.testing.assert_close(mixed.poses[4], whole.poses[0, every_sixth])
+    torch.testing.assert_close(mixed.images[4], whole.images[0, every_sixth])
+    torch.testing.assert_close(mixed.images[:4], views.images)
+
+
 def test_the_turntable_s_views_are_framed_too(tmp_path):
     list(make_dataset(shape_jobs('lamp', range(2), tmp_path), 1))
     views = read_views(list_objects(tmp_path), image_size=128, framed=True)

@@ -22,22 +22,27 @@ class FramedViews:
     """
     Reads images, cameras and voxels of N objects with V views each; for the arrays, see `ViewSet`.
 
-    V is the smallest number of views of any object. What was read is kept, up to some gigabytes,
-    the least recently used of it being dropped first. Raises DataError where the side of an
-    object's voxel grid cannot be read.
+    V is the smallest number of views of any object; of an object with more, every second or so is
+    taken, so that turntables are still seen all around. What was read is kept, up to some
+    gigabytes, the least recently used of it being dropped first. Raises DataError where the side
+    of an object's voxel grid cannot be read.
     """
 
     def __init__(self, folders: Sequence[ObjectFolder], shown: Sequence[Sequence[Camera]],
                  resolution: int, image_size: int) -> None:
         count, views = len(folders), min(map(len, shown))
-        self.folders, self._shown, self._size = folders, shown, image_size
+        self.folders, self._size = folders, image_size
+        self._numbers = [[view * len(cameras) // views for view in range(views)]
+                         for cameras in shown]
+        self._shown = [[cameras[number] for number in numbers]
+                       for cameras, numbers in zip(shown, self._numbers, strict=True)]
         self._resolution = resolution
         self._sides = np.ones(count)
         self.poses = np.empty((count, views, 4, 4))
         self.intrinsics = np.empty((count, views, 3, 3))
         for index in range(count):
             self._sides[index] = side = folders[index].grid_side(resolution)
-            for view, camera in enumerate(shown[index][:views]):
+            for view, camera in enumerate(self._shown[index]):
                 target = framing_camera(camera, side, image_size)
                 self.poses[index, view] = target.scaled(1 / side).pose
                 self.intrinsics[index, view] = target.intrinsics.matrix
@@ -49,14 +54,16 @@ class FramedViews:
 
     def read_image(self, index: int, view: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
         """Read an image, (S, S, 4), and its mask `seen`, (S, S); raises DataError on bad ones."""
-        layers = np.asarray(weighted(self.folders[index].image(view)).round(), np.uint8)
+        layers = np.asarray(weighted(self.folders[index].image(
+            self._numbers[index][view])).round(), np.uint8)
         return framed_layers(layers, self._shown[index][view], self._sides[index], self._size)[:2]
 
     def read_depth(self, index: int, view: int) -> NDArray[np.float32]:
         """Read a depth image, (S, S), in sides of the grid; raises DataError on bad ones."""
-        depth, camera = self.folders[index].depth(view), self._shown[index][view]
+        number, camera = self._numbers[index][view], self._shown[index][view]
+        depth = self.folders[index].depth(number)
         if depth.shape != (camera.intrinsics.height, camera.intrinsics.width):
-            raise DataError(f'{self.folders[index].depth_path(view)}: wrong size: expected '
+            raise DataError(f'{self.folders[index].depth_path(number)}: wrong size: expected '
                             f'{camera.intrinsics.height} x {camera.intrinsics.width} pixels, as '
                             f'its camera says, got {depth.shape[0]} x {depth.shape[1]}')
         side = self._sides[index]
