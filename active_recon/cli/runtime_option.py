@@ -7,6 +7,6 @@ import typer
 
 MeasuredIn = Annotated[str, typer.Option(
     '--runtime', help=f'What runs the networks, one of {", ".join(RUNTIME_CHOICES)}. Outside '
-                      'torch, exported networks measure 1.5 to 3 times as many '
+                      'torch, exported networks measure 1.5 to 2 times as many '
                       'objects a second, and IoU agrees within .0005 with --no-bf16; auto runs in '
                       'torch what is not exported.')]

@@ -223,7 +223,7 @@ def _require_parts(weights: Path, graphs: Mapping[str, Graph], told: GraphMetada
     camera = {'pose', 'intrinsics'}
     size, resolution = told.facts['image_size'], told.facts['resolution']
     given = {'encode': {'image', *camera}, 'update': {'encoded', *camera, *told.state},
-             'decode': {*told.state}}
+             'decode': set(told.state)}
     gives = {'encode': ['encoded'], 'update': [], 'decode': ['occupancy']}
     for part, graph in graphs.items():
         path = graph_path(weights, part)
