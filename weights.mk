@@ -77,9 +77,11 @@ $(RUN)/real_val.rendered:
 
 # The network
 NETWORK := $(RUN)/lifting/weights
-$(NETWORK).safetensors: $(RUN)/data.rendered $(RUN)/things.rendered $(REAL:%=$(RUN)/%.rendered)
+$(NETWORK).safetensors: $(RUN)/data.rendered $(RUN)/things.rendered $(RUN)/turn.rendered \
+		$(REAL:%=$(RUN)/%.rendered)
 	$(AR) train $(RUN)/data/train $(RUN)/things/train $(REAL:%=$(RUN)/%) \
-		--validation $(RUN)/data/val --out $(RUN)/lifting --model lifting --steps $(STEPS) \
+		$(RUN)/turn/train $(RUN)/turn_things/train $(REAL:%=$(RUN)/turn_real) \
+		--validation $(RUN)/data/val --validation $(RUN)/turn/val --out $(RUN)/lifting --model lifting --steps $(STEPS) \
 		--batch-size 8 --learning-rate 1.2e-3 --max-views 8 --curriculum-fraction 0 \
 		--warmup-steps 100 --checkpoint-every 100 --devices $(DEVICES) --threads 1 --resume
 

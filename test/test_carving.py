@@ -16,6 +16,7 @@ from active_recon.volumes.voxelisation import voxelise
 import numpy as np
 import pytest
 import torch
+from torch.nn import functional
 from torch.testing import assert_close
 import trimesh
 
@@ -80,6 +81,34 @@ def test_the_background_is_what_the_border_shows():
     share = foreground(image)
     assert share[..., 40:80, 50:90].eq(1).all()
     assert share.sum() == 40 * 40
+
+
+def blurred_square(behind, color):
+    """Return the share of a square that is out of focus in each pixel, and an image of it."""
+    share = torch.zeros(1, 1, 128, 128)
+    share[..., 40:80, 50:90] = 1
+    share = functional.avg_pool2d(share, 2, 1)  # the edges fall on the middle of a pixel
+    share = functional.pad(share, (1, 0, 1, 0))
+    return share, behind + share * (color - behind)
+
+
+@pytest.mark.parametrize(('behind', 'color'), [(0.3, 0.6), (1.0, 0.1), (0.0, 0.9)])
+def test_a_pixel_at_the_edge_is_foreground_by_its_share_of_the_mixture(behind, color):
+    share, image = blurred_square(behind, color)
+    assert_close(foreground(image.expand(-1, 3, -1, -1)), share, atol=0.01, rtol=0)
+
+
+def test_the_inside_of_an_object_that_hardly_differs_from_the_background_is_foreground():
+    share, image = blurred_square(0.5, 0.56)
+    assert_close(foreground(image.expand(-1, 3, -1, -1))[share > 0.8], share[share > 0.8])
+
+
+def test_where_an_image_ends_is_no_edge_of_the_background():
+    image = torch.full((1, 4, 128, 128), 0.3)
+    image[:, :3, 40:80, 50:] = 0.6  # the object goes on where nothing was seen
+    image[:, :, :, 100:] = 0
+    assert foreground(image)[..., 40:80, 50:].eq(1).all()
+    assert foreground(image)[..., 100:].eq(1).all()
 
 
 def test_a_border_tells_of_the_background_where_it_is_of_one_colour():

@@ -51,6 +51,12 @@ def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, datase
     assert len(card['generators_sha256']) == 64
 
 
+def test_a_training_is_validated_on_the_objects_of_every_folder(
+        dataset, tmp_path, monkeypatch, capsys):
+    assert command(monkeypatch, *training(dataset, tmp_path, '--validation', dataset)) == 0
+    assert f'reading validation data: {2 * 6}/{2 * 6}' in capsys.readouterr().out
+
+
 def test_a_training_that_is_done_is_resumed_to_the_same_weights(run, dataset, monkeypatch):
     before = load_file(run / 'weights.safetensors')
     assert command(monkeypatch, *training(dataset, run, '--resume')) == 0

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 def train(
     data: Annotated[list[Path], typer.Argument(
         help="Folders of training objects in R2N2's layout (see `active-recon dataset build`).")],
-    validation: Annotated[Path, typer.Option(
-        help='Folder of validation objects, on which the threshold is chosen.')],
+    validation: Annotated[list[Path], typer.Option(
+        help='Folder of validation objects, on which the threshold is chosen. May be given '
+             'several times.')],
     split_file: Split = None,
     out: Annotated[Path, typer.Option(
         help='Run folder: checkpoints, TensorBoard log, weights.')] = Path('runs/default'),
@@ -147,7 +148,7 @@ def train(
     fabric.launch()
     asked = entry.build(plan.config).spec
     training = read_objects(data, 'training data', asked, split_file, 'train', at_once=False)
-    held_out = read_objects([validation], 'validation data', asked, split_file, 'val')
+    held_out = read_objects(validation, 'validation data', asked, split_file, 'val')
     if fabric.is_global_zero:
         _warn_of_shared_objects(training, held_out)
     with SummaryLog(out / 'tensorboard', held_out) as log:

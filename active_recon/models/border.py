@@ -5,6 +5,7 @@ from torch import Tensor
 from torch.nn import functional
 
 _NEARLY, _CLEARLY = 0.015, 0.045  # distances of a colour from the background's, in [0, 1]
+_CONTRAST = 0.1  # the least distance of an object's colour at whose edge pixels are shared
 _SCATTERED, _EVEN = 0.35, 0.7  # fractions of the border that are nearly of one colour
 _HALVINGS = 8  # of the range of a colour: to one grey level of 256
 
@@ -19,8 +20,17 @@ def foreground(images: Tensor) -> Tensor:
 
 
 def share_apart(distance: Tensor, seen: Tensor) -> Tensor:
-    """Return the foreground of colour distances, in [0, 1]; 1 where nothing was seen."""
+    """
+    Return the foreground of colour distances, in [0, 1]; 1 where nothing was seen.
+
+    A pixel between background and a distinct colour is a mixture of both: its share of the
+    foreground is its distance over the largest of its eight neighbours.
+    """
     share = ((distance - _NEARLY) / (_CLEARLY - _NEARLY)).clamp(0, 1)
+    most = _largest(distance * seen, 3)
+    least = -_largest(-torch.where(seen > 0.5, distance, 1.0), 3)
+    at_edge = (least < _NEARLY) & (most > _CONTRAST)
+    share = torch.where(at_edge, torch.minimum(share, distance / most.clamp(min=_CONTRAST)), share)
     return torch.where(seen > 0.5, share, 1.0)
 
 
@@ -54,11 +64,17 @@ def border_evenness(distance: Tensor, images: Tensor) -> Tensor:
 def _border(images: Tensor) -> Tensor:
     """Return 1 along the edge of the seen pixels, two pixels wide, else 0, (B, 1, S, S)."""
     seen = seen_pixels(images) > 0.5
-    # A square is the same along one axis and then the other, in less time
-    inner = -functional.max_pool2d(
-        functional.max_pool2d(-seen.float(), (5, 1), 1, (2, 0)), (1, 5), 1, (0, 2))
+    inner = -_largest(-seen.float(), 5)
     padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
     return (seen & (padded < 0.5)).float()
+
+
+def _largest(maps: Tensor, side: int) -> Tensor:
+    """Return the largest of the square of pixels around each of maps (B, C, S, S)."""
+    # A square is the same along one axis and then the other, in less time
+    half = side // 2
+    return functional.max_pool2d(
+        functional.max_pool2d(maps, (side, 1), 1, (half, 0)), (1, side), 1, (0, half))
 
 
 def _median(values: Tensor, weights: Tensor) -> Tensor:
