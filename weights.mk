@@ -10,7 +10,7 @@
 
 RUN ?= runs/default
 MESHES ?=
-STEPS ?= 10000
+STEPS ?= 13300
 DEVICES ?= 2
 PARAMETRIC ?= --train 320 --val 8
 THINGS ?= --category thing --train 6000 --val 0
@@ -81,7 +81,8 @@ $(NETWORK).safetensors: $(RUN)/data.rendered $(RUN)/things.rendered $(RUN)/turn.
 		$(REAL:%=$(RUN)/%.rendered)
 	$(AR) train $(RUN)/data/train $(RUN)/things/train $(REAL:%=$(RUN)/%) \
 		$(RUN)/turn/train $(RUN)/turn_things/train $(REAL:%=$(RUN)/turn_real) \
-		--validation $(RUN)/data/val --validation $(RUN)/turn/val --out $(RUN)/lifting --model lifting --steps $(STEPS) \
+		--validation $(RUN)/data/val --validation $(RUN)/turn/val \
+		--out $(RUN)/lifting --model lifting --steps $(STEPS) \
 		--batch-size 8 --learning-rate 1.2e-3 --max-views 8 --curriculum-fraction 0 \
 		--warmup-steps 100 --checkpoint-every 100 --devices $(DEVICES) --threads 1 --resume
 

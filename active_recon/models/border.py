@@ -24,7 +24,7 @@ def share_apart(distance: Tensor, seen: Tensor) -> Tensor:
     Return the foreground of colour distances, in [0, 1]; 1 where nothing was seen.
 
     A pixel between background and a distinct colour is a mixture of both: its share of the
-    foreground is its distance over the largest of its eight neighbours.
+    foreground is its distance over the largest among it and its eight neighbours.
     """
     share = ((distance - _NEARLY) / (_CLEARLY - _NEARLY)).clamp(0, 1)
     most = _largest(distance * seen, 3)
