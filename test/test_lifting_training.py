@@ -140,14 +140,14 @@ def test_the_losses_fall(seen_anyhow, bfloat16):
     optimizer = torch.optim.AdamW(learner.parameters(), 5e-3)
     batch = draw_posed_batch(seen_anyhow, 2, 2, np.random.default_rng(0), augment=False)
     heard = []
-    for _ in range(12):
+    for _ in range(24):
         with torch.autocast('cpu', torch.bfloat16) if bfloat16 else nullcontext():
             losses = learner(batch.images, batch.cameras, batch.alpha, batch.voxels)
         optimizer.zero_grad()
         losses['loss'].backward()
         optimizer.step()
         heard.append({name: value.item() for name, value in losses.items()})
-    assert heard[-1]['loss'] < 0.95 * heard[0]['loss']
+    assert heard[-1]['loss'] < 0.9 * heard[0]['loss']
     assert heard[-1]['silhouette'] < heard[0]['silhouette']
 
 

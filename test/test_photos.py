@@ -154,7 +154,8 @@ def test_photos_that_are_upside_down_are_noticed(views, rgba, tmp_path, shape):
     found = active_recon.reconstruct(folder, box=BOX).warnings
     told = 'photos turned by 180 degrees would fit'
     assert any(told in warning for warning in found)
-    assert not any(told in warning for warning in shape.warnings)
+    # One object in twenty is unusual to the quality without a fault; nothing else is warned of
+    assert all(warning.startswith('unusual views') for warning in shape.warnings)
 
 
 def test_what_is_wrong_with_photos_is_one_line_each_and_the_others_are_used(plain, tmp_path):

@@ -27,8 +27,8 @@ def share_apart(distance: Tensor, seen: Tensor) -> Tensor:
     foreground is its distance over the largest among it and its eight neighbours.
     """
     share = ((distance - _NEARLY) / (_CLEARLY - _NEARLY)).clamp(0, 1)
-    most = _largest(distance * seen, 3)
-    least = -_largest(-torch.where(seen > 0.5, distance, 1.0), 3)
+    most = largest_around(distance * seen, 3)
+    least = -largest_around(-torch.where(seen > 0.5, distance, 1.0), 3)
     at_edge = (least < _NEARLY) & (most > _CONTRAST)
     share = torch.where(at_edge, torch.minimum(share, distance / most.clamp(min=_CONTRAST)), share)
     return torch.where(seen > 0.5, share, 1.0)
@@ -61,20 +61,20 @@ def border_evenness(distance: Tensor, images: Tensor) -> Tensor:
     return ((even - _SCATTERED) / (_EVEN - _SCATTERED)).clamp(0, 1)
 
 
-def _border(images: Tensor) -> Tensor:
-    """Return 1 along the edge of the seen pixels, two pixels wide, else 0, (B, 1, S, S)."""
-    seen = seen_pixels(images) > 0.5
-    inner = -_largest(-seen.float(), 5)
-    padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
-    return (seen & (padded < 0.5)).float()
-
-
-def _largest(maps: Tensor, side: int) -> Tensor:
-    """Return the largest of the square of pixels around each of maps (B, C, S, S)."""
+def largest_around(maps: Tensor, side: int) -> Tensor:
+    """Return the largest of the square around each pixel of maps (B, C, S, S); `side` is odd."""
     # A square is the same along one axis and then the other, in less time
     half = side // 2
     return functional.max_pool2d(
         functional.max_pool2d(maps, (side, 1), 1, (half, 0)), (1, side), 1, (0, half))
+
+
+def _border(images: Tensor) -> Tensor:
+    """Return 1 along the edge of the seen pixels, two pixels wide, else 0, (B, 1, S, S)."""
+    seen = seen_pixels(images) > 0.5
+    inner = -largest_around(-seen.float(), 5)
+    padded = functional.pad(inner[:, :, 2:-2, 2:-2], (2, 2, 2, 2))
+    return (seen & (padded < 0.5)).float()
 
 
 def _median(values: Tensor, weights: Tensor) -> Tensor:

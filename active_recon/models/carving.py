@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError
-from active_recon.models.border import foreground
+from active_recon.models.border import foreground, largest_around
 from active_recon.models.lifted import projected, projection, sampled
 from active_recon.models.lifting_encoder import IMAGE_SIZE
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
@@ -68,8 +68,7 @@ class Carving(ReconstructionNetwork):
 
     def encode(self, images: Tensor, cameras: Cameras) -> Tensor:
         """Return the dilated foreground, (B, 1, 128, 128) in [0, 1]; 1 where nothing was seen."""
-        return functional.max_pool2d(
-            foreground(images), 2 * self._dilation + 1, 1, self._dilation)
+        return largest_around(foreground(images), 2 * self._dilation + 1)
 
     def update(self, encoded: Tensor, cameras: Cameras, state: State) -> State:
         """Return the state carved by one more silhouette of each object."""
