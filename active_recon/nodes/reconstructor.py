@@ -1,51 +1,45 @@
 """ROS node of the reconstructor: views in, the object's occupancy out; it owns the episode."""
 
 from contextlib import nullcontext
-from functools import partial
 import math
 from pathlib import Path
-import time
 import uuid
 
-from active_recon.acquisition.background import main_part_share, WHOLE_SHARE
 from active_recon.acquisition.view_gate import ViewGate
-from active_recon.errors import DataError, MessageError
-from active_recon.geometry.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.errors import DataError
+from active_recon.geometry.cameras import Camera
 from active_recon.models.weights_files import find_weights
-from active_recon.nodes.camera.depth_images import DEPTH_INFO_TOPIC, DEPTH_TOPIC, DepthImages
-from active_recon.nodes.camera.images import CameraImages
-from active_recon.nodes.camera.monitor import CameraMonitor
-from active_recon.nodes.camera.pose_sources import check_pose_source, subscribe_poses
+from active_recon.nodes.camera.depth_images import DEPTH_INFO_TOPIC, DEPTH_TOPIC
+from active_recon.nodes.camera.pose_sources import check_pose_source
 from active_recon.nodes.camera.reference_capture import ReferenceCapture
+from active_recon.nodes.camera.view_inputs import ViewInputs
 from active_recon.nodes.loop.mesh_publisher import meshing_imported
 from active_recon.nodes.loop.mesh_saver import MeshSaver
 from active_recon.nodes.loop.products import no_view_before, Products, Write
 from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPublisher
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
+from active_recon.nodes.loop.view_warnings import ViewWarnings
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.deferred_work import DeferredWork
 from active_recon.nodes.runtime.freed_memory import give_back_freed_memory
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.runtime.parameters import Commit, Parameters, set_read_only_parameter
 from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
-from active_recon.nodes.runtime.resting_timer import RestingTimer
 from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
-from active_recon.reconstructor import Reconstruction, Reconstructor
+from active_recon.reconstructor import Reconstructor
 from active_recon.saved_states import read_state
 import cv2
 from geometry_msgs.msg import PoseStamped
-from msg_tools.camera_images import is_compressed, pixels_from_msg
-from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
+from msg_tools.camera_images import is_compressed
 from msg_tools.episodes import Episode, episode_to_msg
 from msg_tools.goals import view_goal_from_msg
 from msg_tools.images import mask_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
-from msg_tools.views import NOT_BEGUN, View, ViewJoiner
+from msg_tools.views import View
 import numpy as np
 from numpy.typing import NDArray
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
@@ -80,15 +74,13 @@ class ReconstructorNode(ManagedNode):
         with meshing_imported() if params.publish_mesh else nullcontext():
             self._reconstructor = self._load(params)
         give_back_freed_memory()
-        self._joiner = ViewJoiner(
-            params.max_pose_gap, masks=self._background.how == 'mask',
-            max_depth_gap=params.max_depth_gap if params.use_depth else None)
         self._gate = ViewGate(
             params.take_views, params.goal_tolerance, params.min_view_separation,
             params.settle_time)
-        self._monitor = CameraMonitor(
-            self._diagnostics, params.goal_tolerance, params.stall_timeout)
+        self._inputs = ViewInputs(
+            self, self._diagnostics, params, self._gate, self._capture, self._select)
         self._object_frame = params.object_frame
+        self._warnings = ViewWarnings(self._diagnostics, self._reconstructor.spec.needs_front)
         self._products = Products(self, self._reconstructor, self._object_frame,
                                   params.publish_mesh)
         self.add_cleanup(self._free_network)
@@ -110,25 +102,10 @@ class ReconstructorNode(ManagedNode):
         self._begin_episode()
         self._deferred = DeferredWork(self, self._take_pending_view)
         self.add_cleanup(self._deferred.close)
+        self._goals = self.create_subscription(PoseStamped, 'next_view', self._on_goal, SENSOR_QOS)
         inputs = AwaitedInputs(self, self._diagnostics)
         self.add_cleanup(inputs.clear)
-        inputs.subscribe(CameraInfo, 'camera/camera_info', self._on_camera_info, SENSOR_QOS)
-        if self._background.how == 'mask':
-            inputs.subscribe(Image, 'camera/mask', self._on_mask, SENSOR_QOS)
-        self._depths = DepthImages(
-            self, self._diagnostics, inputs, self._joiner,
-            self._on_message) if self._params.values.use_depth else None
-        self._poses = subscribe_poses(self, self._params.values, self._object_frame, self._on_pose,
-                                      self._diagnostics, inputs)
-        self._goals = self.create_subscription(PoseStamped, 'next_view', self._on_goal, SENSOR_QOS)
-        # Last: a publisher that discovers this subscription has discovered the others
-        CameraImages(self, self._diagnostics, inputs, self._on_image, self._monitor.add_lost)
-        # Images without a pose or camera info are rejected after a time
-        self._image_timer = RestingTimer(
-            self, 0.1, self._process_joined, lambda: self._joiner.is_waiting)
-        self._camera_timer = RestingTimer(
-            self, 0.1, self._monitor.update, lambda: self._monitor.sees)
-        self.add_cleanup(self._monitor.reset)
+        self._inputs.subscribe(self._params.values, inputs, self._deferred.note_message)
 
     def destroy_node(self) -> None:
         """Wait for a mesh that is being written, then free everything."""
@@ -136,7 +113,7 @@ class ReconstructorNode(ManagedNode):
         super().destroy_node()
 
     def _free_network(self) -> None:
-        del self._reconstructor, self._products, self._joiner
+        del self._reconstructor, self._products, self._inputs
 
     def _load(self, params: ReconstructorParameters) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
@@ -160,11 +137,10 @@ class ReconstructorNode(ManagedNode):
         def commit() -> None:
             self._background = background
             self._reconstructor.set_threshold(_given(params.threshold))
-            self._joiner.max_pose_gap = params.max_pose_gap
+            self._inputs.set_limits(params)
             self._gate.take_views = params.take_views
             self._gate.goal_tolerance = params.goal_tolerance
             self._gate.min_view_separation = params.min_view_separation
-            self._monitor.set_limits(params.goal_tolerance, params.stall_timeout)
             self._gate.settle_time = params.settle_time
 
         return commit
@@ -174,8 +150,8 @@ class ReconstructorNode(ManagedNode):
         self._reconstructor.reset()
         self._gate.reset()
         self._episode = Episode(uuid.uuid4().hex[:12], self.get_clock().now().nanoseconds)
-        self._joiner.clear(self._episode.begin)
-        self._diagnostics.clear_warning('unusual_views', log=False)
+        self._inputs.begin_episode(self._episode.begin)
+        self._warnings.clear()
         self._diagnostics.count('episodes')
         self._diagnostics.set_value('Episode', self._episode.id)
         self._diagnostics.set_value('Views of the episode', '0')
@@ -188,65 +164,12 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.count('clock_jumps')
         self.get_logger().warning(f'{how}: the episode {self._episode.id} begins')
 
-    def _on_image(self, msg: Image | CompressedImage) -> None:
-        self._diagnostics.count('images')
-        with self._diagnostics.rejecting():
-            stamp = nanoseconds_from_stamp(msg.header.stamp)
-            self._monitor.add_message('images', stamp)
-            self._capture.on_image(stamp, partial(pixels_from_msg, msg))
-            if stamp < self._episode.begin or self.clock_monitor.is_ahead(stamp):
-                raise MessageError(
-                    'image of another episode: expected one of this episode, which began at '
-                    f'{self._episode.begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
-                    'recording, play its clock and set use_sim_time', 'last_episode')
-            self._joiner.add_image(stamp, msg, time.monotonic())
-            self._poses.on_image(msg.header)
-        self._on_message()
-
-    def _on_camera_info(self, msg: CameraInfo) -> None:
-        with self._diagnostics.rejecting():
-            stamp = nanoseconds_from_stamp(msg.header.stamp)
-            self._monitor.add_message('camera_info', stamp)
-            self._joiner.add_intrinsics(stamp, intrinsics_from_msg(msg))
-        self._on_message()
-
-    def _on_mask(self, msg: Image) -> None:
-        self._joiner.add_mask(nanoseconds_from_stamp(msg.header.stamp), msg)
-        self._on_message()
-
-    def _on_pose(self, msg: PoseStamped) -> None:
-        self._diagnostics.count('poses')
-        with self._diagnostics.rejecting():
-            stamp = nanoseconds_from_stamp(msg.header.stamp)
-            self._monitor.add_message('poses', stamp)
-            pose = pose_from_msg(msg, self._object_frame)
-            self._monitor.add_pose(Camera(pose), stamp, self._gate.open_goal)
-            self._joiner.add_pose(stamp, pose)
-        self._on_message()
-
     def _on_goal(self, msg: PoseStamped) -> None:
         with self._diagnostics.rejecting():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             if stamp >= self._episode.begin and not self.clock_monitor.is_ahead(stamp):
                 self._take_pending_view()  # it belongs to the previous goal
                 self._gate.set_goal(view_goal_from_msg(msg, self._object_frame), stamp)
-
-    def _on_message(self) -> None:
-        """Process the camera's messages after one has arrived."""
-        self._deferred.note_message()
-        self._process_joined()
-        self._image_timer.wake()
-        self._camera_timer.wake()
-
-    def _process_joined(self) -> None:
-        """Select the newest joined image that is to be a view."""
-        for view in self._joiner.joined(time.monotonic()):
-            if isinstance(view, View):
-                self._select(view)
-            elif view.kind == NOT_BEGUN:
-                self._diagnostics.count('images_unused')
-            else:
-                self._diagnostics.reject(view)
 
     def _select(self, view: View) -> None:
         if not self._gate.wants(view.camera, view.stamp,
@@ -266,12 +189,13 @@ class ReconstructorNode(ManagedNode):
 
     def _add_view(self, view: View) -> None:
         image, camera, is_cleared = self._prepared(view)
-        depth = None if self._depths is None else self._depths.of(view)
+        depths = self._inputs.depths
+        depth = None if depths is None else depths.of(view)
         reconstruction = self._reconstructor.add_view(image, camera, depth)
-        if self._depths is not None and reconstruction.depth_refusal:
-            self._depths.warn(reconstruction.depth_refusal)
+        if depths is not None and reconstruction.depth_refusal:
+            depths.warn(reconstruction.depth_refusal)
         self._gate.took(view.camera)
-        self._check_elevation(view.camera)
+        self._warnings.check_elevation(view.camera)
         self._diagnostics.count('views')
         self._publisher.publish_occupancy(
             view.stamp, reconstruction, self._reconstructor.threshold)
@@ -281,8 +205,9 @@ class ReconstructorNode(ManagedNode):
         self._publisher.publish_view(
             view.stamp, view.camera.pose, reconstruction, image if is_cleared else None)
         self._products.add_view(view.stamp, image, camera, reconstruction)
-        self._check_quality(reconstruction)
-        self._check_background(image)  # last: it is for the user, and nothing waits for it
+        self._warnings.check_quality(reconstruction.quality)
+        if self._background.how in ('color', 'reference'):
+            self._warnings.check_background(image)  # last: nothing waits for it
 
     def _prepared(self, view: View) -> tuple[NDArray[np.uint8], Camera, bool]:
         """Return what is reconstructed with, its camera, and whether a background is removed."""
@@ -293,32 +218,6 @@ class ReconstructorNode(ManagedNode):
         mask = None if view.mask is None else mask_from_msg(view.mask)
         image = self._background.cleared(view.image, mask, self._capture.reference)
         return image, view.camera, True
-
-    def _check_quality(self, reconstruction: Reconstruction) -> None:
-        quality = reconstruction.quality
-        if quality is None:
-            return
-        self._diagnostics.set_value('Quality', quality.summary, at_once=False)
-        if quality.suspect:
-            self._diagnostics.raise_warning('unusual_views', quality.warning)
-        else:
-            self._diagnostics.clear_warning('unusual_views')
-
-    def _check_background(self, image: NDArray[np.uint8]) -> None:
-        if self._background.how in ('color', 'reference') and (
-                share := main_part_share(image)) < WHOLE_SHARE:
-            self._diagnostics.warn('background', (
-                'the object is in pieces once its background is removed, the largest of them '
-                f'{share:.0%} of it: is part of the object of the same colour as the background? '
-                'see view_image; a mask or another background colour may help'))
-
-    def _check_elevation(self, camera: Camera) -> None:
-        away = camera.elevation - CANONICAL_ELEVATION
-        if self._reconstructor.spec.needs_front and abs(away) > ELEVATION_TOLERANCE:
-            self._diagnostics.warn('elevation', (
-                'wrong elevation of the camera: expected 30 degrees, as the network was trained '
-                f'with, got {math.degrees(camera.elevation):.1f}; the reconstruction will be '
-                'worse'))
 
     def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the new episode's id."""
@@ -361,7 +260,7 @@ class ReconstructorNode(ManagedNode):
         self._products.take_up(saved)
         self._publisher.publish_occupancy(self._episode.begin, saved.reconstruction,
                                           self._reconstructor.threshold)
-        self._check_quality(saved.reconstruction)
+        self._warnings.check_quality(saved.reconstruction.quality)
         response.success, response.message = True, self._episode.id
         return response
 
