@@ -1,8 +1,10 @@
 """What a view scorer learns from: measured gains, losses of their order, a calibration."""
 
+from active_recon.datasets.layout import RENDERING
 from active_recon.errors import ConfigError, DataError
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID, MOST_VIEWS
 from active_recon.models.view_scorer import Looked, ScorerConfig, ViewScorer
+from active_recon.training.gain_files import drawn_objects
 from active_recon.training.looked import joined, looked_states, LookedStates, mirrored, spreads
 from active_recon.training.scorer import (
     calibrate,
@@ -171,6 +173,17 @@ def test_some_views_are_drawn_once_each(total, count):
         drawn = spread_views(total, count, np.random.default_rng(seed))
         assert len(set(drawn)) == len(drawn) == min(total, count)
         assert set(drawn) <= set(range(total))
+
+
+def test_rounds_go_through_all_objects_in_turn_and_each_has_as_many_as_it_can(tmp_path):
+    for number in range(5):
+        (tmp_path / RENDERING / 'chair' / f'{number}').mkdir(parents=True)
+    first, second, third, whole = (
+        [folder.name for folder in drawn_objects(tmp_path, most, number)]
+        for most, number in ((2, 1), (2, 2), (2, 3), (7, 2)))
+    assert sorted([*first, *second, third[0]]) == ['0', '1', '2', '3', '4']
+    assert third[1] == first[0]
+    assert sorted(whole) == ['0', '1', '2', '3', '4']
 
 
 def test_a_training_that_trains_nothing_is_refused():

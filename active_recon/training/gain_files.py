@@ -64,11 +64,11 @@ def drawn_objects(data: Path, most: int, number: int = 1) -> list[ObjectFolder]:
     """
     Return at most so many objects of a folder for a round, from 1 on, drawn by their names.
 
-    Each round has objects of its own, as long as there are any; then it begins again.
+    Each round goes on where the one before ended, and begins again where there are no more.
     """
     drawn = sorted(list_objects(data), key=_key)
     first = (number - 1) * most % max(len(drawn), 1)
-    return drawn[first:first + most]
+    return (drawn[first:] + drawn[:first])[:most]
 
 
 def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting: Collecting,
