@@ -19,7 +19,6 @@ from active_recon.nodes.loop.products import no_view_before, Products, Write
 from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPublisher
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.loop.view_warnings import ViewWarnings
-from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.deferred_work import DeferredWork
 from active_recon.nodes.runtime.freed_memory import give_back_freed_memory
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
@@ -102,10 +101,9 @@ class ReconstructorNode(ManagedNode):
         self._begin_episode()
         self._deferred = DeferredWork(self, self._take_pending_view)
         self.add_cleanup(self._deferred.close)
+        # Before the camera's images, by which others discover that all is subscribed to
         self._goals = self.create_subscription(PoseStamped, 'next_view', self._on_goal, SENSOR_QOS)
-        inputs = AwaitedInputs(self, self._diagnostics)
-        self.add_cleanup(inputs.clear)
-        self._inputs.subscribe(self._params.values, inputs, self._deferred.note_message)
+        self._inputs.subscribe(self._params.values, self._deferred.note_message)
 
     def destroy_node(self) -> None:
         """Wait for a mesh that is being written, then free everything."""

@@ -48,10 +48,12 @@ class ViewInputs:
         self._begin = 0
         self.depths: DepthImages | None = None
 
-    def subscribe(self, params: ReconstructorParameters, inputs: AwaitedInputs,
+    def subscribe(self, params: ReconstructorParameters,
                   note_message: Callable[[], None]) -> None:
         """Subscribe to all that the parameters name; `note_message` hears of each message."""
         self._note_message, self._object_frame = note_message, params.object_frame
+        inputs = AwaitedInputs(self._node, self._diagnostics)
+        self._node.add_cleanup(inputs.clear)
         inputs.subscribe(CameraInfo, 'camera/camera_info', self._on_camera_info, SENSOR_QOS)
         if self._takes_masks:
             inputs.subscribe(Image, 'camera/mask', self._on_mask, SENSOR_QOS)
