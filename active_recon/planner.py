@@ -22,11 +22,12 @@ from active_recon.policies import (
     PolicyOptions,
 )
 from active_recon.policies.automatic import SWEEP
+from active_recon.policies.planner_views import observation, PlannerView, policy_poses
 from active_recon.policies.reasons import goal_reason, GoalReason
 from active_recon.policies.stopping import StoppingRule
 from active_recon.quality.quality import Quality
 from active_recon.runtimes import AUTO, State
-from active_recon.volumes.voxels import turned, VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,30 +43,6 @@ class Decision:
 
     goal: Goal | None
     reason: str = ''
-
-
-@dataclass(frozen=True, eq=False)
-class PlannerView:
-    """
-    A view and the reconstruction after it, as a policy needs them.
-
-    - latent: (C, h, w), the network's after that view
-    - camera: of the view that was really taken, in the object frame
-    - entropy: of the reconstruction, nats
-    - volume: the published probabilities, for a policy that wants them
-    - quality: None where it is not judged
-    """
-
-    latent: NDArray[np.float32]
-    camera: Camera
-    entropy: float
-    volume: VoxelGrid | None = None
-    quality: Quality | None = None
-
-    def is_of(self, other: 'PlannerView') -> bool:
-        """Whether it is the same view, whatever its entropy and quality."""
-        return (self.latent is other.latent and self.camera is other.camera
-                and self.volume is other.volume)
 
 
 class Planner:
@@ -190,8 +167,8 @@ class Planner:
         if prepare is None:
             return
         with suppress(ViewError):  # which `add_view` tells
-            prepare(self._poses([camera], 1 / size)[0],
-                    self._poses(self._places.candidates(camera), 1 / size))
+            prepare(policy_poses([camera], self._yaw, 1 / size)[0],
+                    policy_poses(self._places.candidates(camera), self._yaw, 1 / size))
 
     def expect_view(self, latent: NDArray[np.float32], camera: Camera,
                     volume: VoxelGrid | None = None) -> None:
@@ -305,20 +282,7 @@ class Planner:
     def _observed(self, views: Sequence[PlannerView],
                   candidates: Sequence[OrbitCamera]) -> Observation:
         """Return what the policy sees after the last of some views."""
-        last = views[-1]
-        if last.volume is None and self._policy.wants_volume:
-            raise ViewError('no probabilities: expected them beside the latent, as this policy '
-                            'looks at them, got none', 'volume')
-        unit = 1.0 if last.volume is None else 1 / last.volume.size
-        taken, places = (self._poses(cameras, unit)[None]
-                         for cameras in ([view.camera for view in views], candidates))
-        volume = None if last.volume is None else turned(
-            last.volume.occupancy, -self._yaw)[None]
-        return Observation(last.latent[None], taken, places, volume)
-
-    def _poses(self, cameras: Sequence[Camera], unit: float) -> NDArray[np.float64]:
-        """Return the poses of cameras as a policy sees them, (N, 4, 4), lengths times `unit`."""
-        return np.stack([each.turned(-self._yaw).scaled(unit).pose for each in cameras])
+        return observation(views, candidates, self._yaw, self._policy.wants_volume)
 
     def _aim_first(self, camera: Camera) -> None:
         """Make the best of a camera that no policy chose."""

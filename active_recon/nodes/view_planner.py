@@ -1,15 +1,11 @@
 """ROS node of the planner: publishes the next view after each view, or that it is done."""
 
 import math
-import time
 
 from active_recon.acquisition.goals import Goal
 from active_recon.errors import ActiveReconError
-from active_recon.geometry.cameras import (
-    Camera,
-    CANONICAL_ELEVATION,
-    orbit_camera,
-)
+from active_recon.geometry.cameras import Camera
+from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
 from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
@@ -18,25 +14,20 @@ from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.clock import AHEAD_S, STEADY
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.runtime.parameters import Commit, Parameters
-from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
+from active_recon.nodes.runtime.qos import LATCHED_QOS
 from active_recon.nodes.runtime.resting_timer import RestingTimer
 from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.view_planner import ViewPlannerParameters
-from active_recon.planner import Decision, Planner, PlannerView
+from active_recon.planner import Decision, Planner
 from active_recon.policies import Policy
-from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import pose_from_msg
+from active_recon.policies.planner_views import PlannerView
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
-from msg_tools.stamps import nanoseconds_from_stamp
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 REPEAT_S = 1.0
 """Period at which an open goal is published again."""
-FIND_CAMERA_S = 1.0
-"""Time to wait for a publisher of the camera's pose after an episode began."""
-_STEEPEST = 1.5  # rad, of a first view
 TOPICS = ('camera/pose', 'view', 'latent', 'entropy', 'quality', 'probabilities', 'episode',
           'next_view', 'next_azimuth', 'azimuth_scores', 'goal_reason', 'done')
 """Topics that the node subscribes to and publishes."""
@@ -70,12 +61,11 @@ class ViewPlannerNode(ManagedNode):
         """Subscribe to the reconstructor, and continue from its latched messages."""
         self._episode: Episode | None = None
         self._begun_at = self.get_clock().now().nanoseconds
-        self._reset_episode()
         inputs = AwaitedInputs(self, self._diagnostics)
         self.add_cleanup(inputs.clear)
-        subscribe_camera = (inputs.subscribe if math.isnan(self._params.values.start_azimuth)
-                            else self.create_subscription)
-        self._cameras = subscribe_camera(PoseStamped, 'camera/pose', self._on_camera, SENSOR_QOS)
+        self._first_view = FirstView(self, inputs, self._diagnostics,
+                                     lambda: self._params.values, self._on_camera)
+        self._reset_episode()
         self._views = ViewSynchronizer(
             self, self._frame, self._diagnostics, self._decide, self._expect, self._prepare)
         if self._planner.wants_volume:
@@ -126,7 +116,7 @@ class ViewPlannerNode(ManagedNode):
         """Forget the camera, the goal and the views."""
         self._planner.reset()
         self._goals.close()
-        self._camera: Camera | None = None
+        self._first_view.begin(self._episode)
         self._started = False
         self._done = False
 
@@ -135,9 +125,9 @@ class ViewPlannerNode(ManagedNode):
             episode = episode_from_msg(msg)
             if self._episode is not None and episode.id == self._episode.id:
                 return
+            self._episode = episode
             self._reset_episode()
             self._views.begin_episode(episode.begin)
-            self._episode, self._episode_received_at = episode, time.monotonic()
             self._diagnostics.count('episodes')
             self._diagnostics.set_value('Episode', episode.id)
             self._publish_done(episode.begin, '')
@@ -160,18 +150,14 @@ class ViewPlannerNode(ManagedNode):
             self._publish_goal(self._planner.plan())  # with a stamp of the new time
             self._tell_reason()
 
-    def _on_camera(self, msg: PoseStamped) -> None:
-        with self._diagnostics.rejecting():
-            camera = Camera(pose_from_msg(msg, self._frame))
-            if self._episode and nanoseconds_from_stamp(msg.header.stamp) >= self._episode.begin:
-                self._camera = camera
+    def _on_camera(self) -> None:
         self._publish_first_goal()
         self._first_goal_timer.wake()
 
     def _first_goal_is_due(self) -> bool:
         """Whether the first goal waits for nothing but time."""
-        return self._episode is not None and not self._started and not (
-            self._camera is None and math.isnan(self._params.values.start_azimuth))
+        return (self._episode is not None and not self._started
+                and self._first_view.waits_for_time_alone())
 
     def _publish_first_goal(self) -> None:
         """Publish the goal of the first view, once the camera's pose or the parameter gives it."""
@@ -179,24 +165,9 @@ class ViewPlannerNode(ManagedNode):
             return
         if self._episode.begin < self._begun_at and not self._views.is_caught_up():
             return  # an episode older than this node may already have views
-        first = self._first_camera()
+        first = self._first_view.where()
         if first is not None:
             self._publish_goal(self._planner.first_goal(first))
-
-    def _first_camera(self) -> Camera | None:
-        """Return the camera of the first view, None while it is not known."""
-        params = self._params.values
-        if math.isnan(params.start_azimuth):
-            return self._camera
-        elevation = params.elevation
-        if math.isnan(elevation) and self._camera is not None:
-            elevation = min(max(self._camera.elevation, -_STEEPEST), _STEEPEST)
-        if math.isnan(elevation):  # then it is the camera's, if one publishes its pose
-            if (time.monotonic() - self._episode_received_at < FIND_CAMERA_S
-                    or self.count_publishers(self._cameras.topic_name)):
-                return None
-            elevation = CANONICAL_ELEVATION
-        return orbit_camera(params.start_azimuth, elevation)
 
     def _prepare(self, camera: Camera) -> None:
         """Let the policy prepare while the reconstructor makes its clouds."""
@@ -255,7 +226,7 @@ class ViewPlannerNode(ManagedNode):
         timeout, failed = self._params.values.goal_timeout, self._goals.camera
         if timeout == 0 or failed is None or not self._goals.open_for > timeout:
             return
-        decision = self._planner.give_up(failed, self._camera)
+        decision = self._planner.give_up(failed, self._first_view.camera)
         instead = ('no reachable goal is left' if decision.goal is None else
                    f'the next best is {_place_words(decision.goal.camera)}')
         self._diagnostics.warn('goal_timeout', (

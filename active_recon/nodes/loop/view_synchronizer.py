@@ -8,7 +8,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.life_cycle import ManagedNode
 from active_recon.nodes.runtime.qos import LATCHED_QOS
-from active_recon.planner import PlannerView
+from active_recon.policies.planner_views import PlannerView
 from active_recon.quality.quality import Quality
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped

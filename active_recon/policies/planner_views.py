@@ -1,0 +1,60 @@
+"""The views of an episode, and how its policy sees them: from the object's front."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from active_recon.errors import ViewError
+from active_recon.geometry.cameras import Camera
+from active_recon.policies.base import Observation
+from active_recon.quality.quality import Quality
+from active_recon.volumes.voxels import turned, VoxelGrid
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class PlannerView:
+    """
+    A view and the reconstruction after it, as a policy needs them.
+
+    - latent: (C, h, w), the network's after that view
+    - camera: of the view that was really taken, in the object frame
+    - entropy: of the reconstruction, nats
+    - volume: the published probabilities, for a policy that wants them
+    - quality: None where it is not judged
+    """
+
+    latent: NDArray[np.float32]
+    camera: Camera
+    entropy: float
+    volume: VoxelGrid | None = None
+    quality: Quality | None = None
+
+    def is_of(self, other: 'PlannerView') -> bool:
+        """Whether it is the same view, whatever its entropy and quality."""
+        return (self.latent is other.latent and self.camera is other.camera
+                and self.volume is other.volume)
+
+
+def observation(views: Sequence[PlannerView], candidates: Sequence[Camera], yaw: float,
+                wants_volume: bool) -> Observation:
+    """
+    Return what a policy sees after the last of some views of one episode.
+
+    `yaw` is the azimuth of the object's front, radians. Raises ViewError where the policy wants
+    the probabilities and the last view has none.
+    """
+    last = views[-1]
+    if last.volume is None and wants_volume:
+        raise ViewError('no probabilities: expected them beside the latent, as this policy '
+                        'looks at them, got none', 'volume')
+    unit = 1.0 if last.volume is None else 1 / last.volume.size
+    taken = policy_poses([view.camera for view in views], yaw, unit)
+    volume = None if last.volume is None else turned(last.volume.occupancy, -yaw)[None]
+    return Observation(
+        last.latent[None], taken[None], policy_poses(candidates, yaw, unit)[None], volume)
+
+
+def policy_poses(cameras: Sequence[Camera], yaw: float, unit: float) -> NDArray[np.float64]:
+    """Return the poses of cameras as an Observation has them, (N, 4, 4): lengths times `unit`."""
+    return np.stack([each.turned(-yaw).scaled(unit).pose for each in cameras])
