@@ -2,7 +2,8 @@
 #
 # Renders the training data, trains the network, its view policy, the tables of its quality and its
 # depth refiner, and puts all of it, exported, into RUN/weights. What stands is not made again, an
-# interrupted training continues. The numbers below are of the weights that ship; fewer are faster.
+# interrupted training continues. The numbers below are about those of the weights that ship, whose
+# four stages were trained one after the other; fewer are faster.
 #
 #   MESHES    folder with manifest.csv of real models (docs/data-sources.csv); without, none are used
 #   RUN       folder of data and runs, some 8 GB

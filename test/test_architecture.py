@@ -1,4 +1,4 @@
-"""The direction of the imports: each room knows those below it, and three rooms know ROS."""
+"""The direction of the imports: a subpackage knows those below it, and three know ROS."""
 
 import ast
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ('active_recon', 'msg_tools')
-# A room imports itself and what stands in the rows above its own
+# A subpackage imports itself and what stands in the rows above its own
 ROWS: tuple[set[str], ...] = (
     {'errors'},
     {'config', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting', 'view_colors',
@@ -27,7 +27,7 @@ ROWS: tuple[set[str], ...] = (
     {'demo'},
     {'cli'},
 )
-ROW_OF = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
+ROW_OF = {subpackage: row for row, subpackages in enumerate(ROWS) for subpackage in subpackages}
 # What runs on a robot needs nothing of what only researchers need, and the other way round
 RESEARCH = {'evaluation', 'training', 'paper'}
 ROBOT = {'msg_tools', 'bags', 'batch', 'report', 'viewer', 'watching', 'nodes', 'launching',
@@ -39,19 +39,19 @@ ROS = re.compile(r'(rclpy|rosidl_\w+|rmw_\w+|ament_\w+|tf2_\w+|launch(_\w+)?|cv_
                  r'message_filters|\w+_msgs|\w+_srvs|\w+_interfaces)(\.|$)')
 
 
-def room_of(module: str) -> str:
-    """Return the room of a dotted module name of ours: what stands first below active_recon."""
+def subpackage_of(module: str) -> str:
+    """Return the subpackage of a module of ours: what stands first below active_recon."""
     package, _, rest = module.partition('.')
     return rest.partition('.')[0] if package == 'active_recon' else package
 
 
-def may_import(room: str, other: str) -> bool:
-    """Return whether modules of a room may import those of another."""
-    apart = {room, other} & RESEARCH and {room, other} & ROBOT
+def may_import(subpackage: str, other: str) -> bool:
+    """Return whether modules of a subpackage may import those of another."""
+    apart = {subpackage, other} & RESEARCH and {subpackage, other} & ROBOT
     # The package itself offers what a notebook needs, and has its version
-    return room in ('', other) or other in ('', '__version__') or (
-        ROW_OF[other] < ROW_OF[room] and not apart
-        and room in IMPORTED_BY.get(other, ROW_OF))
+    return subpackage in ('', other) or other in ('', '__version__') or (
+        ROW_OF[other] < ROW_OF[subpackage] and not apart
+        and subpackage in IMPORTED_BY.get(other, ROW_OF))
 
 
 def imports_of(code: str, package: str) -> Iterator[str]:
@@ -67,10 +67,11 @@ def imports_of(code: str, package: str) -> Iterator[str]:
 
 def wrong_imports(module: str, code: str, package: str = '') -> list[str]:
     """Return what a module of ours imports against the direction."""
-    room = room_of(module)
+    subpackage = subpackage_of(module)
     return [name for name in imports_of(code, package or module.rpartition('.')[0])
-            if (name.partition('.')[0] in PACKAGES and not may_import(room, room_of(name)))
-            or (ROS.match(name) and room not in KNOW_ROS)]
+            if (name.partition('.')[0] in PACKAGES
+                and not may_import(subpackage, subpackage_of(name)))
+            or (ROS.match(name) and subpackage not in KNOW_ROS)]
 
 
 def modules() -> list[Path]:
@@ -84,8 +85,9 @@ def test_imports_follow_the_direction(path):
     assert not wrong_imports(module, path.read_text(), '.'.join(parts[:-1]))
 
 
-def test_every_room_has_its_row():
-    found = {room_of('.'.join(path.relative_to(ROOT).with_suffix('').parts)) for path in modules()}
+def test_every_subpackage_has_its_row():
+    found = {subpackage_of('.'.join(path.relative_to(ROOT).with_suffix('').parts))
+             for path in modules()}
     assert found - {'__init__'} == set(ROW_OF)
 
 

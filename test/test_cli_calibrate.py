@@ -6,6 +6,7 @@ from active_recon.calibration.lens import project, write_lens
 from active_recon.cli.main import app
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.turntable_pose import FixedCamera
+from active_recon.parameters.params_file import read_params_file
 import cv2
 import numpy as np
 import pytest
@@ -46,6 +47,13 @@ def written(folder):
                        folder / 'lens.yaml', '--out', folder / 'out')
     assert result.exit_code == 0, result.output
     return yaml.safe_load((folder / 'out' / 'calibration.yaml').read_text()), result.output
+
+
+def test_active_recon_up_can_use_the_parameters_that_are_written(written, folder):
+    nodes, _ = written
+    assert '/**/turntable_driver' in nodes
+    assert list(read_params_file(folder / 'out' / 'calibration.yaml')) == [
+        'reconstructor', 'view_planner']
 
 
 def test_the_parameters_are_those_of_the_camera_beside_the_table(written):

@@ -11,6 +11,8 @@ from active_recon.parameters.yaml_files import read_yaml
 
 _OF_ROS = {'use_sim_time'}
 """Parameters that every ROS node declares."""
+_BESIDE = {'turntable_driver'}
+"""Nodes of others that a file of `active-recon calibrate` has parameters for."""
 
 
 def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
@@ -18,9 +20,10 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
     Return the parameters that a file sets for each node that it names, in the file's order.
 
     A node may be named in a namespace (`/cell/recorder`) or in any (`/**/recorder`). Parameters
-    under `/**` are set for every node, except those that only other nodes have. Raises
-    ConfigError where the file is no parameters file, on a node that is not the package's, on an
-    unknown parameter, and on a value that is not allowed.
+    under `/**` are set for every node, except those that only other nodes have. A turntable's
+    driver, which a calibration has parameters for, is left out. Raises ConfigError where the file
+    is no parameters file, on a node that is not the package's, on an unknown parameter, and on a
+    value that is not allowed.
     """
     given: dict[str, dict[str, Any]] = {}
     shared: dict[str, Any] = {}
@@ -33,11 +36,11 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
         values = _mapping(path, str(key), values['ros__parameters'])
         if name == '**':
             shared.update(values)
-        elif name not in NODE_PARAMETERS:
+        elif name in NODE_PARAMETERS:
+            given.setdefault(name, {}).update(values)
+        elif name not in _BESIDE:
             raise ConfigError(
                 f'{path}: unknown node: expected one of {", ".join(NODE_PARAMETERS)}, got {key}')
-        else:
-            given.setdefault(name, {}).update(values)
     if not given:
         raise ConfigError(
             f'{path}: no node: expected one or more of {", ".join(NODE_PARAMETERS)}, got none')
