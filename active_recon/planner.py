@@ -216,7 +216,8 @@ class Planner:
         if self._stopped:
             return self.stop()
         worth = None if self._goal is None else self._goal.worth
-        reason = self._stopping.reason([view.entropy for view in views], quality, worth)
+        reason = self._stopping.reason([view.entropy for view in views], quality, worth,
+                                       learned=bool(self.provenance))
         return Decision(None, reason) if reason else self.next_goal()
 
     def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:

@@ -10,7 +10,8 @@ from std_msgs.msg import Header
 
 NAME = 'quality'
 _SUSPECT = 'suspect'
-_NUMBERS = tuple(field.name for field in fields(Quality) if field.name != _SUSPECT)
+_LATER = 'promise_learned'  # messages of earlier versions lack it
+_NUMBERS = tuple(field.name for field in fields(Quality) if field.name not in (_SUSPECT, _LATER))
 
 
 def quality_to_msg(quality: Quality, header: Header) -> DiagnosticArray:
@@ -19,7 +20,8 @@ def quality_to_msg(quality: Quality, header: Header) -> DiagnosticArray:
     return DiagnosticArray(header=header, status=[DiagnosticStatus(
         level=DiagnosticStatus.WARN if quality.suspect else DiagnosticStatus.OK, name=NAME,
         message=quality.warning or 'ok', hardware_id='',
-        values=[KeyValue(key=name, value=str(value)) for name, value in values.items()])])
+        values=[KeyValue(key=name, value=str(value)) for name, value in values.items()
+                if value is not None])])
 
 
 def quality_from_msg(msg: DiagnosticArray) -> Quality:
@@ -38,7 +40,8 @@ def quality_from_msg(msg: DiagnosticArray) -> Quality:
     if suspect and suspect not in SUSPECTS:
         raise MessageError('unknown suspect: expected one of '
                            f'{", ".join(SUSPECTS)}, got {suspect!r}', NAME)
-    return Quality(**{name: _share(name, values[name]) for name in _NUMBERS}, suspect=suspect)
+    return Quality(**{name: _share(name, values[name]) for name in _NUMBERS}, suspect=suspect,
+                   promise_learned=_share(_LATER, values[_LATER]) if _LATER in values else None)
 
 
 def _share(name: str, text: str) -> float:

@@ -22,7 +22,8 @@ def some_tables(sha256='none', seed=0):
         [sorted(table(50)) for _ in range(COUNTS)], [sorted(table(50)) for _ in range(COUNTS)])
 
 
-def quality_of(expected=0.6, promise=0.0, attainable=1.0, suspect=''):
+def quality_of(expected=0.6, promise=0.0, attainable=1.0, suspect='',
+               promise_learned=None):
     """Return a quality that is as good as it is told."""
     return Quality(expected, max(expected - 0.2, 0.0), promise, attainable,
-                   0.01 if suspect else 0.6, 0.9, suspect)
+                   0.01 if suspect else 0.6, 0.9, suspect, promise_learned)

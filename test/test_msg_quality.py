@@ -14,7 +14,7 @@ HEADER = Header(stamp=stamp_from_nanoseconds(1_795_000_000_123_456_789), frame_i
 
 @pytest.mark.parametrize('suspect', ['', *SUSPECTS])
 def test_a_quality_comes_back_to_the_bit_under_its_stamp(suspect):
-    quality = Quality(1 / 3, 0.1, 0.0, 1.0, 1e-3, 2 / 3, suspect)
+    quality = Quality(1 / 3, 0.1, 0.0, 1.0, 1e-3, 2 / 3, suspect, 0.3)
     msg = quality_to_msg(quality, HEADER)
     assert quality_from_msg(msg) == quality
     assert msg.header == HEADER
@@ -38,6 +38,13 @@ def test_values_that_are_no_quality_are_refused(name, value):
     with pytest.raises(MessageError) as caught:
         quality_from_msg(msg)
     assert caught.value.kind == 'quality'
+
+
+def test_a_quality_from_before_there_were_promises_of_the_learned_policy_has_none():
+    msg = quality_to_msg(quality_of(promise=0.5, promise_learned=0.6), HEADER)
+    msg.status[0].values = [pair for pair in msg.status[0].values
+                            if pair.key != 'promise_learned']
+    assert quality_from_msg(msg) == quality_of(promise=0.5)
 
 
 def test_a_quality_that_lacks_a_value_is_refused():

@@ -194,7 +194,20 @@ def test_bounds_are_about_the_expected_iou_and_promises_below_it():
         assert quality.lower_bound == pytest.approx(max(quality.expected_iou - 0.2, 0))
         assert quality.attainable == pytest.approx(min(quality.expected_iou + 0.3, 1))
         expected = 0.7 if quality.expected_iou >= 0.85 else 0.5 * (quality.expected_iou >= 0.6)
-        assert quality.promise == expected
+        assert quality.promise == quality.promise_learned == expected
+
+
+def test_what_the_learned_policy_promises_has_numbers_of_its_own(tmp_path):
+    tables = replace(some_tables(), needed_learned=[0.1, 0.2])
+    numbers = np.random.default_rng(0).normal(size=len(FEATURES) + 1)
+    quality = judged(numbers, 1, tables)
+    assert quality.expected_iou > 0.2
+    assert quality.promise_learned == 0.7
+    assert quality.promise == judged(numbers, 1).promise < 0.7
+    tables.write(tmp_path / 'tables.json')
+    assert QualityTables.read(tmp_path / 'tables.json') == tables
+    with pytest.raises(WeightsError, match='needed_learned of a wrong shape'):
+        replace(tables, needed_learned=[0.1])
 
 
 def test_what_is_unusual_has_a_suspect_and_a_question_and_the_usual_has_none():

@@ -13,7 +13,13 @@ from active_recon.evaluation.quality.faults import (
     wrong_size,
 )
 from active_recon.evaluation.quality.fitting import fit
-from active_recon.evaluation.quality.measuring import halves, measure, Measured, orders_of
+from active_recon.evaluation.quality.measuring import (
+    halves,
+    LEARNED,
+    measure,
+    Measured,
+    orders_of,
+)
 from active_recon.evaluation.quality.promises import (
     BROKEN,
     Episodes,
@@ -38,7 +44,7 @@ import torch
 COUNTS = 3
 
 
-def made_up(objects, seed, fault='', noise=0.4, sources=20):
+def made_up(objects, seed, fault='', noise=0.4, sources=20, kind='random'):
     """Return episodes whose log odds of IoU are a feature's, with noise; faults shift another."""
     rng = np.random.default_rng(seed)
     count = np.tile(np.arange(1, COUNTS + 1), objects)
@@ -54,7 +60,7 @@ def made_up(objects, seed, fault='', noise=0.4, sources=20):
         numbers, rng.normal(size=(len(count), 4)), np.full(len(count), np.nan) if fault else iou,
         np.zeros(len(count)), count, np.array([f'{name} {fault}' for name in names]), names,
         np.array([f'source {each % sources}' for each in item]),
-        np.full(len(count), fault, '<U16'), np.full(len(count), 'random', '<U16'))
+        np.full(len(count), fault, '<U16'), np.full(len(count), kind, '<U16'))
 
 
 @pytest.fixture(scope='module')
@@ -89,6 +95,19 @@ def test_promises_that_were_calibrated_are_kept_by_new_objects(figures):
     made = [found for found in figures['promises']['random'].values() if found['stopped']]
     assert len(made) > 2
     assert all(found['kept'] > 1 - BROKEN - 0.04 for found in made)
+
+
+def test_views_of_the_learned_policy_have_promises_of_their_own():
+    faults = [made_up(60, 2, fault) for fault in FAULTS]
+    usual = made_up(400, 1)
+    sharper = made_up(400, 5, noise=0.1, kind=LEARNED)
+    alone, other, both = (fit(made_up(400, 0), Measured.joined([*parts, *faults]), 'abc')
+                          for parts in ([usual], [sharper], [usual, sharper]))
+    assert len(alone.needed_learned) == 0
+    assert both.needed_learned == other.needed
+    assert list(both.needed) == [max(pair) for pair in zip(
+        alone.needed, other.needed, strict=True)]
+    assert min(both.needed_learned) < min(both.needed)
 
 
 def test_a_promise_that_is_broken_too_often_is_never_made():

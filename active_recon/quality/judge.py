@@ -47,10 +47,13 @@ class Judge:
             p_value(float(np.logaddexp.reduce(by_fault)), self._tables.usual_scores[row]),
             p_value(float(numbers[-1]), self._tables.usual_distances[row])))
         suspect = self._tables.suspects[int(by_fault.argmax())] if p <= FALSE_ALARMS else ''
+        promise, promise_learned = (
+            promised(expected, self._tables.targets, self._tables.needed_where(learned))
+            for learned in (False, True))
         return Quality(
-            expected, _share(expected - self._tables.margin[row]),
-            promised(expected, self._tables.targets, self._tables.needed),
-            _share(expected + self._tables.growth[row]), p, float(numbers[_IOU]), suspect)
+            expected, _share(expected - self._tables.margin[row]), promise,
+            _share(expected + self._tables.growth[row]), p, float(numbers[_IOU]), suspect,
+            promise_learned)
 
 
 def standardised(numbers: NDArray[np.float64], centre: Sequence[float],

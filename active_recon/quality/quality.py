@@ -23,12 +23,14 @@ class Quality:
     - expected_iou: the expected IoU with the truth, in [0, 1]
     - lower_bound: the IoU that at least 90 % of objects exceed after as many views
     - promise: the largest `target_quality` at which an episode may stop now, so that at most one
-      in ten that stop are below it; 0 if there is none
+      in ten that stop are below it, in whatever order views are taken; 0 if there is none
     - attainable: the IoU that at most 5 % of such objects exceed with as many views as were
       measured
     - p_value: how often views of known objects, without a fault, are as unusual, in (0, 1]
     - silhouette_iou: mean over views of the IoU of the predicted and the seen silhouette
     - suspect: the most likely of SUSPECTS where the p-value is at most FALSE_ALARMS, else ''
+    - promise_learned: the promise where the learned policy of the weights chooses the views; None
+      where it is not told, in bags of earlier versions
     """
 
     expected_iou: float
@@ -38,6 +40,12 @@ class Quality:
     p_value: float
     silhouette_iou: float
     suspect: str = ''
+    promise_learned: float | None = None
+
+    def promise_for(self, learned: bool) -> float:
+        """Return the promise where the learned policy of the weights chooses the views or not."""
+        return self.promise if self.promise_learned is None or not learned else (
+            self.promise_learned)
 
     @property
     def summary(self) -> str:

@@ -1,7 +1,7 @@
 """The numbers that the quality of a network's reconstructions is judged by, in a JSON file."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields, MISSING
 import json
 from pathlib import Path
 from typing import Any, Self
@@ -26,7 +26,9 @@ class QualityTables:
     - head: (2 F,), the weights of the standardised features and of their squares in the log odds
       of the IoU; intercepts: (K,)
     - margin: (K,), between expected IoU and lower bound
-    - targets: (P,), increasing, that can be promised; needed: (P,), the expected IoU for that
+    - targets: (P,), increasing, that can be promised; needed: (P,), the expected IoU for that in
+      any order of the views; needed_learned: (P,), the same where the learned policy of the
+      weights chooses them, empty where that was not measured
     - growth: (K,), between expected and attainable IoU
     - latent_mean: (D,); latent_whitening: (D, D)
     - suspects: names of faults; fault_head: (faults, F + 1), their log odds against no fault
@@ -49,6 +51,7 @@ class QualityTables:
     fault_head: Sequence[Sequence[float]]
     usual_scores: Sequence[Sequence[float]]
     usual_distances: Sequence[Sequence[float]]
+    needed_learned: Sequence[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Raise WeightsError where shapes do not fit each other, or names are unknown."""
@@ -56,6 +59,7 @@ class QualityTables:
         expected = {
             'centre': (size,), 'scale': (size,), 'head': (2 * size,), 'intercepts': (counts,),
             'growth': (counts,), 'needed': (len(self.targets),),
+            'needed_learned': (len(self.targets),) if len(self.needed_learned) else (0,),
             'latent_whitening': (width, width), 'fault_head': (len(self.suspects), size + 1)}
         for name, shape in expected.items():
             found = np.shape(getattr(self, name))
@@ -68,6 +72,10 @@ class QualityTables:
         if unknown := set(self.suspects) - SUSPECTS.keys():
             raise WeightsError('quality tables: unknown suspects: expected some of '
                                f'{", ".join(SUSPECTS)}, got {", ".join(sorted(unknown))}')
+
+    def needed_where(self, learned: bool) -> Sequence[float]:
+        """Return what targets need, (P,), where the learned policy chooses the views or not."""
+        return self.needed_learned if learned and len(self.needed_learned) else self.needed
 
     @property
     def known_latents(self) -> KnownLatents:
@@ -83,7 +91,8 @@ class QualityTables:
         """Read tables; raises WeightsError where they cannot be used."""
         try:
             found = json.loads(path.read_text())
-            return cls(**{each.name: found[each.name] for each in fields(cls)})
+            return cls(**{each.name: found[each.name] for each in fields(cls)
+                          if each.name in found or each.default_factory is MISSING})
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise WeightsError(f'{path}: no readable quality tables: expected those that '
                                f'`active-recon quality fit` writes, got: {error!r}') from error

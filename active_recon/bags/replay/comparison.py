@@ -1,7 +1,7 @@
 """Comparison of a replay with the recording: the same bits, or the largest deviation."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 from active_recon.acquisition.goals import Goal
 from active_recon.bags.replay.replay import ReplayedEpisode, ReplayStep
@@ -105,6 +105,8 @@ def _deviations(step: ReplayStep, done: str,
                abs(recorded.entropy - entropy) / max(abs(recorded.entropy), 1e-9))
     judged = step.reconstruction.quality
     if recorded.quality is not None and judged is not None:
+        if recorded.quality.promise_learned is None:
+            judged = replace(judged, promise_learned=None)
         yield 'quality', recorded.quality == judged, _quality(recorded.quality, judged)
     if step.decision is None:
         return
@@ -148,8 +150,8 @@ def _quality(recorded: Quality, replayed: Quality) -> float:
     """Return the largest deviation of two qualities' numbers; infinite for other suspects."""
     if recorded.suspect != replayed.suspect:
         return np.inf
-    pairs = zip(astuple(recorded)[:-1], astuple(replayed)[:-1], strict=True)
-    return float(max(abs(own - other) for own, other in pairs))
+    return float(max(abs(value - getattr(replayed, name))
+                     for name, value in asdict(recorded).items() if isinstance(value, float)))
 
 
 def _largest(recorded: np.ndarray, replayed: np.ndarray) -> float:

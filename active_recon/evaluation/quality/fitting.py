@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from active_recon.errors import DataError
 from active_recon.evaluation.quality.faults import FAULTS
-from active_recon.evaluation.quality.measuring import Measured
+from active_recon.evaluation.quality.measuring import LEARNED, Measured
 from active_recon.evaluation.quality.promises import Episodes, needed_for
 from active_recon.evaluation.quality.shells import HOLLOW
 from active_recon.quality.conformal import upper_quantile
@@ -57,18 +57,18 @@ def fit(known: Measured, calibration: Measured, sha256: str) -> QualityTables:
     judged = usual.hollow <= HOLLOW
     right, ahead = usual.solid, expected[judged]
     of = [usual.count == number for number in range(1, counts + 1)]
-    needed = [max(needed_for(target, Episodes.of(right.rows(right.kind == kind),
-                                                 ahead[right.kind == kind]))
-                  for kind in np.unique(right.kind)) for target in TARGETS]
+    needed = {kind: _needed(right.rows(right.kind == kind), ahead[right.kind == kind])
+              for kind in np.unique(right.kind).tolist()}
     return QualityTables(
         sha256, _plain(centre), _plain(scale), _plain(head), _plain(intercepts),
         _plain([min(upper_quantile((ahead - right.iou)[right.count == number], MISS), 1.0)
                 for number in range(1, counts + 1)]),
-        TARGETS, _plain(needed), _growth(right, ahead), _plain(latents.mean),
+        TARGETS, _plain(np.max(list(needed.values()), axis=0)), _growth(right, ahead),
+        _plain(latents.mean),
         [_plain(row) for row in latents.whitening], suspects,
         [_plain(row) for row in fault_head],
         [_plain(np.sort(scores[rows])) for rows in of],
-        [_plain(np.sort(own[rows, -1])) for rows in of])
+        [_plain(np.sort(own[rows, -1])) for rows in of], _plain(needed.get(LEARNED, [])))
 
 
 def numbers_of(measured: Measured, latents: KnownLatents) -> Matrix:
@@ -114,6 +114,12 @@ def _softmax_head(classes: Sequence[Matrix]) -> Matrix:
     found = minimize(loss, np.zeros(shape[0] * shape[1]), jac=True, method='L-BFGS-B',
                      options={'maxiter': 2000})
     return np.asarray(found.x.reshape(shape))
+
+
+def _needed(usual: Measured, expected: Matrix) -> list[float]:
+    """Return the expected IoU that each of TARGETS needs in one order of the views."""
+    episodes = Episodes.of(usual, expected)
+    return [needed_for(target, episodes) for target in TARGETS]
 
 
 def _growth(usual: Measured, expected: Matrix) -> list[float]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from active_recon.evaluation.quality.fitting import numbers_of
-from active_recon.evaluation.quality.measuring import Measured
+from active_recon.evaluation.quality.measuring import LEARNED, Measured
 from active_recon.evaluation.quality.promises import Episodes, kept_at_least
 from active_recon.evaluation.quality.shells import HOLLOW
 from active_recon.evaluation.statistics import difference, mean_interval
@@ -51,7 +51,8 @@ def study(measured: Measured, tables: QualityTables) -> dict[str, Any]:
         'promises': {kind: {f'{target:g}': _promise(
             Episodes.of(measured.rows(solid & (measured.kind == kind)),
                         expected[solid & (measured.kind == kind)]), target, needed, tables)
-            for target, needed in zip(tables.targets, tables.needed, strict=True)}
+            for target, needed in zip(
+                tables.targets, tables.needed_where(kind == LEARNED), strict=True)}
             for kind in np.unique(measured.kind[solid]).tolist()}}
 
 
