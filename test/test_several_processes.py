@@ -85,6 +85,15 @@ def on_two_nodes(by_torchrun, *words):
         for rank in range(2)]
 
 
+def kill_node(process):
+    """Kill a node with all that runs on it: torchrun gives its workers sessions of their own."""
+    with suppress(ProcessLookupError, FileNotFoundError):
+        workers = Path(f'/proc/{process.pid}/task/{process.pid}/children').read_text().split()
+        for session in (process.pid, *map(int, workers)):
+            with suppress(ProcessLookupError):
+                os.killpg(session, signal.SIGKILL)
+
+
 @pytest.fixture(scope='module')
 def undisturbed(dataset, tmp_path_factory):
     """Return the weights of two processes that trained to the end."""
@@ -104,13 +113,12 @@ def test_two_nodes_train_as_two_processes_do_and_go_on_after_one_died(
     try:
         while not checkpoint.exists() and time.monotonic() < end:
             time.sleep(0.02)
-        os.killpg(second.pid, signal.SIGKILL)  # the machine with all that runs on it
+        kill_node(second)
         # The other does not go on alone; it may wait for torch's 30 minutes for a collective
         first.communicate(timeout=2000)
     finally:
         for process in (first, second):
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+            kill_node(process)
             process.communicate()
     assert first.returncode != 0
     assert checkpoint.exists() and not (out / 'weights.safetensors').exists()
