@@ -250,11 +250,19 @@ class Planner:
                 'no view in this episode yet: expected one before a plan', 'plan')
         return self._goal
 
+    @property
+    def sweeps(self) -> bool:
+        """Whether an even sweep chooses in the policy's place: the last view is unusual."""
+        last = self._views[-1].quality if self._views else None
+        return last is not None and bool(last.suspect)
+
     def reason(self) -> GoalReason | None:
         """Return why the goal is worth its view; None without probabilities after a view."""
         last = self._views[-1] if self._views else None
         if last is None or last.volume is None or self._goal is None:
             return None
+        if self.sweeps:
+            return GoalReason('next of an even sweep, since the views are unusual')
         poses = np.stack([camera.scaled(1 / last.volume.size).pose for camera in (
             self._goal.camera, *(view.camera for view in self._views))])
         return goal_reason(Observation(last.latent[None], poses[None, 1:], poses[None, :1],

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 import math
 from pathlib import Path
@@ -45,10 +45,10 @@ class Reconstruction:
     """
 
     grid: VoxelGrid
-    latent: NDArray[np.float32]
-    image: NDArray[np.uint8] | None = None
+    latent: NDArray[np.float32] = field(repr=False)
+    image: NDArray[np.uint8] | None = field(default=None, repr=False)
     depth_refusal: str = ''
-    judge: Callable[[], Quality | None] = lambda: None
+    judge: Callable[[], Quality | None] = field(default=lambda: None, repr=False)
 
     @cached_property
     def quality(self) -> Quality | None:

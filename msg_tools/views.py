@@ -172,8 +172,8 @@ class ViewJoiner:
                 height, width = image.size
                 if (intrinsics.height, intrinsics.width) != (height, width):
                     raise MessageError(
-                        f'wrong image size in camera info: expected {height} x {width}, '
-                        f'got {intrinsics.height} x {intrinsics.width}', 'camera_info')
+                        f'wrong image size in camera info: expected {width} x {height}, '
+                        f'got {intrinsics.width} x {intrinsics.height}', 'camera_info')
             except MessageError as error:
                 self._drop_first()
                 yield error

@@ -162,13 +162,13 @@ def test_a_scene_that_changed_as_a_whole_is_refused():
 
 
 def test_a_reference_of_another_size_is_refused():
-    with pytest.raises(ViewError, match='size, 48 x 64, got 64 x 48.*capture_background') as error:
+    with pytest.raises(ViewError, match='size, 64 x 48, got 48 x 64.*capture_background') as error:
         off_reference(np.zeros((64, 48, 3), np.uint8), np.zeros((48, 64, 3), np.uint8))
     assert error.value.kind == 'reference'
 
 
 @pytest.mark.parametrize(('mask', 'kind', 'said'), [
-    (np.ones((64, 47), np.bool_), 'mask', 'size, 64 x 48, got 64 x 47'),
+    (np.ones((64, 47), np.bool_), 'mask', 'size, 48 x 64, got 47 x 64'),
     (np.zeros((64, 48), np.bool_), 'no_object', 'all background'),
 ])
 def test_a_mask_that_cannot_be_used_is_refused(mask, kind, said):

@@ -303,6 +303,16 @@ def test_a_target_that_is_reached_with_the_last_view_is_reached():
     assert ends_after(planner, [quality_of(), quality_of(promise=0.5)]) == (2, 'target_reached')
 
 
+def test_while_views_are_unusual_a_goal_is_told_as_one_of_an_even_sweep():
+    planner = Planner(FarthestPolicy(), 4, 0)
+    volume = VoxelGrid(np.full((32, 32, 32), 0.5, np.float32))
+    for angle, suspect in ((0.0, ''), (1.0, 'pose'), (2.0, '')):
+        planner.add_view(LATENT, orbit_camera(angle), 100.0 / (1 + angle), volume,
+                         quality_of(suspect=suspect))
+        assert planner.sweeps == bool(suspect)
+        assert planner.reason().shows.startswith('next of an even sweep') == bool(suspect)
+
+
 def test_while_views_are_unusual_their_quality_ends_nothing():
     planner = Planner(FarthestPolicy(), 3, 0, target_quality=0.5)
     unusual = [quality_of(promise=0.9, attainable=0.1, suspect='pose')] * 3

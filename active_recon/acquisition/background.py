@@ -205,4 +205,4 @@ def _parts(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int32
 
 
 def _size(image: NDArray[np.uint8] | NDArray[np.bool_]) -> str:
-    return f'{image.shape[0]} x {image.shape[1]}'
+    return f'{image.shape[1]} x {image.shape[0]}'

@@ -1,7 +1,7 @@
 """The goal that a camera is sent to: the best of the candidates, or what lies between them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost
@@ -24,8 +24,8 @@ class Goal:
     """
 
     camera: Camera
-    candidates: Sequence[Camera]
-    scores: NDArray[np.float32]
+    candidates: Sequence[Camera] = field(repr=False)
+    scores: NDArray[np.float32] = field(repr=False)
     gain: float | None = None
     worth: float | None = None
 

@@ -99,7 +99,9 @@ class StreamMonitor:
                     f'holds {_QUEUE} images')
         if stream == 'images' and self._lost_at is not None and now - self._lost_at < _KEPT_S:
             return ('lost in transport: they were published and did not arrive; is the connection '
-                    "too slow, or the middleware's buffer too small for such images?")
+                    "too slow, or the middleware's buffer too small for such images? On one "
+                    "machine the camera's process needs the Fast DDS profile of these nodes: see "
+                    'missing_images under Troubleshooting')
         return 'lost in transport, or never published'
 
     def _note_period(self, stream: str, periods: NDArray[np.float64]) -> None:

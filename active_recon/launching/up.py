@@ -9,7 +9,7 @@ import time
 from active_recon.interrupts import held_interrupts
 from active_recon.launching.processes import NodeProcesses
 from active_recon.nodes.runtime.composable import COMPOSABLE
-from active_recon.parameters.params_file import read_params_file
+from active_recon.parameters.params_file import nodes_left_out, read_params_file
 
 _CHECK_EVERY_S = 0.1
 
@@ -43,6 +43,9 @@ def run_up(start: Start, say: Callable[[str], None]) -> None:
     namespace = f'/{start.namespace.strip("/")}' if start.namespace else ''
     names = list(read_params_file(start.params_file))
     together = [name for name in names if name in COMPOSABLE] if start.single_process else []
+    for left_out in nodes_left_out(start.params_file):
+        say(f"{left_out} is not one of the package's nodes: start it yourself, with the same file "
+            '(examples/ has one)')
     say(f'starting {", ".join(names)}; Ctrl-C stops them')
     with (suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked,
           NodeProcesses() as nodes):

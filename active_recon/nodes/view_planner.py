@@ -8,6 +8,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
 from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy
+from active_recon.nodes.loop.target_warning import tell_target
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.loop.view_synchronizer import ViewSynchronizer
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
@@ -49,6 +50,7 @@ class ViewPlannerNode(ManagedNode):
         self._loaded = loaded_policy(params)
         self._planner = self._planner_of(params, self._loaded.policy)
         tell_policy(self, self._diagnostics, self._loaded.in_use)
+        tell_target(self._diagnostics, params, self._loaded.in_use)
         self.add_cleanup(self._free_policy)
         tell_of_runtime(self._diagnostics, self._planner.provenance)
         self._goals = GoalPublisher(self, self._frame)
@@ -98,6 +100,7 @@ class ViewPlannerNode(ManagedNode):
         def commit() -> None:
             if loaded.in_use != self._loaded.in_use:
                 tell_policy(self, self._diagnostics, loaded.in_use)
+            tell_target(self._diagnostics, params, loaded.in_use)
             self._loaded, self._planner = loaded, planner
             tell_of_runtime(self._diagnostics, planner.provenance)
             if not self.is_active:

@@ -49,6 +49,12 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
     return {node: {**_own(node, shared), **values} for node, values in given.items()}
 
 
+def nodes_left_out(path: Path) -> list[str]:
+    """Return the nodes of others that a file has parameters for; raises as `read_params_file`."""
+    names = (str(key).rpartition('/')[2] for key in _mapping(path, path.name, read_yaml(path)))
+    return [name for name in names if name in _BESIDE]
+
+
 def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
     """Return the shared parameters without those that only other nodes have."""
     own, *others = ({each.name for each in declared(parameters)}

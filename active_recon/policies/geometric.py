@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
+_MOST_IN_TURN = 12
+"""Views of a ring up to which an even sweep takes them one beside the other."""
 
 
 class HeuristicPolicy:
@@ -47,8 +49,9 @@ class UniformPolicy(HeuristicPolicy):
     besides: from azimuth to azimuth the height, the sine of the elevation, grows by 0.618 of the
     candidates' range, and goes on from the lowest where that is above the highest. These are
     points of a Fibonacci lattice, which gives equal areas of a sphere about equally many. They are
-    taken in steps of about 137 degrees, so that few of them are spread too. Then the best
-    candidate is the goal, and no azimuth between candidates is preferred.
+    taken in steps of about 137 degrees, so that few of them are spread too, as are more than
+    twelve at one elevation: an episode of so many is meant to end earlier. Where elevations differ
+    the best candidate is the goal, and no azimuth between candidates is preferred.
     """
 
     def __init__(self, views: int) -> None:
@@ -63,7 +66,8 @@ class UniformPolicy(HeuristicPolicy):
         directions = pose_directions(seen.candidates)
         turns, rest = divmod(count, self._views)
         is_ring = at_one_elevation(directions)
-        place = np.where(is_ring, count, turns * self._views + self._order[rest])
+        spread = turns * self._views + self._order[rest]
+        place = np.where(is_ring & (self._views <= _MOST_IN_TURN), count, spread)
         target = (pose_azimuths(first) + place * self._step) % TURN
         height = np.where(is_ring, pose_directions(first)[:, 2],
                           _risen(pose_directions(first)[:, 2], directions[..., 2], place))

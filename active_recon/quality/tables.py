@@ -77,6 +77,11 @@ class QualityTables:
         """Return what targets need, (P,), where the learned policy chooses the views or not."""
         return self.needed_learned if learned and len(self.needed_learned) else self.needed
 
+    def most_promised(self, learned: bool) -> float:
+        """Return the largest target that an expected IoU up to 1 is enough for, 0 if none is."""
+        return max((target for target, needed in zip(
+            self.targets, self.needed_where(learned), strict=True) if needed <= 1), default=0.0)
+
     @property
     def known_latents(self) -> KnownLatents:
         """The latents of the training objects."""

@@ -1,6 +1,6 @@
 """The voxel grid: a cube of occupancy probabilities, its measures, and its mesh."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, TYPE_CHECKING
 
@@ -61,7 +61,7 @@ class VoxelGrid:
     metres. Raises DataError where the shape is not a cube or the size not finite and above 0.
     """
 
-    occupancy: NDArray[np.float32]
+    occupancy: NDArray[np.float32] = field(repr=False)
     size: float = 1.0
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 
 from .conftest import FakeCamera, FakeReconstructor, STREAM_QOS
 
@@ -44,6 +44,16 @@ def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
     for name in ('camera/camera_info', 'camera/pose'):
         assert f'/{name}: no messages: expected' in said('reconstructor', name)
     assert len(reconstructor.log('WARN.*none has arrived')) == 3
+
+
+def test_what_the_loop_itself_publishes_is_proposed_as_no_input(start_node, bench, said):
+    for topic in ('next_azimuth', 'table/joints'):
+        bench.node.create_publisher(JointState, topic, STREAM_QOS)
+    start_node('reconstructor', pose_source='turntable_joint', camera_position='[1.0, 0.0, 0.0]',
+               camera_orientation='[-0.5, -0.5, 0.5, 0.5]', turntable_direction=1)
+    problem = said('reconstructor', 'turntable/joint_states',
+                   'remap with -r turntable/joint_states:=/table/joints')
+    assert '/next_azimuth' not in problem
 
 
 def test_a_publisher_that_is_silent_or_of_another_type_is_named_with_its_qos(

@@ -114,7 +114,7 @@ def image_of_the_last_episode(camera):
     (pose_in_another_frame, 'frame', "frame .*expected 'object', got 'map'"),
     (pose_with_a_zero_quaternion, 'quaternion', r'expected a unit quaternion.*got \[0.0'),
     (pose_of_nan, 'pose', r'camera pose not finite: got position \[nan'),
-    (camera_info_of_another_size, 'camera_info', 'camera info: expected 137 x 137, got 480 x 640'),
+    (camera_info_of_another_size, 'camera_info', 'camera info: expected 137 x 137, got 640 x 480'),
     (image_that_arrives_twice, 'duplicate', 'duplicate image: got that of'),
     (image_older_than_the_last, 'out_of_order', 'expected increasing stamps, got .* after'),
     (image_of_the_last_episode, 'last_episode', 'image of another episode: expected one of this '

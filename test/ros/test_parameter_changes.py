@@ -1,6 +1,7 @@
 """Parameters that change while a node runs, by the services that `ros2 param` calls."""
 
 import math
+import re
 import shutil
 
 from active_recon.geometry.cameras import Camera
@@ -154,3 +155,16 @@ def test_a_turntable_turns_and_streams_as_fast_as_was_set_last(start_node, bench
         return len(poses) > 10 and abs(azimuth - 2.0) < 0.2
 
     bench.until(there, 'a stream of poses, and the goal')
+
+
+def test_a_target_that_the_tables_never_promise_is_warned_of_while_it_is_set(start_node, bench):
+    planner = start_node('view_planner', target_quality=0.95, start_azimuth=0.0)
+    line, = planner.log('WARN.*target_quality')
+    assert re.search(r'target_quality 0.95 is never reached: expected at most 0\.\d, all that the '
+                     'tables of the weights promise with the policy attention', line)
+    assert change(bench, 'view_planner', target_quality=0.3)['target_quality'].successful
+    bench.until(lambda: not bench.state('view_planner').problem, 'no warning')
+    results = change(bench, 'view_planner', policy='uniform', target_quality=0.9)
+    assert all(each.successful for each in results.values())
+    bench.until(lambda: 'with the policy uniform' in bench.state('view_planner').problem,
+                'the warning')

@@ -8,7 +8,7 @@ import sys
 from active_recon.errors import ConfigError
 from active_recon.parameters.declaration import declared
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
-from active_recon.parameters.params_file import read_params_file
+from active_recon.parameters.params_file import nodes_left_out, read_params_file
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -45,6 +45,14 @@ def test_what_is_given_to_all_is_given_to_each_unless_it_has_its_own(tmp_path):
     assert given['view_planner']['object_size'] == 3
     assert given['recorder'] == {'use_sim_time': True, 'colour': 'red'}  # a node warns of it
     assert 'mesh' not in given['view_planner']
+
+
+def test_the_driver_of_a_turntable_is_left_out_and_named(tmp_path):
+    path = tmp_path / 'some.yaml'
+    path.write_text('/**/turntable_driver: {ros__parameters: {turntable_direction: 1}}\n'
+                    '/**/recorder: {ros__parameters: {output_dir: bags}}\n')
+    assert list(read_params_file(path)) == ['recorder']
+    assert nodes_left_out(path) == ['turntable_driver']
 
 
 @pytest.mark.parametrize(('text', 'said'), [

@@ -43,6 +43,17 @@ def test_a_parameter_out_of_range_is_refused_with_its_range(start_node, name, pa
     assert re.search(f'parameters? {said}', refusal(start_node, name, **parameters))
 
 
+@pytest.mark.parametrize('given', [('-p', 'object_size:=0.5'), ('--nonsense',)])
+def test_arguments_that_are_not_for_ros_are_refused_by_a_node_that_has_none(ros_domain, given):
+    ended = subprocess.run(
+        [sys.executable, '-m', 'active_recon.nodes.recorder', *given, '--ros-args', '--log-level',
+         'info'], cwd=ROOT, capture_output=True, text=True)
+    assert ended.returncode == 1
+    line, = ended.stderr.splitlines()
+    assert line.endswith('unknown arguments: expected --ros-args before all others, as in '
+                         f'--ros-args -p NAME:=VALUE, got {" ".join(given)}')
+
+
 @pytest.mark.parametrize('named', [(), ('recorder',), ('view_planner', 'view_planner')])
 def test_nodes_that_cannot_share_a_process_are_refused_by_name(ros_domain, named):
     ended = subprocess.run(

@@ -17,6 +17,9 @@ CHECK_EVERY_S = 0.4
 _CHECKS = round(AWAITED_S / CHECK_EVERY_S)  # a busy node checks less often, and waits longer
 _LOOK_EVERY = 5  # checks: the remedies need all of the graph
 _MAX_CANDIDATES = 3
+_RESULTS = {'entropy', 'latent', 'network_image', 'next_azimuth', 'next_view', 'view',
+            'view_image'}
+"""Topics of the loop's own nodes, which are nobody's camera or turntable."""
 
 
 class AwaitedInputs:
@@ -91,7 +94,8 @@ class AwaitedInputs:
         own |= {each.topic_name for each in self._node.subscriptions}
         for topic, kinds in self._node.get_topic_names_and_types():
             for suffix in {suffixes[kind] for kind in kinds if kind in suffixes}:
-                if topic in own or not self._node.get_publishers_info_by_topic(topic):
+                if (topic in own or topic.rpartition('/')[2] in _RESULTS
+                        or not self._node.get_publishers_info_by_topic(topic)):
                     continue
                 if topic.endswith(suffix):
                     yield topic, name, topic.removesuffix(suffix)

@@ -37,7 +37,7 @@ class Diagnostics:
         self.reset()
         self._unlogged: Counter[str] = Counter()
         self._logged_at: dict[str, float] = {}
-        self._last_problem = ''
+        self._last_problem = '', ''  # its key and its message
         self._warnings: dict[str, str] = {}
         self._logged_warnings: set[str] = set()
         self._failure = ''
@@ -139,7 +139,7 @@ class Diagnostics:
 
     def _notice(self, key: str, message: str) -> None:
         self._counts[key] += 1
-        self._last_problem = message
+        self._last_problem = key, message
         self._note_change()
 
     def _log(self, key: str, message: str) -> bool:
@@ -161,7 +161,7 @@ class Diagnostics:
     def _publish_regularly(self) -> None:
         self._publish()
         # A problem is published for up to a second, so that slow subscribers see it.
-        self._last_problem = ''
+        self._last_problem = '', ''
 
     def _publish(self) -> None:
         status = self._status(time.monotonic())
@@ -177,6 +177,9 @@ class Diagnostics:
             latency = self._latency.percentile(percent)
             if not math.isnan(latency):
                 values[f'Latency p{percent} (ms)'] = f'{1e3 * latency:.1f}'
-        problems = dict.fromkeys(filter(None, [*self._warnings.values(), self._last_problem]))
+        key, last = self._last_problem
+        # What still holds stands among the warnings, perhaps in newer words
+        last = '' if key.removeprefix('warned/') in self._warnings else last
+        problems = dict.fromkeys(filter(None, [*self._warnings.values(), last]))
         return NodeStatus(self._node.get_fully_qualified_name(), self._counts, values,
                           '; '.join(problems), self._failure, self._host)

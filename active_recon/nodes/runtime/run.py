@@ -18,6 +18,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 _CLOSE_TIMEOUT_S = 15.0
 
@@ -35,7 +36,16 @@ def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> No
         name = program.parent.name if program.stem == '__main__' else program.stem
         sys.stdout.write(usage(name) + '\n')
         return
-    run_nodes(lambda: [make_node], args)
+    run_nodes(lambda: _alone(make_node, args), args)
+
+
+def _alone(make_node: Callable[[], Node], args: list[str] | None) -> list[Callable[[], Node]]:
+    """Return what makes the one node of an executable, which has no arguments but ROS's."""
+    unknown = remove_ros_args(sys.argv[1:] if args is None else args)
+    if unknown:
+        raise ConfigError(f'unknown arguments: expected --ros-args before all others, as in '
+                          f'--ros-args -p NAME:=VALUE, got {" ".join(unknown)}')
+    return [make_node]
 
 
 def run_nodes(makers: Callable[[], Iterable[Callable[[], Node]]],
