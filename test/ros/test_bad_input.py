@@ -194,3 +194,14 @@ def test_goals_that_are_not_finite_are_told_each_said_once_counted_and_survived(
     assert 'azimuth goal not finite: expected radians, got nan' in line
     ask(math.pi)
     bench.until(lambda: poses and poses[-1].pose.position.x < -1, 'the camera on the other side')
+
+
+def test_images_from_a_clock_that_is_far_ahead_are_warned_of(start_node, bench):
+    reconstructor = start_node('reconstructor', take_views='all')
+    camera = FakeCamera(bench)
+    camera.show()
+    assert 'warned/clock_ahead' not in bench.counts('reconstructor')
+    camera.send(*camera.messages(bench.now() + 1_000_000_000_000))
+    bench.until(lambda: bench.counts('reconstructor').get('warned/clock_ahead'), 'the warning')
+    line, = reconstructor.log('stamped')
+    assert re.search('an image is stamped (999|1000) s from now: expected stamps of this', line)

@@ -25,6 +25,9 @@ from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.views import NOT_BEGUN, View, ViewJoiner
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+CLOCK_AHEAD_S = 5.0
+"""Time ahead of the node's clock from which an image's stamp is warned of."""
+
 
 class ViewInputs:
     """
@@ -92,9 +95,19 @@ class ViewInputs:
                     'image of another episode: expected one of this episode, which began at '
                     f'{self._begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
                     'recording, play its clock and set use_sim_time', 'last_episode')
+            self._check_clock(stamp)
             self._joiner.add_image(stamp, msg, time.monotonic())
             self._poses.on_image(msg.header)
         self._on_message()
+
+    def _check_clock(self, stamp: int) -> None:
+        """Warn of a stamp far ahead of the node's clock: images in time are refused after it."""
+        ahead_s = (stamp - self._node.get_clock().now().nanoseconds) / 1e9
+        if ahead_s > CLOCK_AHEAD_S:
+            self._diagnostics.warn('clock_ahead', (
+                f'an image is stamped {ahead_s:.0f} s from now: expected stamps of this '
+                "machine's clock; are the clocks of the machines the same? Images of earlier "
+                'stamps will be refused, until a new episode begins'))
 
     def _on_camera_info(self, msg: CameraInfo) -> None:
         with self._diagnostics.rejecting():
