@@ -160,6 +160,15 @@ def test_a_file_without_cameras_is_refused(name, content, expected, photos, tmp_
         read_cameras(tmp_path / name, photos)
 
 
+@pytest.mark.parametrize('name', ['nothere.json', 'sparse/0'])
+def test_cameras_that_are_not_there_are_refused_as_missing(name, photos, tmp_path):
+    with pytest.raises(DataError, match=f'^{tmp_path / name}: no such file or folder: expected '
+                                        'transforms.json'):
+        read_cameras(tmp_path / name, photos)
+    with pytest.raises(DataError, match=f'^{tmp_path}: no cameras: expected transforms.json'):
+        read_cameras(tmp_path, photos)
+
+
 def test_poses_that_do_not_match_the_photos_are_refused(photos, tmp_path):
     path = write_opencv(tmp_path / 'cameras.yml', rig(count=3), named=False)
     with pytest.raises(DataError, match='expected .* six numbers for each of 4 photos, got 3'):

@@ -1,5 +1,6 @@
 """An object is reconstructed from photos as they are, wherever it stands in the cameras' world."""
 
+from dataclasses import replace
 import json
 import os
 from pathlib import Path
@@ -10,15 +11,20 @@ from active_recon.bags.replay.verification import verify
 from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.photo_run import photo_run
 from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.run import PHOTOS
 from active_recon.bags.runs.run_writing import write_run
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Camera
+from active_recon.photos.conventions import misreading
+from active_recon.photos.doubts import doubts
 from active_recon.photos.picture import shape_picture
 from active_recon.photos.reconstruct import from_files, Options
+from active_recon.photos.transforms_json import FLIP
 from active_recon.volumes.binvox import read_binvox
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import iou
+from judged_quality import quality_of
 import numpy as np
 from photo_scene import cameras, CENTRE, on_plain, rendered, SIDE, thing, write_photos
 from PIL import Image
@@ -133,13 +139,37 @@ def changed(plain, folder, change):
 
 
 @pytest.mark.parametrize(('change', 'expected'), [
-    (lambda pose: pose @ np.diag([1.0, -1, -1, 1]), 'the other camera axes .* would fit'),
+    (lambda pose: pose @ np.diag([1.0, -1, -1, 1]),
+     "the other camera axes .OpenCV's instead of OpenGL's. would fit: give --axes opencv$"),
     (np.linalg.inv, 'camera from world would fit.*: invert')])
 def test_poses_of_another_convention_are_refused_with_the_one_that_fits(
         change, expected, plain, tmp_path):
     path = changed(plain, tmp_path, change)
     with pytest.raises(DataError, match=f'the cameras do not look at one object: {expected}'):
         active_recon.reconstruct(plain, path)
+
+
+@pytest.mark.parametrize(('given', 'fitting'), [('opencv', 'opengl'), ('opengl', 'opencv')])
+def test_axes_that_were_given_wrongly_are_refused_with_those_that_fit(
+        given, fitting, plain, tmp_path):
+    flips = given == 'opengl'  # the photos' own file has OpenGL's axes
+    path = changed(plain, tmp_path, lambda pose: pose @ FLIP if flips else pose)
+    with pytest.raises(DataError, match=f'would fit: give --axes {fitting}$'):
+        from_files(plain, path, Options(axes=given))
+    with pytest.raises(DataError, match=f'would fit: give --axes {fitting}$'):
+        from_files(plain, path, Options(axes=given, box=BOX))
+
+
+@pytest.mark.parametrize(('looks', 'fitting'), [('opencv', 'opengl'), ('opengl', 'opencv')])
+def test_matrices_that_are_inverse_and_of_other_axes_fit_as_is_advised(looks, fitting, views):
+    def read(matrix, axes):
+        return Camera(matrix @ FLIP if axes == 'opengl' else matrix, views[0].intrinsics)
+
+    written = [np.linalg.inv(read(view.pose, fitting).pose) for view in views]
+    assert misreading([read(matrix, looks) for matrix in written], CENTRE, looks).endswith(
+        f'invert the matrices and give --axes {fitting}')
+    assert not misreading([read(np.linalg.inv(matrix), fitting) for matrix in written], CENTRE,
+                          fitting)
 
 
 def test_the_axes_that_fit_can_be_given(plain, tmp_path, shape):
@@ -157,6 +187,15 @@ def test_photos_that_are_upside_down_are_noticed(views, rgba, tmp_path, shape):
     assert not any(told in warning for warning in shape.warnings)
     # One object in twenty is unusual to the quality without a fault; nothing else is warned of
     assert all(warning.startswith('unusual views') for warning in shape.warnings)
+
+
+def test_a_cube_that_does_not_fit_is_asked_for_by_the_options_of_the_command(shape):
+    last = shape.views[-1]
+    judged = replace(last, known=replace(
+        last.known, judge=lambda: quality_of(suspect='object_size')))
+    assert doubts([judged], [], shape.cube, None, 'auto', 1.0, 'opencv') == [
+        'unusual views (p = 0.010): the object does not fit its cube: is the cube (--box, --size) '
+        'right?']
 
 
 def test_what_is_wrong_with_photos_is_one_line_each_and_the_others_are_used(plain, tmp_path):
@@ -212,6 +251,7 @@ def test_the_bag_of_the_photos_replays_bit_by_bit(shape, tmp_path):
     run = read_run(tmp_path / 'bag')
     setup = recorded_setup(run)
     found = verify(run, setup.load_reconstructor(), setup.load_planner())
+    assert run.episodes[0].done == PHOTOS  # by which a report knows it
     assert found.view_count == COUNT
     assert {each.verdict for each in found.comparison.deviations.values()
             if each.compared} == {'same bits'}
@@ -241,6 +281,8 @@ def test_the_command_writes_all_files(plain, tmp_path):
         np.testing.assert_array_equal(cells.occupied(0.5),
                                       voxels['occupancy'] > voxels['threshold'])
     assert trimesh.load(out / 'mesh.obj').extents.max() < BOX[3]
+    page = (out / 'report.html').read_text()
+    assert 'This run was made of 3 photos with known cameras.' in page
 
 
 @pytest.mark.parametrize(('arguments', 'expected'), [

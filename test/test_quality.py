@@ -18,7 +18,7 @@ from active_recon.quality.tables import find_tables, QualityTables, tables_path
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes.torch import TorchRuntime
 from active_recon.volumes.occupancy_threshold import expected_iou
-from judged_quality import CHANNELS, COUNTS, some_tables
+from judged_quality import CHANNELS, COUNTS, quality_of, some_tables
 import numpy as np
 import pytest
 import torch
@@ -220,6 +220,14 @@ def test_what_is_unusual_has_a_suspect_and_a_question_and_the_usual_has_none():
     far = judged(np.append(np.zeros(len(FEATURES)), 99.0))
     assert far.p_value <= FALSE_ALARMS
     assert SUSPECTS[far.suspect] in far.warning
+
+
+@pytest.mark.parametrize('suspect', ['', *SUSPECTS])
+def test_photos_alone_are_warned_of_as_nodes_are_but_for_the_name_of_their_cube(suspect):
+    quality = quality_of(suspect=suspect)
+    assert quality.photo_warning == quality.warning.replace(
+        'is object_size right?', 'is the cube (--box, --size) right?')
+    assert ('object_size' in quality.warning) == (suspect == 'object_size')
 
 
 def test_tables_come_back_from_their_file_and_judge_the_same(tmp_path):

@@ -9,7 +9,8 @@ from active_recon.geometry.cameras import orbit_camera
 from active_recon.policies.reasons import GoalReason
 from active_recon.report.findings import findings
 from active_recon.report.subject import Subject
-from active_recon.report.words import key_words
+from active_recon.report.words import key_words, view_numbers
+from judged_quality import quality_of
 import pytest
 from report_runs import changed, recorded_run
 
@@ -98,6 +99,7 @@ def test_refusal_of_a_kind_unknown_here_is_told_by_its_name(run):
     ('max_views', 'note', 'as many views'),
     ('entropy_settled', 'note', 'by itself'),
     ('battery', 'note', 'battery'),
+    ('photos', 'note', 'It ended with the last photo.'),
     ('', 'warning', 'The episode is incomplete'),
 ])
 def test_reason_to_stop_is_told(run, reason, level, words):
@@ -137,6 +139,35 @@ def test_other_elevation_is_told(run, elevation_deg, warned):
 def test_shape_that_was_not_recorded_is_told(run):
     assert any('abc' in text for text in said(run, 'note', computed='the weights abc'))
     assert not any('weights' in text for text in said(run, 'note'))
+
+
+def suspected(run, *suspects, **changes):
+    views = [replace(view, quality=quality_of(suspect=suspect))
+             for view, suspect in zip(run.episodes[0].views, suspects, strict=True)]
+    return changed(run, views=views, **changes)
+
+
+def test_equal_warnings_of_several_views_are_one_line(run):
+    [warning] = said(suspected(run, 'pose', 'pose', 'pose'))
+    assert warning.startswith('After views 1 to 3: unusual views (p = 0.010): the views do not')
+    first, second = said(suspected(run, 'pose', 'mask', 'pose'))
+    assert first.startswith('After views 1, 3: ') and 'poses right?' in first
+    assert second.startswith('After view 2: ') and 'mask' in second
+    assert said(suspected(run, '', '', '')) == []
+
+
+@pytest.mark.parametrize(('numbers', 'words'), [
+    ([3], 'view 3'), ([1, 2], 'views 1, 2'), ([1, 2, 3], 'views 1 to 3'),
+    ([1, 3, 4, 5, 9, 10], 'views 1, 3 to 5, 9, 10')])
+def test_views_are_named_by_their_numbers_and_three_in_a_row_by_the_first_and_last(numbers, words):
+    assert view_numbers(numbers) == words
+
+
+@pytest.mark.parametrize(('done', 'asked'), [
+    ('max_views', 'is object_size right?'), ('photos', 'is the cube (--box, --size) right?')])
+def test_a_cube_that_does_not_fit_is_asked_for_by_the_names_of_what_set_it(run, done, asked):
+    [warning] = said(suspected(run, '', '', 'object_size', done=done))
+    assert warning.endswith(asked)
 
 
 def test_warnings_come_before_notes(run):

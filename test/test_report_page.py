@@ -158,6 +158,36 @@ def test_several_runs_are_compared_in_a_table_with_a_row_each(run):
     assert 'view limit' in elements.text
 
 
+def of_photos(run, count=5):
+    views = [replace(view, goal=None) for view in run.episodes[0].views[:count]]
+    return replace(changed(run, views=views, first_goal=None, done='photos'),
+                   provenance={**run.provenance, 'object': 'photos', 'policy': ''},
+                   parameters={}, counters={})
+
+
+def test_a_page_of_photos_says_what_they_are_and_tells_of_no_planner(run, page):
+    told = Elements(page_of(of_photos(run))).text
+    assert 'This run was made of 5 photos with known cameras.' in told
+    assert 'An object, rebuilt from 5 views' in told
+    assert 'It ended with the last photo.' in told
+    for word in ('planner', 'goals', 'stopped'):
+        assert word not in told
+    assert 'This run was made of 1 photo with a known camera.' in Elements(
+        page_of(of_photos(run, 1))).text
+    other = Elements(page).text
+    assert 'a planner chose the next view. This page shows that run.' in other
+    assert 'photo' not in other
+
+
+def test_a_page_of_several_runs_tells_which_of_them_are_of_photos(run):
+    photos = of_photos(run)
+    assert 'Each letter below is a run made of photos with known cameras.' in Elements(
+        page_of(photos, photos)).text
+    mixed = Elements(page_of(run, photos, photos)).text
+    assert 'Each letter below is one such run, but B, C were made of photos' in mixed
+    assert 'Each letter below is one such run.' in Elements(page_of(run, run)).text
+
+
 def test_bag_with_hardly_anything_in_it_still_gives_a_page(run):
     bare = [replace(view, reconstruction=None, occupied=None, latent=None, entropy=None, goal=None,
                     received={}) for view in run.episodes[0].views[:1]]

@@ -10,6 +10,9 @@ def read_yaml(path: Path) -> object:
     """Return what a file holds; ConfigError, with line and reason, where it is no YAML."""
     try:
         return yaml.safe_load(path.read_text())
+    except FileNotFoundError as error:
+        raise ConfigError(f'{path}: no such file: expected a ROS parameters file in YAML'
+                          ) from error
     except (OSError, ValueError, yaml.YAMLError) as error:
         raise ConfigError(f'{path}: no ROS parameters file in YAML: '
                           f'{" ".join(str(error).split())}') from error

@@ -5,42 +5,52 @@ from collections.abc import Mapping, Sequence
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.cube import meeting_point
+from active_recon.photos.readers import other_looks
 from active_recon.photos.transforms_json import FLIP
 import numpy as np
 from numpy.typing import NDArray
 
 _FAR = 0.35  # of the distance: optical axes that miss each other by more do not meet
+_NAMES = {'opencv': 'OpenCV', 'opengl': 'OpenGL'}
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
-def conventions(poses: Sequence[NDArray[np.float64]]) -> Mapping[str, list[NDArray[np.float64]]]:
-    """Return poses (4, 4) as other conventions would read them, by what to do about it."""
+def conventions(poses: Sequence[NDArray[np.float64]], looks: str
+                ) -> Mapping[str, list[NDArray[np.float64]]]:
+    """
+    Return poses (4, 4) as other conventions would read them, by what to do about it.
+
+    `looks`, one of LOOKS, are the camera axes that they were read with.
+    """
     flipped = [pose @ FLIP for pose in poses]
+    other = other_looks(looks)
     return {
-        "the other camera axes (OpenGL's instead of OpenCV's, or the other way round) would "
-        'fit: give --axes': flipped,
+        f"the other camera axes ({_NAMES[other]}'s instead of {_NAMES[looks]}'s) would fit: give "
+        f'--axes {other}': flipped,
         'camera from world instead of world from camera would fit: invert the matrices':
             [_inverse(pose) for pose in poses],
         'camera from world would fit, if the matrices are of OpenGL: invert them':
             [_inverse(pose) @ FLIP for pose in flipped],
         'camera from world with the other camera axes would fit: invert the matrices and give '
-        '--axes': [_inverse(pose) for pose in flipped],
+        f'--axes {other}': [_inverse(pose) for pose in flipped] if other == 'opencv' else [
+            _inverse(pose) @ FLIP for pose in poses],
         'photos turned by 180 degrees would fit: turn them':
             [pose @ _HALF_TURN for pose in poses]}
 
 
-def misreading(cameras: Sequence[Camera], centre: NDArray[np.float64] | None = None) -> str:
+def misreading(cameras: Sequence[Camera], centre: NDArray[np.float64] | None,
+               looks: str) -> str:
     """
     Return what is wrong with the poses of cameras, and what would fit; '' where nothing is.
 
     Optical axes have to pass by the object, in front of the cameras. `centre` (3,) is the
-    object's; None: where the axes meet.
+    object's; None: where the axes meet. `looks` is as in `conventions`.
     """
     if len(cameras) < 2 or looks_right(cameras, centre):
         return ''
     lenses = [camera.intrinsics for camera in cameras]
     poses = [camera.pose for camera in cameras]
-    for advice, others in conventions(poses).items():
+    for advice, others in conventions(poses, looks).items():
         if looks_right([Camera(pose, lens) for pose, lens in zip(others, lenses, strict=True)],
                        centre):
             return f'the cameras do not look at one object: {advice}'

@@ -23,22 +23,25 @@ _OUTSIDE = 3 ** 0.5 / 2  # of the cube, from its centre, in its sides
 
 
 def doubts(taken: Sequence[TakenView], views: Sequence[PhotoView], cube: Cube,
-           reconstructor: Reconstructor, background: str, covered: float) -> list[str]:
+           reconstructor: Reconstructor, background: str, covered: float,
+           looks: str) -> list[str]:
     """
     Return the warnings of a reconstruction, one line each.
 
     `covered` is the masks' coverage. Where silhouettes contradict each other, other conventions
-    of the poses are tried on a few views, and one that fits is named.
+    of the poses are tried on a few views, and one that fits is named; `looks` are the camera axes
+    that they were read with.
     """
     quality = taken[-1].known.quality
     if quality is None:
         return [reconstructor.no_quality] if reconstructor.no_quality else []
-    found = [quality.warning] if quality.warning else []
+    found = [quality.photo_warning] if quality.suspect else []
     doubtful = (quality.silhouette_iou < _AGREE or covered < COVERED
                 or quality.suspect == 'pose')
     if not doubtful or len(views) < 3:
         return found
-    advice = _fitting(even_choice(views, _TRIED_VIEWS), cube, reconstructor, background)
+    advice = _fitting(even_choice(views, _TRIED_VIEWS), cube, reconstructor, background,
+                      looks)
     if advice:
         return [*found, f'silhouettes contradict each other: {advice}']
     if covered < COVERED:
@@ -49,11 +52,11 @@ def doubts(taken: Sequence[TakenView], views: Sequence[PhotoView], cube: Cube,
 
 
 def _fitting(views: Sequence[PhotoView], cube: Cube, reconstructor: Reconstructor,
-             background: str) -> str:
+             background: str, looks: str) -> str:
     """Return the advice of the convention whose silhouettes agree best; '' for that in use."""
     masked = all(view.mask is not None for view in views)
     best, advice = 0.0, ''
-    for words, poses in conventions([view.camera.pose for view in views]).items():
+    for words, poses in conventions([view.camera.pose for view in views], looks).items():
         others = [replace(view, camera=Camera(pose, view.camera.intrinsics))
                   for view, pose in zip(views, poses, strict=True)]
         agreeing = (_covered(others, cube) if masked

@@ -1,4 +1,4 @@
-"""One picture of a shape: each photo as the network saw it, over the mesh from the same camera."""
+"""One picture of a shape: photos as the network saw them, over the mesh from the same cameras."""
 
 from collections.abc import Sequence
 import math

@@ -29,6 +29,8 @@ def read_cameras(path: Path, photos: Sequence[PhotoFile], looks: str | None = No
     `looks`, one of LOOKS, replaces the camera axes that the format has. Raises DataError where
     there is no such file or it cannot be used, ConfigError on another value of `looks`.
     """
+    if not path.exists():
+        raise DataError(f'{path}: no such file or folder: expected {FORMATS}', 'no_cameras')
     found = path if path.is_file() else find_cameras([path])
     if found is None:
         raise DataError(f'{path}: no cameras: expected {FORMATS}', 'no_cameras')
@@ -42,8 +44,12 @@ def read_cameras(path: Path, photos: Sequence[PhotoFile], looks: str | None = No
 def with_other_axes(cameras: CameraFile) -> CameraFile:
     """Return cameras as if the file had been read with the other one of LOOKS."""
     entries = [replace(each, pose=each.pose @ FLIP) for each in cameras.entries]
-    other = LOOKS[1 - LOOKS.index(cameras.looks)]
-    return replace(cameras, entries=entries, looks=other)
+    return replace(cameras, entries=entries, looks=other_looks(cameras.looks))
+
+
+def other_looks(looks: str) -> str:
+    """Return the other one of LOOKS."""
+    return LOOKS[1 - LOOKS.index(looks)]
 
 
 def find_cameras(folders: Sequence[Path]) -> Path | None:

@@ -138,7 +138,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
     poses = [view.camera for view in views]
     up = axis_direction(options.up) if options.up else file.up
     cube = _told_cube(options, file, upward(poses) if up is None else up)
-    wrong = misreading(poses, None if cube is None else cube.centre)
+    wrong = misreading(poses, None if cube is None else cube.centre, file.looks)
     if wrong:
         raise DataError(f'{file.source}: {wrong}', 'convention')
     views, empty, cube = _separated(views, file, cube, options.background)
@@ -159,7 +159,8 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         grid = VoxelGrid(occupancy, grid.size)
     return Shape(grid, reconstructor.threshold, taken, cube,
                  named([view.background for view in taken]), [*left_out, *empty, *unseen],
-                 [*doubts(taken, views, cube, reconstructor, options.background, covered),
+                 [*doubts(taken, views, cube, reconstructor, options.background, covered,
+                          file.looks),
                   *_without_depth(views, taken)], dict(reconstructor.provenance))
 
 

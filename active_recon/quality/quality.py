@@ -13,6 +13,8 @@ SUSPECTS: Mapping[str, str] = {
     'unknown': 'the images are unlike all that the network was trained on: is there an object in '
                'them, and of what kind?'}
 """What may be wrong with flagged views, with the question to ask."""
+_PHOTO_SUSPECTS = {**SUSPECTS, 'object_size': 'the object does not fit its cube: is the cube '
+                                              '(--box, --size) right?'}
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,14 @@ class Quality:
     @property
     def warning(self) -> str:
         """The warning in words, '' where nothing is suspected."""
+        return self._asking(SUSPECTS)
+
+    @property
+    def photo_warning(self) -> str:
+        """The same for a shape of photos alone, whose cube is set by other options."""
+        return self._asking(_PHOTO_SUSPECTS)
+
+    def _asking(self, questions: Mapping[str, str]) -> str:
         if not self.suspect:
             return ''
-        return f'unusual views (p = {self.p_value:.3f}): {SUSPECTS[self.suspect]}'
+        return f'unusual views (p = {self.p_value:.3f}): {questions[self.suspect]}'

@@ -7,11 +7,12 @@ import math
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.bags.runs.missing import describe_lost
 from active_recon.bags.runs.parameters import node_parameters
+from active_recon.bags.runs.run import PHOTOS
 from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE
 from active_recon.geometry.view_distance import view_distance
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import degrees, Subject
-from active_recon.report.words import counted, refused, times, warned
+from active_recon.report.words import counted, refused, times, view_numbers, warned
 
 _STOPPED = {
     'max_views': ('view limit', 'It stopped because it had taken as many views as '
@@ -26,6 +27,7 @@ _STOPPED = {
     'no_reachable_azimuth': ('no reachable goal', 'It stopped because the camera could not reach '
                                                   'any of the remaining azimuths.'),
     'stopped': ('stopped', 'It was stopped by a service call.'),
+    PHOTOS: ('last photo', 'It ended with the last photo.'),
     '': ('incomplete', 'The episode is incomplete: the recording ends, or a new episode begins, '
                        'before it was done.'),
 }
@@ -118,9 +120,13 @@ def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
 
 
 def _unusual(subject: Subject) -> Iterator[tuple[str, str]]:
+    told: dict[str, list[int]] = {}
     for number, view in enumerate(subject.views, 1):
         if view.quality is not None and view.quality.suspect:
-            yield 'warning', f'After view {number}: {view.quality.warning}'
+            warning = (view.quality.photo_warning if subject.of_photos else view.quality.warning)
+            told.setdefault(warning, []).append(number)
+    for warning, numbers in told.items():
+        yield 'warning', f'After {view_numbers(numbers)}: {warning}'
 
 
 def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:

@@ -12,6 +12,7 @@ from active_recon.report.charts import entropy_chart, iou_chart, stage_chart
 from active_recon.report.embedding import compressed, plotly_script
 from active_recon.report.findings import findings, stopped
 from active_recon.report.images import data_uri
+from active_recon.report.introduction import introduction
 from active_recon.report.scene import scene
 from active_recon.report.stages import median, STAGES, timings
 from active_recon.report.subject import degrees, elevation_degrees, Subject
@@ -55,6 +56,7 @@ def report_page(subjects: Sequence[Subject]) -> str:
                             'words': key_words}
     return environment.get_template('page.html').render(
         panels=panels, several=several, known_truth=known_truth, stages=STAGES,
+        introduction=introduction(subjects),
         drawn=compressed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
         plotly=plotly_script())
 
@@ -75,7 +77,7 @@ def _panel(subject: Subject) -> dict[str, Any]:
     recorded = datetime.fromtimestamp(run.begin / 1e9, UTC)
     return {
         'subject': subject,
-        'object': object_name(run.provenance.get('object', '')),
+        'object': '' if subject.of_photos else object_name(run.provenance.get('object', '')),
         'policy': run.provenance.get('policy', ''),
         'recorded': f'{recorded:%Y-%m-%d %H:%M} UTC' if run.begin > 0 else '',
         'duration_s': (run.end - run.begin) / 1e9,

@@ -5,7 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 import math
 
-from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
+from active_recon.bags.runs.run import (
+    PHOTOS,
+    RecordedEpisode,
+    RecordedGoal,
+    RecordedRun,
+    RecordedView,
+)
 from active_recon.geometry.cameras import azimuth_difference
 from active_recon.geometry.view_distance import at_one_elevation
 from active_recon.volumes.voxels import iou, VoxelGrid
@@ -33,6 +39,11 @@ class Subject:
     def views(self) -> Sequence[RecordedView]:
         """The views in the order in which they were taken."""
         return self.episode.views
+
+    @property
+    def of_photos(self) -> bool:
+        """Whether the views are photos with known cameras, which no planner chose."""
+        return self.episode.done == PHOTOS
 
     @property
     def goals(self) -> list[RecordedGoal | None]:

@@ -1,5 +1,7 @@
 """The page's texts for counters, warnings and record keys, and for their counts."""
 
+from collections.abc import Sequence
+
 _REFUSED = {
     'no_pose': 'no camera pose arrived close enough to {them} in time (late poses)',
     'no_camera_info': 'no camera info of {their} stamp arrived',
@@ -48,6 +50,19 @@ _KEYS = {
 def counted(count: int, thing: str) -> str:
     """Return a count with its noun: '1 image', '2 images'."""
     return f'{count} {thing}{"" if count == 1 else "s"}'
+
+
+def view_numbers(numbers: Sequence[int]) -> str:
+    """Return the numbers of views, in their order: 'view 3', 'views 1, 2, 5 to 9'."""
+    rows: list[list[int]] = []
+    for number in numbers:
+        if rows and number == rows[-1][-1] + 1:
+            rows[-1].append(number)
+        else:
+            rows.append([number])
+    words = [f'{row[0]} to {row[-1]}' if len(row) > 2 else ', '.join(map(str, row))
+             for row in rows]
+    return f'view{"" if len(numbers) == 1 else "s"} {", ".join(words)}'
 
 
 def times(count: int) -> str:

@@ -81,8 +81,9 @@ def test_a_file_that_cannot_be_used_is_refused_with_its_name(tmp_path, text, sai
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match='No such file'):
-        read_params_file(tmp_path / 'none.yaml')
+    path = tmp_path / 'none.yaml'
+    with pytest.raises(ConfigError, match=f'^{path}: no such file: expected a ROS parameters'):
+        read_params_file(path)
 
 
 def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_path):

@@ -4,7 +4,7 @@ from pathlib import Path
 import time
 
 from active_recon import __version__
-from active_recon.bags.runs.run import RecordedEpisode, RecordedRun, RecordedView
+from active_recon.bags.runs.run import PHOTOS, RecordedEpisode, RecordedRun, RecordedView
 from active_recon.photos.shape import Shape
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
 
@@ -28,7 +28,7 @@ def photo_run(shape: Shape, folder: Path, begin: int | None = None) -> RecordedR
             grid.above(shape.threshold), view.known.latent, grid.entropy(), None, {},
             quality=view.known.quality, depth=view.depth))
     end = views[-1].stamp
-    episode = RecordedEpisode('photos', start, None, views, 'photos')
+    episode = RecordedEpisode('photos', start, None, views, PHOTOS)
     provenance = {'version': __version__, 'object': 'photos', **shape.provenance}
     parameters = {'/reconstructor': {'object_size': shape.size, 'threshold': shape.threshold,
                                      'threads': 1, 'use_depth': any(

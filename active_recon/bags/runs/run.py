@@ -16,6 +16,9 @@ from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
+PHOTOS = 'photos'
+"""The reason for the end of an episode that was made of photos with known cameras."""
+
 
 @dataclass(frozen=True)
 class TopicSummary:
