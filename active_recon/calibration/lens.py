@@ -63,6 +63,9 @@ def read_lens(path: Path) -> Intrinsics:
         coefficients = tuple(map(float, content['distortion_coefficients']['data']))
         size = int(content['image_width']), int(content['image_height'])
         distortion = Distortion(content['distortion_model'], coefficients)
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: no such file: expected a YAML file of ROS's camera_calibration"
+                        ) from error
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError,
             ValueError) as error:
         raise DataError(f"{path}: no calibration: expected a YAML file of ROS's "

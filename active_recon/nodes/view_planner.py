@@ -188,6 +188,9 @@ class ViewPlannerNode(ManagedNode):
                                           view.quality)
         self._started = True
         self._diagnostics.count('views')
+        name = self._loaded.in_use.name
+        self._diagnostics.set_value('Policy', (
+            f'even sweep instead of {name}: unusual views' if self._planner.sweeps else name))
         self._follow(decision, stamp)
         if decision.goal is not None:
             self._diagnostics.record_latency(stamp)

@@ -143,3 +143,17 @@ def test_a_planner_waits_for_the_quality_of_a_view_and_stops_by_it(start_node, b
                        quality=quality_of(promise=0.5))
     done = bench.until(lambda: fake.done and fake.done[-1].frame_id and fake.done[-1], 'the end')
     assert (done.frame_id, nanoseconds_from_stamp(done.stamp)) == ('target_reached', second)
+
+
+def test_a_sweep_in_the_policy_s_place_is_told_while_views_are_unusual(start_node, bench, latent):
+    start_node('view_planner', policy='farthest', start_azimuth=1.0, entropy_tolerance=0.0)
+    fake = FakeReconstructor(bench, ('episode', *FakeReconstructor.PARTS, 'quality'))
+    fake.begin('only')
+    stamp = 0
+    for suspect, told in (('', 'farthest'), ('pose', 'even sweep instead of farthest: unusual '
+                                             'views'), ('', 'farthest')):
+        goal = view_goal_from_msg(fake.wait_goal(stamp))
+        stamp = fake.show(latent, goal.azimuth, parts=('quality', *FakeReconstructor.PARTS),
+                          quality=quality_of(suspect=suspect))
+        fake.wait_goal(stamp)
+        bench.until(lambda: bench.state('view_planner').facts['Policy'] == told, told)  # noqa: B023
