@@ -22,6 +22,7 @@ from active_recon.cli.reconstruct import reconstruct
 from active_recon.cli.record_sweep import record_sweep
 from active_recon.cli.replay import replay
 from active_recon.cli.report import report
+from active_recon.cli.running_nodes import call, set_parameter, status
 from active_recon.cli.sheet import sheet
 from active_recon.cli.study import study
 from active_recon.cli.train import train
@@ -34,10 +35,13 @@ import typer
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-for command in (demo, up, reconstruct, calibrate, camera, view, report, replay, play, record_sweep,
-                render, train, train_policy, train_depth, export, evaluate, study, policies, paper,
-                sheet):
-    app.command()(command)
+_OTHERWISE: dict[Callable[..., None], dict[str, Any]] = {
+    # A negative number is a value, not an option
+    set_parameter: {'name': 'set', 'context_settings': {'ignore_unknown_options': True}}}
+for command in (demo, up, call, set_parameter, status, reconstruct, calibrate, camera, view,
+                report, replay, play, record_sweep, render, train, train_policy, train_depth,
+                export, evaluate, study, policies, paper, sheet):
+    app.command(**_OTHERWISE.get(command, {}))(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')
 app.add_typer(batch, name='batch')

@@ -1,0 +1,124 @@
+"""`active-recon call`, `set` and `status` on real nodes."""
+
+from pathlib import Path
+import re
+
+from active_recon.launching.processes import private_environment
+from command_line import command, refusal
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from rcl_interfaces.srv import GetParameters
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture(scope='module')
+def nodes(start_shared_node):
+    """Start a planner, and a recorder in a namespace."""
+    start_shared_node('view_planner', policy='farthest')
+    start_shared_node('recorder', namespace='cell', record_at_start=False)
+
+
+@pytest.fixture
+def told(nodes, monkeypatch, capsys):
+    """Run a command that ends with this code; return what it prints, failures as errors."""
+    def run(code, *arguments):
+        capsys.readouterr()
+        assert command(monkeypatch, *arguments) == code
+        output, errors = capsys.readouterr()
+        assert not (output if code else errors)
+        return errors if code else output
+
+    return run
+
+
+def planned(shared_bench, name):
+    """Return the value of a parameter of the planner, as a message."""
+    value, = shared_bench.ask(GetParameters, 'view_planner/get_parameters',
+                              GetParameters.Request(names=[name])).values
+    return value
+
+
+def test_a_parameter_that_is_set_is_told_with_the_value_before(told, shared_bench):
+    assert told(0, 'set', 'view_planner', 'target_quality', '0.5') == (
+        '/view_planner: target_quality was 0.0, is 0.5\n')
+    assert planned(shared_bench, 'target_quality').double_value == 0.5
+    assert told(0, 'set', '/view_planner', 'target_quality', '0') == (
+        '/view_planner: target_quality was 0.5, is 0.0\n')
+
+
+def test_lists_and_words_are_set_as_the_parameter_has_them(told, shared_bench):
+    told(0, 'set', 'view_planner', 'azimuth_range', '[-1, 2.2]')
+    assert list(planned(shared_bench, 'azimuth_range').double_array_value) == [-1.0, 2.2]
+    told(0, 'set', 'view_planner', 'forbidden_sectors', '[0.4, 0.7]')
+    assert 'was [0.4, 0.7], is []' in told(0, 'set', 'view_planner', 'forbidden_sectors', '[]')
+    assert 'was farthest, is uniform' in told(0, 'set', 'view_planner', 'policy', 'uniform')
+
+
+@pytest.mark.parametrize(('name', 'value', 'reason'), [
+    ('target_quality', '-1.5', 'target_quality stays 0.0: .*out of range.*-1.5'),
+    ('policy', 'off', 'policy stays .*: invalid value: expected one of auto.*, got .*off'),
+    ('weights', 'mine.safetensors', "weights stays '': .*read-only")])
+def test_a_refused_value_is_told_with_the_reason_of_the_node(told, name, value, reason):
+    said = told(1, 'set', 'view_planner', name, value)
+    assert re.fullmatch(f'/view_planner: {reason}.*\n', said), said
+
+
+def test_what_is_no_parameter_or_no_value_is_refused(nodes, monkeypatch, capsys):
+    said = refusal(monkeypatch, capsys, 'set', 'view_planner', 'target_qualty', '0.5')
+    assert '/view_planner has no parameter target_qualty; did you mean target_quality?' in said
+    said = refusal(monkeypatch, capsys, 'set', 'view_planner', 'target_quality', '[0.5')
+    assert "[0.5: no parameter's value: expected, in YAML" in said
+
+
+def test_a_service_is_called_and_its_answer_is_printed(told):
+    begun = told(0, 'call', 'start', '--namespace', 'cell')
+    assert (Path(begun.strip()).parent.name, told(0, 'call', '/cell/stop')) == ('bags', begun)
+
+
+def test_a_service_that_does_not_succeed_makes_the_command_fail(told):
+    assert told(1, 'call', 'stop_episode') == (
+        'no episode to stop: expected a running one, there is none\n')
+
+
+def test_what_nobody_offers_is_told_with_what_is_there(nodes, monkeypatch, capsys):
+    said = refusal(monkeypatch, capsys, 'call', 'start')
+    assert 'no service /start: expected a Trigger service of a running node, found ' in said
+    assert {'/cell/start', '/cell/stop', '/plan', '/stop_episode'} <= set(
+        re.findall(r'/[\w/]+', said.partition('found ')[2]))
+    assert 'name one with its namespace' in said
+    said = refusal(monkeypatch, capsys, 'set', 'recorder', 'topics', '[]')
+    assert 'no node /recorder: expected a running node with parameters, found ' in said
+    assert {'/cell/recorder', '/view_planner'} <= set(
+        re.findall(r'/[\w/]+', said.partition('found ')[2]))
+
+
+@pytest.mark.parametrize(('arguments', 'missing'), [
+    (('call', 'save_mesh'), 'service /save_mesh'),
+    (('set', 'view_planner', 'policy', 'auto'), 'node /view_planner'),
+    (('status',), 'diagnostics')], ids=lambda each: each[0] if isinstance(each, tuple) else '')
+def test_where_no_node_runs_the_domain_is_named(monkeypatch, capsys, arguments, missing):
+    environment = private_environment()
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    said = refusal(monkeypatch, capsys, *arguments, '--timeout', '0.5')
+    assert f'no {missing}: expected ' in said
+    assert f'found none within 0.5 s on ROS domain {environment["ROS_DOMAIN_ID"]}; start' in said
+
+
+def test_the_status_tells_level_message_and_values_of_each_node(told):
+    said = told(0, 'status')
+    planner = re.search(r'^/view_planner  WARN  .*/episode: no messages.*\n((?:  .*\n)+)', said,
+                        re.MULTILINE)
+    assert planner, said
+    assert re.search(r'^  State +active *$', planner[1], re.MULTILINE)
+    assert re.search(r'^  warned/never_heard/episode +1 *$', planner[1], re.MULTILINE)
+    assert re.search(r'^/cell/recorder  OK  ok\n(  .*\n)*  messages ', said, re.MULTILINE)
+
+
+def test_the_status_names_a_node_that_tells_nothing(told, shared_bench):
+    publisher = shared_bench.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    said = told(0, 'status', '--timeout', '3')
+    shared_bench.node.destroy_publisher(publisher)
+    assert re.search(r'^/bench  nothing heard in 3 s: it is busy', said, re.MULTILINE)
+    assert re.search(r'^/view_planner  WARN', said, re.MULTILINE)
