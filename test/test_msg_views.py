@@ -171,7 +171,7 @@ def test_camera_info_of_another_size_is_refused_and_the_next_view_is_joined():
         joiner.add_pose(stamp, pose(1.0))
     error, view = drain(joiner)
     assert error.kind == 'camera_info'
-    assert '137 x 137, got 48 x 64' in str(error)
+    assert '137 x 137, got 64 x 48' in str(error)
     assert view.stamp == 1
 
 

@@ -19,6 +19,7 @@ from active_recon.photos.hull import (
     seen_cells,
 )
 from active_recon.photos.integrating import even_choice
+from active_recon.photos.readers import LOOKS
 from active_recon.photos.views import PhotoView, view_of
 from active_recon.volumes.voxelisation import voxelise
 import numpy as np
@@ -131,13 +132,16 @@ def test_no_cube_is_refused():
         Cube(CENTRE, 1, 0 * UP)
 
 
-def test_each_convention_but_the_right_one_is_a_misreading(views):
+@pytest.mark.parametrize('looks', LOOKS)
+def test_each_convention_but_the_right_one_is_a_misreading(views, looks):
     taken = [view.camera for view in views]
-    assert looks_right(taken) and not misreading(taken) and not misreading(taken, CENTRE)
-    for words, poses in list(conventions([camera.pose for camera in taken]).items())[:-1]:
+    assert looks_right(taken)
+    assert not misreading(taken, None, looks) and not misreading(taken, CENTRE, looks)
+    others = conventions([camera.pose for camera in taken], looks)
+    for words, poses in list(others.items())[:-1]:
         wrong = [Camera(pose, taken[0].intrinsics) for pose in poses]
         assert not looks_right(wrong), words
-        assert 'would fit' in misreading(wrong)
+        assert 'would fit' in misreading(wrong, None, looks)
 
 
 def test_a_plain_background_is_told_from_the_object(views):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
-_MOST_IN_TURN = 12
+_MOST_IN_TURN = 24
 """Views of a ring up to which an even sweep takes them one beside the other."""
 
 
@@ -49,9 +49,9 @@ class UniformPolicy(HeuristicPolicy):
     besides: from azimuth to azimuth the height, the sine of the elevation, grows by 0.618 of the
     candidates' range, and goes on from the lowest where that is above the highest. These are
     points of a Fibonacci lattice, which gives equal areas of a sphere about equally many. They are
-    taken in steps of about 137 degrees, so that few of them are spread too, as are more than
-    twelve at one elevation: an episode of so many is meant to end earlier. Where elevations differ
-    the best candidate is the goal, and no azimuth between candidates is preferred.
+    taken in steps of about 137 degrees, so that few of them are spread too, as are more than 24
+    at one elevation: an episode of so many is meant to end earlier. Where elevations differ the
+    best candidate is the goal, and no azimuth between candidates is preferred.
     """
 
     def __init__(self, views: int) -> None:
