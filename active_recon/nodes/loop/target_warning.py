@@ -1,7 +1,9 @@
 """Warns of a target quality that the tables of the weights never promise."""
 
+from active_recon.errors import WeightsError
 from active_recon.models.weights_files import find_weights
 from active_recon.nodes.runtime.diagnostics import Diagnostics
+from active_recon.nodes.runtime.run import one_line
 from active_recon.parameters.view_planner import ViewPlannerParameters
 from active_recon.policies import POLICIES, PolicyInUse
 from active_recon.quality.tables import QualityTables, tables_path
@@ -11,7 +13,7 @@ _WARNING = 'target_quality'
 
 def tell_target(diagnostics: Diagnostics, params: ViewPlannerParameters,
                 in_use: PolicyInUse) -> None:
-    """Warn while no episode can end as having reached the target; raises WeightsError."""
+    """Warn while no episode can end as having reached the target."""
     target = params.target_quality
     problem = _problem(params, in_use) if target else ''
     if problem:
@@ -23,11 +25,14 @@ def tell_target(diagnostics: Diagnostics, params: ViewPlannerParameters,
 
 
 def _problem(params: ViewPlannerParameters, in_use: PolicyInUse) -> str:
+    """Return why the target is never promised, '' where it may be."""
     path = tables_path(find_weights(params.weights or None))
     if not path.is_file():
         return f'expected quality tables beside the weights, {path.name}, found none'
-    learned = POLICIES[in_use.name].is_learned
-    most = QualityTables.read(path).most_promised(learned)
+    try:
+        most = QualityTables.read(path).most_promised(POLICIES[in_use.name].is_learned)
+    except WeightsError as error:
+        return one_line(error)
     if params.target_quality <= most:
         return ''
     return (f'expected at most {most:g}, all that the tables of the weights promise with the '
