@@ -10,6 +10,7 @@ from active_recon.photos.files import open_photos
 from active_recon.photos.reconstruct import from_files, Options
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 from active_recon.policies.stopping import StoppingRule
+from active_recon.runtimes import precision
 from active_recon.watching.advice import Adviser, ELEVATIONS
 from active_recon.watching.arrivals import Arrivals, SETTLED_S
 from active_recon.watching.collection import Collection
@@ -27,7 +28,15 @@ from typer.testing import CliRunner
 from watched_photos import orbit, with_focal, written
 
 SOURCE = BoardCameras(BOARD)
-_SAME = 1e-2  # the search for the lens ends a little elsewhere in each run, and bf16 rounds
+_SAME = 1e-2  # the search for the lens ends a little elsewhere in each run
+
+
+@pytest.fixture(scope='module', autouse=True)
+def in_f32():
+    """Compute in f32: bf16 rounds by more than what is told apart, on some processors."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(precision, 'has_bf16', lambda: False)
+        yield
 
 
 @pytest.fixture(scope='module')
