@@ -24,6 +24,16 @@ def refusal(start_node, name, **parameters):
     return line
 
 
+def refused_arguments(module, given):
+    """Return the one line with which an executable gave up that was given arguments of its own."""
+    ended = subprocess.run(
+        [sys.executable, '-m', f'active_recon.nodes.{module}', *given, '--ros-args', '--log-level',
+         'info'], cwd=ROOT, capture_output=True, text=True)
+    assert ended.returncode == 1
+    line, = ended.stderr.splitlines()
+    return line
+
+
 @pytest.mark.parametrize(('name', 'parameters', 'said'), [
     ('turntable_camera', {'speed': 0.0}, 'speed: invalid value: expected a number from 0.001 to '
                                          '100, got 0.0'),
@@ -45,24 +55,16 @@ def test_a_parameter_out_of_range_is_refused_with_its_range(start_node, name, pa
 
 @pytest.mark.parametrize('given', [('-p', 'object_size:=0.5'), ('--nonsense',)])
 def test_arguments_that_are_not_for_ros_are_refused_by_a_node_that_has_none(ros_domain, given):
-    ended = subprocess.run(
-        [sys.executable, '-m', 'active_recon.nodes.recorder', *given, '--ros-args', '--log-level',
-         'info'], cwd=ROOT, capture_output=True, text=True)
-    assert ended.returncode == 1
-    line, = ended.stderr.splitlines()
-    assert line.endswith('unknown arguments: expected --ros-args before all others, as in '
-                         f'--ros-args -p NAME:=VALUE, got {" ".join(given)}')
+    assert refused_arguments('recorder', given).endswith(
+        'unknown arguments: expected --ros-args before all others, as in '
+        f'--ros-args -p NAME:=VALUE, got {" ".join(given)}')
 
 
 @pytest.mark.parametrize('named', [(), ('recorder',), ('view_planner', 'view_planner')])
 def test_nodes_that_cannot_share_a_process_are_refused_by_name(ros_domain, named):
-    ended = subprocess.run(
-        [sys.executable, '-m', 'active_recon.nodes.composed', *named, '--ros-args', '--log-level',
-         'info'], cwd=ROOT, capture_output=True, text=True)
-    assert ended.returncode == 1
-    line, = ended.stderr.splitlines()
-    assert line.endswith('which nodes: expected names out of reconstructor, view_planner, '
-                         f'turntable_camera, each once, got {", ".join(named) or "none"}')
+    assert refused_arguments('composed', named).endswith(
+        'which nodes: expected names out of reconstructor, view_planner, '
+        f'turntable_camera, each once, got {", ".join(named) or "none"}')
 
 
 def missing_weights(folder):
