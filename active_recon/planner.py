@@ -128,7 +128,8 @@ class Planner:
         Take over what another planner has seen of the episode, as if it had always been this one.
 
         Volumes before the last are not kept, so a policy that looks at them chooses after the last
-        alone. Raises ViewError where this planner's policy cannot use it, and then is good for
+        alone. Where that has none, since no policy wanted it, an even sweep chooses once more.
+        Raises ViewError where this planner's policy cannot use what was seen, and then is good for
         nothing.
         """
         self._views = list(other._views)
@@ -138,6 +139,9 @@ class Planner:
             if (self._policy is other._policy and self._yaw == other._yaw
                     and self._places == other._places):
                 self._choice, self._state = other._choice, other._state
+            elif self._policy.wants_volume and self._views[-1].volume is None:
+                self._choice, _ = self._sweep.choose(observation(
+                    self._views, self._candidates, self._yaw, wants_volume=False), {})
             else:
                 whole = len(self._views)
                 for count in range(whole if self._policy.wants_volume else 1, whole + 1):

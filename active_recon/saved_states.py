@@ -45,7 +45,11 @@ class SavedState:
 
 
 def write_state(saved: SavedState, reconstructor: Reconstructor, path: Path) -> None:
-    """Write an episode of a reconstructor to a file, which appears at once and whole."""
+    """
+    Write an episode of a reconstructor to a file, which appears at once and whole.
+
+    Raises DataError or OSError where it cannot be written.
+    """
     progress, known = saved.progress, saved.reconstruction
     arrays: dict[str, NDArray[Any]] = {
         **{f'state/{name}': array for name, array in progress.state.items()},
@@ -63,8 +67,11 @@ def write_state(saved: SavedState, reconstructor: Reconstructor, path: Path) -> 
              'quality': json.dumps(known.quality and asdict(known.quality))}
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as unfinished:
-        save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()},
-                  unfinished, facts)
+        try:
+            save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()},
+                      unfinished, facts)
+        except SafetensorError as error:  # where the disk is full, too: it is no OSError
+            raise DataError(str(error)) from error
 
 
 def read_state(path: Path, reconstructor: Reconstructor) -> SavedState:

@@ -251,10 +251,17 @@ def test_a_policy_that_looks_at_the_volume_refuses_a_view_without_one():
     assert planner.add_view(LATENT, orbit_camera(1.0), 9, volume).goal is not None
 
 
-def test_a_policy_that_looks_at_the_volume_cannot_go_on_from_views_without_one():
+def test_a_policy_that_looks_at_the_volume_goes_on_by_a_sweep_until_a_view_has_one():
     before, _ = seen(Planner(FarthestPolicy(), max_views=9), 2)
-    with pytest.raises(ViewError, match='no probabilities: expected them beside the latent'):
-        Planner(Looking(), max_views=9).go_on_from(before)
+    after, sweep = (Planner(policy, max_views=9) for policy in (Looking(), UniformPolicy(9)))
+    for planner in (after, sweep):
+        planner.go_on_from(before)
+    assert after.plan().camera.azimuth == sweep.plan().camera.azimuth
+    volume = VoxelGrid(np.zeros((32,) * 3, np.float32))
+    camera = after.plan().camera
+    goals = [planner.add_view(LATENT, camera, 9, volume).goal.camera.azimuth
+             for planner in (before, after)]
+    assert goals[0] == goals[1]
 
 
 def ends_after(planner, qualities):

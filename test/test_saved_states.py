@@ -1,5 +1,7 @@
 """A saved episode: gone on with, it is the episode; spoilt or of other weights, it is refused."""
 
+from pathlib import Path
+
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.meshes.photos import Photo
@@ -122,3 +124,8 @@ def test_weights_are_no_state(reconstructor):
 def test_a_file_that_is_not_there_is_refused(reconstructor, tmp_path):
     with pytest.raises(DataError, match='none: no readable state'):
         read_state(tmp_path / 'none', reconstructor)
+
+
+def test_a_state_that_cannot_be_written_is_refused_as_data(reconstructor):
+    with pytest.raises(DataError):
+        write_state(episode(reconstructor, 1), reconstructor, Path('/proc/mug.state.safetensors'))

@@ -2,9 +2,11 @@
 
 import math
 
+from active_recon.acquisition.stillness import Stillness
 from active_recon.acquisition.view_gate import ViewGate
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera, orbit_camera
+import numpy as np
 import pytest
 
 PERIOD = 100_000_000  # nanoseconds
@@ -139,3 +141,15 @@ def test_poses_that_jump_are_of_no_still_camera_until_half_a_second_after():
 def test_a_camera_that_rests_between_two_ways_does_not_jump():
     gate = ViewGate('by_separation', min_view_separation=0.2)
     assert offer(gate, [0, 0, 1, 1, 0, 0, 1, 1]) == [1, 3, 5, 7]
+
+
+@pytest.mark.parametrize('elevation_deg', [85, 89, 89.99])
+def test_a_camera_that_trembles_above_the_object_is_still(elevation_deg):
+    stillness, rng = Stillness(), np.random.default_rng(0)
+    pose = orbit_camera(0.3, math.radians(elevation_deg), 0.5).pose
+    for number in range(200):
+        trembling = pose.copy()
+        trembling[:3, 3] += rng.normal(0, 3e-4, 3)  # a third of a millimetre
+        stillness.add(Camera(trembling), number * PERIOD)
+        assert not stillness.jumps(1)
+    assert stillness.is_still()

@@ -1,6 +1,7 @@
 """Detects whether a camera is at rest, and whether its poses are reliable."""
 
 from collections import deque
+import math
 
 from active_recon.geometry.cameras import azimuth_difference, Camera
 import numpy as np
@@ -33,7 +34,9 @@ class Stillness:
     def add(self, camera: Camera, stamp: int) -> None:
         """Add the next pose."""
         if self._last is not None:
-            step = np.array([azimuth_difference(camera.azimuth, self._last.azimuth),
+            # As seen from the object: above it, a tremble is a large difference of azimuths
+            across = math.cos(max(abs(camera.elevation), abs(self._last.elevation)))
+            step = np.array([azimuth_difference(camera.azimuth, self._last.azimuth) * across,
                              camera.elevation - self._last.elevation])
             sure = min(np.abs(step).max(), np.abs(self._step).max()) > STILL_ANGLE
             if sure and step @ self._step < 0:

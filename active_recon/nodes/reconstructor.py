@@ -152,12 +152,14 @@ class ReconstructorNode(ManagedNode):
         self._warnings.clear()
         self._diagnostics.count('episodes')
         self._diagnostics.set_value('Episode', self._episode.id)
-        self._diagnostics.set_value('Views of the episode', '0')
+        self._tell_view_count()
         self._episode_pub.publish(episode_to_msg(self._episode))
         self._products.begin_episode(self._episode)
 
     def clock_went_back(self, how: str) -> None:
         """Begin an episode: earlier views have stamps in the future."""
+        if self.is_active:
+            self._inputs.clock_went_back()
         self._begin_episode()
         self._diagnostics.count('clock_jumps')
         self.get_logger().warning(f'{how}: the episode {self._episode.id} begins')
@@ -165,9 +167,11 @@ class ReconstructorNode(ManagedNode):
     def _on_goal(self, msg: PoseStamped) -> None:
         with self._diagnostics.rejecting():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
-            if stamp >= self._episode.begin and not self.clock_monitor.is_ahead(stamp):
-                self._take_pending_view()  # it belongs to the previous goal
-                self._gate.set_goal(view_goal_from_msg(msg, self._object_frame), stamp)
+            if stamp < self._episode.begin or self.clock_monitor.is_ahead(stamp):
+                self._diagnostics.count('goals_unused')
+                return
+            self._take_pending_view()  # it belongs to the previous goal
+            self._gate.set_goal(view_goal_from_msg(msg, self._object_frame), stamp)
 
     def _select(self, view: View) -> None:
         if not self._gate.wants(view.camera, view.stamp,
@@ -198,14 +202,17 @@ class ReconstructorNode(ManagedNode):
         self._publisher.publish_occupancy(
             view.stamp, reconstruction, self._reconstructor.threshold)
         self._diagnostics.record_latency(view.stamp)
-        self._diagnostics.set_value('Views of the episode', str(self._reconstructor.view_count),
-                                    at_once=False)
+        self._tell_view_count(at_once=False)
         self._publisher.publish_view(
             view.stamp, view.camera.pose, reconstruction, image if is_cleared else None)
         self._products.add_view(view.stamp, image, camera, reconstruction)
         self._warnings.check_quality(reconstruction.quality)
         if self._background.how in ('color', 'reference'):
             self._warnings.check_background(image)  # last: nothing waits for it
+
+    def _tell_view_count(self, at_once: bool = True) -> None:
+        self._diagnostics.set_value(
+            'Views of the episode', str(self._reconstructor.view_count), at_once)
 
     def _prepared(self, view: View) -> tuple[NDArray[np.uint8], Camera, bool]:
         """Return what is reconstructed with, its camera, and whether a background is removed."""
@@ -254,6 +261,7 @@ class ReconstructorNode(ManagedNode):
             return response
         self._begin_episode()
         self._reconstructor.go_on_from(saved.progress)
+        self._tell_view_count()
         self._gate.took(saved.last_camera)
         self._products.take_up(saved)
         self._publisher.publish_occupancy(self._episode.begin, saved.reconstruction,

@@ -12,6 +12,7 @@ from active_recon.nodes.recording.disk_rate import DiskRate
 from active_recon.nodes.recording.recorded_nodes import RecordedNodes
 from active_recon.nodes.recording.recorded_subscriptions import RecordedSubscriptions
 from active_recon.nodes.recording.recorded_topics import RecordedTopics
+from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.output import output_path
 from active_recon.nodes.runtime.parameters import Parameters
@@ -50,8 +51,8 @@ class RecorderNode(QosWarnings):
         self._nodes = RecordedNodes(self, self._on_parameters)
         self.create_service(Trigger, 'start', self._on_start)
         self.create_service(Trigger, 'stop', self._on_stop)
-        self.create_timer(UPDATE_EVERY_S, self._update)
-        self.create_timer(FLUSH_EVERY_S, self._flush)
+        self.create_timer(UPDATE_EVERY_S, self._update, clock=STEADY)
+        self.create_timer(FLUSH_EVERY_S, self._flush, clock=STEADY)
         if params.record_at_start:
             self._begin()
         self.get_logger().info('ready')

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import DataError
-from active_recon.nodes.runtime.clock import ClockMonitor
+from active_recon.nodes.runtime.clock import ClockMonitor, STEADY
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.parameters import Commit, Parameters, set_read_only_parameter
 from active_recon.nodes.runtime.qos import SENSOR_QOS, STREAM_QOS
@@ -161,7 +161,8 @@ class TurntableCameraNode(QosWarnings):
     async def _begin_episode(self) -> bool:
         """Request a new episode of the reconstructor; return whether it began one in time."""
         answered = Future()
-        late = self.create_timer(ANSWER_S, lambda: answered.done() or answered.set_result(None))
+        late = self.create_timer(
+            ANSWER_S, lambda: answered.done() or answered.set_result(None), clock=STEADY)
         request = self._start_episode.call_async(Trigger.Request())
         request.add_done_callback(
             lambda call: answered.done() or answered.set_result(call.result()))

@@ -222,7 +222,7 @@ class ViewPlannerNode(ManagedNode):
         self._diagnostics.set_value('Done', reason or 'not yet')
 
     def _publish_goal(self, goal: Goal) -> None:
-        self._goals.publish(goal)
+        self._goals.publish(goal, 0 if self._episode is None else self._episode.begin)
         self._started = True
         self._timeout_timer.wake()
         self._diagnostics.count('goals')

@@ -7,6 +7,7 @@ import os
 
 from active_recon.nodes.loop.followed_loop import Loop, LoopFinder
 from active_recon.nodes.loop.loop_subscriber import LoopSubscriber
+from active_recon.nodes.runtime.clock import STEADY
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.parameters import Parameters
 from active_recon.nodes.runtime.qos_warnings import QosWarnings
@@ -43,8 +44,8 @@ class ViewerNode(QosWarnings):
         self._triggers = self._make_clients()
         self._finder = LoopFinder(self, self._on_loop)
         self._update_status()
-        self.create_timer(_DRAW_EVERY_S, self._draw)
-        self.create_timer(_STATUS_EVERY_S, self._update_status)
+        self.create_timer(_DRAW_EVERY_S, self._draw, clock=STEADY)
+        self.create_timer(_STATUS_EVERY_S, self._update_status, clock=STEADY)
         if self._page.port_taken:
             self.get_logger().warning(
                 f'port {self._params.port} is in use; the page is at another')

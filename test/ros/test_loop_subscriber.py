@@ -161,3 +161,37 @@ def test_the_reconstructor_tells_what_its_network_saw(start_node, bench, box):
                 & {str(msg.header.stamp) for msg in views}, 'the image of a view')
     assert images[-1].encoding == 'rgb8'
     assert images[-1].height == images[-1].width > 0
+
+
+def test_an_image_of_a_time_that_came_again_is_kept(bench, hear):
+    heard = hear(Loop('/', object_size=0.16))
+    publisher = bench.advertise(Image, 'camera/image_raw')
+    grid = VoxelGrid(np.zeros((8, 8, 8), np.float32), 0.16)
+    late = bench.now()
+    early = late - 90_000_000_000
+
+    def shown(stamp, brightness):
+        def sent():
+            publisher.publish(image_to_msg(np.full((16, 16, 3), brightness, np.uint8), Header(
+                stamp=stamp_from_nanoseconds(stamp))))
+            heard.update()
+            picture = heard.observer.state.picture
+            return picture is not None and (picture == brightness).all()
+        bench.until(sent, f'an image of {brightness}')
+
+    for number in range(80):  # more than are kept
+        shown(late + number, number)
+    shown(early, 200)
+    header = Header(stamp=stamp_from_nanoseconds(early), frame_id='object')
+    for kind, topic, msg in (
+            (PointCloud2, 'occupancy', voxel_grid_to_msg(grid, 0.5, header)),
+            (PointCloud2, 'probabilities', voxel_grid_to_msg(grid, 0.02, header)),
+            (PoseStamped, 'view', pose_to_msg(orbit_camera(0.5).pose, header))):
+        bench.node.create_publisher(kind, topic, LATCHED_QOS).publish(msg)
+
+    def taken():
+        heard.update()
+        return heard.observer.state.views
+
+    view, = bench.until(taken, 'the view')
+    assert (view.image == 200).all()

@@ -59,6 +59,18 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
     bench.until(lambda: not fake.done[-1].frame_id, 'an end that is taken back')
 
 
+def test_the_goals_of_an_episode_that_a_clock_ahead_began_are_of_that_episode(
+        start_node, bench, latent):
+    start_node('view_planner', policy='farthest', start_azimuth=1.0, max_views=3)
+    fake = FakeReconstructor(bench)
+    begin = bench.now() + 60_000_000_000
+    fake.begin('of a clock ahead', begin)
+    first = fake.wait_goal(begin - 1)
+    second = fake.wait_goal(fake.show(latent, 1.0, begin + 1) - 1)
+    assert view_goal_from_msg(first).azimuth == pytest.approx(1.0)
+    assert view_goal_from_msg(second).azimuth == pytest.approx(1.0 + math.pi, abs=0.14)
+
+
 def test_a_goal_is_repeated_under_its_stamp_until_its_view_comes(start_node, bench, latent):
     start_node('view_planner', policy='farthest', start_azimuth=1.0)
     fake = FakeReconstructor(bench)

@@ -19,6 +19,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
 from .conftest import BUDGET_S, LATCHED_QOS, SEND_AGAIN_S
+from .test_clock import FakeClock
 
 pytestmark = pytest.mark.ros
 POSE = orbit_camera(1.2).pose
@@ -35,6 +36,9 @@ class FakeBuffer:
     """Knows the camera's transform at the stamps of `known`, nanoseconds."""
 
     known = set()
+
+    def clear(self):
+        self.known.clear()
 
     def lookup_transform(self, target, source, time):
         if (target, source) != ('object', 'camera') or time.nanoseconds not in self.known:
@@ -103,6 +107,18 @@ def test_an_image_whose_transform_does_not_come_is_refused_once_with_tf_s_reason
     fake_tf.known.add(6)
     source.on_image(image_header(6))
     assert len(taken) == len(refused) == 1
+
+
+def test_what_is_forgotten_is_looked_up_anew(bench, tf_poses, fake_tf):
+    source, taken, refused = tf_poses
+    source.on_image(image_header(4))
+    fake_tf.known.add(5)
+    source.forget()
+    source.on_image(image_header(5))
+    assert not fake_tf.known
+    error, = bench.until(lambda: refused, 'the refusal of the later one')
+    assert 'nothing known at 5' in str(error)
+    assert not taken
 
 
 def test_where_tf2_is_missing_it_is_said_what_to_do(bench, monkeypatch):
@@ -196,6 +212,9 @@ class Buffer:
             translation=Vector3(x={0}, y={1}, z={2}),
             rotation=Quaternion(x={3}, y={4}, z={5}, w={6})))
 
+    def clear(self):
+        print('the transforms are forgotten', flush=True)
+
 
 class TransformListener:
     def __init__(self, buffer, node):
@@ -221,6 +240,19 @@ def test_a_view_is_taken_from_where_tf_says(bench, start_node, put_tf):
     Eye(bench, None, '').show(None)
     view = bench.until(lambda: views, 'a view')[0]
     np.testing.assert_allclose(pose_from_msg(view), TURNED, atol=1e-9)
+
+
+def test_transforms_are_forgotten_where_the_clock_goes_back(bench, start_node, put_tf):
+    put_tf(TF.format(0, 0, 1, 0, 0, 0, 1))
+    node = start_node('reconstructor', pose_source='tf', use_sim_time=True)
+    clock = FakeClock(bench)
+
+    def went_back():
+        clock.tell(100.0)
+        clock.tell(50.0)
+        return node.log('the transforms are forgotten')
+
+    bench.until(went_back, 'the end of the old time')
 
 
 def test_a_node_that_is_to_ask_a_tf2_that_is_missing_does_not_start(start_node, put_tf):

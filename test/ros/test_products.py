@@ -57,8 +57,13 @@ def test_an_episode_goes_on_from_its_file_in_another_process(start, bench):
     assert answer.success, answer.message
     assert not saved.name.startswith(answer.message)  # an episode of its own
     bench.until(lambda: len(camera.occupancy) > before, 'the shape that was loaded')
+    bench.until(lambda: bench.state('reconstructor').facts['Views of the episode'] == '2',
+                'its views in the diagnostics')
+    assert 'expected IoU' in bench.state('reconstructor').facts['Quality']
     assert '-2.' in bench.call('save_mesh').message
     assert bench.call('start_episode').success
+    bench.until(lambda: 'Quality' not in bench.state('reconstructor').facts,
+                'no quality of the episode before')
     saved.write_bytes(saved.read_bytes()[:1000])
     answer = bench.call('load_state')
     assert not answer.success
@@ -72,3 +77,13 @@ def test_an_episode_goes_on_from_its_file_in_another_process(start, bench):
 def set_state_file(bench, name):
     bench.ask(SetParameters, 'reconstructor/set_parameters', SetParameters.Request(parameters=[
         Parameter(name='state_file', value=ParameterValue(type=4, string_value=name))]))
+
+
+def test_a_state_that_cannot_be_written_is_told_and_the_node_goes_on(start_node, bench):
+    start_node('reconstructor', take_views='all', output_dir='/proc')
+    FakeCamera(bench).show()
+    for service in ('save_state', 'save_mesh'):
+        answer = bench.call(service)
+        assert not answer.success
+        assert 'was not written: ' in answer.message
+    assert bench.call('start_episode').success

@@ -388,3 +388,14 @@ def test_messages_that_were_lost_in_transport_are_told():
     assert [gaps.before('view', number) for number in (31, 33)] == [0, 1]
     gaps.restart('view')
     assert gaps.before('view', 33) == 0
+
+
+def test_a_recording_ends_with_its_episode_although_the_clock_stands_still(
+        bench, start_node, tmp_path):
+    start_node('recorder', output_dir=tmp_path / 'bags', stop_when_done=True, use_sim_time=True,
+               topics="['done']")
+    done = publish(bench, Header, 'done', LATCHED_QOS, [])
+    done.publish(Header(frame_id='max_views'))
+    bench.until(lambda: bench.counts('recorder').get('recording') == 0, 'the end')
+    (bag,) = bags(tmp_path / 'bags')
+    assert len(read(bag)['/done']) == 1

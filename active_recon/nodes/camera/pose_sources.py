@@ -40,6 +40,9 @@ class PoseSource(Protocol):
     def on_image(self, header: Header) -> None:
         """Note an image, by its stamp and the frame of its camera."""
 
+    def forget(self) -> None:
+        """Forget all poses: the clock went back, and what is known is of the time before."""
+
 
 def check_pose_source(params: CameraPoseParameters) -> None:
     """Raise ConfigError where the poses cannot be obtained."""
@@ -69,6 +72,9 @@ class TopicPoses:
     def on_image(self, header: Header) -> None:
         """Do nothing: the joiner interpolates."""
 
+    def forget(self) -> None:
+        """Do nothing: the joiner keeps the poses."""
+
 
 class TurntablePoses:
     """Poses of a fixed camera in the frame of an object that `turntable/joint_states` turns."""
@@ -95,6 +101,9 @@ class TurntablePoses:
     def on_image(self, header: Header) -> None:
         """Do nothing: the joiner interpolates."""
 
+    def forget(self) -> None:
+        """Do nothing: the joiner keeps the poses."""
+
 
 class TfPoses:
     """
@@ -119,6 +128,11 @@ class TfPoses:
         """Look up the image's pose, now or when its transform has arrived."""
         self._waiting.append((header, time.monotonic()))
         self._look_up()
+
+    def forget(self) -> None:
+        """Forget all transforms that move: tf2 mixes them with earlier ones, or refuses these."""
+        self._waiting.clear()
+        self._buffer.clear()
 
     def _look_up(self) -> None:
         waiting, now = list(self._waiting), time.monotonic()

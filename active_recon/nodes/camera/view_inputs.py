@@ -84,6 +84,10 @@ class ViewInputs:
         self._begin = stamp
         self._joiner.clear(stamp)
 
+    def clock_went_back(self) -> None:
+        """Forget the poses of the time before."""
+        self._poses.forget()
+
     def _on_image(self, msg: Image | CompressedImage) -> None:
         self._diagnostics.count('images')
         with self._diagnostics.rejecting():

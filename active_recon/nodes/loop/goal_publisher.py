@@ -43,12 +43,13 @@ class GoalPublisher:
             return math.nan
         return (self._node.get_clock().now().nanoseconds - self._since) / 1e9
 
-    def publish(self, goal: Goal) -> None:
-        """Publish a goal with a unique stamp, its identity."""
+    def publish(self, goal: Goal, begin: int) -> None:
+        """Publish a goal of an episode, by its begin, with a unique stamp, its identity."""
         self.camera = goal.camera
         self._since = self._node.get_clock().now().nanoseconds
-        # A paused clock would give two goals one identity
-        self._last_stamp = max(self._since, self._last_stamp + 1)
+        # A paused clock would give two goals one identity; and the begin is by the
+        # reconstructor's clock, which takes an earlier goal for another episode's
+        self._last_stamp = max(self._since, self._last_stamp + 1, begin)
         header = Header(stamp=stamp_from_nanoseconds(self._last_stamp), frame_id=self._frame)
         self._open = (view_goal_to_msg(goal.camera, header),
                        azimuth_goal_to_msg(goal.camera.azimuth, header))

@@ -126,7 +126,7 @@ class LoopSubscriber:
         picture = thumbnail(pixels_from_msg(msg))
         self._images[nanoseconds_from_stamp(msg.header.stamp)] = picture
         while len(self._images) > _IMAGES_KEPT:
-            del self._images[min(self._images)]
+            del self._images[next(iter(self._images))]  # the first that came: stamps may go back
         self.observer.set_camera(picture=picture)
 
     def _on_network_image(self, msg: Image) -> None:

@@ -18,6 +18,7 @@ class ViewWarnings:
 
     def clear(self) -> None:
         """Forget the views: an episode begins."""
+        self._diagnostics.drop_value('Quality')
         self._diagnostics.clear_warning('unusual_views', log=False)
 
     def check_elevation(self, camera: Camera) -> None:

@@ -76,6 +76,10 @@ class Diagnostics:
         if at_once and before != value:
             self._note_change()
 
+    def drop_value(self, key: str) -> None:
+        """Drop a value of the node's state that holds no longer, if there is one."""
+        self._values.pop(key, None)
+
     def reject(self, error: ActiveReconError) -> None:
         """Count a rejected input by the error's kind and log the reason in one line."""
         self._record(f'refused/{error.kind}', f'refused: {one_line(error)}')
