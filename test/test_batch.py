@@ -106,6 +106,14 @@ def test_a_fault_of_the_program_refuses_its_bag_alone(archive, tmp_path, monkeyp
     assert [row['refused_kind'] for row in others] == ['data', '', '']
 
 
+def test_a_file_in_the_place_of_the_folder_is_told_in_one_line(
+        archive, tmp_path, monkeypatch, capsys):
+    (tmp_path / 'out').write_text('a file')
+    said = refusal(monkeypatch, capsys, 'batch', 'measure', archive, '--out', tmp_path / 'out',
+                   '--workers', 1)
+    assert 'out: not written: expected a folder, got: ' in said
+
+
 def test_a_full_disk_stops_with_one_line_and_a_second_start_does_the_rest(
         archive, tmp_path, monkeypatch, capsys):
     write, written = BagResult.write, []

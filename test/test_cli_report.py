@@ -97,6 +97,8 @@ def test_only_the_episode_that_is_asked_for_is_shown(bags, tmp_path, monkeypatch
     assert len(panel['scene']['grids']) == 1
     with pytest.raises(DataError, match='no episodes with views'):
         report(bags[0], '--out', page, '--episode', 1)
+    with pytest.raises(ConfigError, match='has no episode 4: expected 1 to 3'):
+        report(bags[0], '--out', page, '--episode', 4)
 
 
 def test_bag_of_images_alone_gets_its_shapes_and_the_page_says_so(bags, tmp_path, monkeypatch,

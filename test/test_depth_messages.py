@@ -21,11 +21,12 @@ import cv2
 from msg_tools.compressed_depth import depth_to_compressed_msg, metres_from_msg
 from msg_tools.images import depth_from_msg, depth_to_msg, image_to_msg
 from msg_tools.loop import depth_to_msgs
+from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.views import ViewJoiner
 import numpy as np
 from photo_rigs import blank_photos, PINHOLE, rig, transforms, write_transforms
 import pytest
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 MS = 1_000_000
@@ -199,6 +200,17 @@ def test_a_depth_camera_s_own_info_is_its_lens_at_the_pose_of_the_image(tmp_path
     view, = run_with_depth(tmp_path / 'own', [DepthImage(BAG_DEPTH[:48, :64], own)])
     assert view.depth.camera.intrinsics == own.intrinsics
     np.testing.assert_allclose(view.depth.camera.pose, camera.pose, atol=1e-9)
+
+
+def test_an_info_of_no_calibrated_depth_camera_is_as_good_as_none(tmp_path, monkeypatch):
+    def uncalibrated(stamp, depth):
+        header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='camera')
+        return depth_to_msgs(stamp, depth) | {
+            'camera/depth/camera_info': CameraInfo(header=header, width=137, height=137)}
+
+    monkeypatch.setattr(run_writing, 'depth_to_msgs', uncalibrated)
+    view, = run_with_depth(tmp_path / 'bag', [DepthImage(BAG_DEPTH)])
+    np.testing.assert_array_equal(view.depth.metres, BAG_DEPTH)
 
 
 def test_compressed_depth_in_a_bag_is_read_as_raw_depth_is(tmp_path, monkeypatch):

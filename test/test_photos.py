@@ -20,6 +20,7 @@ from active_recon.photos.conventions import misreading
 from active_recon.photos.doubts import doubts
 from active_recon.photos.picture import shape_picture
 from active_recon.photos.reconstruct import from_files, Options
+from active_recon.photos.saving import save_shape
 from active_recon.photos.transforms_json import FLIP
 from active_recon.volumes.binvox import read_binvox
 from active_recon.volumes.voxelisation import voxelise
@@ -261,6 +262,12 @@ def test_the_picture_shows_each_photo_over_the_shape(shape):
     picture = shape_picture(shape)
     assert picture.dtype == np.uint8 and picture.shape[1] > 4 * picture.shape[0] / 2
     assert (np.abs(picture - [217.0, 95, 2]).max(axis=2) < 60).any()  # the outline
+
+
+def test_a_folder_that_cannot_be_made_is_told(shape, tmp_path):
+    (tmp_path / 'out').write_text('a file')
+    with pytest.raises(DataError, match='out: not written: expected a folder with room'):
+        save_shape(shape, tmp_path / 'out')
 
 
 def test_the_command_writes_all_files(plain, tmp_path):

@@ -5,6 +5,7 @@ import random
 import subprocess
 import sys
 
+from active_recon.bags.storage.opening import open_bag
 from active_recon.bags.storage.repair import repair_bag
 from active_recon.errors import DataError
 from mcap.reader import make_reader
@@ -199,3 +200,28 @@ def test_the_command_says_what_it_did_and_refuses_in_one_line(cut_off, tmp_path)
     refused = run(tmp_path / 'nowhere')
     assert refused.returncode == 2
     assert refused.stderr.count('\n') == 1 and 'no bag there' in refused.stderr
+
+
+def test_what_only_the_recorder_knew_of_the_bag_is_kept(cut_off):
+    metadata = cut_off / 'metadata.yaml'
+    with announced(cut_off.parent / 'whole') as bag:
+        fill(bag)
+    said = (bag.folder / 'metadata.yaml').read_text().replace(
+        "compression_format: ''", 'compression_format: zstd').replace(
+        "compression_mode: ''", 'compression_mode: MESSAGE').replace(
+        'message_count: 20', 'message_count: 19')
+    metadata.write_text(said)
+    assert repair_bag(cut_off)[1]
+    assert 'compression_mode: MESSAGE' in metadata.read_text()
+    assert 'compression_format: zstd' in metadata.read_text()
+
+
+def test_a_packed_file_that_nothing_lists_is_asked_to_be_unpacked(cut_off):
+    (cut_off / 'metadata.yaml').unlink(missing_ok=True)
+    whole, = cut_off.glob('*.mcap')
+    whole.with_name('run_1.mcap.zstd').write_bytes(b'packed')
+    before = state(cut_off)
+    for use in (repair_bag, open_bag):
+        with pytest.raises(DataError, match=r'run_1.mcap.zstd; unpack it first'):
+            use(cut_off)
+    assert state(cut_off) == before

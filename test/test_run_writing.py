@@ -204,3 +204,19 @@ def test_a_run_rewritten_with_overrides_keeps_its_frame_and_where_its_goals_stan
               if topic in ('/camera/pose', '/view', '/occupancy', '/probabilities', '/next_view',
                            '/azimuth_scores')}
     assert frames == {'table'}
+
+
+def test_a_run_of_a_simulation_s_stamps_lasts_as_long_as_it_was_received(bag, tmp_path):
+    later = 10 ** 9 * SECOND  # messages are received by the time of day
+    run = read_run(bag)
+    episode, = run.episodes
+    received = [replace(view, received={topic: time + later for topic, time in
+                                        view.received.items()}, goal=view.goal and replace(
+                                            view.goal, received=view.goal.received + later))
+                for view in episode.views]
+    assert all(view.received for view in received)
+    first = replace(episode.first_goal, received=episode.first_goal.received + later)
+    write_run(replace(run, episodes=[replace(episode, views=received, first_goal=first)]),
+              tmp_path / 'simulated')
+    times = [time for _, time, _ in messages_of(tmp_path / 'simulated')]
+    assert max(times) - min(times) < 100 * SECOND

@@ -6,11 +6,15 @@ from types import SimpleNamespace
 from xml.etree import ElementTree
 
 from active_recon.cli.shape_files import ShapeFiles
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
+from active_recon.meshes.files import write_mesh
+from active_recon.volumes.binvox import write_binvox
+from active_recon.volumes.voxel_files import write_npz
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
+from recorded_messages import small_disk
 import trimesh
 
 GRID = VoxelGrid(np.pad(np.ones((4, 4, 4), np.float32), 2), 0.2)
@@ -43,3 +47,33 @@ def test_a_robot_description_weighs_as_its_density_says(tmp_path, monkeypatch, c
 def test_a_density_without_a_robot_description_is_refused(mesh, said):
     with pytest.raises(ConfigError, match=said):
         ShapeFiles(mesh and Path(mesh), None, 300.0)
+
+
+def test_voxels_have_the_name_that_was_given(tmp_path, capsys):
+    ShapeFiles(None, tmp_path / 'mug.NPZ').write([(GRID, [])], 0.5)
+    assert [path.name for path in tmp_path.iterdir()] == ['mug.NPZ']
+    with np.load(tmp_path / 'mug.NPZ') as voxels:
+        np.testing.assert_array_equal(voxels['occupancy'], GRID.occupancy)
+
+
+@pytest.mark.parametrize('name', ['mug.ply', 'mug.npz', 'mug.binvox', 'mug.urdf'])
+def test_a_file_that_cannot_be_written_is_told_and_the_one_before_stays(name, tmp_path):
+    (tmp_path / 'taken').write_text('a file')
+    path = tmp_path / 'taken' / name
+    mesh, voxels = (path, None) if path.suffix in ('.ply', '.urdf') else (None, path)
+    with pytest.raises(DataError, match=f'{name}: not written: expected a folder with room'):
+        ShapeFiles(mesh, voxels).write([(GRID, RED_VIEWS)], 0.5)
+
+
+@pytest.mark.parametrize('write', [
+    lambda path: write_mesh(GRID.mesh(0.5), path.with_suffix('.stl')),
+    lambda path: write_binvox(GRID, path.with_suffix('.binvox')),
+    lambda path: write_npz(GRID, path.with_suffix('.npz'), 0.5)], ids=['mesh', 'binvox', 'npz'])
+def test_a_shape_is_written_whole_or_what_was_there_stays(write, tmp_path):
+    write(tmp_path / 'mug')
+    path, = tmp_path.iterdir()
+    path.write_text('before')
+    with small_disk(100), pytest.raises(OSError):
+        write(tmp_path / 'mug')
+    assert path.read_text() == 'before'
+    assert list(tmp_path.iterdir()) == [path]

@@ -127,6 +127,34 @@ def test_a_run_with_overrides_says_so_and_replays_to_the_same_bits(
                    0.12).verdict == SAME_BITS
 
 
+def test_the_views_of_several_episodes_stay_apart_and_one_without_views_stays_so(
+        weights, sweep, tmp_path):
+    soon = replace(sweep, id='soon', begin=2 * SECOND)  # its views are a second apart
+    empty = replace(sweep, id='empty', begin=3 * SECOND, views=[])
+    run = replace(run_of([sweep, soon, empty]), path=tmp_path)
+    other = run_with_overrides(run, LoopSetup(weights[0], {}, None), Overrides(policy='uniform'))
+    assert [len(episode.views) for episode in other.episodes] == [3, 3, 0]
+    times = [time for episode in other.episodes
+             for time in (episode.begin, *(view.stamp for view in episode.views))]
+    assert times == sorted(times)
+    stamps = [view.stamp for episode in other.episodes for view in episode.views]
+    assert len(set(stamps)) == len(stamps)
+    with pytest.raises(DataError, match='no views in the bag'):
+        run_with_overrides(replace(run, episodes=[empty]), LoopSetup(weights[0], {}, None),
+                           Overrides(policy='uniform'))
+
+
+def test_the_topics_of_a_new_bag_have_their_own_names_and_it_knows_its_object(
+        weights, sweep, tmp_path):
+    shown = {'/cell/turntable_camera': {'mesh': 'chair'}}
+    run = replace(run_of([sweep]), path=tmp_path, parameters=shown, provenance={
+        'object': 'chair', '/cell/camera/image_raw': '/usb_cam/image'})
+    other = run_with_overrides(run, LoopSetup(weights[0], {}, None), Overrides(threshold=0.2))
+    assert other.provenance['object'] == 'chair'
+    assert '/cell/camera/image_raw' not in other.provenance
+    assert other.parameters['/cell/turntable_camera'] == {'mesh': 'chair'}
+
+
 def test_under_another_model_alone_nothing_tells_who_chose_the_views(weights, tmp_path, loop):
     run = replace(run_of([episode_of(*loop, SECOND, 1.0)]), path=tmp_path, parameters={
         '/view_planner': {'policy': 'attention', 'weights': str(weights[0]), 'max_views': 3}})

@@ -55,7 +55,8 @@ def run_batch(task: Task, roots: Sequence[Place], crew: Crew,
             return _run(task, roots, crew, reporting, listed)
     except OSError as error:
         if not is_no_room(error):
-            raise
+            raise DataError(f'{task.out}: not written: expected a folder, got: '
+                            f'{error}') from error
         raise WorkError(f'{task.out}: no room to write: {error.strerror}; what is finished is '
                         'kept: start again once there is room', 'no_room') from error
 

@@ -97,10 +97,7 @@ def _considered(task: Task, run: RecordedRun) -> tuple[RecordedRun, str, str]:
                                          task.scene.parameters))
     made_by = f'the weights {setup.load_reconstructor().provenance["weights_sha256"][:12]}'
     if task.overrides != Overrides():
-        other = run_with_overrides(run, setup, task.overrides)
-        shown = {name: values for name, values in run.parameters.items()
-                 if name.rpartition('/')[2] == 'turntable_camera'}  # says which object it was
-        return replace(other, parameters={**shown, **other.parameters}), '', ''
+        return run_with_overrides(run, setup, task.overrides), '', ''
     reconstructor = setup.load_reconstructor()
     if task.kind != 'replay':
         return with_reconstruction(run, reconstructor), made_by, ''

@@ -89,6 +89,9 @@ def _subjects(run: 'RecordedRun', scene: 'Scene', truth: 'TruthFile | None', epi
     from active_recon.report.subject import letters, Subject
     from active_recon.report.truth import known_truth
 
+    if episode is not None and episode > len(run.episodes):
+        raise ConfigError(f'--episode: {run.path} has no episode {episode}: expected 1 to '
+                          f'{len(run.episodes)}')
     run, computed = rebuilt(run, scene, find_weights(model) if model else None)
     true = known_truth(run) if truth is None else truth.read(run, scene.object_size)
     cells, placed = (true.cells, true.placed) if true else (None, '')

@@ -1,11 +1,12 @@
 """Reconstructed shapes as files: coloured meshes, robot descriptions, and voxels."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, DataError
 import typer
 
 if TYPE_CHECKING:
@@ -48,27 +49,29 @@ class ShapeFiles:
         """
         Write shapes, each with the views that it was made from, and print the paths.
 
-        Raises DataError where there is no surface.
+        Each file appears whole. Raises DataError where there is no surface, or a file cannot be
+        written.
         """
         from active_recon.volumes.binvox import write_binvox
-        import numpy as np
+        from active_recon.volumes.voxel_files import write_npz
 
         for number, (grid, views) in enumerate(shapes, 1):
             of_several = number if len(shapes) > 1 else None
             if self.mesh is not None:
-                self._write_mesh(_numbered(self.mesh, of_several), grid, views, threshold)
+                path = _numbered(self.mesh, of_several)
+                with _told(path):
+                    missing = self._write_mesh(path, grid, views, threshold)
+                if missing:
+                    typer.echo(missing)
             if self.voxels is not None:
                 path = _numbered(self.voxels, of_several)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                if path.suffix.lower() == '.binvox':
-                    write_binvox(grid, path, threshold)
-                else:
-                    np.savez_compressed(path, occupancy=grid.occupancy, size=grid.size,
-                                        threshold=threshold)
-                typer.echo(f'wrote {path}')
+                write = write_binvox if path.suffix.lower() == '.binvox' else write_npz
+                with _told(path):
+                    write(grid, path, threshold)
 
     def _write_mesh(self, path: Path, grid: 'VoxelGrid', views: Sequence['RecordedView'],
-                    threshold: float) -> None:
+                    threshold: float) -> str:
+        """Write a mesh; return in words what is missing, or ''."""
         from active_recon.meshes.coloring import colored
         from active_recon.meshes.files import write_mesh
         from active_recon.meshes.photos import album_of
@@ -77,14 +80,21 @@ class ShapeFiles:
 
         photos = album_of([(view.image, view.camera) for view in views], grid.size).photos
         mesh = colored(refined_mesh(grid, threshold), photos)
-        missing = ''
         if path.suffix.lower() == '.urdf':
-            missing = write_urdf(mesh, path, DENSITY if self.density is None else self.density)
-        else:
-            write_mesh(mesh, path)
-        typer.echo(f'wrote {path}')
-        if missing:
-            typer.echo(missing)
+            return write_urdf(mesh, path, DENSITY if self.density is None else self.density)
+        write_mesh(mesh, path)
+        return ''
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Print that a file was written once the block has; DataError where it cannot be."""
+    try:
+        yield
+    except OSError as error:
+        raise DataError(f'{path}: not written: expected a folder with room, got: '
+                        f'{error.strerror}') from error
+    typer.echo(f'wrote {path}')
 
 
 def _numbered(path: Path, number: int | None) -> Path:

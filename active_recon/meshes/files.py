@@ -1,9 +1,10 @@
 """Mesh files: metres, the origin of the object frame; z up, in GLB y up as its standard says."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from active_recon.errors import ConfigError
+from active_recon.whole_files import whole_file
 import numpy as np
 
 if TYPE_CHECKING:
@@ -27,12 +28,14 @@ def write_mesh(mesh: 'trimesh.Trimesh', path: Path) -> None:
     Write a mesh of the object frame as PLY, OBJ, STL or GLB, by the file's suffix.
 
     Vertex colours, sRGB, go with it, but for STL. In GLB y is up and the front is +z, as glTF
-    says; what else reads and writes meshes here does the same. Raises ConfigError on other
-    suffixes.
+    says; what else reads and writes meshes here does the same. The file appears whole. Raises
+    ConfigError on other suffixes.
     """
     suffix = mesh_suffix(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    (_y_up(mesh) if suffix == 'glb' else mesh).export(path)
+    content: Any = (_y_up(mesh) if suffix == 'glb' else mesh).export(file_type=suffix)
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def _y_up(mesh: 'trimesh.Trimesh') -> 'trimesh.Trimesh':

@@ -7,6 +7,7 @@ import uuid
 
 from active_recon.acquisition.view_gate import ViewGate
 from active_recon.errors import DataError
+from active_recon.freed_memory import give_back_freed_memory
 from active_recon.geometry.cameras import Camera
 from active_recon.models.weights_files import find_weights
 from active_recon.nodes.camera.depth_images import DEPTH_INFO_TOPIC, DEPTH_TOPIC
@@ -20,7 +21,6 @@ from active_recon.nodes.loop.reconstruction_publisher import ReconstructionPubli
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.loop.view_warnings import ViewWarnings
 from active_recon.nodes.runtime.deferred_work import DeferredWork
-from active_recon.nodes.runtime.freed_memory import give_back_freed_memory
 from active_recon.nodes.runtime.life_cycle import ManagedNode, run_managed_node
 from active_recon.nodes.runtime.parameters import Commit, Parameters, set_read_only_parameter
 from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS

@@ -11,8 +11,8 @@ from active_recon.meshes.urdf import write_urdf
 from active_recon.photos.picture import shape_picture
 from active_recon.photos.shape import Shape
 from active_recon.volumes.binvox import write_binvox
+from active_recon.volumes.voxel_files import write_npz
 import cv2
-import numpy as np
 
 FORMATS = (*MESH_FORMATS, 'urdf')
 """Of the mesh; `urdf` is a robot description, see `write_urdf`."""
@@ -29,14 +29,13 @@ def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply') -> list[Pat
     paths = [folder / name for name in (
         f'mesh.{mesh_format}', 'voxels.npz', 'voxels.binvox', 'picture.png', 'shape.json')]
     mesh, voxels, binvox, picture, description = paths
-    if mesh_format == 'urdf':
-        folder.mkdir(parents=True, exist_ok=True)
-        write_urdf(shape.mesh(), mesh)
-    else:
-        write_mesh(shape.mesh(), mesh)
     try:
-        np.savez_compressed(voxels, occupancy=shape.occupancy, size=shape.size,
-                            threshold=shape.threshold)
+        if mesh_format == 'urdf':
+            folder.mkdir(parents=True, exist_ok=True)
+            write_urdf(shape.mesh(), mesh)
+        else:
+            write_mesh(shape.mesh(), mesh)
+        write_npz(shape.grid, voxels, shape.threshold)
         write_binvox(shape.grid, binvox, shape.threshold)
         _, drawn = cv2.imencode('.png', shape_picture(shape)[..., ::-1])
         picture.write_bytes(drawn.tobytes())

@@ -12,7 +12,8 @@ def keep_freed_memory() -> bool:
 
     A training step allocates and frees gigabytes in large blocks, which glibc maps anew each time:
     the kernel's clearing of their pages took a fifth to a half of a step on the CPU. The process
-    keeps the most that it ever needed. Without glibc nothing changes.
+    keeps the most that it ever needed, and the gaps between blocks of other sizes, until
+    `give_back_freed_memory`. Without glibc nothing changes.
     """
     try:
         mallopt = ctypes.CDLL(None).mallopt

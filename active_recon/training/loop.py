@@ -10,6 +10,7 @@ from typing import Any
 from active_recon.config import Config
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import ActiveReconError, ConfigError
+from active_recon.freed_memory import give_back_freed_memory
 from active_recon.interrupts import held_interrupts
 from active_recon.training.ahead import drawn_ahead
 from active_recon.training.allocation import keep_freed_memory
@@ -175,6 +176,9 @@ def train_steps(
                 if last or stopping or (step + 1) % config.checkpoint_every == 0:
                     save_checkpoint(run.checkpoint_path, trained, raw,
                                     Checkpoint(step + 1, settings, begun.log))
+            if last or (step + 1) % config.checkpoint_every == 0:
+                # Steps of all sizes leave gaps between what they keep: gigabytes in an hour
+                give_back_freed_memory()
             if stopping:
                 raise TrainingStoppedError(
                     f'stopped at step {step + 1} of {config.steps}; continue with --resume')

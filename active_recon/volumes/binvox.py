@@ -4,6 +4,7 @@ from pathlib import Path
 
 from active_recon.errors import DataError
 from active_recon.volumes.voxels import VoxelGrid
+from active_recon.whole_files import whole_file
 import numpy as np
 
 
@@ -55,7 +56,7 @@ def binvox_side(path: Path) -> float:
 
 def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
     """
-    Write the occupied cells as binvox, as `read_binvox` reads them.
+    Write the occupied cells as binvox, as `read_binvox` reads them; the file appears whole.
 
     Not by trimesh: it writes other bytes, and its run lengths overflow for grids that it has read.
     """
@@ -68,4 +69,5 @@ def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
     dims = ' '.join(map(str, grid.occupancy.shape))
     header = f'#binvox 1\ndim {dims}\ntranslate 0 0 0\nscale {grid.size:.9g}\ndata\n'
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(header.encode() + runs)
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(header.encode() + runs)

@@ -1,9 +1,10 @@
 """A recorded run as it would have been with another model, threshold or policy."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
+from typing import Any
 
 from active_recon import __version__
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
@@ -50,12 +51,14 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
         planner = setup.load_planner()
         assert planner is not None
         tolerance = node_parameters(run, 'reconstructor').get('goal_tolerance', GOAL_TOLERANCE)
-        episodes = [replan_episode(episode, reconstructor, planner, tolerance, advance)
-                    for episode in before]
+        episodes = _replanned(before, reconstructor, planner, tolerance, advance)
     made_by = dict(reconstructor.provenance)
-    provenance = {**run.provenance, **made_by, 'version': __version__,
+    # The new bag has the topics under their own names
+    kept = {name: text for name, text in run.provenance.items()
+            if not ('/' in name and text.startswith('/'))}
+    provenance = {**kept, **made_by, 'version': __version__,
                   'replay_of': run.path.resolve().name}
-    parameters = {'/reconstructor': {
+    parameters: dict[str, Mapping[str, Any]] = {'/reconstructor': {
         **node_parameters(run, 'reconstructor'), **made_by, 'threshold': math.nan,
         'weights': str(setup.weights), 'runtime': setup.runtime, 'precision': setup.precision,
         **setup.reconstructor}}
@@ -65,10 +68,29 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
                     'weights': str(setup.planner['weights'])}
         parameters['/view_planner'] = planning
         provenance['policy'] = planning['policy']
+    parameters.update({name: values for name, values in run.parameters.items()
+                       if name.rpartition('/')[2] == 'turntable_camera'})  # of the object shown
     times = [time for episode in episodes for view in episode.views
              for time in (view.stamp, *view.received.values())]
     return replace(run, episodes=episodes, provenance=provenance, parameters=parameters,
                    begin=min(times, default=run.begin), end=max(times, default=run.end))
+
+
+def _replanned(before: Sequence[RecordedEpisode], reconstructor: Reconstructor, planner: Planner,
+               goal_tolerance: float, advance: Callable[[], None]) -> list[RecordedEpisode]:
+    """Replan every episode that has views; each begins after the last view of the one before."""
+    if not any(episode.views for episode in before):
+        raise DataError('no views in the bag to choose from', 'no_views')
+    episodes, free = [], 0
+    for recorded in before:
+        episode = replace(recorded, begin=max(recorded.begin, free))
+        if episode.views:
+            episode = replan_episode(episode, reconstructor, planner, goal_tolerance, advance)
+            free = episode.views[-1].stamp + _VIEW_PERIOD_NS
+        else:
+            episode = replace(episode, first_goal=None)
+        episodes.append(episode)
+    return episodes
 
 
 def reconstruct_episode(episode: RecordedEpisode, reconstructor: Reconstructor,

@@ -1,6 +1,7 @@
 """The depth images in a bag that the loop took in with its views."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -56,7 +57,8 @@ def _nearest(bag: Bag, topics: Sequence[str], cameras: Mapping[int, Camera],
                             f'got {message.type_name}', 'topics')
         msg = read_message(message)
         if wanted == CAMERA_INFO:
-            lens = lens or intrinsics_from_msg(msg)
+            with suppress(MessageError):
+                lens = lens or intrinsics_from_msg(msg)
             continue
         stamp = nanoseconds_from_stamp(msg.header.stamp)
         for view in cameras:

@@ -52,8 +52,12 @@ def _messages(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, 
 
 def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
     begin = Episode(episode.id or _UNNAMED, episode.begin)
-    yield episode.begin, 'episode', episode.begin, episode_to_msg(begin)
-    yield episode.begin, 'done', episode.begin, done_to_msg(episode.begin, '')
+    # Stamps may be a simulation's, where messages are received by the time of day
+    goal = () if episode.first_goal is None else (episode.first_goal.received,)
+    received = min([*goal, *(time for view in episode.views for time in view.received.values())],
+                   default=episode.begin)
+    yield received, 'episode', episode.begin, episode_to_msg(begin)
+    yield received, 'done', episode.begin, done_to_msg(episode.begin, '')
     yield from _of_goal(episode.first_goal, frame)
     for view in episode.views:
         messages = image_to_msgs(view.stamp, view.image, view.camera, frame) | view_to_msgs(

@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 import re
 
+from active_recon.errors import DataError
 from active_recon.whole_files import whole_file
 
 
@@ -18,7 +19,16 @@ def write_atomically(path: Path, text: str) -> None:
 
 
 def mcap_files(folder: Path) -> list[Path]:
-    """Return the MCAP files of a folder in rosbag2's order, by their numbers."""
+    """
+    Return the MCAP files of a folder in rosbag2's order, by their numbers.
+
+    Raises DataError where others are packed: without them it would be a part of the bag.
+    """
+    if packed := sorted(folder.glob('*.mcap.zstd')):
+        raise DataError(
+            f'{folder}: packed files in a folder without metadata.yaml to list them: expected '
+            f'MCAP files, got {packed[0].name}; unpack it first, by `zstd -d --rm`', 'compression')
+
     def number(path: Path) -> tuple[int, str]:
         found = re.search(r'_(\d+)$', path.stem)
         return int(found[1]) if found else 0, path.name

@@ -15,11 +15,14 @@ from active_recon.bags.storage.metadata import (
     metadata_yaml,
     qos_from_yaml,
     Topic,
+    yaml_mapping,
 )
 from active_recon.bags.storage.salvage import Salvage
 from active_recon.errors import DataError
 from mcap.records import Channel, Message, Schema
-import yaml
+
+_OF_THE_RECORDER = ('compression_format', 'compression_mode', 'ros_distro', 'custom_data')
+"""What metadata.yaml says that the files do not: messages may be compressed, each alone."""
 
 
 @dataclass
@@ -142,18 +145,28 @@ def _repair_metadata(folder: Path, repairs: Sequence[Repair]) -> bool:
     information = bag_information(
         [(repair.path.name, repair.contents) for repair in repairs], topics.values())
     if path.exists():
-        if _read_essence(path) == _essence(information):
+        before = _read_information(path)
+        if _essence_of(before) == _essence(information):
             return False
+        information |= {key: before[key] for key in _OF_THE_RECORDER if key in before}
         path.rename(free_name(path, 'damaged'))
     write_atomically(path, metadata_yaml(information))
     return True
 
 
-def _read_essence(path: Path) -> object:
-    """Return the files and message counts in a metadata.yaml; None if it cannot be read."""
+def _read_information(path: Path) -> dict[str, Any]:
+    """Return what a metadata.yaml says of its bag; nothing if it cannot be read."""
     try:
-        return _essence(yaml.safe_load(path.read_text())['rosbag2_bagfile_information'])
-    except (yaml.YAMLError, UnicodeError, KeyError, TypeError):
+        return dict(yaml_mapping(path.read_bytes(), str(path))['rosbag2_bagfile_information'])
+    except (DataError, KeyError, TypeError, ValueError):
+        return {}
+
+
+def _essence_of(information: dict[str, Any]) -> object:
+    """Return the essence of what a metadata.yaml says; None if it lacks it."""
+    try:
+        return _essence(information)
+    except (KeyError, TypeError):
         return None
 
 
