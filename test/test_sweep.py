@@ -7,6 +7,7 @@ from active_recon.bags.runs.sweep import IMAGES_EACH, record_sweep
 from active_recon.cli.main import app
 from active_recon.errors import MeshError, RecordingError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS
+from active_recon.report.truth import known_truth
 from active_recon.simulation.shown_object import rendered_object
 import numpy as np
 import pytest
@@ -29,6 +30,14 @@ def shown(tmp_path_factory):
 def sweep(shown, tmp_path):
     record_sweep(shown, tmp_path / 'sweep', BEGIN)
     return tmp_path / 'sweep'
+
+
+def test_of_an_object_that_ships_the_truth_is_known(shown, tmp_path):
+    for number, (mesh, is_known) in enumerate((({'mesh': 'chair'}, True), ({}, False),
+                                               ({'mesh': 'chair', 'up': 'x'}, False))):
+        folder = tmp_path / str(number)
+        record_sweep(shown, folder, BEGIN, mesh=mesh)
+        assert (known_truth(read_run(folder)) is not None) == is_known
 
 
 def test_every_azimuth_is_a_view_as_it_was_rendered(shown, sweep):

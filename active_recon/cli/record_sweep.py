@@ -36,5 +36,7 @@ def record_sweep(
 
     with progress_bar('rendering and recording', len(AZIMUTHS)) as advance:
         shown = rendered_object(find_object(model), object_size, background, up, front)
-        record_sweep(shown, out, object_size=object_size, advance=lambda: advance(1, ''))
+        given = {'mesh': model, 'up': up, 'front': front}
+        record_sweep(shown, out, object_size=object_size, advance=lambda: advance(1, ''),
+                     mesh={name: value for name, value in given.items() if value is not None})
     typer.echo(f'{len(shown.images)} views of {shown.name} are in {out}')

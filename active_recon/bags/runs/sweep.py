@@ -1,6 +1,6 @@
 """Recording a bag with every view of a turntable, from which any policy can be replayed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 import time
 
@@ -18,20 +18,22 @@ _STEP_NS = 1_000_000  # from stamp to receipt, and from one message of an image 
 
 
 def record_sweep(shown: ShownObject, folder: Path, begin: int | None = None,
-                 object_size: float = 1.0, advance: Callable[[], None] = lambda: None) -> None:
+                 object_size: float = 1.0, advance: Callable[[], None] = lambda: None,
+                 mesh: Mapping[str, str] | None = None) -> None:
     """
     Write a bag in which the camera goes around an object once and stops at each view.
 
     It has what the simulated turntable would have streamed at 10 Hz from `begin` on, nanoseconds
     since 1970; by default it ends now. `object_size` is the side of the object's cube, metres.
-    `advance` is called after each view. The folder appears when the bag is complete; raises
-    RecordingError if it exists or the disk is full.
+    `advance` is called after each view. `mesh` are those of the simulated camera's parameters
+    `mesh`, `up` and `front` that were given: a report knows the truth by them. The folder appears
+    when the bag is complete; raises RecordingError if it exists or the disk is full.
     """
     stamp = begin if begin is not None else (
         time.time_ns() - len(shown.images) * IMAGES_EACH * _PERIOD_NS)
     with atomic_bag(folder) as bag:
         bag.add_provenance({'version': __version__, 'object': shown.name})
-        bag.attach_parameters('/turntable_camera', {'object_size': object_size})
+        bag.attach_parameters('/turntable_camera', {'object_size': object_size, **(mesh or {})})
         for index in range(len(shown.images)):
             for _ in range(IMAGES_EACH):
                 _write_view(bag, shown, index, stamp)
