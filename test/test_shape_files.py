@@ -57,7 +57,7 @@ def test_voxels_have_the_name_that_was_given(tmp_path, capsys):
 
 
 @pytest.mark.parametrize('name', ['mug.ply', 'mug.npz', 'mug.binvox', 'mug.urdf'])
-def test_a_file_that_cannot_be_written_is_told_and_the_one_before_stays(name, tmp_path):
+def test_a_file_that_cannot_be_written_is_told(name, tmp_path):
     (tmp_path / 'taken').write_text('a file')
     path = tmp_path / 'taken' / name
     mesh, voxels = (path, None) if path.suffix in ('.ply', '.urdf') else (None, path)

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 from active_recon.errors import ConfigError
 from active_recon.meshes.collision import convex_parts
 from active_recon.meshes.files import write_mesh
+from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
 import trimesh
@@ -40,7 +41,9 @@ def write_urdf(mesh: trimesh.Trimesh, path: Path, density: float = DENSITY) -> s
     robot = _robot(name, mesh, density, [file.relative_to(path.parent) for file in files],
                    (folder / 'visual.obj').relative_to(path.parent))
     ElementTree.indent(robot)
-    path.write_text(f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n')
+    with whole_file(path) as unfinished:
+        unfinished.write_text(
+            f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n')
     return missing
 
 

@@ -163,6 +163,7 @@ def train_steps(
             schedule.step()
             measured = {name: value.item() for name, value in losses.items()}
             last = step + 1 == config.steps
+            is_checkpoint = last or (step + 1) % config.checkpoint_every == 0
             stopping = not last and _is_asked_to_stop(fabric, raise_if_asked)
             if last or (step + 1) % config.validate_every == 0:
                 if fabric.is_global_zero:
@@ -173,10 +174,10 @@ def train_steps(
                 begun.log.append({'step': step + 1, **measured})
             if fabric.is_global_zero:
                 run.report(step + 1, measured)
-                if last or stopping or (step + 1) % config.checkpoint_every == 0:
+                if is_checkpoint or stopping:
                     save_checkpoint(run.checkpoint_path, trained, raw,
                                     Checkpoint(step + 1, settings, begun.log))
-            if last or (step + 1) % config.checkpoint_every == 0:
+            if is_checkpoint:
                 # Steps of all sizes leave gaps between what they keep: gigabytes in an hour
                 give_back_freed_memory()
             if stopping:

@@ -146,7 +146,7 @@ def _repair_metadata(folder: Path, repairs: Sequence[Repair]) -> bool:
         [(repair.path.name, repair.contents) for repair in repairs], topics.values())
     if path.exists():
         before = _read_information(path)
-        if _essence_of(before) == _essence(information):
+        if _essence(before) == _essence(information):
             return False
         information |= {key: before[key] for key in _OF_THE_RECORDER if key in before}
         path.rename(free_name(path, 'damaged'))
@@ -162,16 +162,12 @@ def _read_information(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _essence_of(information: dict[str, Any]) -> object:
-    """Return the essence of what a metadata.yaml says; None if it lacks it."""
+def _essence(information: dict[str, Any]) -> object:
+    """Return the files and message counts that a metadata.yaml tells; None if it lacks some."""
     try:
-        return _essence(information)
+        return (
+            [Path(name).name for name in information['relative_file_paths']],
+            {topic['topic_metadata']['name']: topic['message_count']
+             for topic in information['topics_with_message_count'] if topic['message_count']})
     except (KeyError, TypeError):
         return None
-
-
-def _essence(information: dict[str, Any]) -> object:
-    return (
-        [Path(name).name for name in information['relative_file_paths']],
-        {topic['topic_metadata']['name']: topic['message_count']
-         for topic in information['topics_with_message_count'] if topic['message_count']})
