@@ -22,6 +22,7 @@ from active_recon.policies import (
     PolicyOptions,
 )
 from active_recon.policies.automatic import SWEEP
+from active_recon.policies.checked import checked_choice
 from active_recon.policies.planner_views import observation, PlannerView, policy_poses
 from active_recon.policies.reasons import goal_reason, GoalReason
 from active_recon.policies.stopping import StoppingRule
@@ -189,8 +190,8 @@ class Planner:
         view = PlannerView(latent, camera, math.nan, volume)
         try:
             candidates = self._places.candidates(camera)
-            choice, state = self._policy.choose(
-                self._observed([*self._views, view], candidates), self._state)
+            choice, state = checked_choice(self._policy.choose(
+                self._observed([*self._views, view], candidates), self._state), len(candidates))
         except ViewError:
             return  # which `add_view` tells
         self._early = view, choice, state
@@ -288,7 +289,8 @@ class Planner:
         if early is not None and early[0].is_of(last):
             _, self._choice, self._state = early
         else:
-            self._choice, self._state = self._policy.choose(seen, self._state)
+            self._choice, self._state = checked_choice(
+                self._policy.choose(seen, self._state), len(self._candidates))
         if last.quality is not None and last.quality.suspect:
             self._choice, _ = self._sweep.choose(seen, {})
 

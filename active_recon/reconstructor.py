@@ -84,7 +84,7 @@ class Reconstructor:
     def __init__(self, runtime: Runtime, object_size: float = 1.0, object_yaw: float = 0.0,
                  threshold: float | None = None, tables: QualityTables | None = None,
                  load_depth: Callable[[], DepthRuntime] | None = None) -> None:
-        if not object_size > 0:
+        if not 0 < object_size < math.inf:
             raise ConfigError('object_size: out of range: expected metres above 0, got '
                               f'{object_size}')
         if not math.isfinite(object_yaw):
@@ -146,7 +146,7 @@ class Reconstructor:
         if not 0 < threshold < 1:
             raise ConfigError('threshold: out of range: expected a probability in (0, 1), got '
                               f'{threshold}')
-        self.threshold = threshold
+        self.threshold = float(threshold)
 
     def warm_up(self, depth: bool = False) -> None:
         """
@@ -210,8 +210,11 @@ class Reconstructor:
 
         Takes an image (H, W, 3) uint8 RGB, its camera in the object frame, and what a depth camera
         measured beside it. Depth that cannot be used is left out, and the result says why. Raises
-        ViewError, which leaves the state unchanged.
+        ViewError, and WeightsError where a state that was taken up needs a depth refiner; they
+        leave the state unchanged.
         """
+        if self._evidence is not None:
+            self._depth_runtime()
         shown, seen_by = network_image(image, camera, self._runtime.spec, self.object_size)
         placed = seen_by.turned(-self._yaw).scaled(1 / self.object_size)
         occupancy, latent, self._state = self._runtime.step(shown, placed, self._state)

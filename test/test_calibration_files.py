@@ -91,3 +91,9 @@ def test_a_quaternion_that_is_no_unit_is_refused(tmp_path):
 def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(DataError, match='nowhere.csv: not readable: expected a CSV file'):
         read_angles(tmp_path / 'nowhere.csv', NAMES)
+
+
+def test_digits_that_are_no_number_are_letters(tmp_path):
+    for name in ('1²1.png', '2.png'):
+        cv2.imwrite(str(tmp_path / name), np.zeros((2, 2, 3), np.uint8))
+    assert len(image_paths([tmp_path])) == 2

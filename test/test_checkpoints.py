@@ -121,3 +121,14 @@ def test_a_checkpoint_may_be_read_by_whom_the_user_lets_read_files(trained, tmp_
     finally:
         os.umask(before)
     assert (tmp_path / 'run.safetensors').stat().st_mode & 0o777 == 0o640
+
+
+def test_weights_that_are_tied_are_saved_and_restored(tmp_path):
+    torch.manual_seed(0)
+    modules = [torch.nn.Sequential(torch.nn.Linear(3, 3), torch.nn.Linear(3, 3)) for _ in 'ab']
+    for module in modules:
+        module[1].weight = module[0].weight
+    path = tmp_path / 'tied.safetensors'
+    save_checkpoint(path, modules[0], optimizer_of(modules[0]), POINT)
+    load_checkpoint(path, modules[1], optimizer_of(modules[1]))
+    assert_close(modules[1].state_dict(), modules[0].state_dict(), rtol=0, atol=0)

@@ -155,3 +155,21 @@ def test_the_board_to_print_comes_with_its_size(tmp_path):
 def test_options_that_do_not_go_together_are_refused(options, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert said in refusal(*options)
+
+
+@pytest.mark.parametrize('square_mm', [0.05, 20000])
+def test_a_board_of_metres_taken_for_millimetres_is_refused(square_mm, tmp_path):
+    assert 'are they in millimetres?' in refusal(
+        '--print-board', tmp_path / 'board.png', '--square-mm', square_mm)
+    assert not any(tmp_path.iterdir())
+
+
+def test_an_object_s_size_in_millimetres_is_refused(folder, tmp_path):
+    line = refusal(folder / 'images', *OPTIONS[:3], 100, '--step-deg', STEP_DEG, '--camera-info',
+                   folder / 'lens.yaml', '--out', tmp_path / 'out')
+    assert "camera in the object's cube" in line and 'in metres?' in line
+    assert not (tmp_path / 'out').exists()
+
+
+def test_it_tells_how_far_it_is(written):
+    assert 'searching the board: 9/9' in written[1]

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import weights_hash
@@ -310,3 +311,13 @@ def test_a_policy_alone_leaves_its_reconstruction_as_it_was(run, dataset, tmp_pa
         same = bool((after[name] == tensor).all())
         assert same == name.startswith('reconstruction.') or not tensor.any(), name
     assert not (out / 'reconstruction.safetensors').exists()
+
+
+def test_a_training_on_other_data_is_not_resumed(run, dataset, tmp_path, monkeypatch, capsys):
+    other = tmp_path / 'other'
+    shutil.copytree(dataset, other)
+    some = next(other.glob('ShapeNetRendering/*/*'))
+    for each in [*other.glob(f'*/{some.parent.name}/{some.name}')]:
+        each.rename(each.with_name('another'))
+    line = refusal(monkeypatch, capsys, *training(other, run, '--resume'))
+    assert 'made under other settings' in line

@@ -152,6 +152,19 @@ def test_a_network_without_a_refiner_says_so_and_goes_on(weights, tmp_path):
         load(alone).warm_up(depth=True)
 
 
+def test_a_state_with_depth_is_not_gone_on_from_without_a_refiner(weights, tmp_path):
+    alone = tmp_path / weights.name
+    alone.write_bytes(weights.read_bytes())
+    deep, plain = load(weights), load(alone)
+    deep.add_view(*view(0))
+    plain.go_on_from(deep.progress)
+    before = plain.progress
+    with pytest.raises(WeightsError, match='takes no depth'):
+        plain.add_view(*view(1))
+    assert plain.progress.view_count == before.view_count == 1
+    assert plain.progress.state is before.state
+
+
 def test_the_exported_refiner_answers_as_torch_does(weights):
     rng = np.random.default_rng(0)
     occupancy = rng.random((64, 64, 64)).astype(np.float32)

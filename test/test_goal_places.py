@@ -204,3 +204,12 @@ def test_listed_azimuths_are_the_only_ones_of_every_ring_of_a_dome():
     dome = goal_places(limits, elevation_range=RANGE)
     assert isinstance(dome, Dome)
     assert [azimuths for azimuths, _ in dome.rings] == [(0.5, 2.0)] * len(dome.rings)
+
+
+@pytest.mark.parametrize('wrong', [{'distance': 0.0}, {'distance': -1.0},
+                                   {'distance': math.nan}, {'elevation': 2.0},
+                                   {'elevation': math.nan}])
+def test_places_where_no_camera_can_stand_are_refused(wrong):
+    (name,) = wrong
+    with pytest.raises(ConfigError, match=f'{name}: out of range'):
+        goal_places(MotionLimits(), **wrong)

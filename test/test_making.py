@@ -1,9 +1,11 @@
 """Meshes to a dataset: every job once, what is there kept, what cannot be read told."""
 
+from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.making import make_dataset, make_object, mesh_jobs, shape_jobs, yawed
 from active_recon.errors import ConfigError, DataError
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
 import trimesh
@@ -137,3 +139,29 @@ def test_a_yaw_turns_counter_clockwise_and_the_object_still_fits():
     np.testing.assert_allclose(turned.extents, [0.2, 1, 0.2], atol=0.01)
     assert turned.vertices[turned.vertices[:, 1].argmax(), 0] == pytest.approx(0, abs=1e-6)
     assert turned.center_mass[1] < 0  # the tip was at +x and is at +y now
+
+
+def test_what_is_finished_under_other_options_is_refused_and_stays(tmp_path):
+    save(tmp_path, *(f'meshes/it/{name}.obj' for name in 'abcdefgh'))
+    turned = Viewing(turned=True)
+    jobs = mesh_jobs(tmp_path / 'meshes', tmp_path / 'out', None, None)
+    jobs = [job for job in jobs if turned.yaw(f'it/{job.folder.name}')][:2]
+    for job in jobs:
+        assert not make_object(job, samples=1, viewing=turned).refusal
+    for job in jobs:
+        assert 'finished as another shape' in make_object(job, samples=1, fine=True).refusal
+        assert not job.folder.voxels_path(64).exists()
+        assert not make_object(job, samples=1, fine=True, viewing=turned).refusal
+        pooled = job.folder.voxels(64).occupancy.reshape(32, 2, 32, 2, 32, 2).max((1, 3, 5))
+        assert iou(pooled > 0.5, job.folder.voxels().occupied(0.5)) > 0.98
+        assert 'finished from other cameras: expected the 3 of' in make_object(
+            job, samples=1, viewing=Viewing('any', 3)).refusal
+
+
+def test_what_a_run_of_other_cameras_left_is_not_mixed_in(tmp_path):
+    (job,) = shape_jobs('lamp', [7], tmp_path)
+    make_object(job, samples=1, viewing=Viewing('any', 3))
+    job.folder.voxels_path().unlink()
+    assert not make_object(job, samples=1).refusal
+    assert len(job.folder.cameras()) == 24
+    assert job.folder.image(0).shape == (137, 137, 4)

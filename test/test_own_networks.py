@@ -5,11 +5,12 @@ from pathlib import Path
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models import registry
 from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
-from active_recon.models.weights import load_weights
+from active_recon.models.weights import Bundle, load_weights, save_weights
 from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLICIES_GROUP
 from active_recon.policies.registry import _installed, PolicyOptions
 from command_line import command
 import pytest
+import torch
 
 EXAMPLE = Path(__file__).parents[1] / 'examples' / 'my_network.py'
 
@@ -21,8 +22,6 @@ def none_known(monkeypatch):
 
 def test_the_example_is_trained_for_ten_steps_and_its_weights_load_where_it_is_named(
         dataset, tmp_path, monkeypatch, capsys):
-    import torch
-
     threads = torch.get_num_threads()
     assert command(monkeypatch, 'train', dataset, '--validation', dataset, '--out', tmp_path,
                    '--model', f'{EXAMPLE}:Net', '--steps', 10, '--batch-size', 2, '--threads',
@@ -76,3 +75,49 @@ def test_what_an_installed_package_offers_is_known_by_its_name(package):
     assert _installed('far')(PolicyOptions()).initial_state(1) == {}
     with pytest.raises(ConfigError, match='broken: cannot be imported'):
         network_entry('broken')
+
+
+OWN = """
+from my_network import Net, Sizes
+from dataclasses import dataclass
+from active_recon.config import Config
+import torch
+
+class Unsaved(Net):
+    def __init__(self, config):
+        super().__init__(config)
+        self.register_buffer('grid', torch.linspace(0, 1, 5), persistent=False)
+        self.rates = torch.linspace(0, 0.1, 3).tolist()
+        self.plain = torch.linspace(0, 1, 5)
+
+class Needs(Net):
+    @dataclass(frozen=True)
+    class Config(Config):
+        channels: int
+"""
+
+
+@pytest.fixture
+def own_file(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLE.parent)
+    path = tmp_path / 'own.py'
+    path.write_text(OWN)
+    return path
+
+
+def test_a_network_with_tensors_that_are_not_stored_is_loaded(own_file, tmp_path, monkeypatch):
+    monkeypatch.setenv(OWN_NETWORKS, f'{own_file}:Unsaved')
+    entry = network_entry('Unsaved')
+    config = entry.sizes['small']
+    network = entry.build(config)
+    path = tmp_path / 'weights.safetensors'
+    save_weights(path, Bundle(network, None, config, 0.5, model='Unsaved'))
+    loaded = load_weights(path).reconstruction
+    assert loaded.rates == network.rates
+    for name in ('grid', 'plain'):
+        torch.testing.assert_close(getattr(loaded, name), getattr(network, name))
+
+
+def test_a_config_without_defaults_is_refused(own_file):
+    with pytest.raises(ConfigError, match=r'own\.py:Needs: a Config without defaults.*channels'):
+        named_network(f'{own_file}:Needs')

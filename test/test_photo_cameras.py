@@ -1,5 +1,6 @@
 """Every format of cameras says the same of the same cameras, and what is no camera is refused."""
 
+from dataclasses import replace
 import json
 from pathlib import Path
 import struct
@@ -127,6 +128,10 @@ def test_cameras_are_found_beside_the_photos(tmp_path):
     ({'camera_model': 'EQUIRECTANGULAR'}, 'camera_model EQUIRECTANGULAR: expected one of'),
     ({'fl_x': -3}, 'frame 0: no camera: .*fl_x of -3.0: expected a number above 0'),
     ({'k4': 0.1}, 'k4 of a lens that is no fisheye'),
+    ({'w': 0}, 'frame 0: no camera: .*w of 0.0: expected a number above 0'),
+    ({'h': float('inf')}, 'frame 0: no camera: .*h of inf: expected a number above 0'),
+    ({'cx': float('nan')}, 'frame 0: no camera: .*cx, cy of nan'),
+    ({'fl_x': 1e400}, 'fl_x of inf'),
     ({'frames': [{'file_path': 'a.png'}]}, 'frame 0: no camera: .*transform_matrix'),
     ({'frames': [{'file_path': 'a.png', 'transform_matrix': np.ones((4, 4)).tolist()}]},
      'frame 0: no rotation')])
@@ -152,6 +157,7 @@ def test_a_colmap_model_that_is_cut_off_is_refused(tmp_path):
 
 @pytest.mark.parametrize(('name', 'content', 'expected'), [
     ('cameras.yml', '%YAML:1.0\n---\na: 1\n', 'no lens: expected camera_matrix'),
+    ('cameras.yaml', '%YAML:1.0\n---\ncamera_matrix: [1, 2, 3]\n', 'expected matrices and lists'),
     ('cameras.txt', 'nothing', 'no COLMAP model'),
     ('cameras.csv', 'nothing', r'no cameras: expected transforms.json')])
 def test_a_file_without_cameras_is_refused(name, content, expected, photos, tmp_path):
@@ -173,3 +179,66 @@ def test_poses_that_do_not_match_the_photos_are_refused(photos, tmp_path):
     path = write_opencv(tmp_path / 'cameras.yml', rig(count=3), named=False)
     with pytest.raises(DataError, match='expected .* six numbers for each of 4 photos, got 3'):
         read_cameras(path, photos)
+
+
+def test_an_angle_of_view_that_no_lens_has_is_refused(tmp_path):
+    path = tmp_path / 'transforms.json'
+    path.write_text(json.dumps({'camera_angle_x': 3.3, 'frames': transforms(rig())['frames']}))
+    with pytest.raises(DataError, match='camera_angle_x of 3.3: expected radians from 0 to pi'):
+        read_transforms(path)
+
+
+def test_a_lens_that_is_not_finite_is_refused(photos, tmp_path):
+    path = write_opencv(tmp_path / 'cameras.yml', rig(), True)
+    path.write_text(path.read_text().replace('300.', '.Nan', 1))
+    with pytest.raises(DataError, match='no lens: expected camera_matrix'):
+        read_cameras(path, photos)
+
+
+def test_a_file_of_windows_is_read_and_one_that_is_no_text_is_not_printed(photos, tmp_path):
+    path = write_transforms(tmp_path / 'transforms.json', rig())
+    path.write_text(path.read_text(), encoding='utf-8-sig')
+    assert_same(path, photos, rig())
+    path.write_bytes(b'\xff\xfe' + bytes(range(256)) * 99)
+    with pytest.raises(DataError, match='expected JSON with a list `frames`') as refused:
+        read_transforms(path)
+    assert len(str(refused.value)) < 400
+
+
+def of_two_folders(root, first='left', second='right'):
+    """Write cameras of photos that have the same names in two folders; return the second's."""
+    photos = open_photos(photo_paths(blank_photos(root / second, rig())))[0]
+    own, other = rig(), rig(distance=2.5)
+    frames = [{**frame, 'file_path': f'{folder}/{name}'}
+              for folder, cameras in ((first, other), (second, own))
+              for name, frame in zip(names(cameras), transforms(cameras)['frames'], strict=True)]
+    path = root / 'transforms.json'
+    path.write_text(json.dumps({**transforms(own), 'frames': frames}))
+    return photos, path
+
+
+def test_of_cameras_of_one_name_the_photo_s_folder_tells_its_own(tmp_path):
+    photos, path = of_two_folders(tmp_path)
+    assert_same(path, photos, rig())
+
+
+def test_photos_that_several_cameras_may_have_taken_are_left_out(tmp_path):
+    photos, path = of_two_folders(tmp_path, 'a', 'b')
+    moved = [replace(photo, path=tmp_path / photo.name) for photo in photos]
+    with pytest.raises(DataError, match='2 cameras of that name in .*a/photo0.png and b/photo0'):
+        posed_photos(read_cameras(path, moved), moved)
+
+
+def test_photos_of_a_test_folder_have_the_cameras_of_its_file(tmp_path):
+    (tmp_path / 'test').mkdir()
+    for part in ('train', 'test'):
+        (tmp_path / f'transforms_{part}.json').touch()
+    assert find_cameras([tmp_path / 'test', tmp_path]) == tmp_path / 'transforms_test.json'
+    assert find_cameras([tmp_path]) == tmp_path / 'transforms_train.json'
+
+
+@pytest.mark.parametrize('about', ['(x y z)', '(1 1 1)\n(0 0 0)'])
+def test_a_readme_without_a_box_is_no_reason_to_stop(about, photos, tmp_path):
+    (tmp_path / 'README.txt').write_text(f'{about}\n(min max mean)\n')
+    path = write_middlebury(tmp_path / 'it_par.txt', rig(PINHOLE))
+    assert read_cameras(path, photos).box is None

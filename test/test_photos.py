@@ -22,6 +22,7 @@ from active_recon.photos.picture import shape_picture
 from active_recon.photos.reconstruct import from_files, Options
 from active_recon.photos.saving import save_shape
 from active_recon.photos.transforms_json import FLIP
+from active_recon.photos.views import _mask
 from active_recon.volumes.binvox import read_binvox
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import iou
@@ -296,6 +297,11 @@ def test_the_command_writes_all_files(plain, tmp_path):
     (['--box', '1,2'], '--box: invalid cube'), (['--board', '--cameras', 'x'], 'several of'),
     (['--turntable-step-deg', '10'], 'needs --distance'),
     (['--size', '1', '--unit', '2'], '--size and --unit'),
+    (['--camera-info', 'lens.yaml'], '--camera-info without --board'),
+    (['--fov-deg', '40'], '--fov-deg or --distance without --turntable-step-deg'),
+    (['--board', '--axes', 'opengl'], '--axes with --board'),
+    (['--turntable-step-deg', '10', '--distance', '1', '--axes', 'opengl'],
+     '--axes with --turntable-step-deg'),
     (['--mesh-format', 'doc'], '--mesh-format: unknown value')])
 def test_options_of_the_command_that_contradict_each_other_are_refused(
         arguments, expected, plain, tmp_path):
@@ -316,3 +322,19 @@ def test_five_photos_of_the_dinosaur_are_near_the_hull_of_all(background, least)
     assert shape.size == pytest.approx(0.0949, abs=1e-3)  # by README.txt
     cells = averaged(shape.occupancy, 32) > shape.threshold
     assert iou(cells, hull(dino, range(16))) > least
+
+
+def test_the_folder_of_photos_is_not_written_to(plain):
+    result = CliRunner().invoke(app, ['reconstruct', str(plain), '--out', f'{plain}/.'])
+    assert isinstance(result.exception, ConfigError) and '--out: the folder of photos' in str(
+        result.exception)
+    assert not (plain / 'picture.png').exists()
+
+
+def test_an_opaque_alpha_channel_is_no_mask(tmp_path):
+    grey = np.zeros((8, 8), np.uint8)
+    grey[2:5, 3:6] = 255
+    for name, alpha in (('opaque', np.full_like(grey, 255)), ('clear', grey)):
+        shown = grey if name == 'opaque' else np.full_like(grey, 7)
+        Image.fromarray(np.dstack([shown] * 3 + [alpha])).save(tmp_path / f'{name}.png')
+        np.testing.assert_array_equal(_mask(tmp_path / f'{name}.png', 8, 8), grey > 0)

@@ -540,3 +540,34 @@ def test_a_policy_that_looks_at_volumes_goes_on_from_the_last():
     after = policy()
     after.go_on_from(before)
     assert after.plan().camera.azimuth == before.plan().camera.azimuth
+
+
+class Mistaken(FarthestPolicy):
+    """A policy whose choice is spoilt by a function."""
+
+    def __init__(self, spoil):
+        self._spoil = spoil
+
+    def choose(self, seen, state):
+        choice, state = super().choose(seen, state)
+        return self._spoil(choice, state)
+
+
+def with_nan(scores):
+    return np.where(np.arange(scores.shape[1]) == 5, np.nan, scores)
+
+
+@pytest.mark.parametrize(('spoil', 'said'), [
+    (lambda choice, state: (Choice(choice.scores[0]), state), r'scores: expected \(1, 24\)'),
+    (lambda choice, state: (Choice(choice.scores[:, :-1]), state), r'got \(1, 23\)'),
+    (lambda choice, state: (Choice(with_nan(choice.scores)), state), 'with 1 NaN'),
+    (lambda choice, state: (choice.scores, state), 'expected a Choice of arrays'),
+    (lambda choice, state: choice, 'expected a Choice of arrays, and a state'),
+    (lambda choice, state: (Choice(choice.scores, 1.0), state), r'azimuth: expected \(1,\)'),
+    (lambda choice, state: (Choice(choice.scores, np.array([np.inf])), state), 'azimuth')])
+def test_what_a_policy_returns_wrongly_is_refused_and_nothing_has_changed(spoil, said):
+    planner = Planner(Mistaken(spoil), max_views=1)
+    goal = planner.first_goal(orbit_camera(0.0))
+    with pytest.raises(ViewError, match=said):
+        planner.add_view(LATENT, goal.camera, 1.0)
+    assert planner.plan() is goal

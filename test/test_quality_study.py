@@ -1,5 +1,6 @@
 """Fitting and testing the tables of quality: on numbers whose truth is known."""
 
+from dataclasses import replace
 import json
 
 from active_recon.datasets.views import read_views
@@ -266,3 +267,22 @@ def test_a_study_of_nothing_and_an_unknown_fault_are_refused(tmp_path, monkeypat
     assert 'nothing to measure' in refusal(monkeypatch, capsys, 'quality', 'study')
     assert 'unknown value' in refusal(monkeypatch, capsys, 'quality', 'measure', tmp_path,
                                       tmp_path / 'm.npz', '--fault', 'luck')
+
+
+def test_more_episodes_of_the_same_objects_make_no_narrower_interval(tables):
+    once = made_up(200, 3)
+    thrice = Measured.joined([
+        replace(once, kind=np.full(len(once), kind, '<U16'),
+                episode=np.array([f'{name} {kind}' for name in once.episode]))
+        for kind in ('random', 'even', LEARNED)])
+    for count in map(str, range(1, COUNTS + 1)):
+        expected = study(once, tables)['views'][count]['solid']['error']
+        assert study(thrice, tables)['views'][count]['solid']['error'] == pytest.approx(expected)
+
+
+def test_what_is_measured_is_written_whole_where_there_is_no_folder_yet(tmp_path):
+    measured = made_up(3, 0)
+    path = tmp_path / 'numbers.npz'
+    measured.write(path)
+    assert [each.name for each in tmp_path.iterdir()] == ['numbers.npz']
+    np.testing.assert_array_equal(Measured.read(path).iou, measured.iou)

@@ -6,7 +6,7 @@ from active_recon.volumes.refinement import refined, refined_mesh
 from active_recon.volumes.voxels import iou, VoxelGrid
 import numpy as np
 import pytest
-from scipy.ndimage import label
+from scipy.ndimage import gaussian_filter, label
 from scipy.special import expit
 
 RANDOM = VoxelGrid(np.random.default_rng(0).random((6, 6, 6), np.float32))
@@ -134,3 +134,13 @@ def test_a_speck_beside_the_object_is_left_out_and_a_smaller_object_stays():
     assert refined_mesh(VoxelGrid(cells), 0.5).body_count == 1
     cells[26:30, 26:30, 26:30] = 1
     assert refined_mesh(VoxelGrid(cells), 0.5).body_count == 2
+
+
+@pytest.mark.parametrize('threshold', [0.1, 0.55])
+def test_a_threshold_of_numpy_cuts_as_a_plain_one(threshold):
+    noise = np.random.default_rng(0).random((32,) * 3)
+    smooth = gaussian_filter(noise, 1.5)
+    grid = VoxelGrid(((smooth - smooth.min()) / np.ptp(smooth)).astype(np.float32))
+    plain, numpy = (refined_mesh(grid, kind(threshold)) for kind in (float, np.float64))
+    assert len(plain.faces) == len(numpy.faces)
+    np.testing.assert_array_equal(plain.vertices, numpy.vertices)

@@ -3,6 +3,7 @@
 from active_recon.cli.main import app
 from active_recon.errors import DataError
 from active_recon.volumes.sheet import contact_sheet, sequence_sheet
+from command_line import refusal as refused
 import cv2
 import numpy as np
 import pytest
@@ -48,3 +49,16 @@ def test_a_folder_without_meshes_or_objects_is_refused(tmp_path):
         run(tmp_path / 'none.png', '--meshes', tmp_path)
     with pytest.raises(DataError, match='has no folder ShapeNetRendering'):
         run(tmp_path / 'none.png', '--training', tmp_path)
+
+
+def test_a_sheet_is_a_png_file_or_refused_before_it_is_drawn(tmp_path, monkeypatch, capsys):
+    for name in ('sheet.xyz', 'sheet'):
+        line = refused(monkeypatch, capsys, 'sheet', tmp_path / name, '--category', 'chair')
+        assert f'{name}: no PNG file' in line
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path, monkeypatch, capsys):
+    (tmp_path / 'file').touch()
+    line = refused(monkeypatch, capsys, 'sheet', tmp_path / 'file/x.png', '--category', 'chair',
+                   '--count', 1)
+    assert 'file' in line

@@ -1,5 +1,7 @@
 """The first stage of training: it learns, repeats, goes on after a cut, says what went wrong."""
 
+from dataclasses import replace
+import json
 import os
 import signal
 
@@ -18,8 +20,11 @@ from active_recon.training.pictures import progress_picture
 from active_recon.training.supervised import longest_sequence, steps_for, train_reconstruction
 import numpy as np
 import pytest
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
 from shown_views import part_of
 import torch
+from torch.nn import functional
 from torch.testing import assert_close
 
 CONFIG = TrainingConfig(steps=7, batch_size=3, max_views=3, bfloat16=False, checkpoint_every=3,
@@ -103,6 +108,45 @@ def test_a_training_stopped_early_and_resumed_does_too(whole, views, tiny, tmp_p
     assert told == whole[1][:6]
     resumed, _ = train(CONFIG, views, tiny, path, seed=9, resume=True)
     assert_same(resumed, whole[0])
+
+
+class Forgetful(Network2d3d):
+    """A network that forgets some of what it sees, at random."""
+
+    def encode(self, images, cameras):
+        return functional.dropout(super().encode(images, cameras), 0.3, self.training)
+
+
+def test_what_a_network_draws_is_the_same_where_the_training_is_resumed(views, tiny, tmp_path):
+    def trained(path, **how):
+        torch.manual_seed(0)
+        network = Forgetful.from_config(tiny)
+        train_reconstruction(network, views, CONFIG, LossConfig(), Run(
+            make_fabric(False), path, lambda step, measured: None, **how), lambda model: {})
+        return network
+
+    whole = trained(tmp_path / 'whole.safetensors')
+    trained(tmp_path / 'cut.safetensors', until=3)
+    assert_same(trained(tmp_path / 'cut.safetensors', resume=True), whole)
+
+
+def test_a_checkpoint_of_other_objects_or_cameras_is_refused(views, tiny, tmp_path):
+    path = tmp_path / 'run.safetensors'
+    train(CONFIG, views, tiny, path, until=3)
+    for other in (part_of(views, slice(1, None)), replace(views, poses=views.poses.flip(1))):
+        with pytest.raises(ConfigError, match='made under other settings'):
+            train(CONFIG, other, tiny, path, resume=True)
+
+
+def test_a_checkpoint_that_does_not_tell_its_data_is_taken_up(views, tiny, tmp_path, monkeypatch):
+    path = tmp_path / 'run.safetensors'
+    train(CONFIG, views, tiny, path, until=3)
+    with safe_open(path, 'pt') as file:
+        told = json.loads(file.metadata()['checkpoint'])
+    del told['settings']['data']
+    save_file(load_file(path), path, {'checkpoint': json.dumps(told)})
+    _, steps = train(CONFIG, views, tiny, path, resume=True)
+    assert [step for step, _ in steps] == [4, 5, 6, 7]
 
 
 def test_a_finished_training_that_is_resumed_does_nothing(whole, views, tiny, tmp_path):

@@ -17,6 +17,7 @@ import pytest
 from safetensors.torch import load_file, save_file
 from shown_views import known_after
 import torch
+from torch import nn
 from torch.testing import assert_close
 
 
@@ -180,3 +181,25 @@ def test_a_tensor_that_is_lacking_is_named(saved, tiny):
 def test_half_precision_is_what_the_file_holds(saved):
     assert {tensor.dtype for tensor in load_file(saved).values()} == {torch.float16}
     assert np.isfinite([tensor.float().abs().max() for tensor in load_file(saved).values()]).all()
+
+
+class Numbers(nn.Module):
+    """Tensors that half precision would spoil, and a network's own."""
+
+    def __init__(self):
+        super().__init__()
+        self.register_buffer('order', torch.arange(5000).flip(0))
+        self.register_buffer('scale', torch.tensor([1e5]))
+        self.register_buffer('endless', torch.tensor([torch.inf, 0.1]))
+
+
+def test_whole_numbers_and_large_ones_are_stored_as_they_are(tmp_path, network, tiny):
+    network.add_module('numbers', Numbers())
+    path = tmp_path / 'weights.safetensors'
+    save_weights(path, Bundle(network, None, tiny, 0.35))
+    stored = load_file(path)
+    for name, kept in (('order', torch.int64), ('scale', torch.float32),
+                       ('endless', torch.float16)):
+        own = getattr(network.numbers, name)
+        assert stored[f'reconstruction.numbers.{name}'].dtype == kept
+        assert_close(stored[f'reconstruction.numbers.{name}'].to(own), own, rtol=1e-3, atol=0)

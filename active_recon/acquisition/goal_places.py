@@ -144,6 +144,11 @@ def goal_places(limits: MotionLimits, yaw: float = 0.0, elevation: float | None 
     """
     if elevation_range and reachable_views:
         raise ConfigError('elevation_range, reachable_views: both given: expected one of them')
+    if not 0 < distance < math.inf:
+        raise ConfigError(f'distance: out of range: expected metres above 0, got {distance}')
+    if elevation is not None and not abs(elevation) <= STEEPEST:
+        raise ConfigError(f'elevation: out of range: expected -{STEEPEST} to {STEEPEST} rad, got '
+                          f'{elevation}')
     if elevation is not None and (elevation_range or reachable_views):
         other = 'elevation_range' if elevation_range else 'reachable_views'
         raise ConfigError(f'elevation, {other}: both given: expected one of them')

@@ -95,9 +95,15 @@ class Board:
         """
         Write the board with a margin as a PNG file with its resolution, so that it prints to size.
 
-        Raises DataError where the file cannot be written.
+        Raises DataError where the file cannot be written, ConfigError where the squares are too
+        small or too large to be drawn.
         """
-        drawn = self.drawn()
+        try:
+            drawn = self.drawn()
+        except cv2.error as error:
+            raise ConfigError(f'board: cannot be drawn with squares of {self.square * 1e3:g} mm '
+                              f'and markers of {self.marker * 1e3:g} mm at {PIXELS_PER_MM:g} '
+                              'pixels a mm; are they in millimetres?') from error
         margin = round(_MARGIN * drawn.shape[1] / self.columns)
         sheet = np.pad(drawn, margin, constant_values=255)
         density = PIXELS_PER_MM * 25.4

@@ -1,6 +1,6 @@
 """Complete calibrations, from images to the parameters of the nodes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from active_recon.calibration.turntable import FEWEST_IMAGES as FEWEST_OF_TABLE
 from active_recon.calibration.turntable import fit_turntable
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.reporting import Advance, Reporting, silent
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,7 +64,8 @@ class _Detections:
 
 
 def calibrate_turntable(images: BoardImages, placement: Placement,
-                        angles: Mapping[str, float] | None = None) -> Calibration:
+                        angles: Mapping[str, float] | None = None,
+                        reporting: Reporting = silent) -> Calibration:
     """
     Estimate the pose of a fixed camera beside a turntable.
 
@@ -71,7 +73,7 @@ def calibrate_turntable(images: BoardImages, placement: Placement,
     not known. Raises DataError where the images do not determine the pose or contradict the
     angles.
     """
-    detected = _detect_board(images, FEWEST_OF_TABLE)
+    detected = _detect_board(images, FEWEST_OF_TABLE, reporting)
     given = None if angles is None else np.array([angles[one.name] for one in detected.seen])
     found = fit_turntable(detected.seen, detected.lens, given)
     pose = placement.on_table(found)
@@ -97,14 +99,15 @@ def calibrate_turntable(images: BoardImages, placement: Placement,
 
 
 def calibrate_arm(images: BoardImages, placement: Placement,
-                  mounts: Mapping[str, NDArray[np.float64]], frames: Frames) -> Calibration:
+                  mounts: Mapping[str, NDArray[np.float64]], frames: Frames,
+                  reporting: Reporting = silent) -> Calibration:
     """
     Estimate the pose of a camera on an arm, and of the object frame in the arm's base frame.
 
     `mounts`: base from mount, (4, 4), metres, by the image's name. Raises DataError as `fit_arm`
     does.
     """
-    detected = _detect_board(images, FEWEST_OF_ARM)
+    detected = _detect_board(images, FEWEST_OF_ARM, reporting)
     found = fit_arm(detected.seen, detected.lens,
                     np.stack([mounts[one.name] for one in detected.seen]))
     board_from_object = placement.on_board(images.board)
@@ -117,9 +120,11 @@ def calibrate_arm(images: BoardImages, placement: Placement,
          (frames.mount, frames.camera): found.mount_from_camera})
 
 
-def _detect_board(images: BoardImages, fewest: int) -> _Detections:
-    seen, missing = _detect(images.board, images.paths, fewest)
-    more = _detect(images.board, images.lens_paths, 1)[0] if images.lens_paths else []
+def _detect_board(images: BoardImages, fewest: int, reporting: Reporting) -> _Detections:
+    with reporting('searching the board', len(images.paths) + len(images.lens_paths)) as advance:
+        seen, missing = _detect(images.board, images.paths, fewest, advance)
+        more = (_detect(images.board, images.lens_paths, 1, advance)[0] if images.lens_paths
+                else [])
     for other in more[:1]:
         _same_size(seen[0], other.size, other.name)
     remarks = of_missing(missing)
@@ -133,9 +138,15 @@ def _detect_board(images: BoardImages, fewest: int) -> _Detections:
     return _Detections(seen, estimated.lens, remarks)
 
 
-def _detect(board: Board, paths: Sequence[Path], fewest: int
+def _detect(board: Board, paths: Sequence[Path], fewest: int, advance: Advance
             ) -> tuple[list[Detection], list[str]]:
-    return detect_all(board, ((path.name, read_image(path)) for path in paths), fewest)
+    return detect_all(board, _read(paths, advance), fewest)
+
+
+def _read(paths: Sequence[Path], advance: Advance) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    for path in paths:
+        yield path.name, read_image(path)
+        advance(1, path.name)  # once the board has been searched in it
 
 
 def _same_size(first: Detection, size: tuple[int, int], name: str) -> None:

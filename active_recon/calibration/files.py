@@ -34,7 +34,7 @@ def image_paths(places: list[Path]) -> list[Path]:
 
 def in_order(path: Path) -> list[tuple[int, str]]:
     """Return a key that sorts names with numbers as people do: 2 before 10."""
-    return [(int(part), '') if part.isdigit() else (0, part)
+    return [(int(part), '') if part.isdecimal() else (0, part)
             for part in re.split(r'(\d+)', path.name)]
 
 

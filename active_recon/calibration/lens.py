@@ -69,7 +69,7 @@ def read_lens(path: Path) -> Intrinsics:
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError,
             ValueError) as error:
         raise DataError(f"{path}: no calibration: expected a YAML file of ROS's "
-                        f'camera_calibration, got: {error!r}') from error
+                        f'camera_calibration, got: {type(error).__name__}: {error}') from error
     except ViewError as error:
         raise DataError(f'{path}: {error}') from error
     if not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1], *size) <= 0:

@@ -44,7 +44,7 @@ class Placement:
         """
         Return the camera's pose in the object frame at table angle 0, (4, 4).
 
-        Raises DataError where the camera is below the plate.
+        Raises DataError where the camera is below the plate or in the object's cube.
         """
         height = found.board_height + self.above_board
         camera = Camera(_moved(0, 0, -height) @ np.linalg.inv(found.camera_from_table))
@@ -52,6 +52,11 @@ class Placement:
             raise DataError('camera below the plate: expected it above, got one '
                             f'{-camera.position[2] - self.object_size / 2:.3f} m below it',
                             'below')
+        if np.abs(camera.position).max() < self.object_size / 2:
+            raise DataError("camera in the object's cube: expected it outside, got one "
+                            f'{camera.distance:.3f} m from the centre of a cube of '
+                            f'{self.object_size:g} m; is the size of the object in metres?',
+                            'inside')
         turn = np.eye(4)
         turn[:3, :3] = Rotation.from_euler(
             'z', self.azimuth_at_zero - camera.azimuth).as_matrix()

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
 
@@ -97,12 +98,12 @@ def calibrate(
     seen = BoardImages(board, paths, camera_info, image_paths(lens_images) if lens_images else ())
     if poses is not None:
         found = calibrate_arm(seen, placement, read_poses(poses, names),
-                              Frames(base_frame, mount_frame, camera_frame))
+                              Frames(base_frame, mount_frame, camera_frame), progress_bar)
     else:
         angles = None if angles_deg is None else read_angles(angles_deg, names)
         if step_deg is not None:
             angles = {name: math.radians(step_deg) * index for index, name in enumerate(names)}
-        found = calibrate_turntable(seen, placement, angles)
+        found = calibrate_turntable(seen, placement, angles, progress_bar)
     found.save(out, paths)
     for one in found.images:
         typer.echo(f'{one.seen.name}: {len(one.seen.points)} corners, {one.error:.2f} pixels')

@@ -82,10 +82,10 @@ _flow(app)
 
 
 def main() -> None:
-    """Run the command; errors of the package are one line and exit code 2."""
+    """Run the command; errors of the package and of files are one line and exit code 2."""
     try:
         app()
-    except ActiveReconError as error:
+    except (ActiveReconError, OSError) as error:
         sys.stderr.write(f'active-recon: {error}\n')
         sys.exit(2)
 

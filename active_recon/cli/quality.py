@@ -59,6 +59,7 @@ def measure(
     network = bundle.reconstruction
     policy = load_policy(LEARNED, PolicyOptions(
         views=views, weights=weights, threads=threads)) if kind == LEARNED else None
+    out.parent.mkdir(parents=True, exist_ok=True)
     folders = chosen_folders(list_objects(data), None, objects, seed)
     parts = []
     with progress_bar(f'measuring {data.name}', len(folders)) as advance:

@@ -128,9 +128,22 @@ def reconstruct(
 
         if distance is None:
             raise ConfigError('--turntable-step-deg needs --distance: give it in metres')
+        if axes is not None:
+            raise ConfigError('--axes with --turntable-step-deg: it is for a file of cameras')
         sources.append(TurntableCameras(
             math.radians(turntable_step_deg), math.radians(elevation_deg), distance,
             None if fov_deg is None else math.radians(fov_deg)))
+    elif fov_deg is not None or distance is not None:
+        raise ConfigError('--fov-deg or --distance without --turntable-step-deg: they are for a '
+                          'turntable alone')
+    if camera_info is not None and not board:
+        raise ConfigError('--camera-info without --board: other sources of cameras have no lens '
+                          'file')
+    if board and axes is not None:
+        raise ConfigError('--axes with --board: it is for a file of cameras')
+    if out.resolve() == photos.resolve():
+        raise ConfigError(f'--out: the folder of photos, {out}: its picture.png would be a photo '
+                          'of the next run; give another folder')
     if len(sources) > 1:
         raise ConfigError('several of --cameras, --board and --turntable-step-deg: give one of '
                           'them')

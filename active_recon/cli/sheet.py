@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.errors import DataError
+from active_recon.errors import ConfigError, DataError
 import typer
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ def sheet(
     """Draw many objects in one image, to inspect them and compare them with real ones."""
     import cv2
 
+    if out.suffix.lower() != '.png':
+        raise ConfigError(f'{out}: no PNG file: expected a path that ends with .png')
     picture = _objects(category, meshes, count, azimuth_deg) if training is None else (
         _training(training, count))
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -166,6 +166,8 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
     Raises DataError where an image cannot be written.
     """
     folder.images_folder.mkdir(parents=True, exist_ok=True)
+    for left in (*folder.images_folder.glob('*.png'), folder.images_folder / _CAMERAS):
+        left.unlink(missing_ok=True)  # of a run that was interrupted, perhaps of other cameras
     rows, names = [], []
     for index, (image, camera) in enumerate(zip(images, cameras, strict=True)):
         names.append(f'{index:02d}.png')

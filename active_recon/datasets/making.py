@@ -23,10 +23,12 @@ from active_recon.shapes import check_category, make_shape
 from active_recon.volumes.meshes import file_rotation, fit_to_grid, load_mesh
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
-from active_recon.volumes.voxels import FINE_RESOLUTION
+from active_recon.volumes.voxels import FINE_RESOLUTION, iou
 import numpy as np
 import trimesh
 
+_ALIKE = 1e-5  # difference of poses by which files round them
+_SAME_SHAPE = 0.98
 MESH_SUFFIXES = {'.glb', '.gltf', '.obj', '.ply', '.stl', '.off', '.3mf', '.dae'}
 
 
@@ -108,19 +110,24 @@ def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = T
     Render and voxelise one object at 32 cells a side, with `fine` also at 64.
 
     Each image pixel averages `samples` x `samples` rays. With `depth` there is a depth image,
-    without noise, beside each image. Existing files are kept. Errors become the outcome's
-    `refusal`; raises OSError where there is no room to write.
+    without noise, beside each image. Existing files are kept, if they are of the same cameras and
+    shape. Errors become the outcome's `refusal`; raises OSError where there is no room to write.
     """
     lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
     lacks_depth = depth and not job.folder.has_depth
-    if job.folder.complete and not (lacks_fine or lacks_depth):
-        return Outcome(job.folder)
     try:
+        finished = job.folder.complete
+        if finished:
+            _check_cameras(job.folder, viewing)
+            if not (lacks_fine or lacks_depth):
+                return Outcome(job.folder)
         mesh = job.make_mesh()
         yaw = viewing.yaw(_name(job.folder))
         if yaw:
             mesh = yawed(mesh, yaw)
-        if not job.folder.complete:
+        if finished:
+            _check_shape(job.folder, mesh)
+        else:
             _render(job.folder, mesh, samples, viewing)
         if lacks_fine:
             write_voxels(job.folder, voxelise(mesh, FINE_RESOLUTION))
@@ -132,6 +139,25 @@ def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = T
             raise
         return Outcome(job.folder, str(error))
     return Outcome(job.folder)
+
+
+def _check_cameras(folder: ObjectFolder, viewing: Viewing) -> None:
+    """Raise DataError where a finished object was rendered from other cameras."""
+    found, asked = folder.cameras(), viewing.of(_name(folder))[0]
+    if len(found) != len(asked) or any(
+            there.intrinsics != here.intrinsics
+            or not np.allclose(there.pose, here.pose, rtol=0, atol=_ALIKE)
+            for there, here in zip(found, asked, strict=True)):
+        raise DataError(f'finished from other cameras: expected the {len(asked)} of these '
+                        f'options, found {len(found)} others; choose another folder')
+
+
+def _check_shape(folder: ObjectFolder, mesh: trimesh.Trimesh) -> None:
+    """Raise DataError where a finished object is turned otherwise, or another one."""
+    share = float(iou(folder.voxels().occupied(0.5), voxelise(mesh).occupied(0.5)))
+    if share < _SAME_SHAPE:
+        raise DataError(f'finished as another shape (IoU {share:.2f}): expected the same mesh and '
+                        '--turned, --up and --front as before; choose another folder')
 
 
 def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int, viewing: Viewing) -> None:

@@ -27,7 +27,8 @@ MARGIN = 1.09  # side of the cube relative to the longest side of the box
 _NUMBERS = 21  # K, R, t
 _DARK = 0.19  # brightness in [0, 1] up to which a pixel is background
 _GROWN, _SHRUNK = 10, 7  # pixels by which a mask is dilated, then eroded, to close dark spots
-_CORNER = re.compile(r'^\s*\(\s*(\S+)\s+(\S+)\s+(\S+)\s*\)\s*$', re.MULTILINE)
+_NUMBER = r'([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)'
+_CORNER = re.compile(rf'^\s*\(\s*{_NUMBER}\s+{_NUMBER}\s+{_NUMBER}\s*\)\s*$', re.MULTILINE)
 _FRONTS = {'x': 'y', 'y': 'x', 'z': 'x'}
 
 

@@ -49,7 +49,7 @@ class Intrinsics:
     Camera intrinsics: focal lengths, principal point and image size in pixels, and distortion.
 
     Pixel coordinates are (0.5, 0.5) at the centre of the first pixel. `distortion` is None for a
-    pinhole camera.
+    pinhole camera. Raises ViewError on numbers that no camera has.
     """
 
     fx: float
@@ -59,6 +59,14 @@ class Intrinsics:
     width: int
     height: int
     distortion: Distortion | None = None
+
+    def __post_init__(self) -> None:
+        """Reject focal lengths and sizes that are not above 0, and what is not finite."""
+        if not (0 < self.fx < math.inf and 0 < self.fy < math.inf and self.width > 0
+                and self.height > 0 and math.isfinite(self.cx) and math.isfinite(self.cy)):
+            raise ViewError('invalid intrinsics: expected focal lengths and sizes above 0 and a '
+                            f'finite centre, got fx {self.fx}, fy {self.fy}, cx {self.cx}, cy '
+                            f'{self.cy}, {self.width} x {self.height}', 'camera_info')
 
     @property
     def matrix(self) -> NDArray[np.float64]:

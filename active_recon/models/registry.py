@@ -131,7 +131,12 @@ def _own_entry(reference: str, found: Any) -> NetworkEntry:
             and isinstance(config, type) and issubclass(config, Config)):
         raise ConfigError(f'{reference}: neither a NetworkEntry nor a ReconstructionNetwork with '
                           'a Config of its own')
-    return NetworkEntry(config, found, {'small': config()}, getattr(found, 'loss', LossConfig()))
+    try:
+        small = config()
+    except TypeError as error:
+        raise ConfigError(f'{reference}: a Config without defaults: expected one for each of its '
+                          f'fields, got: {error}') from error
+    return NetworkEntry(config, found, {'small': small}, getattr(found, 'loss', LossConfig()))
 
 
 def network_config(name: str, size: str) -> Config:

@@ -1,5 +1,6 @@
 """Weights on disk: safetensors, with a card in JSON beside them; never pickle."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 import hashlib
 import json
@@ -9,7 +10,7 @@ from typing import Any
 from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import ReconstructionNetwork
-from active_recon.models.registry import network_entry
+from active_recon.models.registry import network_entry, NETWORKS
 from active_recon.models.weights_bytes import weights_bytes
 from active_recon.models.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
@@ -30,9 +31,13 @@ class Bundle:
 
 
 def save_weights(path: Path, bundle: Bundle) -> None:
-    """Write `path` (.safetensors, half precision) and the card beside it (.json)."""
+    """
+    Write `path` (.safetensors) and the card beside it (.json).
+
+    Floats are stored in half precision, but for tensors with numbers too large for it.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    tensors = {f'{part}.{name}': tensor.detach().cpu().half().contiguous()
+    tensors = {f'{part}.{name}': _stored(tensor.detach().cpu()).contiguous()
                for part, module in _parts(bundle).items()
                for name, tensor in module.state_dict().items()}
     config = json.dumps(bundle.config.to_dict())
@@ -62,23 +67,33 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
     try:
         entry = network_entry(metadata.model)
         config = entry.config.from_dict(metadata.config)
-        # Built on no device: the fresh weights would only be overwritten, and drawing takes time
-        with torch.device('meta'):
+        # Built on no device: the fresh weights would only be overwritten, and drawing takes time.
+        # Networks of others may have tensors that are not stored
+        with torch.device('meta') if metadata.model in NETWORKS else nullcontext():
             attention = (entry.policy(config)
                          if entry.policy is not None and _has(tensors, 'attention') else None)
             bundle = Bundle(entry.build(config), attention, config, metadata.threshold,
                             model=metadata.model)
-    except (KeyError, ValueError, TypeError, ConfigError) as error:
+    except (KeyError, ValueError, TypeError, RuntimeError, ConfigError) as error:
         raise WeightsError(f'{path}: its config cannot be read: {error}') from error
     for part, module in _parts(bundle).items():
-        own = {name.removeprefix(f'{part}.'): tensor.float()
+        own = {name.removeprefix(f'{part}.'):
+               tensor.float() if tensor.is_floating_point() else tensor
                for name, tensor in tensors.items() if name.startswith(f'{part}.')}
         try:
             module.load_state_dict(own, assign=True)
         except RuntimeError as error:
             raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
-        module.eval().requires_grad_(False)
+        module.to(device).eval().requires_grad_(False)
     return bundle
+
+
+def _stored(tensor: torch.Tensor) -> torch.Tensor:
+    """Return a tensor as it is stored: floats halved where that makes none infinite."""
+    if not tensor.is_floating_point():
+        return tensor
+    half = tensor.half()
+    return half if torch.equal(half.isfinite(), tensor.isfinite()) else tensor
 
 
 def state_hash(module: nn.Module) -> str:

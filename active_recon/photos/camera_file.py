@@ -87,18 +87,24 @@ def posed_photos(cameras: CameraFile, photos: Sequence[PhotoFile]
     """
     Return the photos that the file has cameras for, in their order, and why others are left out.
 
-    A name fits with or without folders and suffix, if it fits one photo only. Raises DataError
-    where no camera has a photo.
+    A name fits with or without folders and suffix, if it fits one photo only. Where several fit a
+    photo, those count that have the most of its folders. Raises DataError where no camera has a
+    photo.
     """
     by_photo = _matched(cameras.entries, photos)
     found, left_out = [], []
     for photo in photos:
-        entry = by_photo.get(photo.path)
-        if entry is None:
+        entries = by_photo.get(photo.path, [])
+        if not entries:
             left_out.append(f'{photo.name}: no camera in {cameras.source}')
             continue
+        if any(not np.array_equal(entries[0].pose, other.pose) for other in entries[1:]):
+            left_out.append(f'{photo.name}: {len(entries)} cameras of that name in '
+                            f'{cameras.source}, as different as {entries[0].name} and '
+                            f'{entries[1].name}')
+            continue
         try:
-            found.append(_posed(entry, photo))
+            found.append(_posed(entries[0], photo))
         except ViewError as error:
             left_out.append(f'{photo.name}: {error}')
     if not by_photo:
@@ -121,21 +127,31 @@ def _posed(entry: Entry, photo: PhotoFile) -> PosedPhoto:
                           depth=entry.depth)
 
 
-def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]) -> Mapping[Path, Entry]:
-    """Return the camera of each photo, by its path: names are compared, else their stems."""
+def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]
+             ) -> Mapping[Path, list[Entry]]:
+    """Return the cameras that fit a photo best, by its path: by name, else by stem; by folders."""
     tables: list[dict[str, list[Path]]] = []
     for part in (_name, _stem):
         tables.append({})
         for photo in photos:
             tables[-1].setdefault(part(photo.path.name), []).append(photo.path)
-    found: dict[Path, Entry] = {}
+    found: dict[Path, dict[tuple[bool, int], list[Entry]]] = {}
     for entry in entries:
         for part, table in zip((_name, _stem), tables, strict=True):
             fitting = table.get(part(entry.name), [])
             if len(fitting) == 1:
-                found.setdefault(fitting[0], entry)
+                fit = part is _name, _folders_alike(entry.name, fitting[0])
+                found.setdefault(fitting[0], {}).setdefault(fit, []).append(entry)
                 break
-    return found
+    return {path: fits[max(fits)] for path, fits in found.items()}
+
+
+def _folders_alike(name: str, path: Path) -> int:
+    """Return how many folders of a name are also those of a path, from the last one up."""
+    named = PurePosixPath(name.replace('\\', '/').lower()).parts[-2::-1]
+    there = Path(str(path.resolve()).lower()).parts[-2::-1]
+    unlike = (at for at, (a, b) in enumerate(zip(named, there, strict=False)) if a != b)
+    return next(unlike, min(len(named), len(there)))
 
 
 def _name(path: str) -> str:

@@ -37,6 +37,9 @@ def read_opencv(path: Path, photos: Sequence[PhotoFile]) -> CameraFile:
             raise DataError(f'{path}: not readable: expected a file of OpenCV')
         lens = _lens(storage, path)
         named = [(name, pose, f'{path}: {name}') for name, pose in _poses(storage, path, photos)]
+    except cv2.error as error:
+        raise DataError(f'{path}: no cameras: expected matrices and lists as OpenCV writes them, '
+                        f'got {error.err}') from error
     finally:
         storage.release()
     entries = []
@@ -50,7 +53,8 @@ def _lens(storage: Any, path: Path) -> Lens:
     matrix = _matrix(storage, 'camera_matrix', 'K')
     given = _matrix(storage, 'distortion_coefficients', 'D')
     width, height = (int(storage.getNode(name).real()) for name in ('image_width', 'image_height'))
-    if matrix is None or matrix.shape != (3, 3) or min(width, height, *matrix.diagonal()) <= 0:
+    if (matrix is None or matrix.shape != (3, 3) or not np.isfinite(matrix).all()
+            or min(width, height, *matrix.diagonal()) <= 0):
         raise DataError(f'{path}: no lens: expected camera_matrix (3 x 3), image_width and '
                         f'image_height, got {matrix} and {width} x {height}')
     try:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+import glob
 from pathlib import Path
 
 from active_recon.datasets.middlebury import camera_lines, lens_of, pose_of, read_box
@@ -53,11 +54,17 @@ def other_looks(looks: str) -> str:
 
 
 def find_cameras(folders: Sequence[Path]) -> Path | None:
-    """Return the first file of cameras in folders, or the folder of a COLMAP model, or None."""
+    """
+    Return the first file of cameras in folders, or the folder of a COLMAP model, or None.
+
+    NeRF's synthetic scenes have a file for each folder of photos: transforms_test.json for test/.
+    """
+    own = f'transforms_{folders[0].resolve().name}.json'
     for folder in folders:
         if not folder.is_dir():
             continue
-        for pattern in ('transforms.json', 'transforms_train.json', '*_par.txt', 'cameras.y*ml'):
+        for pattern in ('transforms.json', glob.escape(own), 'transforms_train.json', '*_par.txt',
+                        'cameras.y*ml'):
             found = sorted(folder.glob(pattern))
             if len(found) == 1:
                 return found[0]
@@ -92,7 +99,7 @@ def _read_middlebury(path: Path) -> CameraFile:
             raise DataError(f'{path}, line {number}: {error}') from error
     try:
         box = read_box(path.parent)
-    except DataError:
+    except (DataError, ConfigError):  # the object is found without it
         box = None
     return CameraFile(str(path), entries, np.array([0.0, 1.0, 0.0]), box)
 

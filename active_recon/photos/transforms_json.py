@@ -31,13 +31,13 @@ _FISHEYE = {'OPENCV_FISHEYE', 'FISHEYE'}
 def read_transforms(path: Path) -> CameraFile:
     """Read the file; raises DataError that names the frame and the key that are wrong."""
     try:
-        content = json.loads(path.read_text())
+        content = json.loads(path.read_text(encoding='utf-8-sig'))  # Windows writes its mark
         frames = content['frames']
         if not isinstance(frames, list) or not frames:
             raise ValueError('no frames')
     except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
         raise DataError(f'{path}: no cameras: expected JSON with a list `frames`, got: '
-                        f'{error!r}') from error
+                        f'{type(error).__name__}: {error}') from error
     entries = []
     for number, frame in enumerate(frames):
         where = f'{path}, frame {number}'
@@ -47,7 +47,7 @@ def read_transforms(path: Path) -> CameraFile:
             if matrix.shape not in ((4, 4), (3, 4)):
                 raise ValueError(f'transform_matrix of the shape {matrix.shape}')
             lens = _lens({**content, **frame})
-        except (KeyError, TypeError, ValueError, ViewError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError, ViewError) as error:
             raise DataError(f'{where}: no camera: expected file_path, transform_matrix and '
                             f'intrinsics, got: {error}') from error
         pose = rigid(matrix[:3, :3], matrix[:3, 3], where) @ FLIP
@@ -61,12 +61,15 @@ def _lens(values: Mapping[str, Any]) -> Lens:
     if 'fl_x' not in values and 'camera_angle_x' not in values:
         raise ValueError('neither fl_x nor camera_angle_x')
     if 'fl_x' in values and {'w', 'h'} <= values.keys():
-        width, height = int(values['w']), int(values['h'])
+        width, height = (int(_positive(values, name)) for name in ('w', 'h'))
         across = _positive(values, 'fl_x')
         return sized(Intrinsics(
-            across, _positive({'fl_y': across, **values}, 'fl_y'),
-            float(values.get('cx', width / 2)), float(values.get('cy', height / 2)), width,
-            height, distortion))
+            across, _positive({'fl_y': across, **values}, 'fl_y'), *_centre(values, width, height),
+            width, height, distortion))
+    for angle in ('camera_angle_x', 'camera_angle_y'):
+        if angle in values and not 0 < float(values[angle]) < math.pi:
+            raise ValueError(f'{angle} of {values[angle]}: expected radians from 0 to pi')
+    _centre(values, 1, 1)
 
     def of_size(size: tuple[int, int]) -> Intrinsics:
         width, height = size
@@ -75,9 +78,16 @@ def _lens(values: Mapping[str, Any]) -> Lens:
         down = (_positive(values, 'fl_y') if 'fl_y' in values
                 else height / 2 / math.tan(_positive(values, 'camera_angle_y') / 2)
                 if 'camera_angle_y' in values else across)
-        return Intrinsics(across, down, float(values.get('cx', width / 2)),
-                          float(values.get('cy', height / 2)), width, height, distortion)
+        return Intrinsics(across, down, *_centre(values, width, height), width, height, distortion)
     return of_size
+
+
+def _centre(values: Mapping[str, Any], width: int, height: int) -> tuple[float, float]:
+    """Return the principal point, by default the middle of a photo of that size."""
+    x, y = float(values.get('cx', width / 2)), float(values.get('cy', height / 2))
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise ValueError(f'cx, cy of {x}, {y}: expected pixels')
+    return x, y
 
 
 def _distortion(values: Mapping[str, Any]) -> Distortion | None:

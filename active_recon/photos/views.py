@@ -132,8 +132,10 @@ def _masks_by_stem(folder: Path | None) -> dict[str, Path]:
 def _mask(path: Path, width: int, height: int) -> NDArray[np.bool_]:
     try:
         with Image.open(path) as image:
-            channel = 'A' if image.mode in ('RGBA', 'LA') else None
-            grey = np.asarray(image.getchannel(channel) if channel else image.convert('L'))
+            alpha = image.getchannel('A') if image.mode in ('RGBA', 'LA') else None
+            if alpha is None or alpha.getextrema() == (255, 255):  # an opaque one masks nothing
+                alpha = image.convert('L')
+            grey = np.asarray(alpha)
     except (OSError, SyntaxError, ValueError) as error:
         raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
     if abs(grey.shape[1] * height - width * grey.shape[0]) > 0.01 * width * grey.shape[0]:

@@ -26,7 +26,8 @@ class Checkpoint:
 def save_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
                     checkpoint: Checkpoint) -> None:
     """Write a checkpoint atomically: if writing is interrupted, the previous one is kept."""
-    tensors = {f'module.{name}': tensor.detach().contiguous()
+    # Cloned: safetensors refuses tensors that share memory, as tied weights do
+    tensors = {f'module.{name}': tensor.detach().contiguous().clone()
                for name, tensor in module.state_dict().items()}
     for name, parameter in module.named_parameters():
         for key, value in optimizer.state[parameter].items():
@@ -64,9 +65,13 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
 
 def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
                       settings: dict[str, Any]) -> Checkpoint:
-    """Restore as `load_checkpoint`; raises ConfigError if it was made under other settings."""
+    """
+    Restore as `load_checkpoint`; raises ConfigError if it was made under other settings.
+
+    What an older checkpoint does not tell, such as the data, is taken to be the same.
+    """
     stored = load_checkpoint(path, module, optimizer)
-    if stored.settings != settings:
+    if stored.settings != {name: settings.get(name) for name in stored.settings}:
         raise ConfigError(f'{path}: made under other settings, {stored.settings}, where these '
                           f'are asked for: {settings}')
     return stored

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import hashlib
 import math
 import os
 from pathlib import Path
@@ -16,6 +17,7 @@ from active_recon.training.ahead import drawn_ahead
 from active_recon.training.allocation import keep_freed_memory
 from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
 from lightning_fabric import Fabric
+import numpy as np
 import torch
 from torch import nn, Tensor
 
@@ -132,18 +134,19 @@ def train_steps(
     """
     Train in place: `learner`, called with the arguments of `draw`, returns losses, also `loss`.
 
-    `trained` is the part of the learner that checkpoints hold. Every step's draw depends on the
-    seed and the step alone, so a training that was interrupted and resumed gives the same result
-    as one that was not. `run.report` is called after every step with the losses, and with what
-    `validate` measured where it did. Raises TrainingDivergedError naming the batch where a loss
-    is not finite, ConfigError on a checkpoint of other settings, and TrainingStoppedError where
-    it was interrupted.
+    `trained` is the part of the learner that checkpoints hold. Every step's draw, and what torch
+    draws in it, such as dropout, depend on the seed and the step alone, so a training that was
+    interrupted and resumed gives the same result as one that was not. `run.report` is called after
+    every step with the losses, and with what `validate` measured where it did. Raises
+    TrainingDivergedError naming the batch where a loss is not finite, ConfigError on a checkpoint
+    of other settings or data, and TrainingStoppedError where it was interrupted.
     """
     fabric = run.fabric
     parameters = [part for part in trained.parameters() if part.requires_grad]
     raw = torch.optim.AdamW(parameters, config.learning_rate, betas=(0.9, 0.99),
                             weight_decay=weight_decay)
     wrapped, optimizer = fabric.setup(learner, raw)
+    settings = {**settings, 'data': _hash(views)}
     begun = Checkpoint(0, settings, [])
     if run.resume and run.checkpoint_path.is_file():
         begun = resume_checkpoint(run.checkpoint_path, trained, raw, settings)
@@ -154,6 +157,7 @@ def train_steps(
         steps = range(begun.step, min(config.steps, run.until or config.steps))
         threads = threads_to_draw(fabric) if run.draw_threads is None else run.draw_threads
         for step, drawn in drawn_ahead(draw, steps, threads):
+            torch.manual_seed(_torch_seed(config.seed, step, fabric.global_rank))
             losses = wrapped(*fabric.to_device(drawn.arguments))
             _refuse_divergence(fabric, step, losses['loss'], views, drawn.objects)
             optimizer.zero_grad(set_to_none=True)
@@ -185,6 +189,20 @@ def train_steps(
                     f'stopped at step {step + 1} of {config.steps}; continue with --resume')
     fabric.barrier()
     learner.eval()
+
+
+def _hash(views: ViewSet) -> str:
+    """Return the SHA-256 of which objects a training draws from, in their order, and cameras."""
+    digest = hashlib.sha256()
+    for folder in views.folders:
+        digest.update(f'{folder.category}/{folder.name}\n'.encode())
+    for cameras in (views.poses, views.intrinsics):
+        digest.update(cameras.contiguous().numpy().tobytes())
+    return digest.hexdigest()
+
+
+def _torch_seed(*numbers: int) -> int:
+    return int(np.random.SeedSequence(numbers).generate_state(1)[0])
 
 
 def _is_asked_to_stop(fabric: Fabric, raise_if_asked: Callable[[], None]) -> bool:

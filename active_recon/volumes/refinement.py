@@ -23,6 +23,7 @@ def refined_mesh(grid: VoxelGrid, threshold: float) -> 'trimesh.Trimesh':
     `whole_bodies`: what is so thin that nothing would be left of it keeps the grid's own cells.
     Raises DataError where no cell of the grid is above the threshold.
     """
+    threshold = float(threshold)  # numpy's would be compared in float64
     if not grid.occupied(threshold).any():
         return grid.mesh(threshold)
     whole = whole_bodies(grid, refined(grid), threshold)

@@ -81,7 +81,7 @@ class VoxelGrid:
 
     def occupied(self, threshold: float) -> NDArray[np.bool_]:
         """Return which cells are above the threshold, (X, Y, Z)."""
-        above: NDArray[np.bool_] = self.occupancy > threshold
+        above: NDArray[np.bool_] = self.occupancy > float(threshold)  # compared in float32
         return above
 
     def above(self, threshold: float) -> 'VoxelGrid':

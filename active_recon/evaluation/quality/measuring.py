@@ -20,6 +20,7 @@ from active_recon.quality.features import features
 from active_recon.quality.latents import pooled
 from active_recon.quality.silhouettes import SeenView
 from active_recon.volumes.voxels import iou
+from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
 import torch
@@ -72,8 +73,9 @@ class Measured:
 
     def write(self, path: Path) -> None:
         """Write it as an npz file."""
-        np.savez_compressed(path, **{each.name: getattr(self, each.name)
-                                     for each in fields(self)})
+        with whole_file(path) as unfinished, unfinished.open('wb') as file:
+            np.savez_compressed(file, **{each.name: getattr(self, each.name)
+                                         for each in fields(self)})
 
     @classmethod
     def read(cls, path: Path) -> Self:

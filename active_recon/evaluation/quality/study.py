@@ -23,9 +23,9 @@ def study(measured: Measured, tables: QualityTables) -> dict[str, Any]:
     Return the figures of a set, ready for JSON.
 
     - objects, hollow: numbers; sources
-    - views: by number of views, `error` of the expected IoU (mean absolute, with interval) and
-      `covered`, the share above the lower bound, of objects that are not hollow and of `all`;
-      `flagged`: false alarms among all
+    - views: by number of views, `error` of the expected IoU (mean absolute, with its interval
+      over objects) and `covered`, the share above the lower bound, of objects that are not hollow
+      and of `all`; `flagged`: false alarms among all
     - faults: by name and number of views, the shares `flagged` and `named` rightly
     - promises: by order of views and target, see `_promise`
     """
@@ -64,12 +64,18 @@ def _after(measured: Measured, judged: list[Quality], expected: NDArray[np.float
     for name, chosen in (('solid', solid), ('all', usual)):
         rows = chosen & (measured.count == count)
         if rows.any():
-            spread = mean_interval(error[rows])
+            spread = mean_interval(_by_object(error[rows], measured.object[rows]))
             found[name] = {'episodes': int(rows.sum()), 'iou': float(measured.iou[rows].mean()),
                            'error': [spread.mean, spread.low, spread.high],
                            'covered': float(above[rows].mean())}
     at = np.flatnonzero(usual & (measured.count == count))
     return {**found, 'flagged': float(np.mean([bool(judged[row].suspect) for row in at]))}
+
+
+def _by_object(values: NDArray[np.float64], objects: NDArray[np.str_]) -> NDArray[np.float64]:
+    """Return the mean of each object's values: its episodes are not independent."""
+    _, at = np.unique(objects, return_inverse=True)
+    return np.asarray(np.bincount(at, values) / np.bincount(at))
 
 
 def _found(fault: str, judged: list[Quality]) -> Mapping[str, float]:
