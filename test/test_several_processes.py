@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+from active_recon.datasets.making import make_object, shape_jobs
 from active_recon.models.weights import load_weights
 import numpy as np
 import pytest
@@ -39,6 +40,19 @@ def test_two_processes_write_one_set_of_weights_and_one_log(dataset, tmp_path):
     assert np.isfinite(losses).all()
     assert done.stdout.count('wrote ') == 1
     assert load_weights(tmp_path / 'run' / 'weights.safetensors').model == '2d3d'
+
+
+@pytest.mark.slow
+def test_one_of_two_processes_calibrates_and_chooses_the_threshold(tmp_path):
+    data = tmp_path / 'data'
+    for job in shape_jobs('lamp', range(4), data):
+        assert not make_object(job, samples=1, fine=True).refusal
+    losses, done = train(data, tmp_path / 'run', 2, 2, '--batch-size', '4', '--model', 'lifting',
+                         '--max-views', '2')
+    assert np.isfinite(losses).all()
+    assert done.stdout.count('calibration: 4/4') == done.stdout.count('threshold 0.') == 1
+    calibration = load_weights(tmp_path / 'run' / 'weights.safetensors').reconstruction.calibration
+    assert not np.allclose(calibration[0], [1, 0, 0])
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
+import math
 from pathlib import Path
 from typing import Any
 
@@ -111,15 +112,19 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
             train_lifting(network, training, plan.reconstruction, plan.loss,
                           run('reconstruction', report),
                           lambda model: reconstruction_iou(model, validation))
-        with reporting('calibration', min(MOST_OBJECTS, len(validation))) as report:
-            calibrate(network, validation, lambda done: report(done, {}))
+        if fabric.is_global_zero:
+            with reporting('calibration', min(MOST_OBJECTS, len(validation))) as report:
+                calibrate(network, validation, lambda done: report(done, {}))
+        network.calibration.copy_(fabric.broadcast(network.calibration))
     elif not frozen:
         with reporting('reconstruction', plan.reconstruction.steps) as report:
             train_reconstruction(network, training, plan.reconstruction, plan.loss,
                                  run('reconstruction', report),
                                  lambda model: reconstruction_iou(model, validation))
-    threshold = (plan.begun.threshold if plan.begun and plan.frozen
-                 else best_threshold(network, validation))
+    # By one process: measuring takes memory, which all together may not have
+    threshold: float = fabric.broadcast(
+        plan.begun.threshold if plan.begun and plan.frozen
+        else best_threshold(network, validation) if fabric.is_global_zero else math.nan)
     if plan.policy and attention is not None:
         with reporting('policy', plan.policy.steps) as report:
             train_policy(network, attention, training, threshold, plan.policy, plan.rewards,
