@@ -1,14 +1,21 @@
 """Networks and policies of one's own: from a file, and from an installed package."""
 
 from pathlib import Path
+import re
 
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models import registry
-from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
+from active_recon.models.registry import (
+    named_network,
+    network_entry,
+    NETWORKS,
+    OWN_NETWORKS,
+)
+from active_recon.models.trial import try_network
 from active_recon.models.weights import Bundle, load_weights, save_weights
 from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLICIES_GROUP
 from active_recon.policies.registry import _installed, PolicyOptions
-from command_line import command
+from command_line import command, refusal
 import pytest
 import torch
 
@@ -90,6 +97,26 @@ class Unsaved(Net):
         self.rates = torch.linspace(0, 0.1, 3).tolist()
         self.plain = torch.linspace(0, 1, 5)
 
+class NoLatent(Net):
+    def initial_state(self, batch):
+        return {'seen': super().initial_state(batch)['latent']}
+
+    def update(self, encoded, cameras, state):
+        return {'seen': torch.maximum(state['seen'], encoded)}
+
+    def decode(self, state):
+        return super().decode({'latent': state['seen']})
+
+class Flat(Net):
+    def decode(self, state):
+        return super().decode(state).flatten(1)
+
+class AnyCamera(Net):
+    needs_front = False
+
+class NoSize(Net):
+    image_size = None
+
 class Needs(Net):
     @dataclass(frozen=True)
     class Config(Config):
@@ -116,6 +143,26 @@ def test_a_network_with_tensors_that_are_not_stored_is_loaded(own_file, tmp_path
     assert loaded.rates == network.rates
     for name in ('grid', 'plain'):
         torch.testing.assert_close(getattr(loaded, name), getattr(network, name))
+
+
+@pytest.mark.parametrize(('name', 'said'), [
+    ('NoLatent', r'no latent: expected \(2, C, h, w\) .* got .*seen'),
+    ('Flat', r'occupancy: expected logits \(2, 32, 32, 32\) of decode, got \(2, 32768\)'),
+    ('AnyCamera', r'on two views of \(2, 4, 64, 64\): RuntimeError'),
+    ('NoSize', r'expected image_size and resolution \(int\).*got None, 32 and True')])
+def test_a_network_of_another_interface_is_refused_before_it_is_trained(
+        name, said, own_file, dataset, tmp_path, monkeypatch, capsys):
+    threads = torch.get_num_threads()
+    line = refusal(monkeypatch, capsys, 'train', dataset, '--validation', dataset, '--out',
+                   tmp_path / 'run', '--model', f'{own_file}:{name}', '--threads', 1)
+    torch.set_num_threads(threads)
+    assert re.search(rf'own\.py:{name}: .*{said}', line)
+
+
+@pytest.mark.parametrize('name', NETWORKS)
+def test_the_networks_of_this_package_pass_the_trial(name):
+    entry = network_entry(name)
+    try_network(entry.build(entry.sizes['small']).eval(), name)
 
 
 def test_a_config_without_defaults_is_refused(own_file):

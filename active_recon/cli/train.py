@@ -102,6 +102,7 @@ def train(
     from active_recon.cli.training_log import SummaryLog
     from active_recon.config import LossConfig, RewardConfig
     from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
+    from active_recon.models.trial import try_network
     from active_recon.models.weights import save_weights
     from active_recon.models.weights_files import find_weights
     from active_recon.shapes import generators_hash
@@ -146,7 +147,10 @@ def train(
     torch.manual_seed(seed)
     fabric = make_fabric(bf16, devices, nodes)
     fabric.launch()
-    asked = entry.build(plan.config).spec
+    network = entry.build(plan.config)
+    if own_file != model:
+        try_network(network, own_file)
+    asked = network.spec
     training = read_objects(data, 'training data', asked, split_file, 'train', at_once=False)
     held_out = read_objects(validation, 'validation data', asked, split_file, 'val')
     if fabric.is_global_zero:

@@ -1,0 +1,41 @@
+"""A trial of a network that may be somebody's own, before hours of training depend on it."""
+
+from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import Camera, orbit_camera
+from active_recon.models.network import Cameras, ReconstructionNetwork
+import torch
+
+
+@torch.no_grad()
+def try_network(network: ReconstructionNetwork, name: str) -> None:
+    """
+    Show a network two blank views of two objects, and look at what it returns.
+
+    Raises ConfigError in one line where it fails or where something has another shape than its
+    interface tells, see `ReconstructionNetwork`.
+    """
+    side, cells = (getattr(network, each, None) for each in ('image_size', 'resolution'))
+    front = getattr(network, 'needs_front', None)
+    if not (isinstance(side, int) and isinstance(cells, int) and isinstance(front, bool)):
+        raise ConfigError(f'{name}: no network of this interface: expected image_size and '
+                          'resolution (int) and needs_front (bool), got '
+                          f'{side!r}, {cells!r} and {front!r}')
+    camera: Camera = orbit_camera(0.0)
+    camera = Camera(camera.pose, camera.intrinsics.resized(side, side))
+    cameras = Cameras.of([camera] * 2).to(network.device)
+    images = torch.ones(2, 3 if front else 4, side, side, device=network.device)
+    try:
+        state = network.initial_state(2)
+        for _ in range(2):
+            logits, state = network(images, cameras, state)
+        latent = state.get('latent')
+        found = {key: tuple(each.shape) for key, each in state.items()}
+    except Exception as error:
+        raise ConfigError(f'{name}: fails on two views of {tuple(images.shape)}: '
+                          f'{type(error).__name__}: {error}') from error
+    if tuple(logits.shape) != (2, cells, cells, cells):
+        raise ConfigError(f'{name}: wrong occupancy: expected logits (2, {cells}, {cells}, '
+                          f'{cells}) of decode, got {tuple(logits.shape)}')
+    if latent is None or latent.ndim != 4 or len(latent) != 2:
+        raise ConfigError(f'{name}: no latent: expected (2, C, h, w) as `latent` in the state, '
+                          f'got {found}')
