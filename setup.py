@@ -65,6 +65,7 @@ setup(
         'trimesh>=4.4,<6',
         'typer>=0.12,<1',
         'viser>=1.1,<2',
+        'websockets>=15,<18',
         'zstandard>=0.22,<1',
         *ROS_WHEELS,
     ],

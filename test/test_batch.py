@@ -58,8 +58,12 @@ def test_bags_of_a_tree_are_found_once_and_in_order(tmp_path):
     inside = [str(tmp_path / 'loose'), str(tmp_path / 'loose' / 'y.mcap'), tmp_path.as_uri()]
     assert find_roots(inside) == [tmp_path]
     assert find_roots([str(tmp_path / '**' / '*.db3')]) == [tmp_path / 'loose' / 'x.db3']
-    with pytest.raises(DataError, match='no bags there'):
-        find_roots([str(tmp_path / '*.bag')])
+    for pattern, roots in (('split/*.mcap', ['split']), ('b/*', ['b']), ('**/*_1.mcap', ['split']),
+                           ('loose/*', ['loose/x.db3', 'loose/y.mcap'])):  # parts are one bag
+        assert find_roots([str(tmp_path / pattern)]) == [tmp_path / each for each in roots]
+    for pattern in ('*.bag', 'loose/*.txt'):
+        with pytest.raises(DataError, match='no bags there'):
+            find_roots([str(tmp_path / pattern)])
     with pytest.raises(ConfigError, match='ftp://fleet/day: no such storage'):
         find_roots(['ftp://fleet/day'])
 
@@ -138,6 +142,9 @@ def test_a_report_of_each_bag_is_linked_from_the_page(tmp_path, monkeypatch):
     page = (tmp_path / 'out' / 'summary.html').read_text()
     (link,) = re.findall(r'href="(reports/[^"]+)"', page)
     assert link == row['report'] and 'Plotly' in (tmp_path / 'out' / link).read_text()
+    (tmp_path / 'out' / link).unlink()
+    batch(monkeypatch, 'report', PAPER, tmp_path / 'out')  # a page that is gone is made again
+    assert 'Plotly' in (tmp_path / 'out' / link).read_text()
     assert 'https://' not in page.partition('<script type')[0]
 
 

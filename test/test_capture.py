@@ -223,6 +223,9 @@ def test_the_command_hands_its_options_to_the_node_as_they_are(monkeypatch):
                                 width=1280, height=720, loop=True)
     assert read == {name: getattr(expected, name) for name in read}
     assert all(type(value) is type(getattr(expected, name)) for name, value in read.items())
+    CliRunner().invoke(app, ['camera', '📷/a "b".mp4'])
+    (source,) = (word for word in begun[1] if word.startswith('source:='))
+    assert '📷' in source and yaml.safe_load(source.removeprefix('source:=')) == '📷/a "b".mp4'
     wrong = CliRunner().invoke(app, ['camera', '0', '--size', 'large'])
     assert 'expected WIDTHxHEIGHT' in str(wrong.exception)
 

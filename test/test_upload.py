@@ -193,3 +193,33 @@ def test_the_local_network_is_never_all_networks():
 def test_an_address_that_is_not_this_machine_s_is_refused(folder, verdicts):
     with pytest.raises(ConfigError, match='upload page: cannot be served at 192.0.2.1'):
         UploadServer(folder, Progress, verdicts, '192.0.2.1')
+
+
+@pytest.mark.parametrize('kind', ['JPEG', 'PNG'])
+def test_a_file_that_is_cut_off_is_not_kept(kind, server, folder, tmp_path):
+    path = tmp_path / 'whole'
+    noise = np.random.default_rng(0).integers(0, 256, (90, 120, 3), np.uint8)
+    Image.fromarray(noise).save(path, kind)
+    whole = path.read_bytes()
+    assert refusal(whole) == ''
+    for share in (0.2, 0.6, 0.95):
+        status, said = send(server, whole[:int(share * len(whole))])
+        assert status == 415 and 'expected JPEG or PNG, whole' in said['verdict']
+    assert not any(folder.iterdir())
+
+
+def test_a_photo_s_name_is_not_given_to_another(server, folder, verdicts, tmp_path):
+    photo = encoded('PNG', tmp_path)
+    first = server.keep(photo, '.png')
+    verdicts.put(first, f'{first}: no board seen in it')
+    (folder / first).unlink()  # by who sees that it is no use
+    _, said = send(server, photo)
+    assert 'no board' not in said['verdict']
+
+
+@pytest.mark.parametrize('length', ['0' * 20 + '1' + '0' * 12, '9' * 5000])
+def test_a_length_is_read_whatever_it_begins_with(length, server):
+    with socket.create_connection(server.server_address, timeout=10) as client:
+        client.sendall(f'POST /{server.token}/photo HTTP/1.1\r\nHost: it\r\nContent-Length: '
+                       f'{length}\r\n\r\n'.encode())
+        assert b' 413 ' in client.recv(4096).splitlines()[0]

@@ -1,5 +1,6 @@
 """What is known of the loop, in whatever order it is heard, and the words that tell it."""
 
+from contextlib import nullcontext
 from itertools import permutations
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from active_recon.bags.runs.run import (
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.policies.reasons import GoalReason
 from active_recon.viewer.link import ago, goal_lines, status_lines, TopicLink
+from active_recon.viewer.page import Page
 from active_recon.viewer.playback import recorded_states
 from active_recon.viewer.scene import certainty_colors, relative_scores, shown_cells
 from active_recon.viewer.state import (
@@ -27,6 +29,10 @@ from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
+import viser
+from websockets.asyncio import server
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
 
 GRID = VoxelGrid(np.random.default_rng(0).random((8, 8, 8), np.float32))
 OCCUPIED = VoxelGrid(np.full((8, 8, 8), 0.405, np.float32))
@@ -280,3 +286,24 @@ def test_an_image_of_the_last_episode_is_not_that_of_the_next():
     assert observer.state.network_image is image
     observer.begin_episode('b', 120)
     assert observer.state.network_image is None
+
+
+@pytest.fixture
+def served():
+    shown = Page('a page')
+    yield shown
+    shown.close()
+
+
+@pytest.mark.parametrize(('origin', 'may'), [
+    (None, True), ('http://127.0.0.1:{port}', True), ('http://localhost:9000', True),
+    ('http://evil.example', False), ('null', False), ('http://127.0.0.1.evil.example', False),
+    ('http://evil.example:8080', False)])
+def test_only_pages_of_this_machine_connect_to_the_page(origin, may, served):
+    address = served.url.replace('http', 'ws')
+    port = address.rpartition(':')[2]
+    serve = server.serve
+    with nullcontext() if may else pytest.raises(InvalidStatus, match='HTTP 403'):
+        connect(address, origin=origin and origin.format(port=port),
+                subprotocols=[f'viser-v{viser.__version__}']).close()
+    assert server.serve is serve

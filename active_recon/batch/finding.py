@@ -64,9 +64,21 @@ def find_roots(named: Sequence[str]) -> list[Place]:
 
 
 def _matches(pattern: Place) -> Sequence[Place]:
-    if isinstance(pattern, Stored):
-        return pattern.matches()
-    return [Path(each) for each in glob(str(pattern), recursive=True)]
+    """Return the folders and bags that match; a file is the bag that it is a part of."""
+    found: Sequence[Place] = (
+        pattern.matches() if isinstance(pattern, Stored)
+        else [Path(each) for each in glob(str(pattern), recursive=True)])
+    folders: dict[Place, bool] = {}
+    bags: list[Place] = []
+    for place in found:
+        if place.is_dir():
+            bags.append(place)
+        elif place.name.endswith(_SUFFIXES):
+            above = place.parents[0]
+            if above not in folders:
+                folders[above] = is_bag_folder(above, [name for name, _ in _entries(above)])
+            bags.append(above if folders[above] else place)
+    return list(dict.fromkeys(bags))
 
 
 def bags_below(root: Place) -> Iterator[Place]:

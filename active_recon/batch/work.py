@@ -48,7 +48,7 @@ def do_bag(task: Task, identity: str, bag: Place) -> BagDone:
     try:
         state = state_of(bag, identity)
         kept = BagResult.read(task.out, bag)
-        if kept is not None and kept.state == state:
+        if kept is not None and kept.state == state and _has_reports(task.out, kept):
             return BagDone(kept.refused, True)
         result = BagResult(state, rows_of(task, bag))
     except WorkError:
@@ -67,6 +67,12 @@ def do_bag(task: Task, identity: str, bag: Place) -> BagDone:
             str(bag), f'{bag}: {type(error).__name__}: {error}', UNEXPECTED)])
     result.write(task.out, bag)
     return BagDone(result.refused, False)
+
+
+def _has_reports(out: Place, kept: BagResult) -> bool:
+    """Return whether the pages that a result names are there still."""
+    pages = (row.get('report') for row in kept.rows)
+    return all((out / str(page)).exists() for page in pages if page)
 
 
 def rows_of(task: Task, bag: Place) -> list[Row]:

@@ -1,6 +1,7 @@
 """Options that supply what bags of other recorders do not contain."""
 
 from collections.abc import Callable
+from dataclasses import fields
 from functools import wraps
 import inspect
 import math
@@ -11,6 +12,7 @@ import typer
 
 if TYPE_CHECKING:
     from active_recon.bags.runs.scene import Scene
+    from active_recon.bags.runs.topics import Topics
 
 _PANEL = 'Bags of other recorders'
 
@@ -84,6 +86,16 @@ def with_bag_options(command: Callable[..., None]) -> Callable[..., None]:
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
     return run
+
+
+def bag_options_given(topics: 'Topics', scene: 'Scene') -> set[str]:
+    """Return the options that were given, of those that make these two."""
+    options = {'object_yaw': '--object-yaw-deg', 'elevation': '--elevation-deg',
+               'empty_scene': '--background'}
+    return {options.get(each.name, f'--{each.name.replace("_", "-")}')
+            for part in (topics, scene) for each in fields(part)
+            if (getattr(part, each.name) is not None if each.default is None
+                else getattr(part, each.name) != each.default)}
 
 
 def _scene(object_size: float | None, object_yaw_deg: float | None, elevation_deg: float | None,

@@ -50,7 +50,7 @@ def camera(
         'height': int(height or 0)}
     # ROS reads YAML, of which JSON is a part: a string in quotes is no number, whatever it holds
     given = [word for name, value in parameters.items()
-             for word in ('-p', f'{name}:={json.dumps(value)}')]
+             for word in ('-p', f'{name}:={json.dumps(value, ensure_ascii=False)}')]
     names = [word for each in remap or () for word in ('-r', each)]
     # The node replaces this process and receives its Ctrl-C
     os.execv(sys.executable, [sys.executable, '-m', 'active_recon.nodes.camera', '--ros-args',

@@ -1,5 +1,6 @@
 """`active-recon play`: publish a bag's messages to running nodes."""
 
+import json
 import os
 from pathlib import Path
 import sys
@@ -31,6 +32,12 @@ def play(
     played_topics(bag, rate, topics, bag_progress(bag))
     # The node replaces this process and receives its Ctrl-C
     os.execv(sys.executable, [
-        sys.executable, '-m', 'active_recon.nodes.player', '--ros-args', '-p', f'bag:="{bag}"',
-        '-p', f'rate:={rate}', '-p', f'topics:="{topics}"'])
+        sys.executable, '-m', 'active_recon.nodes.player', '--ros-args',
+        '-p', _parameter('bag', str(bag)), '-p', f'rate:={rate}',
+        '-p', _parameter('topics', topics)])
+
+
+def _parameter(name: str, value: str) -> str:
+    """Return a parameter in ROS's YAML, of which JSON is a part."""
+    return f'{name}:={json.dumps(value, ensure_ascii=False)}'
 

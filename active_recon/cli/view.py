@@ -7,7 +7,8 @@ import sys
 import time
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.bag_options import with_bag_options
+from active_recon.cli.bag_options import bag_options_given, with_bag_options
+from active_recon.errors import ConfigError
 from active_recon.parameters.viewer import DEFAULT_PORT, HIGHEST_PORT
 import typer
 
@@ -42,7 +43,14 @@ def view(
 
     Example: active-recon view bags/2026-11-21_10-00-00
     """
+    if bag is not None and remap:
+        raise ConfigError('--remap with a bag: it is for the topics of a running loop; those of a '
+                          'bag are named by --image and its like')
     if bag is None:
+        if ignored := bag_options_given(topics, scene) - {'--object-size'}:
+            raise ConfigError(f'{", ".join(sorted(ignored))} without a bag: they are for a bag; '
+                              "a running loop's nodes have their own parameters, and --remap "
+                              'renames topics')
         # The node replaces this process and receives its Ctrl-C
         size = [] if scene.object_size is None else ['-p', f'object_size:={scene.object_size}']
         names = [word for each in remap or () for word in ('-r', each)]

@@ -167,7 +167,8 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
     """
     folder.images_folder.mkdir(parents=True, exist_ok=True)
     for left in (*folder.images_folder.glob('*.png'), folder.images_folder / _CAMERAS):
-        left.unlink(missing_ok=True)  # of a run that was interrupted, perhaps of other cameras
+        if left.is_file():  # of a run that was interrupted, perhaps of other cameras
+            left.unlink()
     rows, names = [], []
     for index, (image, camera) in enumerate(zip(images, cameras, strict=True)):
         names.append(f'{index:02d}.png')

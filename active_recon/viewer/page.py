@@ -4,11 +4,13 @@ from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 import math
+import re
 from typing import Any
 
 from active_recon.errors import ConfigError
 from active_recon.parameters.viewer import HIGHEST_PORT
 from active_recon.viewer.address import HOST
+from active_recon.viewer.own_origin import own_origins_only
 from active_recon.viewer.scene import Scene
 from active_recon.viewer.state import entropy_lines, LoopState
 import numpy as np
@@ -21,6 +23,7 @@ _LOWEST, _HIGHEST = 0.02, 0.98  # smaller probabilities are not published
 _FALLBACK_THRESHOLD = 0.5
 _NO_IMAGE = np.zeros((1, 1, 3), np.uint8)
 _LOOK_FROM = (2.1, -1.7, 2.5)  # sides of the voxel grid
+_PUNCTUATION = re.compile(r'([!-/:-@\[-`{-~])')  # all that Markdown lets be escaped
 _LOOK_AT = (0.0, 0.0, -0.05)
 _LEGEND = """
 The blocks are the occupied cells; darker blocks are more certain. A coloured camera with a
@@ -28,6 +31,11 @@ picture is a view that was taken, the grey camera is where the camera is now, an
 is the next view. The bars around the turntable are the planner's scores of the candidate views;
 the best one is yellow.
 """
+
+
+def _literal(line: str) -> str:
+    """Return Markdown that shows a line as it is: names of files and topics are in it."""
+    return _PUNCTUATION.sub(r'\\\1', ' '.join(line.split()))
 
 
 def _entropy_scales(count: int) -> dict[str, uplot.Scale]:
@@ -58,7 +66,8 @@ class Page:
                               f'got {port}')
         # viser prints its address on rich's global console, which is not used otherwise
         rich.get_console().quiet = True
-        self._server = ViserServer(HOST, port, label=title, verbose=False)
+        with own_origins_only():
+            self._server = ViserServer(HOST, port, label=title, verbose=False)
         self.url = f'http://{HOST}:{self._server.get_port()}'
         self.port_taken = port not in (0, self._server.get_port())
         self._clicked: deque[str] = deque()
@@ -136,7 +145,7 @@ class Page:
         """Show lines of text at the top of the panel, the first one in bold."""
         if lines != self._shown_text:
             self._shown_text = lines
-            first, *rest = lines
+            first, *rest = map(_literal, lines)
             self._text.content = '\n\n'.join([f'**{first}**', *rest])
 
     def set_picture(self, image: NDArray[np.uint8] | None) -> None:

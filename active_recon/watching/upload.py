@@ -33,6 +33,7 @@ LARGEST_UPLOAD = 30_000_000
 """Bytes of a photo."""
 _SUFFIXES = {'JPEG': '.jpg', 'PNG': '.png'}
 _MOST_PIXELS = 200_000_000
+_READ_SIDE = 1024
 _AT_ONCE = 4
 _ANSWER_S = 60.0
 _LOOK_S = 0.1  # how often it is looked whether to stop
@@ -65,6 +66,7 @@ class UploadServer(ThreadingHTTPServer):
         self.open_uploads = threading.BoundedSemaphore(_AT_ONCE)
         self._folder = folder
         self._naming = threading.Lock()
+        self._last_number = 0
         threading.Thread(target=self.serve_forever, args=(_LOOK_S,), daemon=True).start()
 
     def verify_request(self, request: Any, client_address: Any) -> bool:
@@ -77,10 +79,11 @@ class UploadServer(ThreadingHTTPServer):
     def keep(self, photo: bytes, suffix: str) -> str:
         """Write a photo under a new name, whole or not at all; return the name."""
         with self._naming:
-            number = 1
+            number = self._last_number + 1  # also after one was deleted: its verdict is known
             while any((self._folder / f'phone-{number:04}{each}').exists()
                       for each in _SUFFIXES.values()):
                 number += 1
+            self._last_number = number
             name = f'phone-{number:04}{suffix}'
             with whole_file(self._folder / name) as begun:
                 begun.write_bytes(photo)
@@ -110,17 +113,25 @@ def refusal(photo: bytes) -> str:
     """Return why bytes are no photo that can be used, in one line; '' where they are one."""
     if photo[4:8] == _HEIC:
         return HEIC_ADVICE
-    return '' if _format(photo) else ('not a photo: expected JPEG or PNG of at most '
+    return '' if _format(photo) else ('not a photo: expected JPEG or PNG, whole and of at most '
                                       f'{_MOST_PIXELS / 1e6:.0f} megapixels')
 
 
 def _format(photo: bytes) -> str:
-    """Return the format by the content, '' where it is none of those allowed."""
+    """Return the format by the content, '' where it is none of those allowed, or cut off."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter('ignore', Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(photo), formats=tuple(_SUFFIXES)) as image:
-                return str(image.format) if image.width * image.height <= _MOST_PIXELS else ''
+                if image.width * image.height > _MOST_PIXELS:
+                    return ''
+                kind = str(image.format)
+                if kind == 'PNG':
+                    image.verify()  # by its checksums
+                else:
+                    image.draft('RGB', (_READ_SIDE, _READ_SIDE))  # at a fraction of its size
+                    image.load()
+                return kind
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         return ''
 
@@ -154,7 +165,8 @@ class _Handler(BaseHTTPRequestHandler):
         if not length.isascii() or not length.isdigit():
             self._tell(HTTPStatus.LENGTH_REQUIRED, {'verdict': 'Refused: no length given'})
             return
-        if int(length[:20]) > LARGEST_UPLOAD:
+        length = length.lstrip('0') or '0'
+        if len(length) > 20 or int(length) > LARGEST_UPLOAD:
             self._tell(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, {'verdict':
                        f'Refused: expected at most {LARGEST_UPLOAD / 1e6:.0f} MB'})
             return

@@ -58,11 +58,15 @@ field('photo').addEventListener('change', async () => {
   field('photo').value = '';
   busy = false;
 });
+let away = false;
 const look = async () => {
   if (busy) return;
   try {
     show(await (await fetch('state')).json());
+    if (away) say('');
+    away = false;
   } catch (error) {
+    away = true;
     say('The computer does not answer.');
   }
 };

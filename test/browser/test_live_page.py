@@ -265,3 +265,14 @@ def test_a_bag_plays_to_its_end_and_then_from_the_first_view(playback, chromium)
 def test_a_run_without_a_view_is_refused(tmp_path):
     with pytest.raises(DataError, match='the run has none'):
         Playback(recorded_run(tmp_path, []))
+
+
+def test_a_line_of_text_is_shown_as_it_is(chromium, page):
+    odd = ('Left out: <img src=x onerror="document.title=1"> ![a](/etc/hosts) *b* _c_ {1 + 1} '
+           '[d](http://e) `f` & # -.jpg')
+    page.set_text(['1. View <b>1</b> of **2**', odd])
+    chromium.open(page.url, LAPTOP)
+    chromium.until(lambda: odd in chromium.text(), 'the text as it is')
+    assert '1. View <b>1</b> of **2**' in chromium.text()
+    assert chromium.run('return document.querySelectorAll(arguments[0]).length',
+                        'img[src="x"], a[href="http://e"]') == 0
