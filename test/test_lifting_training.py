@@ -11,9 +11,11 @@ from active_recon.models.carving import Carving
 from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.network import Cameras
 from active_recon.models.network_2d3d_posed import Network2d3dPosed, Network2d3dPosedConfig
+from active_recon.models.volume_unet import depth_to_space
 from active_recon.training.calibration import calibrate
 from active_recon.training.lifting import LiftingLearner, train_lifting
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
+from active_recon.training.losses import volume_loss
 from active_recon.training.posed_augmentation import augment_posed, perturb_poses
 from active_recon.training.posed_batches import draw_posed_batch, turned_by_quarters
 from active_recon.training.supervised import train_reconstruction
@@ -131,6 +133,27 @@ def test_a_training_that_was_cut_off_goes_on_as_if_it_was_not_whoever_draws(
     resumed = learned(tmp_path / 'cut.safetensors', resume=True, draw_threads=2)
     for name, weight in whole.state_dict().items():
         assert_close(resumed.state_dict()[name], weight, rtol=1e-4, atol=1e-5)
+
+
+def test_the_loss_is_the_mean_of_those_after_the_first_and_after_the_last_view(seen_anyhow):
+    torch.manual_seed(0)
+    network = Lifting.from_config(TINY)
+    learner = LiftingLearner(network, LOSS)
+    batch = draw_posed_batch(seen_anyhow, 2, 3, np.random.default_rng(0), augment=False)
+
+    def after(count):
+        state = network.initial_state(2)
+        for view in range(count):
+            state = network.step(batch.images[view], batch.cameras.rows(view), state)
+        logits = depth_to_space(network.logits(state).logits)[:, 0]
+        return volume_loss(logits, batch.voxels, 'bce+dice')
+
+    def volume(count):
+        return learner(batch.images[:count], batch.cameras.rows(slice(count)),
+                       batch.alpha[:count], batch.voxels)['volume']
+
+    assert_close(volume(1), after(1))
+    assert_close(volume(3), (after(1) + after(3)) / 2)
 
 
 @pytest.mark.parametrize('bfloat16', [False, True])

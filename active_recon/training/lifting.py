@@ -5,7 +5,8 @@ from collections.abc import Callable
 from active_recon.config import LossConfig
 from active_recon.datasets.views import ViewSet
 from active_recon.models.lifting import Lifting
-from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.models.lifting_encoder import Maps
+from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.volume_unet import depth_to_space
 from active_recon.training.loop import (
     Draw,
@@ -27,7 +28,12 @@ FOREGROUND_WEIGHT, COARSE_WEIGHT = 0.5, 0.3
 
 
 class LiftingLearner(nn.Module):
-    """A sequence of views to the losses after the last of them."""
+    """
+    A sequence of views to the losses after the first and after the last of them.
+
+    A single view is where most is to be learned, and its state is a step on the way to the last:
+    in sequences of equally likely lengths it alone would be decoded in one of `max_views` steps.
+    """
 
     def __init__(self, network: Lifting, loss: LossConfig) -> None:
         super().__init__()
@@ -38,10 +44,10 @@ class LiftingLearner(nn.Module):
                 voxels: Tensor) -> dict[str, Tensor]:
         """Return the losses of images (T, B, 4, S, S) of cameras (T, B, ...); see `PosedBatch`."""
         maps = self.network.maps(images.flatten(0, 1))
-        state = self.network.update_from_maps(
-            maps, Cameras(cameras.poses.flatten(0, 1), cameras.intrinsics.flatten(0, 1)),
-            self.network.initial_state(len(voxels)))
-        logits, coarse_logits, _ = self.network.logits(state)
+        states = self._first_and_last(maps, Cameras(
+            cameras.poses.flatten(0, 1), cameras.intrinsics.flatten(0, 1)), len(voxels))
+        logits, coarse_logits, _ = self.network.logits(states)
+        voxels = voxels.repeat(len(logits) // len(voxels), 1, 1, 1)
         with torch.autocast(logits.device.type, enabled=False):
             volume = volume_loss(depth_to_space(logits.float())[:, 0], voxels, self._kind)
             coarse = volume_loss(coarse_logits.float(),
@@ -50,6 +56,17 @@ class LiftingLearner(nn.Module):
                                                images[:, :, 3].flatten(0, 1))
         total = volume + COARSE_WEIGHT * coarse + FOREGROUND_WEIGHT * silhouette
         return {'loss': total, 'volume': volume.detach(), 'silhouette': silhouette.detach()}
+
+    def _first_and_last(self, maps: Maps, cameras: Cameras, batch: int) -> State:
+        """Return the states after the first and after the last view, (2 B, ...); (B, ...) of 1."""
+        first = self.network.update_from_maps(
+            Maps(*(part[:batch] for part in maps)), cameras.rows(slice(batch)),
+            self.network.initial_state(batch))
+        if len(maps.seen) == batch:
+            return first
+        last = self.network.update_from_maps(
+            Maps(*(part[batch:] for part in maps)), cameras.rows(slice(batch, None)), first)
+        return {name: torch.cat([first[name], last[name]]) for name in first}
 
     @staticmethod
     def _silhouette_loss(logits: Tensor, alpha: Tensor, seen: Tensor) -> Tensor:
