@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
-from active_recon.models.weights_bytes import weights_bytes
+from active_recon.models.weights_bytes import in_precision, weights_bytes
 from active_recon.models.weights_files import weights_hash
 from safetensors import safe_open, SafetensorError
 import torch
@@ -41,7 +41,7 @@ class Companion(Generic[Module]):
         """Write `path` (.safetensors) for a network's weights, and the card beside it."""
         path.parent.mkdir(parents=True, exist_ok=True)
         dtype = torch.float16 if self.half else torch.float32
-        tensors = {name: _in(dtype, tensor.detach().cpu()).contiguous()
+        tensors = {name: in_precision(dtype, tensor.detach().cpu()).contiguous()
                    for name, tensor in module.state_dict().items()}
         path.write_bytes(weights_bytes(tensors, {
             'model': self.kind, 'config': json.dumps(config.to_dict()),
@@ -60,7 +60,7 @@ class Companion(Generic[Module]):
         try:
             with safe_open(path, framework='pt', device=device) as stored:
                 facts = stored.metadata() or {}
-                tensors = {name: _in(torch.float32, stored.get_tensor(name))
+                tensors = {name: in_precision(torch.float32, stored.get_tensor(name))
                            for name in stored.keys()}  # noqa: SIM118
         except (SafetensorError, OSError) as error:
             raise WeightsError(f'{path}: no whole safetensors file: {error}') from error
@@ -78,8 +78,3 @@ class Companion(Generic[Module]):
             raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
         module.requires_grad_(False)
         return module.eval()
-
-
-def _in(dtype: torch.dtype, tensor: torch.Tensor) -> torch.Tensor:
-    """Return a tensor in a precision; whole numbers stay as they are."""
-    return tensor.to(dtype) if tensor.is_floating_point() else tensor

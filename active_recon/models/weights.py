@@ -11,7 +11,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry, NETWORKS
-from active_recon.models.weights_bytes import weights_bytes
+from active_recon.models.weights_bytes import in_precision, weights_bytes
 from active_recon.models.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
 import torch
@@ -37,7 +37,7 @@ def save_weights(path: Path, bundle: Bundle) -> None:
     Floats are stored in half precision, but for tensors with numbers too large for it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    tensors = {f'{part}.{name}': _stored(tensor.detach().cpu()).contiguous()
+    tensors = {f'{part}.{name}': in_precision(torch.float16, tensor.detach().cpu()).contiguous()
                for part, module in _parts(bundle).items()
                for name, tensor in module.state_dict().items()}
     config = json.dumps(bundle.config.to_dict())
@@ -77,8 +77,7 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
     except (KeyError, ValueError, TypeError, RuntimeError, ConfigError) as error:
         raise WeightsError(f'{path}: its config cannot be read: {error}') from error
     for part, module in _parts(bundle).items():
-        own = {name.removeprefix(f'{part}.'):
-               tensor.float() if tensor.is_floating_point() else tensor
+        own = {name.removeprefix(f'{part}.'): in_precision(torch.float32, tensor)
                for name, tensor in tensors.items() if name.startswith(f'{part}.')}
         try:
             module.load_state_dict(own, assign=True)
@@ -86,14 +85,6 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
             raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
         module.to(device).eval().requires_grad_(False)
     return bundle
-
-
-def _stored(tensor: torch.Tensor) -> torch.Tensor:
-    """Return a tensor as it is stored: floats halved where that makes none infinite."""
-    if not tensor.is_floating_point():
-        return tensor
-    half = tensor.half()
-    return half if torch.equal(half.isfinite(), tensor.isfinite()) else tensor
 
 
 def state_hash(module: nn.Module) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 import json
 
 from safetensors.torch import save
+import torch
 from torch import Tensor
 
 _LENGTH = 8  # bytes that hold the header's length, little endian
@@ -22,3 +23,11 @@ def weights_bytes(tensors: Mapping[str, Tensor], facts: Mapping[str, str]) -> by
     ordered = json.dumps(header, ensure_ascii=False, separators=(',', ':')).encode()
     ordered += b' ' * (-len(ordered) % _LENGTH)
     return len(ordered).to_bytes(_LENGTH, 'little') + ordered + written[end:]
+
+
+def in_precision(dtype: torch.dtype, tensor: Tensor) -> Tensor:
+    """Return a tensor in a precision; whole numbers, and what it would make infinite, stay."""
+    if not tensor.is_floating_point():
+        return tensor
+    converted = tensor.to(dtype)
+    return converted if torch.equal(converted.isfinite(), tensor.isfinite()) else tensor

@@ -23,8 +23,8 @@ _LOWEST, _HIGHEST = 0.02, 0.98  # smaller probabilities are not published
 _FALLBACK_THRESHOLD = 0.5
 _NO_IMAGE = np.zeros((1, 1, 3), np.uint8)
 _LOOK_FROM = (2.1, -1.7, 2.5)  # sides of the voxel grid
-_PUNCTUATION = re.compile(r'([!-/:-@\[-`{-~])')  # all that Markdown lets be escaped
 _LOOK_AT = (0.0, 0.0, -0.05)
+_PUNCTUATION = re.compile(r'([!-/:-@\[-`{-~])')  # all that Markdown lets be escaped
 _LEGEND = """
 The blocks are the occupied cells; darker blocks are more certain. A coloured camera with a
 picture is a view that was taken, the grey camera is where the camera is now, and the yellow one

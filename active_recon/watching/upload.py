@@ -191,12 +191,13 @@ class _Handler(BaseHTTPRequestHandler):
         if len(photo) < length:
             self._tell(HTTPStatus.BAD_REQUEST, {'verdict': 'Refused: the photo is not whole'})
             return
-        refused = refusal(photo)
-        if refused:
-            self._tell(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, {'verdict': f'Refused: {refused}'})
+        kind = _format(photo)
+        if not kind:
+            self._tell(HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
+                       {'verdict': f'Refused: {refusal(photo)}'})
             return
         try:
-            name = self.server.keep(photo, _SUFFIXES[_format(photo)])
+            name = self.server.keep(photo, _SUFFIXES[kind])
         except OSError as error:
             self._tell(HTTPStatus.INSUFFICIENT_STORAGE,
                        {'verdict': f'Not kept: {error.strerror}'})
