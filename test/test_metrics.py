@@ -117,6 +117,19 @@ def test_iou_view_by_view_is_that_of_the_rollout_whatever_the_batch(network, vie
         np.testing.assert_allclose(whole[:, t, 1], expected, atol=1e-6)
 
 
+def test_fewer_episodes_of_a_network_with_a_large_state_run_at_once(network, views, monkeypatch):
+    objects, starts = episodes(views, 2)
+    small, sizes = network.initial_state, []
+
+    def large(batch):
+        sizes.append(batch)
+        return small(batch) | {'more': torch.empty(batch, 2 ** 24)}  # 64 MiB
+
+    monkeypatch.setattr(network, 'initial_state', large)
+    iou_per_view(network, FarthestPolicy(), views, objects, starts, np.array([0.1]), 1)
+    assert sizes[0] == 1 and set(sizes[1:]) == {3}  # a look at the state, then a quarter of a GiB
+
+
 def test_the_threshold_is_the_best_on_validation(network, views):
     objects, starts = episodes(views, 2)
     values = iou_per_view(network, RandomPolicy(np.random.default_rng(0)), views, objects, starts,

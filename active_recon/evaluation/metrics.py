@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 THRESHOLDS: NDArray[np.float64] = np.arange(0.10, 0.66, 0.05).round(2)
+_MOST_EPISODES, _MOST_STATE_BYTES = 128, 2 ** 28  # of one batch
 
 
 def episodes(views: ViewSet, starts: int, seed: int = 0) -> tuple[Tensor, Tensor]:
@@ -27,9 +28,16 @@ def episodes(views: ViewSet, starts: int, seed: int = 0) -> tuple[Tensor, Tensor
 
 def iou_per_view(
     network: ReconstructionNetwork, policy: Policy, views: ViewSet, objects: Tensor,
-    starts: Tensor, thresholds: NDArray[np.float64], count: int = 5, batch: int = 128,
+    starts: Tensor, thresholds: NDArray[np.float64], count: int = 5, batch: int | None = None,
 ) -> NDArray[np.float64]:
-    """Return the IoU of E episodes after each view at each of K thresholds, (E, count, K)."""
+    """
+    Return the IoU of E episodes after each view at each of K thresholds, (E, count, K).
+
+    `batch` episodes run at once: without it 128, or fewer of a network whose state is large.
+    """
+    if batch is None:
+        state_bytes = sum(part.nbytes for part in network.initial_state(1).values())
+        batch = min(_MOST_EPISODES, max(1, _MOST_STATE_BYTES // state_bytes))
     result = np.empty((len(objects), count, len(thresholds)))
     for low in range(0, len(objects), batch):
         part = slice(low, low + batch)
