@@ -1,4 +1,4 @@
-"""Ctrl-C taken at chosen points: wherever else it struck, ROS's bindings could be torn apart."""
+"""Requests to stop, taken at chosen points: elsewhere ROS's bindings could be torn apart."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -6,10 +6,16 @@ import signal
 import threading
 
 
+def stop_signals() -> tuple[signal.Signals, ...]:
+    """Return the signals of Ctrl-C, `kill` and, without `nohup`, a terminal that is closed."""
+    is_ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    return (signal.SIGINT, signal.SIGTERM, *(() if is_ignored else (signal.SIGHUP,)))
+
+
 @contextmanager
 def held_interrupts() -> Iterator[Callable[[], None]]:
     """
-    Hold Ctrl-C and SIGTERM back in the block, if it is the main thread's, which gets them.
+    Hold the `stop_signals` back in the block, if it is the main thread's, which gets them.
 
     What is yielded raises KeyboardInterrupt when called after one came; so does the block's end,
     where nothing has been raised before.
@@ -17,7 +23,7 @@ def held_interrupts() -> Iterator[Callable[[], None]]:
     asked: list[int] = []
     mine = threading.current_thread() is threading.main_thread()
     before = {kind: signal.signal(kind, lambda kind, _frame: asked.append(kind))
-              for kind in ((signal.SIGINT, signal.SIGTERM) if mine else ())}
+              for kind in (stop_signals() if mine else ())}
 
     def raise_if_asked() -> None:
         if asked:

@@ -67,6 +67,16 @@ def test_the_nodes_of_a_file_run_in_a_namespace_until_ctrl_c(up, bench, tmp_path
     assert 'Traceback' not in said
 
 
+def test_a_terminal_that_is_closed_stops_the_nodes_and_completes_the_bag(up, bench, tmp_path):
+    process = up('/**/recorder: {ros__parameters: {output_dir: bags}}\n')
+    bench.until(lambda: '/recorder' in bench.node.get_fully_qualified_node_names(), 'the node')
+    process.send_signal(signal.SIGHUP)
+    assert process.wait(BUDGET_S) == 0
+    assert not node_pids(tmp_path)
+    bag, = (tmp_path / 'bags').iterdir()
+    assert (bag / 'metadata.yaml').is_file()
+
+
 def test_where_one_node_ends_the_others_are_stopped_and_the_command_fails(up, bench, tmp_path):
     process = up(TWO)
     bench.until(lambda: len(node_pids(tmp_path)) == 2, 'the nodes')

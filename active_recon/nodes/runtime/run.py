@@ -10,6 +10,7 @@ import sys
 import threading
 
 from active_recon.errors import ActiveReconError, ConfigError
+from active_recon.interrupts import stop_signals
 from active_recon.nodes.runtime.shared_memory import make_room
 from active_recon.nodes.runtime.usage import is_help_wanted, usage
 from active_recon.parameters.yaml_files import read_yaml
@@ -25,7 +26,7 @@ _CLOSE_TIMEOUT_S = 15.0
 
 def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> None:
     """
-    Spin the node until the process is asked to stop, by SIGINT or SIGTERM.
+    Spin the node until the process is asked to stop, by one of the `stop_signals`.
 
     Where a node cannot start (a parameter out of range, a missing weights file) the process logs
     the reason in one line and exits with code 1, as it does where a node does not close in time.
@@ -77,7 +78,7 @@ def run_nodes(makers: Callable[[], Iterable[Callable[[], Node]]],
 
 class _StopRequests:
     """
-    Notes SIGINT and SIGTERM from now on; `requested` is whether one came.
+    Notes the `stop_signals` from now on; `requested` is whether one came.
 
     rclpy's own handlers shut its context down at any time: while a node starts or closes its
     files that ends in a traceback, or the signal is lost.
@@ -85,7 +86,7 @@ class _StopRequests:
 
     def __init__(self) -> None:
         self.requested = False
-        for request in (signal.SIGINT, signal.SIGTERM):
+        for request in stop_signals():
             signal.signal(request, self._note)
 
     def wakes(self, executor: Executor) -> None:
