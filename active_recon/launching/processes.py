@@ -106,14 +106,14 @@ class NodeProcesses:
             raise NodeError(f'{node} ended with code {code}. The end of its log:\n  {log_lines}')
 
     def stop(self) -> None:
-        """Interrupt the nodes, the last started first, and wait; kill those that do not end."""
+        """Ask the nodes to stop, the last started first, and wait; kill those that do not end."""
         deadline = time.monotonic() + _STOP_S
         while alive := [process for process in reversed(self._running.values())
                         if process.poll() is None]:
             late = time.monotonic() > deadline
             for process in alive:
-                process.send_signal(signal.SIGKILL if late else signal.SIGINT)
-            # Some libraries swallow an interrupt of their import, so it is sent again.
+                # Not SIGINT: an import that it strikes ends in a traceback, or swallows it
+                process.send_signal(signal.SIGKILL if late else signal.SIGTERM)
             with suppress(subprocess.TimeoutExpired):
                 alive[-1].wait(_SIGNAL_AGAIN_S)
         self._running.clear()

@@ -67,6 +67,16 @@ def test_the_nodes_of_a_file_run_in_a_namespace_until_ctrl_c(up, bench, tmp_path
     assert 'Traceback' not in said
 
 
+def test_nodes_that_are_still_starting_are_stopped_without_a_traceback(up, tmp_path):
+    process = up(TWO)
+    while len(node_pids(tmp_path)) < 2:
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    assert process.wait(BUDGET_S) == 0
+    assert not node_pids(tmp_path)
+    assert 'Traceback' not in (tmp_path / 'up.log').read_text()
+
+
 def test_a_terminal_that_is_closed_stops_the_nodes_and_completes_the_bag(up, bench, tmp_path):
     process = up('/**/recorder: {ros__parameters: {output_dir: bags}}\n')
     bench.until(lambda: '/recorder' in bench.node.get_fully_qualified_node_names(), 'the node')
