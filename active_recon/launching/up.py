@@ -9,7 +9,11 @@ import time
 from active_recon.interrupts import held_interrupts
 from active_recon.launching.processes import NodeProcesses
 from active_recon.nodes.runtime.composable import COMPOSABLE
-from active_recon.parameters.params_file import nodes_left_out, read_params_file
+from active_recon.parameters.params_file import (
+    check_reach,
+    nodes_left_out,
+    read_params_file,
+)
 
 _CHECK_EVERY_S = 0.1
 
@@ -42,6 +46,7 @@ def run_up(start: Start, say: Callable[[str], None]) -> None:
     """
     namespace = f'/{start.namespace.strip("/")}' if start.namespace else ''
     names = list(read_params_file(start.params_file))
+    check_reach(start.params_file, namespace)
     together = [name for name in names if name in COMPOSABLE] if start.single_process else []
     for left_out in nodes_left_out(start.params_file):
         say(f"{left_out} is not one of the package's nodes: start it yourself, with the same file "

@@ -1,15 +1,18 @@
 """ROS parameters files of the package's nodes, checked before any node is started."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
+import re
 from typing import Any
 
 from active_recon.errors import ConfigError
-from active_recon.parameters.declaration import declared, nearest
+from active_recon.parameters.declaration import Declared, declared, nearest
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
+from active_recon.parameters.value_text import floating
 from active_recon.parameters.yaml_files import read_yaml
 
-_OF_ROS = {'use_sim_time'}
+_OF_ROS = {'start_type_description_service', 'use_sim_time'}
 """Parameters that every ROS node declares."""
 _BESIDE = {'turntable_driver'}
 """Nodes of others that a file of `active-recon calibrate` has parameters for."""
@@ -55,12 +58,44 @@ def nodes_left_out(path: Path) -> list[str]:
     return [name for name in names if name in _BESIDE]
 
 
+def check_reach(path: Path, namespace: str) -> None:
+    """
+    Raise ConfigError on a node that in this namespace ('' or '/cell') gets nothing of the file.
+
+    ROS compares keys with full names; there, `*` is any one part and `**` any number of them.
+    """
+    keys = defaultdict(list)
+    for key in map(str, _mapping(path, path.name, read_yaml(path))):
+        keys[key.rpartition('/')[2]].append(f'/{key.removeprefix("/")}')
+    for name in keys:
+        # All nodes of `/cell/**`, else those of the name in what stands before it
+        where = [key if name == '**' else key.rpartition('/')[0] for key in keys[name]]
+        if name in {'**', *NODE_PARAMETERS} and not any(_matches(each, namespace)
+                                                        for each in where):
+            raise ConfigError(
+                f'{path}: {", ".join(keys[name])}: not in the namespace {namespace or "/"} of the '
+                f'nodes, which would get nothing of it: expected {namespace}/{name}, or '
+                f'{"/**" if name == "**" else f"/**/{name}"} for any namespace')
+
+
+def _matches(pattern: str, namespace: str) -> bool:
+    parts = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+    return re.fullmatch(parts, namespace) is not None
+
+
 def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
     """Return the shared parameters without those that only other nodes have."""
     own, *others = ({each.name for each in declared(parameters)}
                     for parameters in (NODE_PARAMETERS[node], *NODE_PARAMETERS.values()))
     return {name: value for name, value in shared.items()
             if name in own or name not in set().union(*others)}
+
+
+def _as_ros_reads(parameter: Declared, value: object) -> object:
+    """Return a value with the numbers that YAML's older version takes for text: nan, 1e-3."""
+    if float not in (parameter.kind, parameter.of):
+        return value
+    return [floating(each) for each in value] if isinstance(value, list) else floating(value)
 
 
 def _mapping(path: Path, where: str, value: object) -> Mapping[Any, Any]:
@@ -75,7 +110,7 @@ def _check(path: Path, node: str, values: Mapping[str, Any], shared: Mapping[str
     for name, value in {**shared, **values}.items():
         if name in known:
             try:
-                known[name].checked(value)
+                known[name].checked(_as_ros_reads(known[name], value))
             except ConfigError as error:
                 raise ConfigError(f'{path}: {node}: {error}') from None
         elif name in values and name not in _OF_ROS:

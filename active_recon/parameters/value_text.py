@@ -21,10 +21,10 @@ def value_from_text(text: str, present: object = None) -> object:
     if isinstance(present, str) and not isinstance(value, str | list | dict):
         return text  # YAML reads off, 1 and nothing at all as no strings
     if isinstance(present, float):
-        value = _floating(value)
+        value = floating(value)
     if isinstance(value, list) and any(isinstance(each, float) for each in (
             *value, *(present if isinstance(present, list) else ()))):
-        value = [_floating(each) for each in value]
+        value = [floating(each) for each in value]
     elements = value if isinstance(value, list) else [value]
     if not all(_is_scalar(each) for each in elements) or len(set(map(type, elements))) > 1:
         raise _not_a_value(text, type(value).__name__)
@@ -38,7 +38,7 @@ def text_from_value(value: object) -> str:
     return line.removesuffix('\n').removesuffix('\n...')
 
 
-def _floating(value: object) -> object:
+def floating(value: object) -> object:
     """Return the float that a value is, or that its text is to Python: 1, 1e-3, nan; else it."""
     if isinstance(value, bool) or not isinstance(value, int | str):
         return value

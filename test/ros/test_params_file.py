@@ -8,7 +8,11 @@ import sys
 from active_recon.errors import ConfigError
 from active_recon.parameters.declaration import declared
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
-from active_recon.parameters.params_file import nodes_left_out, read_params_file
+from active_recon.parameters.params_file import (
+    check_reach,
+    nodes_left_out,
+    read_params_file,
+)
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -45,6 +49,42 @@ def test_what_is_given_to_all_is_given_to_each_unless_it_has_its_own(tmp_path):
     assert given['view_planner']['object_size'] == 3
     assert given['recorder'] == {'use_sim_time': True, 'colour': 'red'}  # a node warns of it
     assert 'mesh' not in given['view_planner']
+
+
+def test_numbers_are_read_as_ros_reads_them(tmp_path):
+    path = tmp_path / 'some.yaml'
+    path.write_text('view_planner: {ros__parameters: {elevation: nan, min_gain: 1e-3, '
+                    'azimuth_range: [0.0, 1e-1], start_type_description_service: false}}\n')
+    assert list(read_params_file(path)) == ['view_planner']
+
+
+KEYS = {  # what ROS does with each, for view_planner in '', in /cell and in /a/cell
+    'view_planner': (True, False, False), '/view_planner': (True, False, False),
+    'cell/view_planner': (False, True, False), '/cell/view_planner': (False, True, False),
+    '/*/view_planner': (False, True, False), '/**/cell/view_planner': (False, True, True),
+    '/a/**/view_planner': (False, False, True), '/**/view_planner': (True, True, True),
+    '/cell/**': (False, True, False), '/**': (True, True, True)}
+
+
+@pytest.mark.parametrize(('namespace', 'reached'), [
+    (namespace, {key: reaches[n] for key, reaches in KEYS.items()})
+    for n, namespace in enumerate(('', '/cell', '/a/cell'))])
+def test_a_file_that_gives_nodes_of_a_namespace_nothing_is_refused(tmp_path, namespace, reached):
+    path = tmp_path / 'some.yaml'
+    for key, is_reached in reached.items():
+        path.write_text(f'"{key}": {{ros__parameters: {{policy: farthest}}}}\n')
+        if is_reached:
+            check_reach(path, namespace)
+        else:
+            with pytest.raises(ConfigError, match=f'not in the namespace {namespace or "/"} of '):
+                check_reach(path, namespace)
+
+
+def test_a_file_may_give_nodes_of_other_namespaces_something_else(tmp_path):
+    path = tmp_path / 'some.yaml'
+    path.write_text('/a/recorder: {ros__parameters: {output_dir: a}}\n'
+                    '/b/recorder: {ros__parameters: {output_dir: b}}\n')
+    check_reach(path, '/a')
 
 
 def test_the_driver_of_a_turntable_is_left_out_and_named(tmp_path):

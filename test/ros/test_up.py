@@ -103,6 +103,10 @@ def test_a_file_that_cannot_be_used_starts_nothing(up, tmp_path):
     assert 'recorder has no parameter output_dri; did you mean output_dir?' in said
 
 
+def test_a_file_of_another_namespace_starts_nothing(up):
+    assert up(TWO.replace('/**/recorder', 'recorder'), '--namespace', 'cell').wait(BUDGET_S) == 2
+
+
 def test_nodes_that_share_a_process_answer_a_view_with_a_goal(up, bench, tmp_path):
     process = up('/**/reconstructor: {ros__parameters: {take_views: all}}\n'
                  '/**/view_planner: {ros__parameters: {max_views: 9}}\n'
