@@ -150,6 +150,8 @@ def test_the_board_to_print_comes_with_its_size(tmp_path):
     (['--print-board', 'b.png', '--squares', '7by5'], "e.g. 7x5, got '7by5'"),
     (['images', '--object-size', 1, '--step-deg', 15, '--angles-deg', 'a.csv'],
      'give one of them'),
+    (['images', '--object-size', 1, '--step-deg', 15, '--mount-frame', 'flange'],
+     '--mount-frame without --poses'),
     (['nowhere', '--object-size', 1], 'nowhere'),
 ])
 def test_options_that_do_not_go_together_are_refused(options, said, tmp_path, monkeypatch):

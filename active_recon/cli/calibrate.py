@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.needed_options import refuse_lone
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 import typer
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 
 
 def calibrate(
+    context: typer.Context,
     images: Annotated[list[Path] | None, typer.Argument(
         help='Images of the board, or folders of them.', show_default=False)] = None,
     object_size: Annotated[float | None, typer.Option(
@@ -67,6 +69,8 @@ def calibrate(
 
     Example: active-recon calibrate images/ --step-deg 15 --object-size 0.25
     """
+    refuse_lone(context, '--poses', poses is not None,
+                'base_frame', 'mount_frame', 'camera_frame')
     board = printed_board(squares, square_mm, marker_mm, dictionary)
     if print_board is not None:
         board.save(print_board)

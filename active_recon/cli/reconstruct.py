@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.calibrate import printed_board
+from active_recon.cli.needed_options import refuse_lone
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError, RecordingError
 from active_recon.parameters.viewer import DEFAULT_PORT, HIGHEST_PORT
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 
 def reconstruct(
+    context: typer.Context,
     photos: Annotated[Path, typer.Argument(
         help='Folder of photos.', show_default=False)],
     out: Annotated[Path, typer.Option(
@@ -111,6 +113,12 @@ def reconstruct(
                           f'{mesh_format!r}')
     if size is not None and unit != 1.0:
         raise ConfigError('--size and --unit both set the scale: give one of them')
+    refuse_lone(context, '--board', board,
+                'squares', 'square_mm', 'marker_mm', 'dictionary', 'camera_info')
+    refuse_lone(context, '--turntable-step-deg', turntable_step_deg is not None,
+                'elevation_deg', 'distance', 'fov_deg')
+    refuse_lone(context, '--watch', watch,
+                'lan', 'port', 'max_views', 'target_quality', 'min_gain')
     folder = out / 'bag'
     if bag and folder.exists():
         raise RecordingError(f'{folder}: already there: expected a new folder; give another --out',
@@ -133,12 +141,6 @@ def reconstruct(
         sources.append(TurntableCameras(
             math.radians(turntable_step_deg), math.radians(elevation_deg), distance,
             None if fov_deg is None else math.radians(fov_deg)))
-    elif fov_deg is not None or distance is not None:
-        raise ConfigError('--fov-deg or --distance without --turntable-step-deg: they are for a '
-                          'turntable alone')
-    if camera_info is not None and not board:
-        raise ConfigError('--camera-info without --board: other sources of cameras have no lens '
-                          'file')
     if board and axes is not None:
         raise ConfigError('--axes with --board: it is for a file of cameras')
     if out.resolve() == photos.resolve():
@@ -159,8 +161,6 @@ def reconstruct(
                               '--max-views tells when there are enough')
         shape = watch_photos(photos, source, options, StoppingRule(
             max_views, target_quality=target_quality, min_gain=min_gain), Pages(port, lan))
-    elif lan:
-        raise ConfigError('--lan without --watch: there is no page then')
     else:
         shape = from_files(photos, source, options, progress_bar)
     _print(shape)
