@@ -169,6 +169,10 @@ def train_steps(
             last = step + 1 == config.steps
             is_checkpoint = last or (step + 1) % config.checkpoint_every == 0
             stopping = not last and _is_asked_to_stop(fabric, raise_if_asked)
+            if is_checkpoint:
+                # Steps of all sizes leave gaps between what they keep: gigabytes in an hour,
+                # which validation needs
+                give_back_freed_memory()
             if last or (step + 1) % config.validate_every == 0:
                 if fabric.is_global_zero:
                     learner.eval()
@@ -181,9 +185,6 @@ def train_steps(
                 if is_checkpoint or stopping:
                     save_checkpoint(run.checkpoint_path, trained, raw,
                                     Checkpoint(step + 1, settings, begun.log))
-            if is_checkpoint:
-                # Steps of all sizes leave gaps between what they keep: gigabytes in an hour
-                give_back_freed_memory()
             if stopping:
                 raise TrainingStoppedError(
                     f'stopped at step {step + 1} of {config.steps}; continue with --resume')
