@@ -3,8 +3,9 @@
 from types import SimpleNamespace
 
 from active_recon.nodes.runtime import diagnostics as diagnostics_module
-from active_recon.nodes.runtime.diagnostics import Diagnostics, LOG_EVERY_S
+from active_recon.nodes.runtime.diagnostics import Diagnostics, FORGOTTEN_S, LOG_EVERY_S
 import pytest
+from rclpy.node import Node
 
 pytestmark = pytest.mark.ros
 
@@ -62,3 +63,17 @@ def test_a_trouble_that_stays_is_said_although_one_of_its_kind_was_said_just_bef
     diagnostics.clear_warning('silent')
     diagnostics.clear_warning('silent')
     assert said[3:] == ['INFO over: still nothing']
+
+
+def test_a_node_says_that_another_has_its_name_until_that_is_gone(bench, clock, said):
+    Diagnostics(bench.node)
+    other = Node('bench', context=bench.node.context)
+    asked = bench.now()
+    bench.until(lambda: bench.now() > asked + 1.5e9, 'some checks')
+    assert not said  # it may have been killed a moment ago
+    clock.now += FORGOTTEN_S + 1
+    bench.until(lambda: said, 'the warning')
+    other.destroy_node()
+    bench.until(lambda: len(said) > 1, 'its end')
+    named = '/bench: another node has the same name: expected one, since both answer what is meant'
+    assert said[0].startswith(f'WARN {named}') and said[1].startswith(f'INFO over: {named}')

@@ -21,6 +21,8 @@ from rclpy.node import Node
 LOG_EVERY_S = 10.0
 PUBLISH_EVERY_S = 1.0
 CHANGES_WITHIN_S = 0.1
+FORGOTTEN_S = 25.0
+"""DDS knows a node that was killed for 20 s more: one started anew is not alone meanwhile."""
 
 
 class Diagnostics:
@@ -42,6 +44,7 @@ class Diagnostics:
         self._logged_warnings: set[str] = set()
         self._failure = ''
         self._host = socket.gethostname()
+        self._alone_at = time.monotonic()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         # A steady clock: diagnostics are published while simulation time is paused, too.
         node.create_timer(PUBLISH_EVERY_S, self._publish_regularly,
@@ -163,9 +166,23 @@ class Diagnostics:
         self._changes.wake()
 
     def _publish_regularly(self) -> None:
+        self._check_name()
         self._publish()
         # A problem is published for up to a second, so that slow subscribers see it.
         self._last_problem = '', ''
+
+    def _check_name(self) -> None:
+        """Warn while another node has this node's name, as one that was left running."""
+        own = self._node.get_fully_qualified_name()
+        names = [f'{namespace.rstrip("/")}/{name}'
+                 for name, namespace in self._node.get_node_names_and_namespaces()]
+        if names.count(own) < 2:
+            self._alone_at = time.monotonic()
+            self.clear_warning('same_name')
+        elif time.monotonic() - self._alone_at > FORGOTTEN_S:
+            self.raise_warning('same_name', (
+                f'{own}: another node has the same name: expected one, since both answer what is '
+                'meant for one of them; stop the other, or start this one in a namespace'))
 
     def _publish(self) -> None:
         status = self._status(time.monotonic())
