@@ -19,6 +19,8 @@ MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 ROS_WHEELS = {
     'ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp', 'ros-jazzy-common-interfaces'}
 IMPORTED_BY_TORCH = {'tensorboard'}
+ROSDEP = {'opencv-python-headless': 'opencv', 'pillow': 'pil', 'pyyaml': 'yaml',
+          'scikit-image': 'skimage'}
 distributions = cache(packages_distributions)  # takes seconds
 
 
@@ -79,6 +81,16 @@ def test_what_is_declared_is_imported():
     used = {canonicalize_name(owner) for name in imported()
             for owner in distributions().get(name, ())}
     assert requirements().keys() - extras().keys() - ROS_WHEELS - IMPORTED_BY_TORCH <= used
+
+
+def test_what_setup_asks_for_is_in_the_manifest_or_said_to_be_in_setup_alone():
+    by_rosdep = {element.text.removeprefix('python3-').removesuffix('-pip')
+                 for element in MANIFEST.iter('exec_depend')}
+    comment = re.search('<!-- (.*) are named by', (ROOT / 'package.xml').read_text())
+    alone = set(re.split(', | and ', comment[1]))
+    needed = {ROSDEP.get(name, name) for name in
+              requirements().keys() - extras().keys() - ROS_WHEELS}
+    assert needed - by_rosdep == alone
 
 
 @pytest.mark.parametrize('name', sorted(requirements().keys() - {'torch'}))
