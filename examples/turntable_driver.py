@@ -13,6 +13,7 @@ import math
 import signal
 import time
 
+from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
@@ -73,9 +74,13 @@ class TurntableDriver(Node):
     def __init__(self, motor: Motor) -> None:
         super().__init__('turntable_driver')
         self._motor = motor
-        # Both as `active-recon calibrate` writes them
-        self._azimuth_at_zero = float(self.declare_parameter('camera_azimuth_at_zero', 0.0).value)
-        self._direction = int(self.declare_parameter('turntable_direction', 1).value)
+        # Both as `active-recon calibrate` writes them; 1 may stand for 1.0
+        either = ParameterDescriptor(dynamic_typing=True)
+        self._azimuth_at_zero = float(
+            self.declare_parameter('camera_azimuth_at_zero', 0.0, either).value)
+        self._direction = self.declare_parameter('turntable_direction', 1, either).value
+        if self._direction not in (1, -1):
+            raise SystemExit(f'turntable_direction: expected 1 or -1, got {self._direction}')
         self._goal_stamp = None
         self._publisher = self.create_publisher(JointState, 'turntable/joint_states', 10)
         self.create_subscription(

@@ -39,6 +39,17 @@ def driver(start_shared_node):
     return start(start_shared_node)
 
 
+def test_a_direction_that_is_none_is_refused_in_one_line(start_node):
+    node = start_node('turntable_driver', ready=False, program=(DRIVER,), turntable_direction=5)
+    assert node.wait() == 1
+    assert node.log() == ['turntable_direction: expected 1 or -1, got 5']
+
+
+def test_whole_numbers_are_taken_for_the_driver_s_parameters(start_node):
+    start_node('turntable_driver', program=(DRIVER,), camera_azimuth_at_zero=1,
+               turntable_direction=-1.0)
+
+
 @pytest.fixture
 def joints(bench, driver):
     """Return the angles of the table as they are told."""
