@@ -277,6 +277,8 @@ def noise(size):
 
 @pytest.mark.parametrize(('parameters', 'said'), [
     ({'topics': '7'}, 'parameter topics: invalid value: expected a list, each a string, got 7'),
+    ({'topics': "['a-b']"}, "parameter topics: invalid value: .*got 'a-b': .*characters"),
+    ({'topics': "['a//b']"}, 'parameter topics: invalid value: .*repeated'),
     ({'output_dir': '/proc/bags'}, 'cannot start a bag in /proc/bags'),
 ])
 def test_what_cannot_be_recorded_is_refused_at_start(start_node, parameters, said):

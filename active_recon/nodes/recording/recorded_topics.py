@@ -2,9 +2,11 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from active_recon.errors import ConfigError
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.topic_names import TRANSPORT_SUFFIXES
 from active_recon.parameters.recorder import TOPICS
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 NEEDED = ('camera/image_raw', 'camera/camera_info', 'camera/pose')
@@ -17,13 +19,13 @@ class RecordedTopics:
     The full names of the recorded topics; nodes may add the names they have for them.
 
     In the diagnostics, topics without a publisher are the warning `no_publisher`: of the default
-    topics only those that every loop has, else all.
+    topics only those that every loop has, else all. ConfigError on what can be no topic's name.
     """
 
     def __init__(self, node: Node, names: tuple[str, ...], diagnostics: Diagnostics) -> None:
         self._node = node
         self._diagnostics = diagnostics
-        self._full = {name: {node.resolve_topic_name(name)} for name in names}
+        self._full = {name: {_full_name(node, name)} for name in names}
         self._needed = NEEDED if names == TOPICS else names
         self.begin()
 
@@ -68,3 +70,12 @@ class RecordedTopics:
                 'them is recorded; remap with -r NAME:=TOPIC where they have other names'))
         else:
             self._diagnostics.clear_warning('no_publisher')
+
+
+def _full_name(node: Node, name: str) -> str:
+    try:
+        return node.resolve_topic_name(name)
+    except rclpy_implementation.RCLError as error:
+        reason = str(error).partition(', at ')[0]  # without the line of the C code
+        raise ConfigError('parameter topics: invalid value: expected names that topics can have, '
+                          f'got {name!r}: {reason}') from error
