@@ -4,6 +4,7 @@ Declares a node's parameters as data: a frozen dataclass, each field made by `pa
 The dataclass describes them completely, without a running node and without ROS.
 """
 
+from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
@@ -73,8 +74,9 @@ class Declared:
                 return elements
         elif self.of is None and self._allows(_as(self.kind, value)):
             return _as(self.kind, value)
+        given = list(value) if isinstance(value, array) else value
         raise ConfigError(
-            f'parameter {self.name}: invalid value: expected {self.expected}, got {value!r}')
+            f'parameter {self.name}: invalid value: expected {self.expected}, got {given!r}')
 
     @property
     def may_be_nan(self) -> bool:

@@ -1,5 +1,6 @@
 """Parameters declared as data: what a value may be, and what ROS is told of it."""
 
+from array import array
 from dataclasses import make_dataclass
 import math
 from types import SimpleNamespace
@@ -60,6 +61,7 @@ WORDS = tuple[str, ...], parameter(('a',), 'words')
     ('c', WORD, "one of a, b, got 'c'"),
     (1, FLAG, 'true or false, got 1'),
     ([0.5, 2.0], NUMBERS, r'a list, each a number from -1 to 1, got \[0.5, 2.0\]'),
+    (array('d', [0.5, 2.0]), NUMBERS, r'a list, each a number from -1 to 1, got \[0.5, 2.0\]'),
     ('abc', WORDS, "a list, each a string, got 'abc'"),
     ([1, 2], WORDS, r'a list, each a string, got \[1, 2\]')])
 def test_a_value_of_another_kind_or_out_of_range_is_refused(make_node, given, declared, said):
