@@ -99,8 +99,8 @@ class RunningNodes(LoopClient):
         def silent() -> list[str]:
             endpoints = self._node.get_publishers_info_by_topic('/diagnostics')
             nodes = {name for name in map(endpoint_node, endpoints) if name is not None}
-            return sorted(name for name in nodes
-                          if not any(_tells_of(each, name) for each in readings))
+            return sorted(name for name in nodes if not _is_hidden(name)
+                          and not any(_tells_of(each, name) for each in readings))
 
         self._node.create_subscription(DiagnosticArray, '/diagnostics', take, SENSOR_QOS)
         discovered_at = time.monotonic() + _DISCOVERY_S
@@ -126,7 +126,7 @@ class RunningNodes(LoopClient):
         """Return the nodes whose parameters can be set, without hidden ones, such as this one."""
         services = self._offered('rcl_interfaces/srv/SetParameters')
         return [node for node, slash, name in (each.rpartition('/') for each in services)
-                if name == 'set_parameters' and '/_' not in node]
+                if name == 'set_parameters' and not _is_hidden(node)]
 
     def _missing(self, what: str, kind: str, found: list[str]) -> ConfigError:
         if found:
@@ -171,6 +171,11 @@ def running_nodes(namespace: str = '', timeout_s: float = 5.0) -> Iterator[Runni
 def _tells_of(status: str, node: str) -> bool:
     """Return whether a status is of a node: others name theirs `node: what`."""
     return status.lstrip('/').startswith((node.lstrip('/'), node.rpartition('/')[2]))
+
+
+def _is_hidden(node: str) -> bool:
+    """Return whether a node, or its namespace, is hidden by ROS's rule, as this one is."""
+    return '/_' in node
 
 
 def _nothing() -> None:

@@ -9,6 +9,7 @@ from command_line import command, refusal
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
 
 pytestmark = pytest.mark.ros
 
@@ -138,3 +139,16 @@ def test_the_status_names_a_node_that_tells_nothing(told, shared_bench):
     shared_bench.node.destroy_publisher(publisher)
     assert re.search(r'^/bench  nothing heard in 3 s: it is busy', said, re.MULTILINE)
     assert re.search(r'^/view_planner  WARN', said, re.MULTILINE)
+
+
+def test_the_status_leaves_hidden_nodes_out(told, shared_bench):
+    warned_status(told)
+    hidden = Node('_watching', context=shared_bench.node.context)
+    try:
+        hidden.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        shared_bench.until(lambda: '_watching' in {
+            each.node_name for each in shared_bench.node.get_publishers_info_by_topic(
+                '/diagnostics')}, 'the hidden node')
+        assert '_watching' not in told(0, 'status', '--timeout', '3')
+    finally:
+        hidden.destroy_node()
