@@ -3,7 +3,7 @@
 # Renders the training data, trains the network, its view policy, the tables of its quality and its
 # depth refiner, and puts all of it, exported, into RUN/weights. What stands is not made again, an
 # interrupted training continues. The numbers below are about those of the weights that ship, whose
-# five stages were trained one after the other; fewer are faster.
+# stages were trained one after the other, two of them side by side; fewer are faster.
 #
 #   MESHES    folder with manifest.csv of real models (docs/data-sources.csv); without, none are used
 #   RUN       folder of data and runs, some 8 GB
@@ -11,7 +11,7 @@
 
 RUN ?= runs/default
 MESHES ?=
-STEPS ?= 16600
+STEPS ?= 25300
 DEVICES ?= 2
 PARAMETRIC ?= --train 320 --val 8
 THINGS ?= --category thing --train 6000 --val 0
