@@ -77,6 +77,15 @@ def test_nodes_that_are_still_starting_are_stopped_without_a_traceback(up, tmp_p
     assert 'Traceback' not in (tmp_path / 'up.log').read_text()
 
 
+@pytest.fixture
+def hears_of_terminal():
+    """What is started hears that its terminal is closed, also where the tests run by nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures('hears_of_terminal')
 def test_a_terminal_that_is_closed_stops_the_nodes_and_completes_the_bag(up, bench, tmp_path):
     process = up('/**/recorder: {ros__parameters: {output_dir: bags}}\n')
     bench.until(lambda: '/recorder' in bench.node.get_fully_qualified_node_names(), 'the node')
