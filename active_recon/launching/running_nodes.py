@@ -9,6 +9,7 @@ from typing import Any
 
 from active_recon.errors import ConfigError
 from active_recon.launching.loop_client import joined_domain, LoopClient
+from active_recon.nodes.runtime.hidden_nodes import is_hidden
 from active_recon.nodes.runtime.qos import endpoint_node, SENSOR_QOS
 from active_recon.parameters.declaration import nearest
 from active_recon.parameters.value_text import value_from_text
@@ -99,7 +100,7 @@ class RunningNodes(LoopClient):
         def silent() -> list[str]:
             endpoints = self._node.get_publishers_info_by_topic('/diagnostics')
             nodes = {name for name in map(endpoint_node, endpoints) if name is not None}
-            return sorted(name for name in nodes if not _is_hidden(name)
+            return sorted(name for name in nodes if not is_hidden(name)
                           and not any(_tells_of(each, name) for each in readings))
 
         self._node.create_subscription(DiagnosticArray, '/diagnostics', take, SENSOR_QOS)
@@ -126,7 +127,7 @@ class RunningNodes(LoopClient):
         """Return the nodes whose parameters can be set, without hidden ones, such as this one."""
         services = self._offered('rcl_interfaces/srv/SetParameters')
         return [node for node, slash, name in (each.rpartition('/') for each in services)
-                if name == 'set_parameters' and not _is_hidden(node)]
+                if name == 'set_parameters' and not is_hidden(node)]
 
     def _missing(self, what: str, kind: str, found: list[str]) -> ConfigError:
         if found:
@@ -171,11 +172,6 @@ def running_nodes(namespace: str = '', timeout_s: float = 5.0) -> Iterator[Runni
 def _tells_of(status: str, node: str) -> bool:
     """Return whether a status is of a node: others name theirs `node: what`."""
     return status.lstrip('/').startswith((node.lstrip('/'), node.rpartition('/')[2]))
-
-
-def _is_hidden(node: str) -> bool:
-    """Return whether a node, or its namespace, is hidden by ROS's rule, as this one is."""
-    return '/_' in node
 
 
 def _nothing() -> None:

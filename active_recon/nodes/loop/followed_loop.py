@@ -63,9 +63,9 @@ class LoopFinder:
 
     def _nodes(self) -> Iterator[str]:
         """Yield the full names of nodes that belong to a loop."""
-        for name, namespace in self._node.get_node_names_and_namespaces():
-            if name in _NAMES:
-                yield f'{namespace.rstrip("/")}/{name}'
+        for name in self._node.get_fully_qualified_node_names():
+            if name.rpartition('/')[2] in _NAMES:
+                yield name
         for topic, kinds in self._node.get_topic_names_and_types():
             if topic.endswith(_LOOP_TOPICS) and _HEADER in kinds:
                 publishers = self._node.get_publishers_info_by_topic(topic)

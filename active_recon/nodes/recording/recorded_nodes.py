@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 
+from active_recon.nodes.runtime.hidden_nodes import is_hidden
 from active_recon.nodes.runtime.parameter_collector import ParameterCollector
 from active_recon.nodes.runtime.qos import endpoint_node
 from rclpy.node import Node
@@ -40,16 +41,11 @@ class RecordedNodes:
     def update(self) -> None:
         """Request the parameters of nodes that are not known yet; to be called repeatedly."""
         own = self._node.get_fully_qualified_name()
-        running = {f'{namespace.rstrip("/")}/{name}'
-                  for name, namespace in self._node.get_node_names_and_namespaces()}
+        space = own.rpartition('/')[0]
+        running = set(self._node.get_fully_qualified_node_names())
         self._collector.request(name for name in running - {own} if name in self or (
-            name.rpartition('/')[0] == own.rpartition('/')[0] and not _is_hidden(name)))
+            name.rpartition('/')[0] == space and not is_hidden(name.removeprefix(space))))
 
     def pause(self) -> None:
         """Request nothing, and regard nodes that are running later as new."""
         self._collector.request(())
-
-
-def _is_hidden(full_name: str) -> bool:
-    """Return whether ROS hides a node, as it does the short-lived ones of its command line."""
-    return full_name.rpartition('/')[2].startswith('_')

@@ -174,9 +174,7 @@ class Diagnostics:
     def _check_name(self) -> None:
         """Warn while another node has this node's name, as one that was left running."""
         own = self._node.get_fully_qualified_name()
-        names = [f'{namespace.rstrip("/")}/{name}'
-                 for name, namespace in self._node.get_node_names_and_namespaces()]
-        if names.count(own) < 2:
+        if self._node.get_fully_qualified_node_names().count(own) < 2:
             self._alone_at = time.monotonic()
             self.clear_warning('same_name')
         elif time.monotonic() - self._alone_at > FORGOTTEN_S:
