@@ -5,6 +5,8 @@ import shutil
 
 from active_recon.cli.main import main
 from active_recon.errors import WeightsError
+from active_recon.models.scorer_weights import save_scorer
+from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.models.weights_files import find_weights
 from active_recon.policies import load_policy, PolicyOptions
 import numpy as np
@@ -61,6 +63,26 @@ def test_a_policy_is_learned_in_two_rounds_and_chooses(
                    'random,attention', '--objects', 2, '--starts', 1, '--seeds', 1, '--views', 3,
                    '--threads', 1, '--out', tmp_path) == 0
     assert '| attention |' in (tmp_path / 'policies.md').read_text()
+
+
+def test_a_policy_follows_a_network_that_was_trained_further(
+        dataset, weights, tmp_path, monkeypatch, capsys):
+    earlier = tmp_path / 'earlier-scorer.safetensors'
+    torch.manual_seed(1)
+    save_scorer(earlier, ViewScorer.from_config(ScorerConfig()), ScorerConfig(), 'a' * 64, {})
+    arguments = [dataset, '--validation', dataset, '--model', weights, '--objects', 2,
+                 '--candidates', 4, '--starts', 1, '--views', 3, '--epochs', 1, '--threads', 1,
+                 '--rounds', 1, '--learning-rate', 1e-9]
+    assert command(monkeypatch, 'train-policy', *arguments, '--init-from', earlier, '--out',
+                   tmp_path / 'run') == 0
+    begun, learned = (load_file(file) for file in (
+        earlier, tmp_path / 'run' / 'carving-scorer.safetensors'))
+    for name in begun:
+        if name.endswith(('weight', 'bias')):
+            np.testing.assert_allclose(learned[name], begun[name], atol=1e-6)
+    assert command(monkeypatch, 'train-policy', *arguments, '--init-from', weights, '--out',
+                   tmp_path / 'other') == 2
+    assert 'no view scorer' in capsys.readouterr().err
 
 
 def test_weights_without_a_scorer_have_no_learned_policy(weights):

@@ -95,6 +95,23 @@ def test_a_training_from_one_seed_ends_the_same():
         assert_close(mine, other, rtol=0, atol=0)
 
 
+def test_a_training_may_begin_with_a_scorer_which_stays_as_it_is():
+    learned = train_scorer([learnable()], SMALL, ScorerTraining(epochs=40, batch_size=16))
+    before = {name: tensor.clone() for name, tensor in learned.state_dict().items()}
+    short = ScorerTraining(epochs=1, batch_size=16, learning_rate=1e-4)
+    further = train_scorer([learnable(seed=3)], SMALL, short, begun=learned)
+    assert gap_shares(further, [learnable(seed=1)])['all'] > 0.8 > gap_shares(
+        train_scorer([learnable(seed=3)], SMALL, short), [learnable(seed=1)])['all']
+    for name, tensor in learned.state_dict().items():
+        assert_close(tensor, before[name], rtol=0, atol=0)
+
+
+def test_a_scorer_of_other_sizes_to_begin_with_is_refused():
+    other = ViewScorer.from_config(ScorerConfig(2, 8, 2, 0.0))
+    with pytest.raises(ConfigError, match='of other sizes'):
+        train_scorer([learnable()], SMALL, ScorerTraining(epochs=1), begun=other)
+
+
 def test_the_mean_of_calibrated_gains_is_the_mean_of_those_measured():
     scorer = train_scorer([learnable()], SMALL, ScorerTraining(epochs=10))
     states = learnable(seed=2)

@@ -51,6 +51,10 @@ def train_policy(
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     workers: Annotated[int, typer.Option(
         min=1, help='Processes that measure gains; with --cluster so many of its cores.')] = 1,
+    init_from: Annotated[Path | None, typer.Option(
+        help='A scorer file of this or an earlier network (WEIGHTS-scorer.safetensors): it '
+             'chooses the views of the first round, and its weights are those that the training '
+             'begins with.')] = None,
     cluster: Cluster = None,
     runtime: MeasuredIn = 'torch',
 ) -> None:
@@ -61,14 +65,15 @@ def train_policy(
     order of what they add, and how much that is. Gains are kept in OUT/gains-N, so that an
     interrupted run continues where it stopped; an object takes some seconds of a core. Writes
     OUT/<weights>-scorer.safetensors and its card: copy both beside the network's weights, and
-    `policy: attention` finds them.
+    `policy: attention` finds them. Where a network was trained further, --init-from lets its
+    policy follow it: one round and half of the epochs do.
 
     For example:
 
       active-recon train-policy turn/train things/train --validation turn/val --out runs/policy
     """
     from active_recon.evaluation.posed.entrants import load_entrants
-    from active_recon.models.scorer_weights import save_scorer
+    from active_recon.models.scorer_weights import load_scorer_of_any_network, save_scorer
     from active_recon.models.view_scorer import ScorerConfig
     from active_recon.models.weights_files import find_weights, scorer_path
     from active_recon.training.gain_files import Collecting
@@ -92,7 +97,8 @@ def train_policy(
     training = ScorerTraining(epochs, batch_size, learning_rate, seed=seed)
     learned: list[LookedStates] = []
     held_out: list[LookedStates] = []
-    scorer = None
+    begun = None if init_from is None else load_scorer_of_any_network(init_from)
+    scorer = begun
     told: list[dict[str, Any]] = []
     for number in range(1, rounds + 1):
         with workers_of(cluster, workers) as crew:
@@ -102,7 +108,7 @@ def train_policy(
             held_out += source.states(validation, number, scorer)
         train, test = joined(learned), joined(held_out)
         with progress_bar(f'training, round {number}', epochs) as advance:
-            scorer = train_scorer(train, config, training, partial(advance, 1))
+            scorer = train_scorer(train, config, training, partial(advance, 1), begun)
         calibrate(scorer, test)
         shares = gap_shares(scorer, test)
         told.append({'train_states': sum(map(len, train)),

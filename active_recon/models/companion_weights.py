@@ -50,9 +50,11 @@ class Companion(Generic[Module]):
             'model': self.kind, 'config': config.to_dict(), 'network_sha256': network_sha256,
             'sha256': weights_hash(path), **card}, indent=2) + '\n')
 
-    def read(self, path: Path, network_sha256: str, device: str = 'cpu') -> Module:
+    def read(self, path: Path, network_sha256: str | None, device: str = 'cpu') -> Module:
         """
         Return the module in a file, for the network whose weights have a hash; it is not trained.
+
+        Without a hash it may be for any network, as where it is only trained further.
 
         Raises WeightsError where the file is not whole or of another kind, and where it was
         trained for other weights.
@@ -66,7 +68,7 @@ class Companion(Generic[Module]):
             raise WeightsError(f'{path}: no whole safetensors file: {error}') from error
         if facts.get('model') != self.kind:
             raise WeightsError(f'{path}: {self.no_such}, got {facts.get("model")!r}')
-        if facts.get('network_sha256') != network_sha256:
+        if network_sha256 is not None and facts.get('network_sha256') != network_sha256:
             raise WeightsError(
                 f'{path}: {self.of_others}: expected one trained for {network_sha256[:12]}, got '
                 f'one for {facts.get("network_sha256", "none")[:12]}; {self.advice}')

@@ -45,6 +45,16 @@ def load_scorer(weights: Path | None = None, device: str = 'cpu') -> ViewScorer:
     return _SCORER.read(path, weights_hash(weights), device)
 
 
+def load_scorer_of_any_network(path: Path) -> ViewScorer:
+    """
+    Return the scorer in a file, in evaluation mode, whatever weights it was trained for.
+
+    It is no policy of other weights: training can begin with it. Raises WeightsError where it is
+    not whole, or no scorer.
+    """
+    return _SCORER.read(path, None)
+
+
 def policy_module(weights: Path, bundle: Bundle) -> nn.Module | None:
     """Return the learned policy in weights that were read, or beside them; None without one."""
     if bundle.attention is not None or not scorer_path(weights).is_file():

@@ -16,7 +16,7 @@ class CameraParameters(ManagedParameters):
     camera_info: str = parameter(
         '', "lens in the YAML format of ROS's camera_calibration, as camera_info_manager and "
         'calibrate write it; empty for a camera that is not calibrated')
-    camera_frame: str = parameter('camera_optical_frame', 'frame of the images')
+    camera_frame: str = parameter('camera_optical_frame', 'frame of the images', needed=True)
     rate: float = parameter(
         0.0, 'images per second; 0 for those of the device or file, and 10 for a folder',
         low=0.0, high=1000.0)

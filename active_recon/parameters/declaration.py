@@ -18,17 +18,18 @@ NEW_START = 'a change requires a restart'
 
 def parameter(default: object, description: str, *, low: float | None = None,
               high: float | None = None, choices: Sequence[str] = (),
-              dynamic: bool = False) -> Any:
+              dynamic: bool = False, needed: bool = False) -> Any:
     """
     Return the field of a parameter: bool, int, float, str, or a tuple of floats or strings.
 
     `low` and `high` are the inclusive ends of its range, given together; for a tuple they hold
     for each element. `choices` are the allowed strings. A default of NaN means 'not given', and
-    NaN is then an allowed value. A `dynamic` parameter can change while the node runs.
+    NaN is then an allowed value. A `dynamic` parameter can change while the node runs. A string
+    that is `needed` cannot be empty.
     """
     return field(default=default, metadata={
         'description': description, 'low': low, 'high': high, 'choices': tuple(choices),
-        'dynamic': dynamic})
+        'dynamic': dynamic, 'needed': needed})
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Declared:
     high: float | None
     choices: tuple[str, ...]
     dynamic: bool
+    needed: bool
 
     @property
     def expected(self) -> str:
@@ -52,7 +54,8 @@ class Declared:
         if self.choices:
             one = f'one of {", ".join(self.choices)}'
         elif kind in (bool, str):
-            one = 'a string' if kind is str else 'true or false'
+            one = ('true or false' if kind is bool else
+                   'a string that is not empty' if self.needed else 'a string')
         else:
             between = ('' if self.low is None or self.high is None else
                        f' from {number_words(self.low)} to {number_words(self.high)}')
@@ -87,7 +90,7 @@ class Declared:
         if type(value) is not (self.of or self.kind):
             return False
         if isinstance(value, str):
-            return not self.choices or value in self.choices
+            return value in self.choices if self.choices else bool(value) or not self.needed
         if isinstance(value, float) and math.isnan(value):
             return self.may_be_nan
         if isinstance(value, int | float) and self.low is not None and self.high is not None:

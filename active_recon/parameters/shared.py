@@ -38,7 +38,7 @@ class CubeParameters:
 
     object_size: float = parameter(1.0, 'side of the voxel grid, m', low=0.001, high=1000.0)
     object_frame: str = parameter(
-        OBJECT_FRAME, 'frame of the object, in which poses are given')
+        OBJECT_FRAME, 'frame of the object, in which poses are given', needed=True)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ class TurntableCameraParameters(CubeParameters):
     time_scale: float = parameter(
         1.0, 'how many times faster than the clock it turns', low=0.001, high=1000.0, dynamic=True)
     rate: float = parameter(10.0, 'image rate, Hz', low=0.1, high=1000.0, dynamic=True)
-    camera_frame: str = parameter('camera_optical_frame', 'frame of the images')
+    camera_frame: str = parameter('camera_optical_frame', 'frame of the images', needed=True)
     faults: tuple[str, ...] = parameter(
         (), 'simulated faults, each as NAME:AMOUNT, such as drop_images:0.3', dynamic=True)
     faults_seed: int = parameter(

@@ -44,16 +44,25 @@ class ScorerTraining(Config):
 
 
 def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: ScorerTraining,
-                 advance: Callable[[str], None] = lambda note: None) -> ViewScorer:
+                 advance: Callable[[str], None] = lambda note: None,
+                 begun: ViewScorer | None = None) -> ViewScorer:
     """
     Return a scorer that learned the order of candidates, in evaluation mode, uncalibrated.
 
     The losses are listwise and ordinal, on gains standardised per number of views; the mean gain
-    is learned beside it. `advance` is called after each epoch with the mean loss.
+    is learned beside it. `advance` is called after each epoch with the mean loss. The weights
+    begin with those of `begun`, which stays as it is; None: with fresh ones. Raises ConfigError
+    where that is of other sizes.
     """
     torch.manual_seed(training.seed)
     rng = np.random.default_rng(training.seed)
     scorer = ViewScorer.from_config(config)
+    if begun is not None:
+        try:
+            scorer.load_state_dict(begun.state_dict())
+        except RuntimeError as error:
+            raise ConfigError('a view scorer of other sizes to begin with: expected those of '
+                              f'{config}') from error
     spread = spreads(train, MOST_VIEWS)
     count = sum(math.ceil(len(states) / training.batch_size) for states in train)
     optimizer = torch.optim.AdamW(scorer.parameters(), training.learning_rate,

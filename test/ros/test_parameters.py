@@ -46,6 +46,7 @@ NUMBER = float, parameter(1.0, 'a number', low=0.0, high=2.0)
 COUNT = int, parameter(1, 'a count', low=0, high=2)
 NOT_GIVEN = float, parameter(math.nan, 'a number, if any', low=0.0, high=2.0)
 WORD = str, parameter('a', 'a word', choices=('a', 'b'))
+FRAME = str, parameter('a', 'a frame', needed=True)
 FLAG = bool, parameter(True, 'a flag')
 NUMBERS = tuple[float, ...], parameter((), 'numbers', low=-1.0, high=1.0)
 WORDS = tuple[str, ...], parameter(('a',), 'words')
@@ -59,6 +60,7 @@ WORDS = tuple[str, ...], parameter(('a',), 'words')
     (1.5, COUNT, 'an integer from 0 to 2, got 1.5'),
     (True, COUNT, 'an integer from 0 to 2, got True'),
     ('c', WORD, "one of a, b, got 'c'"),
+    ('', FRAME, "a string that is not empty, got ''"),
     (1, FLAG, 'true or false, got 1'),
     ([0.5, 2.0], NUMBERS, r'a list, each a number from -1 to 1, got \[0.5, 2.0\]'),
     (array('d', [0.5, 2.0]), NUMBERS, r'a list, each a number from -1 to 1, got \[0.5, 2.0\]'),
