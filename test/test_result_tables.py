@@ -1,5 +1,8 @@
 """The tables of the documents are those of the measured results."""
 
+import json
+
+from benchmarks import views
 from benchmarks.lifting import DOCUMENTS, figures_by_set, with_tables
 import pytest
 
@@ -16,3 +19,16 @@ def test_a_table_that_was_changed_by_hand_is_mended():
     figure = f'{models["lifting"][1]["mean"]:.3f}'
     assert figure in text
     assert with_tables(text.replace(figure, '0.999')) == text
+
+
+def test_the_tables_of_view_policies_are_those_that_were_measured():
+    text = views.DOCUMENT.read_text()
+    assert views.with_tables(text) == text
+    row = next(line for line in views.views_table() if '`attention`' in line)
+    assert row in text and views.with_tables(text.replace(row, '|')) == text
+
+
+@pytest.mark.parametrize('name', views.STUDIES)
+def test_a_study_of_view_policies_was_run_as_it_is_listed(name):
+    ran = json.loads((views.RESULTS / f'{name}.json').read_text())['command'].split()
+    assert sorted(ran[2:]) == sorted([*views.STUDIES[name].split(), '--out', f'build/{name}'])
