@@ -9,11 +9,10 @@ from collections.abc import Iterator, Mapping
 import json
 from pathlib import Path
 import re
-import shlex
 import shutil
-import subprocess
-import sys
 from typing import Any
+
+from benchmarks.studies import chosen_studies, run_study
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / 'docs' / 'results' / 'lifting'
@@ -47,12 +46,7 @@ _TABLE = re.compile(r'(<!-- (iou|iou-short): begin -->\n).*?(<!-- \2: end -->)',
 
 def run(folder: Path, name: str) -> None:
     """Run a study in a folder and keep what it writes: JSON, Markdown, and the picture."""
-    out = folder / 'build' / name
-    shutil.rmtree(out, ignore_errors=True)
-    subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'study',
-                    *shlex.split(STUDIES[name]), '--out', f'build/{name}'], cwd=folder, check=True)
-    for suffix in ('json', 'md'):
-        shutil.copy(out / f'study.{suffix}', RESULTS / f'{name}.{suffix}')
+    out = run_study('study', STUDIES[name], 'study', folder, RESULTS / name)
     for picture in out.glob('*.png'):
         if (kept := RESULTS / f'{name}.png').exists():
             shutil.copy(picture, kept)
@@ -106,12 +100,9 @@ def with_tables(text: str) -> str:
 
 def main() -> None:
     """Run the studies named, or all, where a folder is given; then write the tables."""
-    folder, *names = sys.argv[1:] or [None]
-    if unknown := set(names) - set(STUDIES):
-        sys.exit(f'unknown study: expected some of {", ".join(STUDIES)}, got '
-                 f'{", ".join(sorted(unknown))}')
-    for name in (names or STUDIES) if folder else ():
-        run(Path(folder), name)
+    folder, names = chosen_studies(STUDIES)
+    for name in names:
+        run(folder, name)
     for path in DOCUMENTS:
         path.write_text(with_tables(path.read_text()))
 

@@ -9,11 +9,9 @@ from collections.abc import Iterator, Mapping
 import json
 from pathlib import Path
 import re
-import shlex
-import shutil
-import subprocess
-import sys
 from typing import Any
+
+from benchmarks.studies import chosen_studies, run_study
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / 'docs' / 'results' / 'views'
@@ -64,16 +62,6 @@ def _by_cost(*costs: str) -> str:
 
 
 STUDIES: Mapping[str, str] = dict(_studies())
-
-
-def run(folder: Path, name: str) -> None:
-    """Run a study in a folder and keep its figures and its text."""
-    out = folder / 'build' / name
-    shutil.rmtree(out, ignore_errors=True)
-    subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'policies',
-                    *shlex.split(STUDIES[name]), '--out', f'build/{name}'], cwd=folder, check=True)
-    for suffix in ('json', 'md'):
-        shutil.copy(out / f'policies.{suffix}', RESULTS / f'{name}.{suffix}')
 
 
 def with_tables(text: str) -> str:
@@ -137,13 +125,10 @@ def _interval(value: Mapping[str, float]) -> str:
 
 
 def main() -> None:
-    """Run studies on the data in a folder, and update the tables."""
-    folder, *chosen = sys.argv[1:] or ['']
-    if unknown := sorted(set(chosen) - set(STUDIES)):
-        sys.exit(f'no such study: expected {", ".join(STUDIES)}, got {", ".join(unknown)}')
-    if folder:
-        for name in chosen or STUDIES:
-            run(Path(folder), name)
+    """Run the studies named, or all, where a folder is given; then write the tables."""
+    folder, names = chosen_studies(STUDIES)
+    for name in names:
+        run_study('policies', STUDIES[name], 'policies', folder, RESULTS / name)
     DOCUMENT.write_text(with_tables(DOCUMENT.read_text()))
 
 

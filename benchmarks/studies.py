@@ -1,0 +1,37 @@
+"""Studies by commands of the package, run on the data in a folder, whose results are kept."""
+
+from collections.abc import Mapping
+from pathlib import Path
+import shlex
+import shutil
+import subprocess
+import sys
+
+
+def chosen_studies(studies: Mapping[str, str]) -> tuple[Path, list[str]]:
+    """
+    Return the folder of the data and the names of studies that the command line gives.
+
+    Without names all studies are to be run; without a folder none, and the folder is this one. An
+    unknown name ends the program.
+    """
+    folder, *names = sys.argv[1:] or ['']
+    if unknown := sorted(set(names) - set(studies)):
+        sys.exit(f'unknown study: expected some of {", ".join(studies)}, got {", ".join(unknown)}')
+    return Path(folder), (names or list(studies)) if folder else []
+
+
+def run_study(command: str, arguments: str, stem: str, folder: Path, kept: Path) -> Path:
+    """
+    Run `active-recon COMMAND ARGUMENTS` in a folder; return the folder of what it wrote.
+
+    `kept` is where STEM.json and STEM.md of that go, and the name of the study: without a suffix.
+    """
+    out = folder / 'build' / kept.name
+    shutil.rmtree(out, ignore_errors=True)
+    subprocess.run([sys.executable, '-m', 'active_recon.cli.main', command,
+                    *shlex.split(arguments), '--out', f'build/{kept.name}'], cwd=folder,
+                   check=True)
+    for suffix in ('.json', '.md'):
+        shutil.copy(out / f'{stem}{suffix}', kept.with_name(f'{kept.name}{suffix}'))
+    return out
