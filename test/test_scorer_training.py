@@ -5,7 +5,13 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID, MOST_VIEWS
 from active_recon.models.view_scorer import Looked, ScorerConfig, ViewScorer
 from active_recon.training.gain_files import drawn_objects
-from active_recon.training.looked import joined, looked_states, LookedStates, mirrored, spreads
+from active_recon.training.looked import (
+    joined,
+    looked_states,
+    LookedStates,
+    mirrored_states,
+    spreads,
+)
 from active_recon.training.scorer import (
     calibrate,
     gap_shares,
@@ -181,7 +187,7 @@ def test_looked_states_know_their_views_and_mirror_twice_to_themselves():
     states = looked_states(measured())
     assert states.looked.views.tolist() == [1, 2]
     assert states.looked.grids.shape == (2, 6, *SHAPE)
-    assert_close(mirrored(mirrored(states)).looked.grids, states.looked.grids)
+    assert_close(mirrored_states(mirrored_states(states)).looked.grids, states.looked.grids)
 
 
 @pytest.mark.parametrize(('total', 'count'), [(24, 8), (24, 7), (10, 12)])

@@ -80,6 +80,17 @@ def test_a_quarter_turn_of_object_and_cameras_changes_no_score(scorer, quarters)
     np.testing.assert_allclose(there, here, atol=0.02 * np.ptp(here))
 
 
+def test_mirrored_objects_and_cameras_have_the_same_scores(scorer):
+    azimuths, heights = AZIMUTHS + 0.07, np.linspace(-0.2, 1.3, 24)
+    volume = some_volume()[None]
+    here = scored(scorer, observed(volume, poses([0.3, 1.9]), poses(azimuths, heights)))
+    there = scored(scorer, observed(volume[:, :, ::-1], poses([-0.3, -1.9]),
+                                    poses(-azimuths, heights)))
+    # Samples on the border of two cells may round to either
+    np.testing.assert_allclose(there, here, atol=0.02 * np.ptp(here))
+    assert np.ptp(here) > 1e-3
+
+
 def test_objects_of_a_batch_are_scored_alone(scorer):
     volumes = np.stack([some_volume(seed) for seed in range(3)])
     taken = np.concatenate([poses([azimuth, azimuth + 1]) for azimuth in (0.1, 2.0, 4.0)])

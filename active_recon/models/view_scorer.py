@@ -54,6 +54,11 @@ class Looked(NamedTuple):
     views: Tensor
 
 
+def mirrored(looked: Looked) -> Looked:
+    """Return what candidates look at where all objects and cameras are mirrored."""
+    return looked._replace(grids=looked.grids.flip(-1))
+
+
 class Scored(NamedTuple):
     """The output: the expected gain of IoU of each candidate, (B, K)."""
 
@@ -82,8 +87,8 @@ class ScorerMember(nn.Module):
     def forward(self, looked: Looked) -> tuple[Tensor, Tensor]:
         """Return scores (B, K), whose mean is 0, and the level of the mean gain, (B,)."""
         batch, count = looked.facts.shape[:2]
-        told = torch.cat([_means(looked.grids.flatten(0, 1), self._patches),
-                          looked.facts.flatten(0, 1)], dim=1)
+        grids = patch_means(looked.grids, self._patches).flatten(0, 1).flatten(2)
+        told = torch.cat([grids.mean(dim=2), grids.flatten(1), looked.facts.flatten(0, 1)], dim=1)
         own = self.own(self.scale(told)).unflatten(0, (batch, count))
         mean = own.mean(dim=1, keepdim=True)
         found = self.among(torch.cat([own, own - mean], dim=2))[..., 0]
@@ -94,6 +99,8 @@ class ViewScorer(nn.Module):
     """
     The mean of some members, calibrated to an expected gain of IoU.
 
+    Each member looks twice, the second time at the mirrored objects, since there every view brings
+    as much: mirrored objects and cameras have the same scores.
     Scores are relative to the mean score; a second output, the level, is of the mean gain.
     `calibration`, (MOST_VIEWS, 3), makes them a gain of IoU: by number of views, a factor of the
     score, one of the level, and an offset.
@@ -101,6 +108,7 @@ class ViewScorer(nn.Module):
 
     def __init__(self, patches: int, hidden: int, members: int, dropout: float) -> None:
         super().__init__()
+        self._patches = patches
         self.members = nn.ModuleList(
             ScorerMember(patches, hidden, dropout) for _ in range(members))
         self.calibration: Tensor
@@ -122,7 +130,9 @@ class ViewScorer(nn.Module):
 
     def scores(self, looked: Looked) -> tuple[Tensor, Tensor]:
         """Return the members' mean scores (B, K), whose mean is 0, and mean level (B,)."""
-        scores, level = zip(*(member(looked) for member in self.members), strict=True)
+        told = looked._replace(grids=patch_means(looked.grids, self._patches))
+        scores, level = zip(*(member(each) for each in (told, mirrored(told))
+                              for member in self.members), strict=True)
         return torch.stack(scores).mean(dim=0), torch.stack(level).mean(dim=0)
 
     def forward(self, grids: Tensor, facts: Tensor, views: Tensor,
@@ -137,11 +147,14 @@ class ViewScorer(nn.Module):
         return Scored(scale * scores + of_level * level[:, None] + offset), state
 
 
-def _means(grids: Tensor, patches: int) -> Tensor:
-    """Return the means of grids (N, C, S, S, S), and of so many patches a side, (N, C + ...)."""
+def patch_means(grids: Tensor, patches: int) -> Tensor:
+    """Return the means of so many patches a side of grids (..., S, S, S), a multiple of them."""
+    side = grids.shape[-1]
+    if side == patches:
+        return grids
     # As a product of matrices: in a twentieth of the time of a mean over three axes
-    found = grids.flatten(2) @ torch.from_numpy(_pooling(grids.shape[-1], patches)).to(grids)
-    return torch.cat([found.mean(dim=2), found.flatten(1)], dim=1)
+    found = grids.flatten(-3) @ torch.from_numpy(_pooling(side, patches)).to(grids)
+    return found.reshape(*grids.shape[:-3], patches, patches, patches)
 
 
 @cache

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from active_recon.models.candidate_looks import GRID, look
-from active_recon.models.view_scorer import Looked
+from active_recon.models.view_scorer import Looked, mirrored, patch_means
 from active_recon.policies.candidate_rendering import coarse_volume
 from active_recon.training.view_gains import ViewGains
 import numpy as np
@@ -48,9 +48,8 @@ def looked_states(measured: ViewGains, patches: int = GRID) -> LookedStates:
         found.append(look(volume.occupancy, volume.entropy, seen.taken, seen.candidates))
     grids, facts, views = (torch.from_numpy(np.concatenate(parts))
                            for parts in zip(*found, strict=True))
-    told = grids.reshape(*grids.shape[:3], *(patches, grids.shape[-1] // patches) * 3).mean(
-        dim=(-1, -3, -5))  # (S, K, C, patches, patches, patches)
-    return LookedStates(Looked(told, facts, views.long()), torch.from_numpy(measured.gains))
+    return LookedStates(Looked(patch_means(grids, patches), facts, views.long()),
+                        torch.from_numpy(measured.gains))
 
 
 def joined(parts: Sequence[LookedStates]) -> list[LookedStates]:
@@ -92,7 +91,6 @@ def batches_of(sets: Sequence[LookedStates], size: int,
         yield sets[number].rows(torch.from_numpy(rows))
 
 
-def mirrored(states: LookedStates) -> LookedStates:
+def mirrored_states(states: LookedStates) -> LookedStates:
     """Return the states of mirrored objects: left is right, gains are the same."""
-    return LookedStates(states.looked._replace(grids=states.looked.grids.flip(-1)),
-                        states.gains)
+    return LookedStates(mirrored(states.looked), states.gains)

@@ -9,7 +9,7 @@ from active_recon.errors import ConfigError
 from active_recon.evaluation.rollouts import batches
 from active_recon.models.candidate_looks import MOST_VIEWS
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
-from active_recon.training.looked import batches_of, LookedStates, mirrored, spreads
+from active_recon.training.looked import batches_of, LookedStates, mirrored_states, spreads
 from active_recon.training.scorer_losses import listwise_loss, ordinal_loss, standardised
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +74,8 @@ def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: 
     for _ in range(training.epochs):
         losses = []
         for batch in batches_of(train, training.batch_size, rng):
-            loss = batch_loss(scorer, mirrored(batch) if rng.random() < 0.5 else batch, spread,
-                              training.level_weight)
+            shown = mirrored_states(batch) if rng.random() < 0.5 else batch
+            loss = batch_loss(scorer, shown, spread, training.level_weight)
             optimizer.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             optimizer.step()
