@@ -8,11 +8,10 @@ lists the commands that make it); `python -m benchmarks.lifting` only updates th
 from collections.abc import Iterator, Mapping
 import json
 from pathlib import Path
-import re
 import shutil
 from typing import Any
 
-from benchmarks.studies import chosen_studies, run_study
+from benchmarks.studies import chosen_studies, run_study, with_tables_between_marks
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / 'docs' / 'results' / 'lifting'
@@ -41,7 +40,6 @@ _COUNTS = (1, 2, 3, 5, 8, 24)
 _BOUNDED = (1, 24)
 """Numbers of views whose intervals the long table has room for."""
 _SHORT_COUNTS = (1, 5, 24)
-_TABLE = re.compile(r'(<!-- (iou|iou-short): begin -->\n).*?(<!-- \2: end -->)', re.DOTALL)
 
 
 def run(folder: Path, name: str) -> None:
@@ -93,9 +91,7 @@ def _mean(value: Mapping[str, Any]) -> str:
 
 def with_tables(text: str) -> str:
     """Return a document with the tables between its marks made anew from the results."""
-    tables = {'iou': long_table, 'iou-short': short_table}
-    return _TABLE.sub(
-        lambda found: found[1] + '\n'.join(tables[found[2]]()) + '\n' + found[3], text)
+    return with_tables_between_marks(text, {'iou': long_table, 'iou-short': short_table})
 
 
 def main() -> None:

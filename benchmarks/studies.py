@@ -1,11 +1,25 @@
-"""Studies by commands of the package, run on the data in a folder, whose results are kept."""
+"""Studies by commands of the package, run on the data in a folder, and tables of their results."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+import re
 import shlex
 import shutil
 import subprocess
 import sys
+
+
+def with_tables_between_marks(text: str,
+                              tables: Mapping[str, Callable[[], Iterator[str]]]) -> str:
+    """
+    Return a document with the lines of each table between its marks.
+
+    These are the comments `NAME: begin` and `NAME: end`, on lines of their own.
+    """
+    marks = rf'(<!-- ({"|".join(tables)}): begin -->\n).*?( *<!-- \2: end -->)'
+    return re.sub(
+        marks, lambda found: found[1] + ''.join(f'{line}\n' for line in tables[found[2]]())
+        + found[3], text, flags=re.DOTALL)
 
 
 def chosen_studies(studies: Mapping[str, str]) -> tuple[Path, list[str]]:

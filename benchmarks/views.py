@@ -8,10 +8,9 @@ lists the commands that make it); `python -m benchmarks.views` only updates the 
 from collections.abc import Iterator, Mapping
 import json
 from pathlib import Path
-import re
 from typing import Any
 
-from benchmarks.studies import chosen_studies, run_study
+from benchmarks.studies import chosen_studies, run_study, with_tables_between_marks
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / 'docs' / 'results' / 'views'
@@ -27,7 +26,6 @@ _PLAIN = {
 }
 _ON_TRAINING = '--training turn/train --training-objects'
 _COUNTS = (1, 2, 3, 5)
-_TABLE = re.compile(r'(<!-- (views|swapped): begin -->\n).*?( *<!-- \2: end -->)', re.DOTALL)
 
 
 def _studies() -> Iterator[tuple[str, str]]:
@@ -66,10 +64,7 @@ STUDIES: Mapping[str, str] = dict(_studies())
 
 def with_tables(text: str) -> str:
     """Return the document with the tables between their marks."""
-    tables = {'views': views_table, 'swapped': swapped_table}
-    return _TABLE.sub(
-        lambda found: found[1] + ''.join(f'{line}\n' for line in tables[found[2]]()) + found[3],
-        text)
+    return with_tables_between_marks(text, {'views': views_table, 'swapped': swapped_table})
 
 
 def views_table() -> Iterator[str]:
@@ -80,8 +75,8 @@ def views_table() -> Iterator[str]:
     for cameras in _FOLDERS:
         for name, objects in _SETS.items():
             found = policies_of(f'{cameras}-{name}-learned')
-            if (RESULTS / f'{cameras}-{name}-sequence.json').exists():
-                found['sequence'] = policies_of(f'{cameras}-{name}-sequence')['sequence']
+            if (sequence := f'{cameras}-{name}-sequence') in STUDIES:
+                found['sequence'] = policies_of(sequence)['sequence']
             shown = [policy for policy in (*_PLAIN[cameras].split(','), 'sequence', 'attention',
                                            'oracle') if policy in found]
             for policy in shown:

@@ -83,6 +83,12 @@ def test_a_policy_follows_a_network_that_was_trained_further(
     assert command(monkeypatch, 'train-policy', *arguments, '--init-from', weights, '--out',
                    tmp_path / 'other') == 2
     assert 'no view scorer' in capsys.readouterr().err
+    other = ScorerConfig(hidden=8)
+    save_scorer(earlier, ViewScorer.from_config(other), other, 'a' * 64, {})
+    assert command(monkeypatch, 'train-policy', *arguments, '--init-from', earlier, '--out',
+                   tmp_path / 'other') == 2
+    assert 'of other sizes' in capsys.readouterr().err
+    assert not (tmp_path / 'other').exists()
 
 
 def test_weights_without_a_scorer_have_no_learned_policy(weights):

@@ -81,6 +81,7 @@ def train_policy(
     from active_recon.training.scorer import (
         calibrate,
         gap_shares,
+        scorer_to_train,
         ScorerTraining,
         train_scorer,
     )
@@ -98,6 +99,7 @@ def train_policy(
     learned: list[LookedStates] = []
     held_out: list[LookedStates] = []
     begun = None if init_from is None else load_scorer_of_any_network(init_from)
+    scorer_to_train(config, begun)  # refuses other sizes before anything is measured
     scorer = begun
     told: list[dict[str, Any]] = []
     for number in range(1, rounds + 1):

@@ -56,13 +56,7 @@ def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: 
     """
     torch.manual_seed(training.seed)
     rng = np.random.default_rng(training.seed)
-    scorer = ViewScorer.from_config(config)
-    if begun is not None:
-        try:
-            scorer.load_state_dict(begun.state_dict())
-        except RuntimeError as error:
-            raise ConfigError('a view scorer of other sizes to begin with: expected those of '
-                              f'{config}') from error
+    scorer = scorer_to_train(config, begun)
     spread = spreads(train, MOST_VIEWS)
     count = sum(math.ceil(len(states) / training.batch_size) for states in train)
     optimizer = torch.optim.AdamW(scorer.parameters(), training.learning_rate,
@@ -83,6 +77,22 @@ def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: 
             losses.append(float(loss.detach()))
         advance(f'loss {np.mean(losses):.4f}')
     return scorer.eval()
+
+
+def scorer_to_train(config: ScorerConfig, begun: ViewScorer | None) -> ViewScorer:
+    """
+    Return a scorer with the weights of `begun`, which stays as it is; None: with fresh ones.
+
+    Raises ConfigError where that is of other sizes.
+    """
+    scorer = ViewScorer.from_config(config)
+    if begun is not None:
+        try:
+            scorer.load_state_dict(begun.state_dict())
+        except RuntimeError as error:
+            raise ConfigError('a view scorer of other sizes to begin with: expected those of '
+                              f'{config}') from error
+    return scorer
 
 
 def batch_loss(scorer: ViewScorer, batch: LookedStates, spread: Tensor,
