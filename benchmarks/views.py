@@ -14,7 +14,7 @@ from benchmarks.studies import chosen_studies, run_study, with_tables_between_ma
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / 'docs' / 'results' / 'views'
-DOCUMENT = ROOT / 'doc' / 'results.md'
+DOCUMENTS = (ROOT / 'README.md', ROOT / 'doc' / 'results.md')
 _SETS = {'test': 'parametric test', 'unseen': 'categories never trained on', 'real': 'real models'}
 _DATA = {'test': 'test', 'unseen': 'unseen', 'real': 'real_val'}
 _FOLDERS = {'turntable': 'data', 'dome': 'dome'}
@@ -64,7 +64,20 @@ STUDIES: Mapping[str, str] = dict(_studies())
 
 def with_tables(text: str) -> str:
     """Return the document with the tables between their marks."""
-    return with_tables_between_marks(text, {'views': views_table, 'swapped': swapped_table})
+    return with_tables_between_marks(text, {
+        'views': views_table, 'swapped': swapped_table, 'views-short': short_table})
+
+
+def short_table() -> Iterator[str]:
+    """Yield the lines of the table of the sweep and the learned policy on a turntable."""
+    yield '| objects | even sweep | learned view policy | ahead of the sweep, IoU |'
+    yield '|---|---|---|---|'
+    for name, objects in _SETS.items():
+        found = policies_of(f'turntable-{name}-learned')
+        yield (f'| {objects} (60) | {_share(found["uniform"])} | {_share(found["attention"])} | '
+               f'{_interval(found["attention"]["ahead"]["uniform"])} |')
+    ahead = policies_of('turntable-real-all')['attention']['ahead']['uniform']
+    yield f'| all real models (347) | | | {_interval(ahead)} |'
 
 
 def views_table() -> Iterator[str]:
@@ -103,10 +116,13 @@ def _row(objects: str, policy: str, found: Mapping[str, Any]) -> str:
     means = (f'{found["iou"][count - 1]["mean"]:.3f}' for count in _COUNTS)
     ahead = ('' if policy == other else _interval(found['ahead'][other])
              for other in ('random', 'uniform'))
-    share = found.get('share')
-    told = '' if share is None or policy in ('random', 'oracle') else (
-        f'{100 * share["mean"]:.0f} % [{100 * share["low"]:.0f}, {100 * share["high"]:.0f}]')
+    told = '' if 'share' not in found or policy in ('random', 'oracle') else _share(found)
     return f'| {objects} | `{policy}` | {" | ".join((*means, *ahead, told))} |'
+
+
+def _share(found: Mapping[str, Any]) -> str:
+    share = found['share']
+    return f'{100 * share["mean"]:.0f} % [{100 * share["low"]:.0f}, {100 * share["high"]:.0f}]'
 
 
 def policies_of(study: str) -> dict[str, Any]:
@@ -124,7 +140,8 @@ def main() -> None:
     folder, names = chosen_studies(STUDIES)
     for name in names:
         run_study('policies', STUDIES[name], 'policies', folder, RESULTS / name)
-    DOCUMENT.write_text(with_tables(DOCUMENT.read_text()))
+    for path in DOCUMENTS:
+        path.write_text(with_tables(path.read_text()))
 
 
 if __name__ == '__main__':
