@@ -47,10 +47,15 @@ def _studies() -> Iterator[tuple[str, str]]:
     for name, data in _DATA.items():
         yield f'turntable-{name}-cost', (
             f'data/{data} --policies random,uniform,{_by_cost("0.05", "0.06")} {sixty}')
+        yield f'turntable-{name}-peeking', (
+            f'data/{data} --policies random,uniform,attention,peeking,oracle {sixty}')
     for name in ('unseen', 'real'):
         yield f'turntable-{name}-sequence', (
             f'data/{_DATA[name]} --policies random,uniform,sequence,attention '
             f'{_ON_TRAINING} 60 {sixty}')
+    yield 'turntable-unseen-together', (
+        'data/unseen --policies random,uniform,attention,oracle,together --views 3 --objects 12 '
+        f'{_HOW}')
     yield 'turntable-real-all', (
         f'data/real_val --policies random,uniform,attention --objects 347 {_HOW}')
 
