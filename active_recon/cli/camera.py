@@ -19,7 +19,7 @@ def camera(
         min=0, max=1000, help='Images per second. Default: those of the device or file, and 10 '
                               'for a folder.')] = 0.0,
     size: Annotated[str, typer.Option(
-        metavar='WIDTHxHEIGHT', help="Asked of a device. Default: the device's own.")] = '',
+        metavar='WIDTHxHEIGHT', help="Image size of a device. Default: the device's own.")] = '',
     frame: Annotated[str, typer.Option(
         help='Frame of the images.')] = 'camera_optical_frame',
     loop: Annotated[bool, typer.Option(

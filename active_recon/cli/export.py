@@ -13,16 +13,16 @@ def export(
         help='Folder of the files; default: that of the weights, where they are looked '
              'for.')] = None,
     int8: Annotated[Path | None, typer.Option(
-        help='Dataset of training objects, by whose views the decoder is written in int8 '
-             'too.')] = None,
+        help='Also write the decoder in int8, with integer ranges taken from views of this '
+             'dataset of training objects.')] = None,
 ) -> None:
     """
-    Write a network's encoder, update and decoder as ONNX, and the view policy that goes with it.
+    Write a network as ONNX, with the view policy and the depth refiner that go with it.
 
     The runtimes openvino and onnxruntime run these files; without them, weights run in torch. Each
-    file says in its metadata which weights it was made of, and is refused beside others. An export
-    of one version of torch and onnx may differ from that of another in its bytes. --int8 also
-    writes the decoder of the lifting network for the precision int8, by views of 60 objects.
+    file says in its metadata which weights it was made of, and is refused beside others. Other
+    versions of torch and onnx may write other bytes. --int8 also writes the decoder of the lifting
+    network for the precision int8, with integer ranges taken from views of 60 objects.
 
     Example: active-recon export runs/new/weights.safetensors
     """

@@ -60,9 +60,9 @@ def policies(
     Measure what choosing views is worth: policies beside chance, a fixed sequence and an oracle.
 
     Views are chosen on one rendering of the objects and judged on another (other light, image
-    noise, poses off by half a degree), so that what the oracle is ahead of random by luck does not
-    count: what is left is the repeatable gap. An object takes one to two minutes of a core, most
-    of it for the oracle and peeking.
+    noise, poses off by half a degree), so that the oracle's luck does not count: the lead over
+    random that it keeps there is the repeatable gap. An object takes one to two minutes of a core,
+    most of it for the oracle and peeking.
 
     For example:
 

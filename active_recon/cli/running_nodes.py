@@ -74,10 +74,10 @@ def set_parameter(
 
 def status(timeout: _Timeout = _TIMEOUT_S) -> None:
     """
-    Show what the running nodes tell of themselves on /diagnostics, once.
+    Show the diagnostics of the running nodes, once.
 
-    Each node has a level (OK, WARN or ERROR), a message that gives the reason, and values: names
-    in lower case count since the node's start, the others are of now. doc/diagnostics.md explains
+    Each node has a level (OK, WARN or ERROR), a message that gives the reason, and values: keys
+    in lower case count since the node's start, the others are current. doc/diagnostics.md explains
     them. Nodes that publish diagnostics and were not heard are named. ROS_DOMAIN_ID must be
     that of the nodes.
 
