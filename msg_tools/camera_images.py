@@ -57,7 +57,8 @@ def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
     `MAX_PIXELS` before they are decoded.
     """
     image = _open(msg)
-    if image.mode in ('RGB', 'L') and not image.has_transparency_data:
+    # Of 16 bits OpenCV takes the upper 8, Pillow white for all that is above 255
+    if image.mode in ('RGB', 'L', 'I;16', 'I') and not image.has_transparency_data:
         return _decoded(msg)
     try:
         if image.has_transparency_data:

@@ -22,8 +22,10 @@ def cloud_from_msg(msg: PointCloud2, names: Sequence[str]) -> NDArray[np.float32
         raise MessageError(f'missing cloud fields: expected float32 fields {", ".join(names)}, '
                            f'got none named {", ".join(missing)}', 'cloud')
     count = msg.width * msg.height
-    if len(msg.data) < count * msg.point_step:
-        raise MessageError(f'cloud too short: expected {count * msg.point_step} bytes for {count} '
+    row_bytes = msg.width * msg.point_step
+    step = max(msg.row_step, row_bytes) if msg.height > 1 else row_bytes
+    if len(msg.data) < msg.height * step:
+        raise MessageError(f'cloud too short: expected {msg.height * step} bytes for {count} '
                            f'points, got {len(msg.data)}', 'cloud')
     if any(offsets[name] + 4 > msg.point_step for name in names):
         raise MessageError(f'invalid cloud fields: expected them within {msg.point_step} bytes, '
@@ -31,7 +33,9 @@ def cloud_from_msg(msg: PointCloud2, names: Sequence[str]) -> NDArray[np.float32
     order = '>' if msg.is_bigendian else '<'
     row = np.dtype({'names': list(names), 'formats': [f'{order}f4'] * len(names),
                     'offsets': [offsets[name] for name in names], 'itemsize': msg.point_step})
-    table = np.frombuffer(msg.data, row, count)
+    data = msg.data if step == row_bytes else np.frombuffer(
+        msg.data, np.uint8, msg.height * step).reshape(msg.height, step)[:, :row_bytes].tobytes()
+    table = np.frombuffer(data, row, count)
     if row == np.dtype([(name, '<f4') for name in names]):  # no other fields, in this order
         return table.view('<f4').reshape(count, len(names))
     return np.column_stack([table[name] for name in names]).astype(np.float32)

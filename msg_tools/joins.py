@@ -27,6 +27,6 @@ class StampJoiner:
         parts[name] = part
         if parts.keys() == self._names:
             return self._parts.pop(stamp)
-        if len(self._parts) > _KEPT:  # parts may be lost on the way: the oldest stamp makes room
-            del self._parts[min(self._parts)]
+        if len(self._parts) > _KEPT:  # parts may be lost on the way: what came first makes room
+            del self._parts[next(iter(self._parts))]  # not the oldest: stamps may go back
         return None

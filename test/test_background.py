@@ -110,6 +110,7 @@ def test_an_object_partly_of_the_background_s_color_is_in_pieces():
     pillar[40:280, 140:180] = (200, 30, 30)
     whole = Background('color', GREEN).cleared(pillar)
     assert main_part_share(whole) == 1
+    assert main_part_share(np.full_like(whole, 255)) == 0
     pillar[140:180, 140:180] = GREEN
     assert main_part_share(Background('color', GREEN).cleared(pillar)) == pytest.approx(0.5, 0.02)
 

@@ -12,6 +12,8 @@ from active_recon.geometry.cameras import (
     Intrinsics,
     nearest_view,
     orbit_camera,
+    pose_azimuths,
+    TURN,
     wrap_azimuth,
 )
 from active_recon.geometry.lenses import Distortion
@@ -32,6 +34,14 @@ def test_a_wrapped_azimuth_is_the_same_direction_in_one_turn(azimuth):
 
 def test_the_smallest_negative_azimuth_wraps_into_the_turn():
     assert 0 <= wrap_azimuth(-1e-20) < math.tau
+
+
+def test_azimuths_of_poses_are_those_of_their_cameras_in_the_turn():
+    cameras = [orbit_camera(azimuth) for azimuth in (-1e-20, -1e-17, -1.0, 0.0, 1.0, 3.2, 7.0)]
+    found = pose_azimuths(np.stack([camera.pose for camera in cameras]))
+    assert (found < TURN).all()
+    np.testing.assert_allclose(
+        azimuth_difference(found, [camera.azimuth for camera in cameras]), 0, atol=1e-15)
 
 
 def test_a_difference_of_azimuths_goes_the_short_way_round():
@@ -124,6 +134,19 @@ def test_a_pose_that_is_not_rigid_is_refused(pose):
                        '(finite|rotation)') as refusal:
         Camera(pose)
     assert refusal.value.kind == 'pose'
+
+
+def test_a_pose_of_any_number_type_is_kept_in_double_precision():
+    for kind in (np.float32, np.float16, np.int64):
+        camera = Camera(np.eye(4).astype(kind)).scaled(0.5)
+        assert camera.pose.dtype == camera.turned(1.0).pose.dtype == np.float64
+
+
+def test_a_camera_stays_where_it_is_when_its_array_is_filled_anew():
+    pose = orbit_camera(0.4).pose
+    camera = Camera(pose)
+    pose[:] = orbit_camera(2.0).pose
+    assert camera.azimuth == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize('place', [

@@ -3,8 +3,9 @@
 from dataclasses import replace
 import math
 
+from active_recon.acquisition.goals import best_goal, Wanted
 from active_recon.acquisition.motion import MotionLimits
-from active_recon.acquisition.motion_cost import utility
+from active_recon.acquisition.motion_cost import MotionCost, utility
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, nearest_view, orbit_camera
 from active_recon.planner import Planner
@@ -122,6 +123,16 @@ def test_no_goal_ever_lies_where_the_camera_cannot_go(planner, kind):
                        for goal in goals)
 
 
+def test_a_goal_is_where_the_camera_can_go_however_low_the_scores_are_there():
+    limits = MotionLimits(forbidden_sectors=(6.0, 1.0))
+    candidates = [orbit_camera(azimuth) for azimuth in AZIMUTHS]
+    for low in (-np.inf, np.finfo(np.float32).min):
+        goal = best_goal(Wanted(None, np.full(len(candidates), low, np.float32)), candidates,
+                         candidates[6], [], [candidates[4]], limits, MotionCost())
+        assert limits.allows(goal.camera.azimuth)
+        assert goal.camera is not candidates[4]
+
+
 @pytest.mark.parametrize('by', [0.4, 2.5, -1.3, 6.0])
 @pytest.mark.parametrize('kind', KINDS)
 def test_turned_limits_turn_the_goals_with_them(planner, kind, by):
@@ -204,6 +215,13 @@ def test_no_azimuth_is_asked_for_again_before_all_others_were(planner, kind):
     count = int(MotionLimits((0.0, 3.0), [1.2, 1.5]).allows(AZIMUTHS).sum())
     assert len({nearest_view(goal) for goal in goals[:count]}) == count
     assert len({nearest_view(goal) for goal in goals}) == count
+
+
+@pytest.mark.parametrize('again', [0.1 + math.tau, 0.1 - 2 * math.tau, 0.10001])
+def test_an_azimuth_that_is_listed_twice_is_one_candidate_in_whatever_turn_it_is_told(again):
+    listed = MotionLimits(reachable_azimuths=[0.1, 2.0, again, 4.0]).candidates(AZIMUTHS)
+    np.testing.assert_allclose(listed, [0.1, 2.0, 4.0], atol=2e-5)
+    assert len(MotionLimits(reachable_azimuths=[0.0, 1.57, 6.2832]).candidates(AZIMUTHS)) == 2
 
 
 @pytest.mark.parametrize('kind', KINDS)

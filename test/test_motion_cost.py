@@ -58,6 +58,16 @@ def test_the_way_avoids_what_is_forbidden_where_it_can(limits, start, end, way):
     assert limits.way(start, [end])[0] == pytest.approx(way, abs=1e-9)
 
 
+@pytest.mark.parametrize('turns', [-3, -2, -1, 0])
+def test_the_way_within_a_range_is_the_same_in_whatever_turn_its_ends_are_told(turns):
+    rng = np.random.default_rng(2)
+    ends = rng.uniform(1.3, 7.3, 50)
+    for start in rng.uniform(1.3, 7.3, 20):
+        np.testing.assert_allclose(
+            MotionLimits((1.2, 7.4 + turns * math.tau)).way(start, ends),
+            np.abs(ends - start), atol=1e-9)
+
+
 def test_the_way_is_the_same_there_and_back_and_turns_with_the_limits():
     rng = np.random.default_rng(1)
     for _ in range(100):

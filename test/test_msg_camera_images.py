@@ -46,6 +46,17 @@ def claiming(width, height):
     return CompressedImage(format='png', data=bytes(content))
 
 
+def test_a_compressed_image_of_16_bits_is_that_of_its_upper_8():
+    rng = np.random.default_rng(1)
+    for shape in ((4, 6), (4, 6, 3)):
+        deep = rng.integers(0, 1 << 16, shape, np.uint16)
+        data = cv2.imencode('.png', deep)[1].tobytes()
+        bgr = deep if deep.ndim == 3 else np.dstack([deep] * 3)
+        np.testing.assert_array_equal(
+            compressed_image_from_msg(CompressedImage(format='png', data=data)),
+            bgr[..., ::-1] >> 8)
+
+
 @pytest.mark.parametrize('msg', [
     CompressedImage(), CompressedImage(format='png', data=b'hello'), claiming(9000, 9000),
     claiming(10_000, 10_000), claiming(100_000, 100_000), claiming(0, 5), packed(RGB, 'GIF'),

@@ -268,3 +268,12 @@ def test_parts_that_stay_incomplete_make_room():
         joiner.add('a', stamp, stamp)
     assert joiner.add('b', 0, 0) is None
     assert joiner.add('b', 99, 0) == {'a': 99, 'b': 0}
+
+
+def test_parts_are_joined_after_their_stamps_went_back():
+    joiner = StampJoiner(('a', 'b'))
+    for stamp in range(1000, 1100):
+        joiner.add('a', stamp, stamp)
+    for stamp in range(3):
+        assert joiner.add('a', stamp, stamp) is None
+        assert joiner.add('b', stamp, 0) == {'a': stamp, 'b': 0}

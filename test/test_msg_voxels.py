@@ -77,6 +77,18 @@ def test_a_cloud_is_read_by_the_names_of_its_fields():
     np.testing.assert_array_equal(cloud_from_msg(msg, 'db'), table[:, [3, 1]])
 
 
+def test_the_gaps_between_the_rows_of_an_ordered_cloud_are_no_points():
+    table = np.arange(24, dtype=np.float32).reshape(6, 4)
+    msg = cloud_to_msg(table, 'abcd', Header())
+    padded = np.pad(table.reshape(2, 12), ((0, 0), (0, 4)), constant_values=99)
+    msg.height, msg.width, msg.row_step, msg.data = 2, 3, 64, padded.tobytes()
+    np.testing.assert_array_equal(cloud_from_msg(msg, 'abcd'), table)
+    np.testing.assert_array_equal(cloud_from_msg(msg, 'ca'), table[:, [2, 0]])
+    msg.data = padded.tobytes()[:96]
+    with pytest.raises(MessageError, match='expected 128 bytes for 6 points, got 96'):
+        cloud_from_msg(msg, 'abcd')
+
+
 def test_a_cloud_that_lacks_fields_or_bytes_is_refused():
     msg = cloud_to_msg(np.zeros((3, 2), np.float32), 'ab', Header())
     with pytest.raises(MessageError, match='fields a, z, got none named z'):

@@ -283,17 +283,20 @@ def test_a_sequence_found_on_objects_is_measured_like_a_policy(scene, carving):
     assert '| sequence |' in text and 'ahead of uniform' in text
 
 
-@pytest.mark.parametrize('name', ['swapped', 'swapped_turned'])
-def test_swapped_looks_at_another_object_and_only_there(scene, carving, monkeypatch, name):
+@pytest.mark.parametrize(('name', 'looking'), [
+    ('swapped', 'visible_entropy'), ('swapped_turned', 'visible_entropy'),
+    ('swapped@1e-6', 'visible_entropy@1e-6')])
+def test_swapped_looks_at_another_object_and_only_there(scene, carving, monkeypatch, name,
+                                                        looking):
     monkeypatch.setattr(study, '_LOOKS_ELSEWHERE', 'visible_entropy')
     monkeypatch.setattr(study, 'turned', lambda views, rng: views)
-    episodes = Episodes(('visible_entropy', name), 1, 3, bfloat16=False)
+    episodes = Episodes((looking, name), 1, 3, bfloat16=False)
     lone = replace(scene, views=some_objects(scene.views, torch.tensor([1])),
                    truths={32: scene.truths[32][1:2]})
     same = run_episodes(lone, carving, episodes)
-    np.testing.assert_array_equal(same.other[name], same.other['visible_entropy'])
+    np.testing.assert_array_equal(same.other[name], same.other[looking])
     found = run_episodes(scene, carving, episodes)
-    assert (found.motion[name] != found.motion['visible_entropy']).any()
+    assert (found.motion[name] != found.motion[looking]).any()
 
 
 def test_what_is_swapped_in_is_another_object_of_the_set_and_each_comes_once():

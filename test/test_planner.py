@@ -553,14 +553,15 @@ class Mistaken(FarthestPolicy):
         return self._spoil(choice, state)
 
 
-def with_nan(scores):
-    return np.where(np.arange(scores.shape[1]) == 5, np.nan, scores)
+def with_one(scores, value):
+    return np.where(np.arange(scores.shape[1]) == 5, value, scores)
 
 
 @pytest.mark.parametrize(('spoil', 'said'), [
     (lambda choice, state: (Choice(choice.scores[0]), state), r'scores: expected \(1, 24\)'),
     (lambda choice, state: (Choice(choice.scores[:, :-1]), state), r'got \(1, 23\)'),
-    (lambda choice, state: (Choice(with_nan(choice.scores)), state), 'with 1 NaN'),
+    (lambda choice, state: (Choice(with_one(choice.scores, np.nan)), state), 'with 1 NaN'),
+    (lambda choice, state: (Choice(with_one(choice.scores, -np.inf)), state), 'with 1 NaN or inf'),
     (lambda choice, state: (choice.scores, state), 'expected a Choice of arrays'),
     (lambda choice, state: choice, 'expected a Choice of arrays, and a state'),
     (lambda choice, state: (Choice(choice.scores, 1.0), state), r'azimuth: expected \(1,\)'),

@@ -98,6 +98,18 @@ def test_promises_that_were_calibrated_are_kept_by_new_objects(figures):
     assert all(found['kept'] > 1 - BROKEN - 0.04 for found in made)
 
 
+def test_several_episodes_of_an_object_make_no_interval_narrower(tables):
+    once = made_up(60, 3)
+    again = [replace(once, episode=np.array([f'{name} {seed}' for name in once.episode]))
+             for seed in range(4)]
+    one, other = (study(each, tables) for each in (once, Measured.joined(again)))
+    for count, after in one['views'].items():
+        assert other['views'][count]['solid']['error'] == pytest.approx(after['solid']['error'])
+    assert any(found['change'][0] for found in one['promises']['random'].values())
+    for target, found in one['promises']['random'].items():
+        assert other['promises']['random'][target]['change'] == pytest.approx(found['change'])
+
+
 def test_views_of_the_learned_policy_have_promises_of_their_own():
     faults = [made_up(60, 2, fault) for fault in FAULTS]
     usual = made_up(400, 1)

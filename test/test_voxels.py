@@ -206,6 +206,14 @@ def test_a_mesh_stands_where_its_cells_are():
                                atol=1e-6)
 
 
+def test_a_mesh_is_the_same_for_a_threshold_of_numpy_and_of_python():
+    occupancy = np.zeros((8, 8, 8), np.float32)
+    occupancy[2:6, 2:6, 2:6] = 0.4  # a little above 0.4 in float64
+    occupancy[3, 3, 3] = 0.9
+    one, other = (VoxelGrid(occupancy).mesh(threshold) for threshold in (0.4, np.float64(0.4)))
+    np.testing.assert_array_equal(one.triangles, other.triangles)
+
+
 def test_where_no_cell_is_above_the_threshold_there_is_no_mesh():
     with pytest.raises(DataError, match='no cell is above the threshold 0.5'):
         VoxelGrid(np.full((4, 4, 4), 0.5, np.float32)).mesh(0.5)

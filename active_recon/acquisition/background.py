@@ -75,10 +75,10 @@ class Background:
 
 def main_part_share(cleared: NDArray[np.uint8]) -> float:
     """
-    Return the fraction of the pixels that are not white in their largest connected part, (0, 1].
+    Return the fraction of the pixels that are not white in their largest connected part, [0, 1].
 
-    It is far below 1 where parts of the object were taken for background, for example because
-    they have the same colour.
+    It is 0 where all are white, and far below 1 where parts of the object were taken for
+    background, for example because they have the same colour.
     """
     white = np.asarray(cv2.inRange(cleared, _WHITE, _WHITE), np.uint8)
     _, areas = _parts(_searched(white) < 255)

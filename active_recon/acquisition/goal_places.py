@@ -6,7 +6,7 @@ from functools import cached_property, lru_cache
 import math
 from typing import Protocol
 
-from active_recon.acquisition.motion import MotionLimits
+from active_recon.acquisition.motion import END_TOLERANCE, MotionLimits
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import (
     AZIMUTHS,
@@ -18,7 +18,7 @@ from active_recon.geometry.cameras import (
     VIEW_COUNT,
     wrap_azimuth,
 )
-from active_recon.geometry.view_distance import nearest_camera
+from active_recon.geometry.view_distance import view_distance
 import numpy as np
 from numpy.typing import NDArray
 
@@ -195,7 +195,7 @@ def _listed(limits: MotionLimits, distance: float, views: Sequence[float]) -> Li
                               f'{elevation:g} and {away:g}')
     cameras = [orbit_camera(*place) for place in places]
     for index, camera in enumerate(cameras):
-        if nearest_camera(camera, cameras) != index:
+        if any(view_distance(camera, other) <= END_TOLERANCE for other in cameras[:index]):
             raise ConfigError('reachable_views: two in one direction: expected each direction '
                               f'once, got azimuth {camera.azimuth:g}, elevation '
                               f'{camera.elevation:g} again')

@@ -68,7 +68,7 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
     fresh = is_open & ~is_taken
     eligible = fresh if fresh.any() else is_open
     value = cost.utility(scores, wanted.is_gain, camera, options, limits)
-    best = int(np.where(eligible, value, -np.inf).argmax())
+    best = int(np.flatnonzero(eligible)[value[eligible].argmax()])
     own = slice(len(options) - len(candidates), None)
     goal = Goal(options[best], [each for each, free in zip(
         candidates, is_open[own], strict=True) if free], value[own][is_open[own]])

@@ -68,7 +68,9 @@ class MotionLimits:
         reached are included; see `allows`.
         """
         if self.reachable_azimuths:
-            return np.unique([wrap_azimuth(azimuth) for azimuth in self.reachable_azimuths])
+            listed = np.unique([wrap_azimuth(azimuth) for azimuth in self.reachable_azimuths])
+            apart = np.diff(listed, append=listed[:1] + TURN)
+            return listed[apart > END_TOLERANCE]  # each once, in whatever turn it is told
         free = grid[self.allows(grid)]
         middles = [middle for low, width in self._stretches()
                    if self.allows(middle := wrap_azimuth(low + width / 2))
@@ -93,9 +95,9 @@ class MotionLimits:
         """Return whether any of the ways counter-clockwise from a start is barred, (N,)."""
         barred = np.zeros(width.shape, np.bool_)
         low, high = self.azimuth_range
-        behind = [] if _width(low, high) == TURN else [(high, low)]
-        for low, high in [*self._sectors, *behind]:
-            low, breadth = low + END_TOLERANCE, _width(low, high) - 2 * END_TOLERANCE
+        behind = high, TURN - _width(low, high)
+        for low, whole in [*((low, _width(low, high)) for low, high in self._sectors), behind]:
+            low, breadth = low + END_TOLERANCE, whole - 2 * END_TOLERANCE
             begins_inside = (np.asarray(start) - low) % TURN < breadth
             barred |= (breadth > 0) & (begins_inside | ((low - np.asarray(start)) % TURN < width))
         return barred

@@ -103,7 +103,7 @@ class Camera:
     """
     A pose in the object frame, (4, 4) object from optical frame in metres, and the intrinsics.
 
-    Raises ViewError unless the pose is finite and its rotation a rotation.
+    The pose is copied. Raises ViewError unless the pose is finite and its rotation a rotation.
     """
 
     pose: NDArray[np.float64]
@@ -111,6 +111,8 @@ class Camera:
 
     def __post_init__(self) -> None:
         """Reject a pose that is not rigid."""
+        # Its own, so that a buffer that is filled anew moves no camera of before
+        object.__setattr__(self, 'pose', np.array(self.pose, np.float64))
         if self.pose.shape != (4, 4) or not np.isfinite(self.pose).all():
             raise ViewError('invalid camera pose: expected a finite 4 x 4 matrix, '
                             f'got\n{self.pose}', 'pose')
@@ -280,4 +282,5 @@ def orbit_camera(
 
 def pose_azimuths(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the azimuths (...) of poses (..., 4, 4), radians in [0, 2 pi)."""
-    return np.asarray(np.arctan2(poses[..., 1, 3], poses[..., 0, 3]) % TURN)
+    wrapped = np.arctan2(poses[..., 1, 3], poses[..., 0, 3]) % TURN
+    return np.asarray(np.where(wrapped >= TURN, 0.0, wrapped))  # as in `wrap_azimuth`

@@ -41,15 +41,19 @@ def share_outside(camera: Camera, object_size: float) -> float:
     """
     Return the fraction of the cube's silhouette, [0, 1], that is outside of the image.
 
-    `object_size` is the side of the cube, metres, which has to be in front of the camera.
+    `object_size` is the side of the cube, metres, which has to be in front of the camera. A cube
+    that is too far away to cover anything of an image counts as outside.
     """
     seen, _ = camera.project(_EDGES * object_size)
     # In units of the image's sides, because float32 is too coarse for large images in pixels
     silhouette = cv2.convexHull(
         (seen / [camera.intrinsics.width, camera.intrinsics.height]).astype(np.float32))
     image = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    whole = cv2.contourArea(silhouette)
+    if whole == 0:  # so far away that it is a single point
+        return 1.0
     inside, _ = cv2.intersectConvexConvex(silhouette, image)
-    return float(np.clip(1 - inside / cv2.contourArea(silhouette), 0, 1))
+    return float(np.clip(1 - inside / whole, 0, 1))
 
 
 def cube_corners() -> NDArray[np.float64]:

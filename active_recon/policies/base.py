@@ -34,7 +34,7 @@ class Choice:
     """
     The choice of the next view, for B episodes.
 
-    - scores: (B, K), of the candidates; higher is better
+    - scores: (B, K), of the candidates, finite; higher is better
     - azimuth: (B,), radians, that the policy prefers to all candidates; NaN where it prefers
       none; None: for no episode
     - is_gain: whether the scores are expected gains of IoU, and not only an order

@@ -12,7 +12,7 @@ def checked_choice(found: Any, count: int) -> tuple[Choice, Any]:
     """
     Return what `choose` returned for one episode and `count` candidates: a Choice and a state.
 
-    Raises ViewError where it is no such pair, a score is NaN, or their number is another.
+    Raises ViewError where it is no such pair, a score is not finite, or their number is another.
     """
     try:
         choice, state = found
@@ -22,9 +22,11 @@ def checked_choice(found: Any, count: int) -> tuple[Choice, Any]:
     except (AttributeError, TypeError, ValueError) as error:
         raise ViewError('policy: no choice: expected a Choice of arrays, and a state, got: '
                         f'{error}', 'policy') from error
-    if scores.shape != (1, count) or np.isnan(scores).any():
-        raise ViewError(f'policy: no usable scores: expected (1, {count}) numbers, got '
-                        f'{scores.shape} with {np.isnan(scores).sum()} NaN', 'policy')
+    # An infinite score leaves no order among candidates that motion is taken off from
+    if scores.shape != (1, count) or not np.isfinite(scores).all():
+        raise ViewError(f'policy: no usable scores: expected (1, {count}) finite numbers, got '
+                        f'{scores.shape} with {(~np.isfinite(scores)).sum()} NaN or '
+                        'infinite', 'policy')
     if azimuth is not None and (azimuth.shape != (1,) or np.isinf(azimuth).any()):
         raise ViewError('policy: no usable azimuth: expected (1,), radians or NaN, got '
                         f'{azimuth.shape}, {azimuth}', 'policy')

@@ -121,7 +121,7 @@ class VoxelGrid:
 
         if not self.occupied(threshold).any():
             raise DataError(f'no cell is above the threshold {threshold}: there is no surface yet')
-        return isosurface(self.occupancy, threshold, self.size)
+        return isosurface(self.occupancy, float(threshold), self.size)  # as in `occupied`
 
 
 def cell_centers(side: int) -> NDArray[np.float64]:

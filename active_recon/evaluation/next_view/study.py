@@ -114,9 +114,11 @@ def run_episodes(scene: Scene, entrant: Entrant, episodes: Episodes,
         own, other = (_watched(scene, entrant, episodes, row, 2 * episodes.seed + rendering)
                       for rendering in range(2))
         for name in episodes.policies:
-            looked_at = own if name not in (SWAPPED, SWAPPED_TURNED) else _watched(
+            plain, _ = _parted(name)
+            looked_at = own if plain not in (SWAPPED, SWAPPED_TURNED) else _watched(
                 scene, entrant, episodes, swapped_row(row, len(scene)), 2 * episodes.seed,
-                np.random.default_rng([episodes.seed, row, 1]) if name == SWAPPED_TURNED else None)
+                np.random.default_rng([episodes.seed, row, 1])
+                if plain == SWAPPED_TURNED else None)
             orders = [[_order(name, looked_at, start, [episodes.seed, seed, row, start], entrant,
                               episodes, offsets)
                        for seed in range(_seeds(name, episodes))]

@@ -49,8 +49,8 @@ def study(measured: Measured, tables: QualityTables) -> dict[str, Any]:
             for count in np.unique(measured.count[measured.fault == fault]).tolist()}
             for fault in tables.suspects if (measured.fault == fault).any()},
         'promises': {kind: {f'{target:g}': _promise(
-            Episodes.of(measured.rows(solid & (measured.kind == kind)),
-                        expected[solid & (measured.kind == kind)]), target, needed, tables)
+            measured.rows(solid & (measured.kind == kind)),
+            expected[solid & (measured.kind == kind)], target, needed, tables)
             for target, needed in zip(
                 tables.targets, tables.needed_where(kind == LEARNED), strict=True)}
             for kind in np.unique(measured.kind[solid]).tolist()}}
@@ -84,7 +84,7 @@ def _found(fault: str, judged: list[Quality]) -> Mapping[str, float]:
             'named': float(np.mean([quality.suspect == fault for quality in judged]))}
 
 
-def _promise(episodes: Episodes, target: float, needed: float,
+def _promise(measured: Measured, expected: NDArray[np.float64], target: float, needed: float,
              tables: QualityTables) -> dict[str, Any]:
     """
     Return how a target is kept: by episodes that stop, and against always so many views.
@@ -92,16 +92,19 @@ def _promise(episodes: Episodes, target: float, needed: float,
     - stopped: episodes that did, out of `episodes`; kept: the share of them at or above the
       target, and its exact 95 % bound `kept_at_least`
     - views and change: of all episodes, with five views where they do not stop, the mean number
-      of views, and the difference of IoU from always five, with interval
+      of views, and the difference of IoU from always five, with its interval over objects
     - given_up: share of all told after two to four views that the target is out of reach;
       wrongly: share of those that reach it by the last view
     """
+    episodes = Episodes.of(measured, expected)
+    objects = measured.object[np.unique(measured.episode, return_index=True)[1]]
     at, ious = episodes.stops(needed), episodes.stopped(needed)
     kept = int((ious >= target).sum())
     full = min(FULL, episodes.iou.shape[1]) - 1
     ends = np.where((at >= 0) & (at < full), at, full)
     rows = np.arange(len(at))
-    change = difference(episodes.iou[rows, ends], episodes.iou[:, full])
+    change = difference(_by_object(episodes.iou[rows, ends], objects),
+                        _by_object(episodes.iou[:, full], objects))
     columns = min(len(tables.growth), full)
     short = episodes.expected[:, :columns] + np.array(tables.growth)[:columns] < target
     lost = short.any(axis=1)
