@@ -5,6 +5,7 @@ import json
 import math
 import shutil
 import sys
+from types import ModuleType
 
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
@@ -192,6 +193,14 @@ def test_another_network_is_not_quantised_nor_anything_without_nncf(
 
 
 @pytest.mark.slow
+def test_integers_of_weights_that_are_not_exported_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'nncf', ModuleType('nncf'))
+    weights = tmp_path / SHIPPED.name
+    shutil.copy(SHIPPED, weights)
+    with pytest.raises(WeightsError, match='not exported: expected lifting-encode.onnx beside'):
+        quantize(weights, [])
+
+
 def test_integers_made_anew_hardly_change_an_object(tmp_path):
     pytest.importorskip('nncf', reason="needs nncf: pip install 'active_recon[int8]'")
     for path in SHIPPED.parent.glob('lifting*'):
@@ -333,6 +342,19 @@ def test_a_bad_file_is_one_line_and_torch_goes_on_without_it(broken, part, how, 
     assert instead.provenance[REMARK].startswith('the runtime torch instead of openvino: ')
 
 
+@pytest.mark.parametrize(('name', 'value'), [
+    ('threshold', None), ('image_size', '32'), ('resolution', '64'), ('needs_front', 'no')])
+def test_files_that_lack_a_fact_of_their_network_are_one_line_and_torch_goes_on(
+        broken, exported, name, value):
+    facts = metadata(onnx.load(graph_path(exported['lifting'], 'update')))['facts']
+    for part in NETWORK_PARTS:
+        weights = broken(part, {'facts': facts | {name: value}})
+    for library in LIBRARIES:
+        with pytest.raises(WeightsError, match=f'expected {name} as .*, got {value!r}'):
+            load_runtime(weights, library, threads=1)
+    assert f'expected {name} as ' in load_runtime(weights, threads=1).provenance[REMARK]
+
+
 def test_another_file_of_onnx_is_refused(broken):
     def bare(data):
         model = onnx.load_from_string(data)
@@ -365,6 +387,37 @@ def test_weights_that_were_not_exported_are_told_with_what_to_do(tmp_path, libra
 def test_what_a_runtime_has_not_is_refused(library, wrong, words):
     with pytest.raises(ConfigError, match=words):
         load_runtime(None, library, **wrong)
+
+
+TENSORRT, CUDA, CPU = (f'{name}ExecutionProvider' for name in ('Tensorrt', 'CUDA', 'CPU'))
+
+
+def pretend(monkeypatch, taken):
+    """Let ONNX Runtime be built for graphics cards, and take other providers than it is told."""
+    import onnxruntime
+
+    class Session(onnxruntime.InferenceSession):
+        def __init__(self, path, options, providers):
+            assert providers == [TENSORRT, CUDA]
+            super().__init__(path, options, providers=[CPU])
+
+        def get_providers(self):
+            return taken
+
+    monkeypatch.setattr(onnxruntime, 'InferenceSession', Session)
+    monkeypatch.setattr(onnxruntime, 'get_available_providers', lambda: [TENSORRT, CUDA, CPU])
+
+
+def test_a_graphics_card_whose_libraries_are_missing_is_refused(exported, monkeypatch):
+    pretend(monkeypatch, [CPU])
+    with pytest.raises(ConfigError, match='device: cuda cannot be used: expected .*took CPU'):
+        load_runtime(exported['ptn'], 'onnxruntime', 'cuda')
+
+
+def test_what_onnx_runtime_took_is_told_and_not_what_it_was_to_take(exported, monkeypatch):
+    pretend(monkeypatch, [CUDA, CPU])
+    told = load_runtime(exported['ptn'], 'onnxruntime', 'cuda', 1).provenance['computed_by']
+    assert told.endswith(', f32, CUDA, 1 threads')
 
 
 @pytest.mark.parametrize(('precision', 'expected'), [

@@ -4,7 +4,9 @@ from pathlib import Path
 import re
 
 from active_recon.errors import ConfigError, WeightsError
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.models import registry
+from active_recon.models.network import Cameras
 from active_recon.models.registry import (
     named_network,
     network_entry,
@@ -43,6 +45,14 @@ def test_the_example_is_trained_for_ten_steps_and_its_weights_load_where_it_is_n
         load_weights(weights)
     monkeypatch.setenv(OWN_NETWORKS, f'{EXAMPLE}:Net')
     assert type(load_weights(weights).reconstruction).__name__ == 'Net'
+
+
+def test_a_network_is_given_the_cameras_that_the_page_describes():
+    page = (EXAMPLE.parents[1] / 'doc' / 'extending.md').read_text()
+    assert set(re.findall(r'`cameras\.(\w+)`', page)) == set(Cameras._fields)
+    given = Cameras.of([orbit_camera(0.0)] * 3)
+    assert [part.shape for part in given] == [(3, 4, 4), (3, 3, 3)]
+    assert {part.dtype for part in given} == {torch.float64}
 
 
 def test_a_file_that_has_no_network_is_refused(tmp_path):

@@ -25,6 +25,8 @@ from active_recon.evaluation.posed.study import Extent, study_set
 from active_recon.evaluation.posed.summary import figure, markdown, robustness_figures
 from active_recon.models.carving import Carving
 from active_recon.models.lifted import projected, projection
+from active_recon.training.gain_files import collect_gains, Collecting
+from active_recon.training.view_gains import ViewGains
 from active_recon.volumes.voxels import iou, turned
 import numpy as np
 import pytest
@@ -151,6 +153,37 @@ def test_a_network_that_needs_the_front_joins_in_on_a_turntable_alone(dataset, s
     for measured in found.values():
         assert set(measured.values['even']) == {'iou_32'}  # there are no finer voxels
         assert np.isfinite(measured.values['random']['iou_32']).all()
+
+
+class Small(Carving):
+    """The same hull of images of half the size."""
+
+    image_size = 64
+
+    def update(self, encoded, cameras, state):
+        doubled = cameras.intrinsics * torch.tensor([2, 2, 1.0])[:, None]
+        return super().update(encoded, cameras._replace(intrinsics=doubled), state)
+
+
+@pytest.fixture
+def small():
+    return Entrant('small', Small(0).eval(), {64: 0.5, 32: 0.5})
+
+
+def test_a_network_of_smaller_images_is_measured_on_the_same_views(made, carving, small):
+    scene = read_scene(list_objects(made), [carving.network, small.network])
+    assert scene.shown_to(small.network).image_size == 64
+    torch.testing.assert_close(scene.shown_to(small.network).poses, scene.views.poses)
+    measured = measure(scene, [carving, small], PLAN)
+    large, own = (measured[name].values['random']['iou_32'] for name in ('carving', 'small'))
+    np.testing.assert_allclose(own, large, atol=0.1)
+    assert np.abs(own - large).max() > 0  # it is not shown the same images
+
+
+def test_gains_are_measured_of_a_network_of_smaller_images(made, small, tmp_path):
+    folder = list_objects(made)[0]
+    (path,) = collect_gains([folder], small, Collecting(1, 3, 1, 2), tmp_path)
+    assert np.isfinite(ViewGains.load(path).gains).any()
 
 
 def test_thresholds_are_chosen_where_iou_is_best(scene):

@@ -42,9 +42,9 @@ def quantize(weights: Path, objects: Sequence[ObjectFolder], folder: Path | None
     nncf = _nncf()
     import onnx
 
+    runtime = load_network(weights, 'cpu', None, 'f32')  # refuses what is not exported
     graph = _whole(onnx.load(graph_path(weights, DECODE_PART)))
     names = [each.name for each in graph.graph.input]
-    runtime = load_network(weights, 'cpu', None, 'f32')
     given = [{name: state[name] for name in names} for state in _decoded(runtime, objects)]
     # One range for each channel, the same on both sides of 0: faster, and nearer to float
     found = nncf.quantize(

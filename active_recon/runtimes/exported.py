@@ -26,6 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Arrays = Mapping[str, NDArray[np.float32]]
+_FACTS = {'threshold': float, 'image_size': int, 'resolution': int, 'needs_front': bool,
+          'config_sha256': str}
+"""What the metadata of a network tell, and as what."""
 
 
 class Graph(Protocol):
@@ -220,8 +223,9 @@ def _opened(weights: Path, part: str, digest: str, open_graph: OpenGraph,
 
 def _require_parts(weights: Path, graphs: Mapping[str, Graph], told: GraphMetadata) -> None:
     """Raise WeightsError where the parts of a network do not give what the next of them takes."""
+    _require_facts(graph_path(weights, 'update'), told)
     camera = {'pose', 'intrinsics'}
-    size, resolution = told.facts['image_size'], told.facts['resolution']
+    size = told.facts['image_size']
     given = {'encode': {'image', *camera}, 'update': {'encoded', *camera, *told.state},
              'decode': set(told.state)}
     gives = {'encode': ['encoded'], 'update': [], 'decode': ['occupancy']}
@@ -234,6 +238,15 @@ def _require_parts(weights: Path, graphs: Mapping[str, Graph], told: GraphMetada
             raise WeightsError(f'{path}: contradicts its metadata: expected the output '
                                f'{gives[part][0]}, got {", ".join(graph.outputs)}')
     image = tuple(graphs['encode'].inputs.get('image', ()))
-    if image[2:] != (size, size) or not resolution > 0:
+    if image[2:] != (size, size):
         raise WeightsError(f'{graph_path(weights, "encode")}: contradicts its metadata: expected '
                            f'images of {size} pixels, got {image}')
+
+
+def _require_facts(path: Path, told: GraphMetadata) -> None:
+    """Raise WeightsError where the metadata lack what a network says of itself."""
+    for name, kind in _FACTS.items():
+        found = told.facts.get(name)
+        if not isinstance(found, kind):
+            raise WeightsError(f'{path}: its metadata cannot be used: expected {name} as '
+                               f'{kind.__name__}, got {found!r}; export the weights anew')

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 _PROVIDERS = {'cpu': ('CPUExecutionProvider',),
               'cuda': ('TensorrtExecutionProvider', 'CUDAExecutionProvider')}
-"""What computes on a device; the first that the installation has is taken."""
+"""What computes on a device; the first that can be used here is taken."""
 
 
 class OnnxRuntimeGraph:
@@ -78,18 +78,20 @@ class _Opener:
             raise ConfigError('runtime: onnxruntime is not installed: expected it, as `pip '
                               "install 'active_recon[onnxruntime]'` installs it, or the runtime "
                               'torch') from error
-        self._library, self._threads = onnxruntime, threads or 0
+        self._library, self._threads, self._device = onnxruntime, threads or 0, device
         known = onnxruntime.get_available_providers()
         self._providers = [name for name in _PROVIDERS.get(device, ()) if name in known]
         if not self._providers:
             raise ConfigError(f'parameter device: {device} not available: expected one that this '
                               f'onnxruntime knows, which has {", ".join(known)}; use cpu')
+        self._taken: set[str] = set()
 
     def told(self) -> str:
-        """Return what computes, in words."""
+        """Return what computes the graphs that were opened, in words."""
         threads = f'{self._threads} threads' if self._threads else 'all threads'
-        return (f'onnxruntime {self._library.__version__}, f32, '
-                f'{self._providers[0].removesuffix("ExecutionProvider")}, {threads}')
+        taken = ' and '.join(name.removesuffix('ExecutionProvider')
+                             for name in sorted(self._taken))
+        return f'onnxruntime {self._library.__version__}, f32, {taken}, {threads}'
 
     def __call__(self, path: Path, half: bool) -> OnnxRuntimeGraph:
         """Return the graph in a file; see OpenGraph."""
@@ -98,8 +100,15 @@ class _Opener:
         options.log_severity_level = 3  # errors
         options.add_session_config_entry('session.intra_op.allow_spinning', '0')
         try:
-            return OnnxRuntimeGraph(self._library.InferenceSession(
-                path, options, providers=self._providers))
+            session = self._library.InferenceSession(path, options, providers=self._providers)
         except Exception as error:  # the library has no error of its own above all others
             raise WeightsError(f'{path}: no whole ONNX file: '
                                f'{str(error).strip().splitlines()[0]}') from error
+        # A provider that is built in and whose libraries are missing is left out in silence
+        taken = session.get_providers()[0]
+        if taken not in self._providers:
+            raise ConfigError(f'parameter device: {self._device} cannot be used: expected '
+                              f'{" or ".join(self._providers)} to start, but this onnxruntime '
+                              f'took {taken}: install the libraries that it needs, or use cpu')
+        self._taken.add(taken)
+        return OnnxRuntimeGraph(session)

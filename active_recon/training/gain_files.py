@@ -114,7 +114,8 @@ def _measured(folder: ObjectFolder, entrant: Entrant, collecting: Collecting,
     seed = int.from_bytes(_key(folder)[:6], 'big')
     rng = np.random.default_rng(seed)
     scene = read_scene([folder], [entrant.network])
-    views = some_views(scene.views, spread_views(scene.view_count, collecting.candidates, rng))
+    shown = scene.framed[entrant.network.image_size]
+    views = some_views(shown, spread_views(scene.view_count, collecting.candidates, rng))
     side = max(side for side in entrant.sides if side in scene.truths)
     watched = WatchedObject(
         entrant.network, another_rendering(views, seed % 2 ** 31), scene.truths[side][0],

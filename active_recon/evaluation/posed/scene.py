@@ -23,15 +23,17 @@ class Scene:
     """
     N objects with V posed views each.
 
-    - views: framed images, for networks that need no front
+    - views: framed images of IMAGE_SIZE
     - truths: true voxels (N, R, R, R) bool, by R, cells a side
     - turntable: the same views for the paper's networks, by image size; empty unless the views
       are those of a turntable
+    - framed: the framed images for networks that need no front, by image size
     """
 
     views: ViewSet
     truths: Mapping[int, Tensor]
     turntable: Mapping[int, ViewSet]
+    framed: Mapping[int, ViewSet]
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -44,9 +46,8 @@ class Scene:
 
     def shown_to(self, network: ReconstructionNetwork) -> ViewSet | None:
         """Return the views for a network; None where it cannot use them."""
-        if network.needs_front:
-            return self.turntable.get(network.image_size)
-        return self.views if network.image_size == self.views.image_size else None
+        shown = self.turntable if network.needs_front else self.framed
+        return shown.get(network.image_size)
 
 
 def chosen_folders(folders: Sequence[ObjectFolder], category: str | None = None,
@@ -79,21 +80,26 @@ def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[Reconstructio
     object can be read.
     """
     fine = any(folder.voxels_path(FINE_RESOLUTION).is_file() for folder in folders)
+    resolution = FINE_RESOLUTION if fine else RESOLUTION
     with reporting(f'reading {title}', len(folders)) as advance:
-        views = read_views(folders, lambda: advance(1, ''),
-                           FINE_RESOLUTION if fine else RESOLUTION, IMAGE_SIZE, framed=True)
+        views = read_views(folders, lambda: advance(1, ''), resolution, IMAGE_SIZE, framed=True)
     truths = {views.resolution: views.voxels}
     if fine:
         truths[RESOLUTION] = torch.from_numpy(np.stack(
             [folder.voxels(RESOLUTION).occupied(0.5) for folder in views.folders]))
-    sizes = {network.image_size for network in networks if network.needs_front}
-    turntable: dict[int, ViewSet] = {}
-    if on_turntable(views):
-        for size in sorted(sizes):
-            with reporting(f'reading {title} for the front', len(views)) as advance:
-                shown = read_views(views.folders, lambda: advance(1, ''), RESOLUTION, size)
-            if shown.folders != views.folders:
-                raise DataError(f'objects missing at {size} pixels: expected those of the other '
-                                f'sizes, got errors: {"; ".join(shown.unreadable[:3])}')
-            turntable[size] = shown
-    return Scene(views, truths, turntable)
+
+    def again(size: int, resolution: int, framed: bool) -> ViewSet:
+        what = f'reading {title} at {size} pixels'
+        with reporting(what, len(views)) as advance:
+            shown = read_views(views.folders, lambda: advance(1, ''), resolution, size, framed)
+        if shown.folders != views.folders:
+            raise DataError(f'objects missing at {size} pixels: expected those of the other '
+                            f'sizes, got errors: {"; ".join(shown.unreadable[:3])}')
+        return shown
+
+    front, free = ({network.image_size for network in networks if network.needs_front == needed}
+                   for needed in (True, False))
+    turntable = {size: again(size, RESOLUTION, framed=False) for size in sorted(front)
+                 } if on_turntable(views) else {}
+    framed = {size: again(size, resolution, framed=True) for size in sorted(free - {IMAGE_SIZE})}
+    return Scene(views, truths, turntable, {IMAGE_SIZE: views, **framed})

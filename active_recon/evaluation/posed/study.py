@@ -24,7 +24,6 @@ from active_recon.reporting import Reporting, silent
 
 _NO_TURNTABLE = ('it takes objects seen from 24 azimuths at an elevation of 30 degrees alone, '
                  'and these are seen from elsewhere')
-_OTHER_SIZE = 'it takes images of another size than all others'
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,7 @@ def study_set(data: Path, entrants: Sequence[Entrant], plan: Plan, extent: Exten
     """
     scene = read_set(data, entrants, extent, plan.seed, reporting)
     taking = [each for each in entrants if scene.shown_to(each.network) is not None]
-    left_out = {each.name: _NO_TURNTABLE if each.network.needs_front else _OTHER_SIZE
-                for each in entrants if each not in taking}
+    left_out = {each.name: _NO_TURNTABLE for each in entrants if each not in taking}
     if not taking:
         raise ConfigError(f'{data}: no model for these views: expected one that can use them, got '
                           + '; '.join(f'{name}: {why}' for name, why in left_out.items()))
