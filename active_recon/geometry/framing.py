@@ -8,18 +8,20 @@ from numpy.typing import NDArray
 
 TOLERATED_OUTSIDE = 0.02
 """Fraction of the cube's silhouette that may be outside of the image, since poses are inexact."""
+_FEWEST_PIXELS = 4
+"""Width of the cube's silhouette below which an image shows nothing of the object."""
 _ALONG = np.linspace(-0.5, 0.5, 9)  # points along an edge, which a lens distorts
 
 
 def require_in_image(camera: Camera, object_size: float,
                      tolerated: float = TOLERATED_OUTSIDE) -> None:
     """
-    Raise ViewError where the object is not in front of the camera or not in its image.
+    Raise ViewError where the object is not in front of the camera or not to be seen in its image.
 
     `object_size` is the side of the object's cube, metres; `tolerated` is the fraction of the
     cube's silhouette, [0, 1], that may be outside.
     """
-    _, depth = camera.project(_EDGES * object_size)
+    seen, depth = camera.project(_EDGES * object_size)
     if depth.max() <= 0:
         raise ViewError('camera looks away from the object: expected one that looks at it; check '
                         'that the pose is that of the optical frame (z forward, y down)',
@@ -29,6 +31,13 @@ def require_in_image(camera: Camera, object_size: float,
             "camera in the object's cube or beside it: expected a distance at which the whole "
             f'cube of {object_size:g} m is in front of the camera, got {camera.distance:.3g} m; '
             'move it back or set object_size', 'out_of_image')
+    width = float(np.ptp(seen, axis=0).max())
+    if width < _FEWEST_PIXELS:
+        raise ViewError(
+            f'object too small in the image: expected its cube of {object_size:g} m to be '
+            f'{_FEWEST_PIXELS} pixels wide or more, got {width:.2g} at a distance of '
+            f'{camera.distance:.3g} m; move the camera nearer, or give poses in metres',
+            'out_of_image')
     outside = share_outside(camera, object_size)
     if outside > tolerated:
         raise ViewError(
