@@ -291,7 +291,7 @@ def test_swapped_looks_at_another_object_and_only_there(scene, carving, monkeypa
     monkeypatch.setattr(study, '_LOOKS_ELSEWHERE', 'visible_entropy')
     monkeypatch.setattr(study, 'turned', lambda views, rng: views)
     episodes = Episodes((looking, name), 1, 3, bfloat16=False)
-    lone = replace(scene, views=some_objects(scene.views, torch.tensor([1])),
+    lone = replace(scene, framed={128: some_objects(scene.views, torch.tensor([1]))},
                    truths={32: scene.truths[32][1:2]})
     same = run_episodes(lone, carving, episodes)
     np.testing.assert_array_equal(same.other[name], same.other[looking])

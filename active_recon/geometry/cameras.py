@@ -8,6 +8,7 @@ counter-clockwise about +z from +x.
 
 from dataclasses import dataclass
 import math
+from typing import TypeVar
 
 from active_recon.errors import ViewError
 from active_recon.geometry.lenses import Distortion
@@ -26,10 +27,12 @@ CANONICAL_DISTANCE = 2.1
 """Distance of the canonical camera in sides of the voxel grid: the grid's sphere just fits."""
 
 
-def wrap_azimuth(azimuth: float) -> float:
-    """Return the azimuth in [0, 2 pi)."""
-    wrapped = azimuth % TURN
-    return 0.0 if wrapped >= TURN else wrapped  # -1e-20 % TURN rounds up to TURN itself
+_Azimuth = TypeVar('_Azimuth', float, NDArray[np.float64])
+
+
+def wrap_azimuth(azimuth: _Azimuth) -> _Azimuth:
+    """Return the azimuth, or azimuths, in [0, 2 pi)."""
+    return azimuth % TURN % TURN  # -1e-20 % TURN rounds up to TURN itself
 
 
 def azimuth_difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
@@ -282,5 +285,4 @@ def orbit_camera(
 
 def pose_azimuths(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the azimuths (...) of poses (..., 4, 4), radians in [0, 2 pi)."""
-    wrapped = np.arctan2(poses[..., 1, 3], poses[..., 0, 3]) % TURN
-    return np.asarray(np.where(wrapped >= TURN, 0.0, wrapped))  # as in `wrap_azimuth`
+    return np.asarray(wrap_azimuth(np.arctan2(poses[..., 1, 3], poses[..., 0, 3])))

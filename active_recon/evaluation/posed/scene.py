@@ -23,17 +23,20 @@ class Scene:
     """
     N objects with V posed views each.
 
-    - views: framed images of IMAGE_SIZE
+    - framed: framed images for networks that need no front, by image size, IMAGE_SIZE among them
     - truths: true voxels (N, R, R, R) bool, by R, cells a side
     - turntable: the same views for the paper's networks, by image size; empty unless the views
       are those of a turntable
-    - framed: the framed images for networks that need no front, by image size
     """
 
-    views: ViewSet
+    framed: Mapping[int, ViewSet]
     truths: Mapping[int, Tensor]
     turntable: Mapping[int, ViewSet]
-    framed: Mapping[int, ViewSet]
+
+    @property
+    def views(self) -> ViewSet:
+        """The framed images of IMAGE_SIZE."""
+        return self.framed[IMAGE_SIZE]
 
     def __len__(self) -> int:
         """Return the number of objects."""
@@ -102,4 +105,4 @@ def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[Reconstructio
     turntable = {size: again(size, RESOLUTION, framed=False) for size in sorted(front)
                  } if on_turntable(views) else {}
     framed = {size: again(size, resolution, framed=True) for size in sorted(free - {IMAGE_SIZE})}
-    return Scene(views, truths, turntable, {IMAGE_SIZE: views, **framed})
+    return Scene({IMAGE_SIZE: views, **framed}, truths, turntable)
