@@ -1,5 +1,6 @@
 """The greedy oracle and every sequence of views, against doing it one by one."""
 
+from dataclasses import replace
 from itertools import permutations
 
 from active_recon.evaluation.measure import run_oracle, run_policy
@@ -106,6 +107,12 @@ def test_every_sequence_has_the_iou_of_its_rollout_and_no_view_comes_twice(netwo
     assert np.isfinite(table).sum() == len(sequences)
     expected = iou_along(network, few, 4, sequences)[:, -1]
     np.testing.assert_allclose(table[tuple(sequences.T)], expected, atol=2e-3)
+
+
+def test_longer_sequences_than_there_are_views_repeat_one(network, few):
+    pair = replace(few, images=few.images[:, :2], poses=few.poses[:, :2],
+                   intrinsics=few.intrinsics[:, :2])
+    assert np.isnan(sequence_iou(network, pair, 0, THRESHOLD, 3)).all()
 
 
 def test_no_way_of_the_oracle_is_better_than_the_best_sequence(network, few):

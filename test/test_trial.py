@@ -115,3 +115,6 @@ def test_hashes_tell_states_and_sets_apart(network, views):
     assert state_hash(network) != before
     assert data_hash(views) == data_hash(replace(views))
     assert data_hash(replace(views, poses=views.poses + 1)) != data_hash(views)
+    seen = torch.ones(views.images.shape[:-1], dtype=torch.bool)
+    hashes = {data_hash(replace(views, seen=each)) for each in (None, seen, ~seen)}
+    assert len(hashes) == 3

@@ -122,6 +122,8 @@ def sequence_iou(network: ReconstructionNetwork, views: ViewSet, item: int, thre
     """
     count, observer = views.images.shape[1], Observer(network, views, bfloat16)
     table = np.full((count,) * length, np.nan, np.float32)
+    if count < length:  # every sequence repeats a view
+        return table
 
     def explore(sequences: Tensor, state: State) -> None:
         """Evaluate all views that can follow sequences (P, t), whose states are given."""

@@ -104,9 +104,10 @@ class Trial:
 
 
 def data_hash(views: ViewSet) -> str:
-    """Return the SHA-256 of a set's images, cameras and voxels."""
+    """Return the SHA-256 of a set's images, what they show of the cubes, cameras and voxels."""
     digest = hashlib.sha256()
-    for part in (views.images, views.poses, views.intrinsics, views.voxels):
+    seen = () if views.seen is None else (views.seen,)
+    for part in (views.images, views.poses, views.intrinsics, views.voxels, *seen):
         digest.update(str(tuple(part.shape)).encode())
         digest.update(part.contiguous().numpy().data)
     return digest.hexdigest()
