@@ -18,7 +18,7 @@ ROWS: tuple[set[str], ...] = (
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},
     {'environment', 'exporting', 'policies', 'simulation'},
-    {'parameters', 'planner', 'reconstructor'},
+    {'parameters', 'planner', 'reconstructor', 'segmentation'},
     {'evaluation', 'msg_tools', 'photos', 'saved_states'},
     {'bags', 'capture', 'training'},
     {'paper', 'report', 'viewer'},

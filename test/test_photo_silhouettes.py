@@ -172,7 +172,8 @@ def test_what_removed_the_background_is_named(views):
     camera = placed(views)[0]
     for background, source, white in (('auto', 'network and plain', False),
                                       ('plain', 'plain', True), ('network', 'network', False),
-                                      ('grabcut', 'grabcut', True)):
+                                      ('grabcut', 'grabcut', True),
+                                      ('segment', 'segmenter', True)):
         image, found = shown_image(separated(view, background), camera, 1.0, background)
         assert found == source
         assert (image[0, 0] == 255).all() == white

@@ -101,6 +101,26 @@ def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, view
     assert own.size == read.size == BOX[3]
 
 
+def test_before_clutter_the_segmenter_finds_the_object_and_a_mask_of_one_photo_tells_otherwise(
+        views, rgba, tmp_path):
+    rng = np.random.default_rng(0)
+    tiles = [np.kron(rng.integers(0, 256, (9, 12, 3), np.uint8), np.ones((20, 20, 1), np.uint8))
+             for _ in rgba]
+    cluttered = [on_plain(*both) for both in zip(rgba, tiles, strict=True)]
+    folder = write_photos(tmp_path / 'clutter', views, cluttered)
+    ious = {}
+    for background in ('auto', 'network'):
+        shape = active_recon.reconstruct(folder, box=BOX, background=background)
+        ious[shape.background] = iou(shape.occupancy > shape.threshold, truth(shape))
+    assert list(ious) == ['the segmenter', "the network's own silhouettes"]
+    assert ious['the segmenter'] > max(0.5, ious["the network's own silhouettes"])
+    mixed = active_recon.reconstruct(
+        [np.dstack([cluttered[0], rgba[0][..., 3]]), *cluttered[1:]], [
+            Camera(np.block([[each.pose[:3, :3], (each.position - CENTRE)[:, None]],
+                             [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views], BOX[3])
+    assert 'alpha channels (1)' in mixed.background and 'own' in mixed.background
+
+
 def test_masks_of_files_and_an_alpha_channel_say_the_same(views, rgba, tmp_path):
     with_alpha = write_photos(tmp_path / 'alpha', views, rgba)
     without = write_photos(tmp_path / 'rgb', views, [image[..., :3] for image in rgba])

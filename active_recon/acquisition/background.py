@@ -1,6 +1,6 @@
-"""Background removal by a mask, an image of the empty scene, or a colour key."""
+"""Background removal by a segmenter, a mask, an image of the empty scene, or a colour key."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from active_recon.errors import ConfigError, ViewError
@@ -8,8 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-BACKGROUNDS = ('as_is', 'mask', 'reference', 'color')
-"""No removal; by a mask; by an image of the empty scene; by the background's colour."""
+Segmented = Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
+BACKGROUNDS = ('as_is', 'segment', 'mask', 'reference', 'color')
+"""
+No removal; by a segmenter; by a mask; by an image of the empty scene; by the background's colour.
+"""
 COLOR_TOLERANCE = 10.0
 """Largest distance of a background pixel from the background's colour, CIE76 in L*a*b*."""
 GREEN_SCREEN = (0, 177, 64)
@@ -49,16 +52,23 @@ class Background:
         check_color(self.color, self.tolerance)
 
     def cleared(self, image: NDArray[np.uint8], mask: NDArray[np.bool_] | None = None,
-                reference: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+                reference: NDArray[np.uint8] | None = None,
+                segmented: Segmented | None = None) -> NDArray[np.uint8]:
         """
         Return an image, (H, W, 3) uint8 RGB, with a white background; unchanged for `as_is`.
 
         `mask` is (H, W), true on the object; `reference` is an image of the empty scene,
-        (H, W, 3). Raises ViewError where the required one is missing, and as `on_white`,
-        `off_reference` and `off_color` do.
+        (H, W, 3); `segmented` returns the image with the object that it finds on white. Raises
+        ViewError where the required one is missing, and as `on_white`, `off_reference`,
+        `off_color` and `segmented` do.
         """
         if self.how == 'as_is':
             return image
+        if self.how == 'segment':
+            if segmented is None:
+                raise ViewError('no segmenter: expected one to find the object, got none',
+                                'no_segmenter')
+            return segmented(image)
         if self.how == 'color':
             return on_white(image, off_color(image, self.color, self.tolerance))
         if self.how == 'mask':

@@ -59,9 +59,9 @@ _SCENE: dict[str, tuple[Any, Any]] = {
                                 'looks at the object.')],
         None),
     'background': (Annotated[str, _option(
-        metavar='COLOR|IMAGE',
-        help='Background to replace by white: a colour as RED,GREEN,BLUE, or an image of the '
-             'empty scene.')], ''),
+        metavar='segment|COLOR|IMAGE',
+        help='Background to replace by white: all but the object that a learned segmenter finds '
+             '(segment), a colour as RED,GREEN,BLUE, or an image of the empty scene.')], ''),
 }
 
 

@@ -17,7 +17,7 @@ def export(
              'dataset of training objects.')] = None,
 ) -> None:
     """
-    Write a network as ONNX, with the view policy and the depth refiner that go with it.
+    Write a network as ONNX, with its view policy and its depth refiner; or a segmenter.
 
     The runtimes openvino and onnxruntime run these files; without them, weights run in torch. Each
     file says in its metadata which weights it was made of, and is refused beside others. Other
@@ -30,6 +30,10 @@ def export(
     from active_recon.models.weights_files import find_weights
 
     file = find_weights(weights)
+    if int8 is not None:  # before anything is written
+        from active_recon.exporting.quantization import require_quantisable
+
+        require_quantisable(file)
     for path in written(file, out):
         typer.echo(f'wrote {path}')
     if int8 is not None:

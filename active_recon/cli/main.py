@@ -28,6 +28,7 @@ from active_recon.cli.study import study
 from active_recon.cli.train import train
 from active_recon.cli.train_depth import train_depth
 from active_recon.cli.train_policy import train_policy
+from active_recon.cli.train_segmenter import train_segmenter
 from active_recon.cli.up import up
 from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
@@ -40,7 +41,7 @@ _OTHERWISE: dict[Callable[..., None], dict[str, Any]] = {
     set_parameter: {'name': 'set', 'context_settings': {'ignore_unknown_options': True}}}
 for command in (demo, up, call, set_parameter, status, reconstruct, calibrate, camera, view,
                 report, replay, play, record_sweep, render, train, train_policy, train_depth,
-                export, evaluate, study, policies, paper, sheet):
+                train_segmenter, export, evaluate, study, policies, paper, sheet):
     app.command(**_OTHERWISE.get(command, {}))(command)
 app.add_typer(dataset, name='dataset')
 app.add_typer(bag, name='bag')

@@ -60,8 +60,9 @@ def reconstruct(
         help="Axis of the cameras' world that points up, e.g. z or -y. Default: by the "
              'format.')] = None,
     background: Annotated[str, typer.Option(
-        help='auto (masks, alpha, else the network), plain (by the colour of a plain '
-             'background), network, grabcut, or rembg (if installed).')] = 'auto',
+        help='auto (masks, alpha, the network before a plain background, else segment), plain '
+             '(by the colour of a plain background), network, segment (by a learned segmenter), '
+             'grabcut, or rembg (if installed).')] = 'auto',
     masks: Annotated[Path | None, typer.Option(
         help='Folder of masks named like the photos, bright on the object.')] = None,
     views: Annotated[int | None, typer.Option(

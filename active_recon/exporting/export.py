@@ -1,16 +1,24 @@
 """Weights to ONNX files with their metadata inside."""
 
+from collections.abc import Mapping
 import io
 from pathlib import Path
 from typing import Any
 import warnings
 
 from active_recon.errors import ConfigError
-from active_recon.exporting.parts import depth_part, network_parts, Part, policy_part
+from active_recon.exporting.parts import (
+    depth_part,
+    network_parts,
+    Part,
+    policy_part,
+    segment_part,
+)
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID
 from active_recon.models.depth_weights import load_refiner
 from active_recon.models.network import State
 from active_recon.models.scorer_weights import load_scorer
+from active_recon.models.segmenter_weights import is_segmenter, read_segmenter
 from active_recon.models.weights import Bundle, load_weights
 from active_recon.models.weights_files import (
     config_hash,
@@ -24,6 +32,7 @@ from active_recon.runtimes.graph_files import (
     GraphMetadata,
     KEY,
     POLICY_PART,
+    SEGMENT_PART,
 )
 import numpy as np
 import torch
@@ -37,13 +46,18 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
     """
     Write the graphs of weights, and of what goes with them; return the files.
 
-    That is the view policy in them or beside them, and the depth refiner beside them.
+    That is the view policy in them or beside them, and the depth refiner beside them. Weights of
+    a segmenter are a graph of their own.
 
     They lie beside the weights, or in another folder. Raises WeightsError as `load_weights` does,
     and ConfigError where the network runs in torch alone, where it has something that no graph
     can have, or where onnx is not installed.
     """
     _require_onnx()
+    if is_segmenter(weights):
+        told = GraphMetadata(SEGMENT_PART, weights_hash(weights), {}, {})
+        part = segment_part(read_segmenter(weights))
+        return _saved({SEGMENT_PART: _written('segmenter', part, told)}, weights, folder)
     bundle = load_weights(weights)
     network, digest = bundle.reconstruction, weights_hash(weights)
     if network.runs_in_torch_alone:
@@ -61,6 +75,11 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
         told = GraphMetadata(DEPTH_PART, digest, {},
                              {'depth_sha256': weights_hash(depth_path(weights))})
         graphs[DEPTH_PART] = _written(bundle.model, depth_part(load_refiner(weights)), told)
+    return _saved(graphs, weights, folder)
+
+
+def _saved(graphs: Mapping[str, bytes], weights: Path, folder: Path | None) -> list[Path]:
+    """Write graphs beside weights, or in another folder; return the files."""
     (folder or weights.parent).mkdir(parents=True, exist_ok=True)
     written = []
     for name, data in graphs.items():

@@ -7,7 +7,9 @@ from typing import TypeVar
 
 from active_recon.models.depth_refiner import DepthRefiner, KINDS
 from active_recon.models.lifting import COARSE_SIDE
+from active_recon.models.lifting_encoder import IMAGE_SIZE
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
+from active_recon.models.segmenter import Segmenter
 from active_recon.runtimes.graph_files import NEXT
 from active_recon.volumes.voxels import FINE_RESOLUTION
 import torch
@@ -95,6 +97,16 @@ class _Refine(nn.Module):
         return self.refiner.refine(occupancy, evidence, count, total)
 
 
+class _Segment(nn.Module):
+    def __init__(self, segmenter: Segmenter) -> None:
+        super().__init__()
+        self.segmenter = segmenter
+
+    def forward(self, image: Tensor) -> Tensor:
+        found: Tensor = self.segmenter(image).sigmoid()
+        return found
+
+
 class _Choose(nn.Module):
     def __init__(self, model: nn.Module, inputs: Sequence[str], names: Sequence[str]) -> None:
         super().__init__()
@@ -154,6 +166,13 @@ def depth_part(refiner: DepthRefiner) -> Part:
               'count': torch.ones(1, 1, *coarse),
               'total': torch.zeros(1, refiner.features, *coarse)}
     return Part(_for_graphs(module), inputs, ['refined'], {})
+
+
+@torch.no_grad()
+def segment_part(segmenter: Segmenter) -> Part:
+    """Return a segmenter, for one image with its mask of seen pixels."""
+    image = torch.full((1, 4, IMAGE_SIZE, IMAGE_SIZE), 0.5)
+    return Part(_for_graphs(_Segment(segmenter)), {'image': image}, ['object'], {})
 
 
 def _for_graphs(network: Network) -> Network:

@@ -8,6 +8,7 @@ from typing import Any
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.errors import ConfigError
 from active_recon.geometry.canonical import network_image
+from active_recon.models.segmenter_weights import is_segmenter
 from active_recon.models.weights_files import read_metadata
 from active_recon.runtimes.exported import Arrays, ExportedRuntime
 from active_recon.runtimes.graph_files import DECODE_PART, graph_path, INT8_PART, KEY
@@ -26,19 +27,29 @@ _BACKGROUNDS = (255, 255, 0, 128)
 _QUANTISED = 'lifting'
 
 
+def require_quantisable(weights: Path) -> None:
+    """
+    Raise ConfigError where nncf is not installed, or weights are not of the lifting network.
+
+    The loss by integers was measured for that network alone.
+    """
+    model = 'segmenter' if is_segmenter(weights) else read_metadata(weights).model
+    if model != _QUANTISED:
+        raise ConfigError(f'{model}: not quantised: expected the network {_QUANTISED}, whose loss '
+                          'of IoU is known; take bf16 or f32')
+    _nncf()
+
+
 def quantize(weights: Path, objects: Sequence[ObjectFolder], folder: Path | None = None) -> Path:
     """
     Write the decoder of exported weights with int8 convolutions; return the file.
 
     Their ranges are those that views of `objects` show, which should be training data. The file
     lies beside the weights, or in another folder. Raises WeightsError where the weights are not
-    exported, ConfigError where nncf is not installed or the network is not the lifting network,
-    for which alone the loss was measured, and DataError where an object cannot be read.
+    exported, ConfigError as `require_quantisable` does, and DataError where an object cannot be
+    read.
     """
-    model = read_metadata(weights).model
-    if model != _QUANTISED:
-        raise ConfigError(f'{model}: not quantised: expected the network {_QUANTISED}, whose loss '
-                          'of IoU is known; take bf16 or f32')
+    require_quantisable(weights)
     nncf = _nncf()
     import onnx
 

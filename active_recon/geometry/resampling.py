@@ -21,6 +21,7 @@ SAMPLE_EVERY = 1.5
 """Largest distance of two samples in pixels: stripes of a pixel are not skipped."""
 REDUCTIONS = (8, 4, 2, 1)
 """By how much a JPEG image can be reduced while it is decoded."""
+_CARRIED_SIDE = 512  # pixels of a lens with distortion, whose rays are slow to compute
 _BAND = 64
 """Rows of an image whose coordinates are computed at a time, to stay in the processor's cache."""
 _Places = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -88,6 +89,28 @@ def depth_seen_by(target: Camera, depth: NDArray[np.float32],
     inside = (column >= 0) & (column < lens.width) & (row >= 0) & (row < lens.height)
     taken = turned[np.where(inside, row, 0), np.where(inside, column, 0)]
     return np.where(inside & (taken > 0), taken, 0).astype(np.float32)
+
+
+def carried_back(framed: NDArray[np.float32], target: Camera,
+                 camera: Camera) -> NDArray[np.float32]:
+    """
+    Return what was found in the target's image, (S, S), in that of the camera beside it, (H, W).
+
+    It is 0 outside of the target's image.
+    """
+    lens = camera.intrinsics
+    if lens.distortion is None:
+        half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # OpenCV counts from centres
+        moved = np.linalg.inv(half) @ turn_between(camera, target) @ half
+        return np.asarray(cv2.warpPerspective(framed, moved, (lens.width, lens.height)))
+    by = max(1.0, max(lens.width, lens.height) / _CARRIED_SIDE)
+    few = Camera(camera.pose, lens.resized(round(lens.width / by), round(lens.height / by)))
+    rays = few.ray_directions()
+    pixels, depth = target.project((camera.position + rays).reshape(-1, 3))
+    pixels[~(depth > 0)] = -1e9  # nowhere in the image
+    columns, rows = (each.reshape(rays.shape[:2]).astype(np.float32) - 0.5 for each in pixels.T)
+    found = cv2.remap(framed, columns, rows, cv2.INTER_LINEAR)
+    return np.asarray(cv2.resize(found, (lens.width, lens.height)))
 
 
 def _place(places: NDArray[np.float32], seen: NDArray[np.float64], first: int, scale: float,

@@ -20,7 +20,7 @@ Module = TypeVar('Module', bound=nn.Module)
 @dataclass(frozen=True)
 class Companion(Generic[Module]):
     """
-    A module that was trained for the weights of one network.
+    A module that was trained for the weights of one network, or serves every network.
 
     - kind: what its files call themselves
     - build: makes it of its config's mapping, with fresh weights
@@ -36,19 +36,27 @@ class Companion(Generic[Module]):
     advice: str
     half: bool = False
 
-    def save(self, path: Path, module: Module, config: Config, network_sha256: str,
+    def save(self, path: Path, module: Module, config: Config, network_sha256: str | None,
              card: dict[str, Any]) -> None:
-        """Write `path` (.safetensors) for a network's weights, and the card beside it."""
+        """Write `path` (.safetensors) for a network's weights, or any, and the card beside it."""
         path.parent.mkdir(parents=True, exist_ok=True)
+        belongs_to = {} if network_sha256 is None else {'network_sha256': network_sha256}
         dtype = torch.float16 if self.half else torch.float32
         tensors = {name: in_precision(dtype, tensor.detach().cpu()).contiguous()
                    for name, tensor in module.state_dict().items()}
         path.write_bytes(weights_bytes(tensors, {
-            'model': self.kind, 'config': json.dumps(config.to_dict()),
-            'network_sha256': network_sha256}))
+            'model': self.kind, 'config': json.dumps(config.to_dict()), **belongs_to}))
         path.with_suffix('.json').write_text(json.dumps({
-            'model': self.kind, 'config': config.to_dict(), 'network_sha256': network_sha256,
+            'model': self.kind, 'config': config.to_dict(), **belongs_to,
             'sha256': weights_hash(path), **card}, indent=2) + '\n')
+
+    def is_kind(self, path: Path) -> bool:
+        """Return whether a file calls itself one of this kind; False where it cannot be read."""
+        try:
+            with safe_open(path, framework='pt') as stored:
+                return (stored.metadata() or {}).get('model') == self.kind
+        except (SafetensorError, OSError):
+            return False
 
     def read(self, path: Path, network_sha256: str | None, device: str = 'cpu') -> Module:
         """

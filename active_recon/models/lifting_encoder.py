@@ -14,6 +14,8 @@ from torch import nn, Tensor
 from torch.nn import functional
 
 IMAGE_SIZE = 128
+SHOWN = 6
+"""Channels of what an encoder is shown; see `shown_channels`."""
 COARSE, FINE = 32, 64
 """Pixels a side of the two maps."""
 NO_EVIDENCE = 6.0
@@ -80,7 +82,23 @@ class Residual(nn.Module):
         return functional.relu(maps + self.layers(maps))
 
 
-def _halved(before: int, after: int, kernel: int = 3) -> nn.Sequential:
+def shown_channels(images: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """
+    Return what an encoder is shown of images (B, 3 or 4, S, S) in [0, 1], (B, 6, S, S).
+
+    These are colours in [-1, 1], which pixels were seen, the distance from the border's colour,
+    and the foreground by it; the second and the fourth are also returned by themselves.
+    """
+    seen = seen_pixels(images)
+    apart = border_distance(images)
+    # One half where the border has no single colour and says nothing of the background
+    plain = 0.5 + border_evenness(apart, images) * (share_apart(apart, seen) - 0.5)
+    shown = torch.cat([(2 * images[:, :3] - 1) * seen, seen, apart * seen, plain], dim=1)
+    return shown.contiguous(memory_format=torch.channels_last), seen, plain
+
+
+def halved(before: int, after: int, kernel: int = 3) -> nn.Sequential:
+    """Return a convolution to maps of half the side."""
     return nn.Sequential(nn.Conv2d(before, after, kernel, stride=2, padding=kernel // 2),
                          Norm(after), nn.ReLU())
 
@@ -98,20 +116,20 @@ class PyramidEncoder(nn.Module):
         super().__init__()
         at_64, at_32, at_16, at_8 = channels
         # No norm where the maps are wide: it would take longer than what it follows
-        self.down_64 = nn.Sequential(nn.Conv2d(6, at_64, 5, stride=2, padding=2), nn.ReLU(),
+        self.down_64 = nn.Sequential(nn.Conv2d(SHOWN, at_64, 5, stride=2, padding=2), nn.ReLU(),
                                      nn.Conv2d(at_64, at_64, 3, padding=1), nn.ReLU())
-        self.down_32 = nn.Sequential(_halved(at_64, at_32), Residual(at_32))
-        self.down_16 = nn.Sequential(_halved(at_32, at_16), Residual(at_16))
-        self.down_8 = nn.Sequential(_halved(at_16, at_8), Residual(at_8))
+        self.down_32 = nn.Sequential(halved(at_64, at_32), Residual(at_32))
+        self.down_16 = nn.Sequential(halved(at_32, at_16), Residual(at_16))
+        self.down_8 = nn.Sequential(halved(at_16, at_8), Residual(at_8))
         self.whole = nn.Linear(at_8, at_8)
         self.up_8 = nn.Conv2d(at_8, width, 1)
         self.lateral_16, self.lateral_32 = nn.Conv2d(at_16, width, 1), nn.Conv2d(at_32, width, 1)
-        self.smooth_16, self.smooth_32 = _smooth(width), _smooth(width)
+        self.smooth_16, self.smooth_32 = smooth(width), smooth(width)
         half = width // 2
         self.up_32, self.lateral_64 = nn.Conv2d(width, half, 1), nn.Conv2d(at_64, half, 1)
-        self.smooth_64 = _smooth(half)
+        self.smooth_64 = smooth(half)
         self.silhouette = nn.Conv2d(half, 4 * _AT_128, 1)
-        self.shown_128 = nn.Conv2d(6, _AT_128, 3, padding=1)
+        self.shown_128 = nn.Conv2d(SHOWN, _AT_128, 3, padding=1)
         # Learned logits, and the weight of the difference from the border's colour
         self.foreground = nn.Conv2d(2 * _AT_128, 2, 3, padding=1)
         self.foreground.bias = nn.Parameter(torch.tensor([0.0, _TRUST]))
@@ -119,12 +137,7 @@ class PyramidEncoder(nn.Module):
 
     def forward(self, images: Tensor) -> Maps:
         """Return the maps of images (B, 3, 128, 128), or (B, 4, ...) with the mask of `seen`."""
-        seen = seen_pixels(images)
-        apart = border_distance(images)
-        # One half where the border has no single colour and says nothing of the background
-        plain = 0.5 + border_evenness(apart, images) * (share_apart(apart, seen) - 0.5)
-        shown = torch.cat([(2 * images[:, :3] - 1) * seen, seen, apart * seen, plain], dim=1)
-        shown = shown.contiguous(memory_format=torch.channels_last)
+        shown, seen, plain = shown_channels(images)
         at_64 = self.down_64(shown)
         at_32 = self.down_32(at_64)
         at_16 = self.down_16(at_32)
@@ -145,7 +158,8 @@ class PyramidEncoder(nn.Module):
         return Maps(coarse, fine, functional.avg_pool2d(seen, 2).to(fine.dtype), silhouette)
 
 
-def _smooth(channels: int) -> nn.Sequential:
+def smooth(channels: int) -> nn.Sequential:
+    """Return a convolution that keeps the shape."""
     return nn.Sequential(nn.Conv2d(channels, channels, 3, padding=1), nn.ReLU())
 
 

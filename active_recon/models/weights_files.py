@@ -16,6 +16,8 @@ SCORER = '-scorer'
 """What the name of a network's weights is followed by in that of its view policy's."""
 DEPTH = '-depth'
 """Likewise of the depth refiner's."""
+SEGMENTER = FOLDER / 'segmenter.safetensors'
+"""The segmenter that ships: it is no reconstruction network, and serves all of them."""
 SHIPPED = FOLDER / f'{DEFAULT_MODEL}.safetensors'
 
 
@@ -60,7 +62,8 @@ def find_weights(model: str | Path | None = None) -> Path:
     shipped = FOLDER / f'{model}.safetensors'
     if not shipped.is_file():
         names = ', '.join(sorted(file.stem for file in FOLDER.glob('*.safetensors')
-                                 if not file.stem.endswith((SCORER, DEPTH))))
+                                 if not file.stem.endswith((SCORER, DEPTH))
+                                 and file != SEGMENTER))
         raise WeightsError(f'{model}: neither a weights file (.safetensors) nor a model whose '
                            f'weights ship ({names}); `active-recon train` makes weights')
     return shipped

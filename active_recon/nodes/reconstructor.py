@@ -1,6 +1,7 @@
 """ROS node of the reconstructor: views in, the object's occupancy out; it owns the episode."""
 
 from contextlib import nullcontext
+from functools import partial
 import math
 from pathlib import Path
 import uuid
@@ -29,6 +30,7 @@ from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
 from active_recon.reconstructor import Reconstructor
 from active_recon.saved_states import read_state
+from active_recon.segmentation import Segmentation
 import cv2
 from geometry_msgs.msg import PoseStamped
 from msg_tools.camera_images import is_compressed
@@ -67,6 +69,7 @@ class ReconstructorNode(ManagedNode):
         """Load the network, create publishers and services."""
         params = self._params.values
         self._background = params.as_background()
+        self._segmentation = self._segmenter(params)
         self.add_cleanup(self._capture.clear)
         publish_topic_names(self, TOPICS)
         check_pose_source(params)
@@ -92,6 +95,8 @@ class ReconstructorNode(ManagedNode):
         provenance = self._reconstructor.provenance
         self._diagnostics.set_value('Weights SHA-256', provenance.get('weights_sha256', ''))
         tell_of_runtime(self._diagnostics, provenance)
+        self._diagnostics.set_value(
+            'Segmenter', self._segmentation.computed_by if self._segmentation else '')
         self.create_service(Trigger, 'start_episode', self._on_start)
         self.create_service(Trigger, 'save_state', self._on_save_state)
         self.create_service(Trigger, 'load_state', self._on_load_state)
@@ -111,7 +116,7 @@ class ReconstructorNode(ManagedNode):
         super().destroy_node()
 
     def _free_network(self) -> None:
-        del self._reconstructor, self._products, self._inputs
+        del self._reconstructor, self._products, self._inputs, self._segmentation
 
     def _load(self, params: ReconstructorParameters) -> Reconstructor:
         """Load the network and run it once, so that the first view is as fast as the others."""
@@ -125,6 +130,15 @@ class ReconstructorNode(ManagedNode):
             set_read_only_parameter(self, fact, reconstructor.provenance.get(fact, ''), meaning)
         reconstructor.warm_up(params.use_depth)
         return reconstructor
+
+    def _segmenter(self, params: ReconstructorParameters) -> Segmentation | None:
+        """Load what finds the object in images, where it is asked for, and run it once."""
+        if self._background.how != 'segment':
+            return None
+        found = Segmentation.load(Path(params.segmenter) if params.segmenter else None,
+                                  params.device, params.threads, params.runtime, params.precision)
+        found.warm_up()
+        return found
 
     def _change(self, params: ReconstructorParameters) -> Commit | None:
         """Return a function that applies a change of parameters."""
@@ -207,7 +221,7 @@ class ReconstructorNode(ManagedNode):
             view.stamp, view.camera.pose, reconstruction, image if is_cleared else None)
         self._products.add_view(view.stamp, image, camera, reconstruction)
         self._warnings.check_quality(reconstruction.quality)
-        if self._background.how in ('color', 'reference'):
+        if self._background.how in ('segment', 'color', 'reference'):
             self._warnings.check_background(image)  # last: nothing waits for it
 
     def _tell_view_count(self, at_once: bool = True) -> None:
@@ -221,7 +235,10 @@ class ReconstructorNode(ManagedNode):
                   if is_compressed(view.image_msg) else 1)
             return *view.reduced(by), False
         mask = None if view.mask is None else mask_from_msg(view.mask)
-        image = self._background.cleared(view.image, mask, self._capture.reference)
+        segmented = None if self._segmentation is None else partial(
+            self._segmentation.on_white, camera=view.camera,
+            object_size=self._reconstructor.object_size)
+        image = self._background.cleared(view.image, mask, self._capture.reference, segmented)
         return image, view.camera, True
 
     def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

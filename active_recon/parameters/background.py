@@ -16,9 +16,12 @@ class BackgroundParameters:
     """Parameters of a node that removes the background."""
 
     background: str = parameter(
-        'as_is', 'which pixels become white: none (as_is), those outside camera/mask, those that '
-        'equal the image of capture_background, or those of background_color',
+        'as_is', 'which pixels become white: none (as_is), those that are not the object to a '
+        'learned segmenter (segment), those outside camera/mask, those that equal the image of '
+        'capture_background, or those of background_color',
         choices=BACKGROUNDS)
+    segmenter: str = parameter(
+        '', 'weights file of the segmenter (.safetensors); empty: the one that ships')
     background_color: tuple[int, ...] = parameter(
         GREEN_SCREEN, 'RGB color of the background', low=0, high=255, dynamic=True)
     background_tolerance: float = parameter(

@@ -9,17 +9,19 @@ from active_recon.geometry.cameras import Camera
 from active_recon.geometry.framing import cube_corners
 from active_recon.photos.matting import rembg_mask
 from active_recon.photos.views import PhotoView
+from active_recon.segmentation import shipped_segmentation
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-BACKGROUNDS = ('auto', 'plain', 'network', 'grabcut', 'rembg')
+BACKGROUNDS = ('auto', 'plain', 'network', 'segment', 'grabcut', 'rembg')
 """
 `auto`: the object on white by its mask from a file or alpha channel; without one as `network`,
-and where the background is plain, cells that only show it are cut off. `plain`: on white by the
-colour of a plain background. `network`: the photo as it is, of which the network finds the
-silhouette itself. `grabcut`: on white by GrabCut, begun from the projected cube. `rembg`: on
-white by the package of that name.
+and where the background is plain, cells that only show it are cut off; where no photo has a mask
+or a plain background, as `segment`. `plain`: on white by the colour of a plain background.
+`network`: the photo as it is, of which the network finds the silhouette itself. `segment`: on
+white by the segmenter that ships and by what all photos agree on. `grabcut`: on white by GrabCut,
+begun from the projected cube. `rembg`: on white by the package of that name.
 """
 _FRAME = 0.0125  # width of the photo's edge that is looked at, relative to its longer side
 _PLAIN_SHARE = 0.75  # of the edge: the object may reach over the rest
@@ -82,13 +84,17 @@ def shown_image(view: PhotoView, camera: Camera, size: float, background: str
     Return the photo as the network is shown it, (H, W, 3) uint8 RGB, and what removed its back.
 
     `camera` is the view's in the object frame, `size` the side of the cube there. The second is
-    'masks', 'alpha', 'board', 'plain', 'rembg', 'grabcut', or 'network' where nothing was removed,
-    'network and plain' where what only shows a plain background will be cut off.
+    'masks', 'alpha', 'board', 'plain', 'rembg', 'segmenter', 'grabcut', or 'network' where nothing
+    was removed, 'network and plain' where what only shows a plain background will be cut off.
     """
     if view.mask_source == 'plain' and background == 'auto':
         return view.image, 'network and plain'
     if view.mask is not None:
         return on_white(view.image, view.mask), view.mask_source
+    if view.mask_source == 'segmenter':  # on white since all photos were looked at
+        return view.image, 'segmenter'
+    if background == 'segment':
+        return shipped_segmentation().on_white(view.image, camera, size), 'segmenter'
     if background == 'grabcut':
         found = grabcut(view.image, camera, size)
         if found is not None:
@@ -142,8 +148,8 @@ def named(sources: Sequence[str]) -> str:
     """Return in words where the silhouettes of all photos are from."""
     words = {'masks': 'masks from files', 'alpha': 'alpha channels',
              'board': 'what covers the printed board',
-             'plain': "the plain background's colour", 'grabcut': 'GrabCut',
-             'rembg': "rembg's masks",
+             'plain': "the plain background's colour", 'segmenter': 'the segmenter',
+             'grabcut': 'GrabCut', 'rembg': "rembg's masks",
              'network and plain': "the network's own silhouettes, cut by a plain background's "
              'colour', 'network': "the network's own silhouettes"}
     counts = {source: sources.count(source) for source in words if source in sources}

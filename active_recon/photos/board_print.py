@@ -5,6 +5,7 @@ from functools import lru_cache
 
 from active_recon.calibration.board import Board
 from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.photos.seen_photo import SeenPhoto
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -29,22 +30,16 @@ _WHITE = 200.0
 
 
 @dataclass(frozen=True, eq=False)
-class SeenBoard:
+class SeenBoard(SeenPhoto):
     """
     A photo of a board, reduced to the size at which it is searched.
 
-    - camera: of this size, in the board's world, whose z = 0 is the printed face and z points up
-    - image: (H, W, 3) float32 in [0, 255]; even: the same in the light of the other photos, the
-      paper at one grey level in all of them
-    - known: (H, W) bool, where the board is; expected: (H, W, 3), the board there, in this light
+    - camera: in the board's world, whose z = 0 is the printed face and z points up
+    - even: with the paper at one grey level in all photos
+    - known: where the board is; expected: the board there
     - fit: (H, W) log density of the pixel's colour if the board is seen there, 0 elsewhere
     """
 
-    camera: Camera
-    image: NDArray[np.float32]
-    even: NDArray[np.float32]
-    known: NDArray[np.bool_]
-    expected: NDArray[np.float32]
     fit: NDArray[np.float32]
 
 

@@ -14,11 +14,13 @@ from active_recon.photos.cube import Cube, first_cube, upward
 from active_recon.photos.doubts import doubts
 from active_recon.photos.files import in_order_of, open_photos, photo_paths
 from active_recon.photos.integrating import carved, even_choice, found_cube, integrate
+from active_recon.photos.segmented_views import segmented_views
 from active_recon.photos.shape import Shape, TakenView
 from active_recon.photos.sources import posed_by, Source
 from active_recon.photos.views import load_views, PhotoView, view_of
 from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
+from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.meshes import axis_direction
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
@@ -147,6 +149,12 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
             cube = found_cube(views, first_cube(poses, up), reconstructor, options.background,
                               file.board is not None)
             advance(1, '')
+    if options.background == 'segment' or (
+            options.background == 'auto' and all(view.mask is None for view in views)):
+        views, unfound = segmented_views(views, cube, shipped_segmentation())
+        empty = [*empty, *unfound]
+        if not views:
+            raise DataError(f'object not found: {empty[0]}', 'no_object')
     if options.size and file.metric and options.box is None:
         cube = cube.of_side(options.size, file.board is not None)
     size = options.size or cube.side * options.unit

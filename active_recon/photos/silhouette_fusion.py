@@ -1,15 +1,15 @@
 """
-Silhouettes in photos of a board, found together with the cells that they agree on.
+Silhouettes in photos, found together with the cells that they agree on.
 
 Each pixel is the object's or not by three witnesses: whether the board agrees with its place, if
-that is known; its colour, beside those of the object over the board and of what lies far from
-it; and the other photos, in which a cell along its ray has to be the object too. Franco and Boyer,
+that is known, or what a segmenter says; its colour, beside those of the object and of the rest;
+and the other photos, in which a cell along its ray has to be the object too. Franco and Boyer,
 "Fusion of multi-view silhouette cues using a space occupancy grid", ICCV 2005. Neighbours without
 an edge between them are alike: Grady, "Multilabel random walker image segmentation using prior
 models", CVPR 2005.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 
@@ -17,6 +17,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.geometry.framing import cube_corners
 from active_recon.photos.board_print import SeenBoard, UNIFORM
 from active_recon.photos.cube import Cube
+from active_recon.photos.seen_photo import SeenPhoto
 from active_recon.volumes.voxels import cell_centers
 import cv2
 import numpy as np
@@ -31,6 +32,7 @@ _ROUNDS = 3
 _MOST = 4.0  # log odds of a pixel by its own witnesses
 _SURE = 2.0
 _EXCLUDED = -6.0
+_LEAST_SHARE = 0.01  # a segmenter is never surer
 _SEEN, _ELSEWHERE = 0.95, 0.7  # how often a cell shows object: where it is one, where it is none
 _BEYOND = 0.3  # weight of a photo for a cell that it shows beyond the board
 _OTHER_COLORS = 0.3
@@ -38,6 +40,7 @@ _EDGE = 18.0  # difference of neighbours, grey levels
 _TIES = 3.0  # of neighbours without an edge, relative to a pixel's own witnesses
 _FEWEST = 500  # pixels that tell the colours of the rest
 _LEAST_COVERED = 0.005  # of the board in all photos; less is dust and noise
+_SEGMENTED_SHARE = 0.6  # of the photos that have to show a cell as the object
 Logits = NDArray[np.float64]
 
 
@@ -70,7 +73,6 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
     """
     above = cube.above_ground(CELLS).ravel()
     places = [_place(cube.camera(photo.camera, 1.0), above) for photo in photos]
-    doubt = -least_share * len(photos) * np.log(_SEEN / _ELSEWHERE)
     sure = [place.outline & (photo.known & (UNIFORM - photo.fit > _SURE))
             for photo, place in zip(photos, places, strict=True)]
     outside = [~photo.known & ~place.outline for photo, place in zip(photos, places, strict=True)]
@@ -80,7 +82,47 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
             int(photo.known.sum()) for photo in photos):
         return ([np.zeros(photo.known.shape, np.float32) for photo in photos],
                 np.zeros((CELLS,) * 3, np.bool_))
-    own = _by_color(photos, sure, outside)
+
+    def by_board(found: Sequence[NDArray[np.float32]]) -> list[Logits]:
+        return _by_color(photos, [share > 0.7 for share in found],
+                         [~photo.known & (share < 0.3)
+                          for photo, share in zip(photos, found, strict=True)])
+
+    found, total = _agreed(photos, places, _by_color(photos, sure, outside), by_board, least_share)
+    return found, ((total > 0) & above).reshape((CELLS,) * 3)
+
+
+def segmented_silhouettes(photos: Sequence[SeenPhoto],
+                          shares: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
+    """
+    Return the object's share in each pixel, (H, W) in [0, 1] each, by those of a segmenter.
+
+    The cameras are in the object frame, lengths in sides of the cube.
+    """
+    everywhere = np.full(CELLS ** 3, True)
+    places = [_place(photo.camera, everywhere) for photo in photos]
+    sure = [share.clip(_LEAST_SHARE, 1 - _LEAST_SHARE) for share in shares]
+    logits = [np.log(share / (1 - share)) for share in sure]
+
+    def by_both(found: Sequence[NDArray[np.float32]]) -> list[Logits]:
+        of_object, of_rest = (_colors(photos, parts) for parts in (
+            [share > 0.7 for share in found], [share < 0.3 for share in found]))
+        return [np.clip(logit + np.clip(_density(of_object, photo.even)
+                                        - _density(of_rest, photo.even), -_MOST, _MOST),
+                        -_MOST, _MOST) for photo, logit in zip(photos, logits, strict=True)]
+
+    return _agreed(photos, places, by_both(shares), by_both, _SEGMENTED_SHARE)[0]
+
+
+def _agreed(photos: Sequence[SeenPhoto], places: Sequence['_Place'], own: list[Logits],
+            own_by: Callable[[Sequence[NDArray[np.float32]]], list[Logits]], least_share: float
+            ) -> tuple[list[NDArray[np.float32]], Logits]:
+    """
+    Return the shares, (H, W) each, that photos and cells agree on, and the cells' log odds (S^3,).
+
+    `own` are the log odds of pixels by their photo alone, and `own_by` those by shares found.
+    """
+    doubt = -least_share * len(photos) * np.log(_SEEN / _ELSEWHERE)
     others: list[Logits] = [np.zeros(photo.known.shape) for photo in photos]
     for _ in range(_ROUNDS):
         found = [_smooth(photo, np.where(place.outline, mine + theirs, _EXCLUDED), place.box)
@@ -90,10 +132,8 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
         total = np.sum(votes, axis=0) + doubt
         others = [_along_rays(total - mine, place, photo.known.shape)
                   for photo, place, mine in zip(photos, places, votes, strict=True)]
-        own = _by_color(photos, [share > 0.7 for share in found],
-                        [~photo.known & (share < 0.3)
-                         for photo, share in zip(photos, found, strict=True)])
-    return found, ((total > 0) & above).reshape((CELLS,) * 3)
+        own = own_by(found)
+    return found, total
 
 
 def _place(camera: Camera, above: NDArray[np.bool_]) -> _Place:
@@ -128,7 +168,7 @@ def _by_color(photos: Sequence[SeenBoard], inside: Sequence[NDArray[np.bool_]],
                     -_MOST, _MOST) for photo in photos]
 
 
-def _colors(photos: Sequence[SeenBoard], parts: Sequence[NDArray[np.bool_]]
+def _colors(photos: Sequence[SeenPhoto], parts: Sequence[NDArray[np.bool_]]
             ) -> NDArray[np.float64]:
     """Return how often each colour is in parts of photos, (16, 16, 16), sum 1; 0 if empty."""
     counts = np.zeros(_BINS ** 3)
@@ -148,7 +188,7 @@ def _bins(colors: NDArray[np.float32]) -> NDArray[np.intp]:
     return np.asarray((levels[..., 0] * _BINS + levels[..., 1]) * _BINS + levels[..., 2])
 
 
-def _votes(photo: SeenBoard, place: _Place, share: NDArray[np.float32]) -> Logits:
+def _votes(photo: SeenPhoto, place: _Place, share: NDArray[np.float32]) -> Logits:
     """Return the log odds by one photo that the object touches cells, (S^3,)."""
     shown = cv2.dilate(share, place.touched)[place.down, place.across]
     odds = np.log((_SEEN * shown + (1 - _SEEN) * (1 - shown))
@@ -165,7 +205,7 @@ def _along_rays(odds: Logits, place: _Place, shape: tuple[int, ...]) -> Logits:
     return np.asarray(cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, place.closed), np.float64)
 
 
-def _smooth(photo: SeenBoard, logits: Logits, box: tuple[slice, slice]) -> NDArray[np.float32]:
+def _smooth(photo: SeenPhoto, logits: Logits, box: tuple[slice, slice]) -> NDArray[np.float32]:
     """
     Return the object's share in each pixel, (H, W), alike in neighbours; 0 outside of a box.
 

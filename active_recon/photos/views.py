@@ -24,7 +24,8 @@ class PhotoView:
     A photo and its camera.
 
     - image: (H, W, 3) uint8 RGB; mask: (H, W) bool, true on the object, or None
-    - mask_source: 'masks' (files), 'alpha', or '' without a mask
+    - mask_source: 'masks' (files), 'alpha', or '' without a mask; 'segmenter' where the image is
+      on white by one
     - camera: pose world from optical frame, in the units of the camera file
     - depth: (H, W) metres along the optical axis, 0 where there is no value, or None;
       depth_refusal: why there is none although there is a file, else ''

@@ -7,11 +7,13 @@ from typing import Any, Protocol, TYPE_CHECKING
 
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.geometry.cameras import Camera
+from active_recon.models.weights_files import SEGMENTER
 from active_recon.runtimes.graph_files import (
     DEPTH_PART,
     is_exported,
     NETWORK_PARTS,
     POLICY_PART,
+    SEGMENT_PART,
 )
 from active_recon.runtimes.precision import require_precision
 import numpy as np
@@ -26,8 +28,8 @@ State = Mapping[str, NDArray[np.float32]]
 RUNTIMES: Mapping[str, str] = {
     name: f'active_recon.runtimes.{name}' for name in ('openvino', 'torch', 'onnxruntime')}
 """
-The module of each runtime, which offers `load_network`, `load_policy` and `load_depth`; imported
-when asked for.
+The module of each runtime, which offers `load_network`, `load_policy`, `load_depth` and
+`load_segmenter`; imported when asked for.
 """
 AUTO = 'auto'
 RUNTIME_CHOICES = (AUTO, *RUNTIMES)
@@ -118,6 +120,26 @@ class DepthRuntime(Protocol):
         ...
 
 
+class SegmenterRuntime(Protocol):
+    """
+    Finds the object in an image around its cube.
+
+    - provenance: what diagnostics tell of it
+    """
+
+    @property
+    def provenance(self) -> Mapping[str, str]: ...
+
+    def segment(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """
+        Return how likely each pixel is the object's, (S, S) in [0, 1].
+
+        Takes (S, S, 3 or 4) uint8 RGB of 128 pixels a side; the fourth channel is 255 where the
+        camera saw the pixel.
+        """
+        ...
+
+
 def load_runtime(weights: Path | None = None, runtime: str = AUTO, device: str = 'cpu',
                  threads: int | None = None, precision: str = 'auto') -> Runtime:
     """
@@ -147,6 +169,15 @@ def load_depth_runtime(weights: Path | None = None, runtime: str = AUTO, device:
     """Return a runtime of the depth refiner beside a weights file; see `load_runtime`."""
     loaded: DepthRuntime = _loaded('load_depth', (DEPTH_PART,), weights, runtime, device, threads,
                                    precision)
+    return loaded
+
+
+def load_segmenter_runtime(weights: Path | None = None, runtime: str = AUTO, device: str = 'cpu',
+                           threads: int | None = None, precision: str = 'auto'
+                           ) -> SegmenterRuntime:
+    """Return a runtime of a segmenter; None: of the one that ships. See `load_runtime`."""
+    loaded: SegmenterRuntime = _loaded('load_segmenter', (SEGMENT_PART,), weights or SEGMENTER,
+                                       runtime, device, threads, precision)
     return loaded
 
 

@@ -21,6 +21,7 @@ from active_recon.runtimes.graph_files import (
     POLICY_PART,
     read_graph_metadata,
     require_shapes,
+    SEGMENT_PART,
 )
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +84,7 @@ class ExportedRuntime:
         """Return the next state after an image."""
         seen_from = {'pose': camera.pose[None].astype(np.float32),
                      'intrinsics': camera.intrinsics.matrix[None].astype(np.float32)}
-        planes = image.transpose(2, 0, 1)[None] * np.float32(1 / 255)
-        return self.update(self.encode(planes, seen_from), seen_from, state)
+        return self.update(self.encode(planes_of(image), seen_from), seen_from, state)
 
     def encode(self, planes: NDArray[np.float32], seen_from: Arrays) -> NDArray[np.float32]:
         """
@@ -148,6 +148,27 @@ class ExportedDepthRuntime:
         return refined
 
 
+class ExportedSegmenterRuntime:
+    """A segmenter in a graph; see SegmenterRuntime."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self.provenance: Mapping[str, str] = {}
+
+    def segment(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return how likely each pixel is the object's; see SegmenterRuntime."""
+        found = self._graph.run({'image': planes_of(image, 4)})['object']
+        return np.asarray(found[0, 0])
+
+
+def planes_of(image: NDArray[np.uint8], channels: int | None = None) -> NDArray[np.float32]:
+    """Return an image as (1, C, S, S) in [0, 1]; a mask of pixels seen that is missing is 1."""
+    planes = image.transpose(2, 0, 1)[None] * np.float32(1 / 255)
+    if channels is not None and planes.shape[1] < channels:
+        planes = np.pad(planes, ((0, 0), (0, 1), (0, 0), (0, 0)), constant_values=1)
+    return planes
+
+
 def first_state(described: Mapping[str, tuple[Sequence[int], float]], batch: int) -> State:
     """Return the state before any view of so many objects."""
     return {name: np.full((batch, *shape), value, np.float32)
@@ -204,6 +225,12 @@ def open_depth(weights: Path | None, open_graph: OpenGraph) -> ExportedDepthRunt
                            f'refiner: expected that of {beside.name}, trained since; export the '
                            'weights anew')
     return ExportedDepthRuntime(graph)
+
+
+def open_segmenter(weights: Path, open_graph: OpenGraph) -> ExportedSegmenterRuntime:
+    """Return the segmenter that was exported beside its weights. Raises WeightsError."""
+    graph, _ = _opened(weights, SEGMENT_PART, weights_hash(weights), open_graph, True)
+    return ExportedSegmenterRuntime(graph)
 
 
 def _opened(weights: Path, part: str, digest: str, open_graph: OpenGraph,

@@ -15,6 +15,8 @@ KEY = 'active_recon'
 NEXT = 'next_'
 """What the name of a part of the state begins with where it is an output."""
 NETWORK_PARTS, POLICY_PART, DEPTH_PART = ('encode', 'update', 'decode'), 'policy', 'depth'
+SEGMENT_PART = 'segment'
+"""The segmenter, which goes with no other weights than its own."""
 DECODE_PART, INT8_PART = 'decode', 'decode-int8'
 """The decoder, and what takes its place in the precision int8."""
 
@@ -24,7 +26,7 @@ class GraphMetadata:
     """
     What an exported file says of itself.
 
-    - part: one of NETWORK_PARTS, INT8_PART, POLICY_PART or DEPTH_PART
+    - part: one of NETWORK_PARTS, INT8_PART, POLICY_PART, DEPTH_PART or SEGMENT_PART
     - weights_sha256: of the weights file whose network it is, or with which the part goes
     - state: the shape of each named array, without the axis of objects, and the value that all of
       it has before the first view

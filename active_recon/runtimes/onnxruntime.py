@@ -9,9 +9,11 @@ from active_recon.runtimes.exported import (
     ExportedDepthRuntime,
     ExportedPolicyRuntime,
     ExportedRuntime,
+    ExportedSegmenterRuntime,
     open_depth,
     open_network,
     open_policy,
+    open_segmenter,
 )
 from active_recon.runtimes.graph_files import KEY
 from active_recon.runtimes.precision import require_f32
@@ -63,6 +65,15 @@ def load_depth(weights: Path | None, device: str, threads: int | None,
     """Return the depth refiner that was exported beside weights; see `load_depth_runtime`."""
     opener = _Opener(device, threads, 'f32')
     loaded = open_depth(weights, opener)
+    loaded.provenance = {'computed_by': opener.told()}
+    return loaded
+
+
+def load_segmenter(weights: Path, device: str, threads: int | None,
+                   precision: str) -> ExportedSegmenterRuntime:
+    """Return the exported segmenter; see `load_segmenter_runtime`."""
+    opener = _Opener(device, threads, precision)
+    loaded = open_segmenter(weights, opener)
     loaded.provenance = {'computed_by': opener.told()}
     return loaded
 

@@ -15,9 +15,11 @@ from active_recon.runtimes.exported import (
     ExportedDepthRuntime,
     ExportedPolicyRuntime,
     ExportedRuntime,
+    ExportedSegmenterRuntime,
     open_depth,
     open_network,
     open_policy,
+    open_segmenter,
 )
 from active_recon.runtimes.graph_files import KEY
 from active_recon.runtimes.precision import chosen_precision, has_bf16, INT8
@@ -91,6 +93,16 @@ def load_depth(weights: Path | None, device: str, threads: int | None,
     chosen_precision(precision, device)
     opener = _Opener(threads, 'f32')
     loaded = open_depth(weights, opener)
+    loaded.provenance = opener.provenance
+    return loaded
+
+
+def load_segmenter(weights: Path, device: str, threads: int | None,
+                   precision: str) -> ExportedSegmenterRuntime:
+    """Return the exported segmenter; see `load_segmenter_runtime`."""
+    chosen = chosen_precision(precision, device)
+    opener = _Opener(threads, 'bf16' if chosen == INT8 and has_bf16() else chosen)
+    loaded = open_segmenter(weights, opener)
     loaded.provenance = opener.provenance
     return loaded
 

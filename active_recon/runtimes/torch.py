@@ -13,6 +13,8 @@ from active_recon.models.depth_weights import load_refiner
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.models.registry import network_entry
 from active_recon.models.scorer_weights import load_scorer
+from active_recon.models.segmenter import Segmenter
+from active_recon.models.segmenter_weights import read_segmenter
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import config_hash, read_metadata, SHIPPED, weights_hash
 from active_recon.runtimes.base import State
@@ -106,6 +108,23 @@ class TorchDepthRuntime:
             return refined
 
 
+class TorchSegmenterRuntime:
+    """A segmenter in torch; see SegmenterRuntime."""
+
+    def __init__(self, segmenter: Segmenter, threads: int | None = None) -> None:
+        self._segmenter, self._threads = segmenter.eval(), threads
+        self._device = next(segmenter.parameters()).device
+        self.provenance: Mapping[str, str] = _provenance(self._device, threads)
+
+    @torch.inference_mode()
+    def segment(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return how likely each pixel is the object's; see SegmenterRuntime."""
+        with _computing_with(self._threads):
+            batch = torch.from_numpy(image).to(self._device).permute(2, 0, 1)[None].float() / 255
+            found: NDArray[np.float32] = self._segmenter(batch)[0, 0].sigmoid().cpu().numpy()
+            return found
+
+
 def load_network(weights: Path | None, device: str, threads: int | None,
                  precision: str) -> TorchRuntime:
     """Return the network of a weights file; see `load_runtime`."""
@@ -133,6 +152,13 @@ def load_depth(weights: Path | None, device: str, threads: int | None,
     """Return the depth refiner beside a weights file; raises WeightsError without one."""
     _require(device, 'f32')  # whatever the network's
     return TorchDepthRuntime(load_refiner(weights, device), threads)
+
+
+def load_segmenter(weights: Path, device: str, threads: int | None,
+                   precision: str) -> TorchSegmenterRuntime:
+    """Return the segmenter in a file; see `load_segmenter_runtime`."""
+    _require(device, 'f32')  # whatever the network's
+    return TorchSegmenterRuntime(read_segmenter(weights, device), threads)
 
 
 def _require(device: str, precision: str) -> None:

@@ -1,5 +1,7 @@
 """Augmentation of posed views: backgrounds, tables, light, noise, cropped images, pose errors."""
 
+from collections.abc import Mapping
+
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.network import Cameras
 from active_recon.training import augmentation
@@ -21,18 +23,18 @@ _NOISE, _DARKEST, _BRIGHTEST = 0.03, 0.6, 2.2
 
 
 def augment_posed(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, views: ViewSet,
-                  rng: np.random.Generator) -> Tensor:
+                  rng: np.random.Generator, shares: Mapping[str, float] = SHARES) -> Tensor:
     """
     Return augmented images (T, B, 4, S, S) in [0, 1] of premultiplied ones (T, B, S, S, 4) uint8.
 
     Some objects, of voxels (B, R, R, R), stand on a table. The fourth channel is 1 where the
-    image has the pixel: `seen` (T, B, S, S) bool, less what is cropped from some views. `rng` is
-    the only source of randomness.
+    image has the pixel: `seen` (T, B, S, S) bool, less what is cropped from some views. `shares`
+    are those of the kinds of backgrounds. `rng` is the only source of randomness.
     """
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
     planes[:, :, :3] = augmentation.jitter_colors(planes, rng)
-    kinds = augmentation.draw_kinds(SHARES, size, rng)
+    kinds = augmentation.draw_kinds(shares, size, rng)
     behind = augmentation.draw_backgrounds(kinds, BACKGROUNDS, views, length, rng)
     on_table = torch.from_numpy(np.flatnonzero(rng.random(size) < _TABLE_SHARE))
     if len(on_table):

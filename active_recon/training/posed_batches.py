@@ -1,11 +1,12 @@
 """Random sequences of posed views for training: any cameras, and a frame at any yaw."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.network import Cameras
 from active_recon.training.batches import mirror_some
-from active_recon.training.posed_augmentation import augment_posed, perturb_poses
+from active_recon.training.posed_augmentation import augment_posed, perturb_poses, SHARES
 import numpy as np
 import torch
 from torch import Tensor
@@ -32,11 +33,12 @@ class PosedBatch:
 
 
 def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
-                     augment: bool = True) -> PosedBatch:
+                     augment: bool = True, shares: Mapping[str, float] = SHARES) -> PosedBatch:
     """
     Draw objects with different random views of each, turned by quarters and mirrored at random.
 
-    With `augment` the images get backgrounds, light and noise, and the poses small errors.
+    With `augment` the images get backgrounds, of kinds in these shares, light and noise, and the
+    poses small errors.
     """
     objects = torch.from_numpy(rng.integers(len(views), size=size))
     order = rng.random((size, views.images.shape[1])).argsort(axis=1)
@@ -59,7 +61,7 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
         voxels[row] = turned_by_quarters(voxels[row], int(quarter))
     alpha = images[..., 3].float() / 255
     if augment:
-        return PosedBatch(augment_posed(images, seen, cameras, voxels, views, rng),
+        return PosedBatch(augment_posed(images, seen, cameras, voxels, views, rng, shares),
                           perturb_poses(cameras, rng), alpha,
                           voxels, objects, depths)
     planes = images.permute(0, 1, 4, 2, 3).float() / 255

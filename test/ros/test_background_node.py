@@ -2,7 +2,11 @@
 
 from active_recon.acquisition.background import off_color, off_reference, on_white
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.objects import find_object
 from active_recon.reconstructor import Reconstructor
+from active_recon.segmentation import Segmentation
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import camera_to_msgs
@@ -21,6 +25,8 @@ pytestmark = pytest.mark.ros
 CAMERA = orbit_camera(0.5)
 SIDE = CANONICAL_INTRINSICS.width
 RNG = np.random.default_rng(0)
+CLUTTER = np.kron(RNG.integers(0, 256, (SIDE // 8 + 1,) * 2 + (3,), np.uint8),
+                  np.ones((8, 8, 1), np.uint8))[:SIDE, :SIDE]
 WALL = (20, 60, 160)
 EMPTY = np.full((SIDE, SIDE, 3), WALL, np.uint8)
 OBJECT = np.zeros((SIDE, SIDE), np.bool_)
@@ -124,6 +130,18 @@ def test_an_image_of_the_empty_scene_is_asked_for_kept_over_episodes_and_forgott
         assert supervisor.set(transition)
     room = Room(bench)
     room.until(lambda: refused(bench, 'no_reference')() > before, SHOWN)
+
+
+def test_what_the_segmenter_calls_background_becomes_white(bench, start_node):
+    node = start(start_node, background='segment')
+    room = Room(bench)
+    shown = composite(Renderer(load_mesh(find_object('chair'))).render(CAMERA), CLUTTER)
+    expected = Segmentation.load(threads=1).on_white(shown, CAMERA)
+    np.testing.assert_array_equal(room.take(shown), expected)
+    assert (expected[0, 0] == 255).all() and 0.02 < (expected < 200).any(axis=2).mean() < 0.5
+    told = bench.until(lambda: bench.state('reconstructor').facts.get('Segmenter'), 'its library')
+    assert 'openvino' in told or 'torch' in told
+    assert not node.log('in pieces')
 
 
 def test_what_is_of_the_background_s_color_becomes_white_also_where_it_cuts_the_object(

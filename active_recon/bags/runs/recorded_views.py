@@ -156,7 +156,7 @@ def _view(view: View, goal: RecordedGoal | None, stream: CameraStream,
 
     image = part('view_image')  # with the background removed, as the network saw it
     if image is None:
-        image = scene.cleared(view.image)
+        image = scene.cleared(view.image, view.camera)
     whole = image is view.image
     return RecordedView(view.stamp, image, view.camera,
                         part('probabilities'), part('occupancy'), part('latent'), part('entropy'),

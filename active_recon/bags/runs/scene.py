@@ -2,13 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 import math
 from pathlib import Path
 
 from active_recon.acquisition.background import Background
 from active_recon.errors import ConfigError
-from active_recon.geometry.cameras import CANONICAL_DISTANCE, CANONICAL_ELEVATION, orbit_camera
+from active_recon.geometry.cameras import (
+    Camera,
+    CANONICAL_DISTANCE,
+    CANONICAL_ELEVATION,
+    orbit_camera,
+)
 from active_recon.geometry.turntable_pose import FixedCamera
+from active_recon.segmentation import shipped_segmentation
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -93,9 +100,11 @@ class Scene:
                                f'(--elevation-deg{"" if has_poses else " or --camera-position"})')
         return assumptions
 
-    def cleared(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return an image with its background removed as set up; raises ViewError."""
-        return self.background.cleared(image, reference=self.empty_scene)
+    def cleared(self, image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
+        """Return a camera's image with its background removed as set up; raises ViewError."""
+        segmented = None if self.background.how != 'segment' else partial(
+            shipped_segmentation().on_white, camera=camera, object_size=self.size)
+        return self.background.cleared(image, None, self.empty_scene, segmented)
 
     def _fixed_camera(self, turned_object: bool) -> FixedCamera:
         position = np.asarray(self.camera_position, np.float64)
@@ -113,17 +122,17 @@ def parse_background(option: str) -> tuple[Background, NDArray[np.uint8] | None]
     """
     Return how the background is removed, and the image of the empty scene if there is one.
 
-    `option` is a colour, red,green,blue, or the path of such an image; '' keeps the background.
-    Raises ConfigError if it is neither.
+    `option` is `segment`, a colour, red,green,blue, or the path of such an image; '' keeps the
+    background. Raises ConfigError if it is neither.
     """
-    if not option:
-        return Background(), None
+    if option in ('', 'segment'):
+        return Background(option or 'as_is'), None
     channels = option.split(',')
     if all(channel.strip().isdecimal() for channel in channels):
         return Background('color', tuple(map(int, channels))), None
     if not Path(option).is_file():
-        raise ConfigError(f'--background: {option} is neither a colour, such as 0,177,64, nor a '
-                          'file with an image of the empty scene')
+        raise ConfigError(f'--background: {option} is neither segment, nor a colour, such as '
+                          '0,177,64, nor a file with an image of the empty scene')
     image = cv2.imread(option, cv2.IMREAD_COLOR)
     if image is None:
         raise ConfigError(f'--background: {option} is no readable image')

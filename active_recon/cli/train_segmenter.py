@@ -1,0 +1,102 @@
+"""`active-recon train-segmenter`: what of an image is the object, before any background."""
+
+from pathlib import Path
+from typing import Annotated
+
+from active_recon.cli.command_line import command_line
+from active_recon.cli.progress import progress_bar
+from active_recon.cli.reading import read_objects
+from active_recon.errors import ConfigError
+import typer
+
+
+def train_segmenter(
+    data: Annotated[list[Path], typer.Argument(
+        help="Folders of training objects in R2N2's layout (see `active-recon dataset build "
+             '--cameras any`).')],
+    validation: Annotated[Path, typer.Option(
+        help='Folder of other objects, on whose silhouettes the result is measured.')],
+    out: Annotated[Path, typer.Option(
+        help='Folder of the checkpoint, and of the weights at the end.')] = Path('runs/segmenter'),
+    init_from: Annotated[str, typer.Option(
+        help='A segmenter to begin with, or a lifting network, of whose encoder it takes the way '
+             "down. '': fresh weights.")] = 'lifting',
+    steps: Annotated[int, typer.Option(min=1, help='Steps.')] = 4000,
+    batch_size: Annotated[int, typer.Option(
+        min=1, help='Objects of a step, of two images each.')] = 16,
+    learning_rate: Annotated[float, typer.Option(help='Peak learning rate.')] = 2e-3,
+    warmup_steps: Annotated[int, typer.Option(
+        min=1, help='Steps over which the learning rate rises to its peak.')] = 100,
+    checkpoint_every: Annotated[int, typer.Option(
+        min=1, help='Steps between two checkpoints.')] = 100,
+    seed: Annotated[int, typer.Option(help='Seed of the weights and of the batches.')] = 0,
+    bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
+    devices: Annotated[int, typer.Option(
+        min=1, help='Processes that share the batches.')] = 1,
+    threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
+    resume: Annotated[bool, typer.Option(
+        help='Continue from the checkpoint in the run folder.')] = False,
+) -> None:
+    """
+    Train what finds the object in an image, before any background.
+
+    It serves every network: the nodes and `reconstruct` put the object on white by it with
+    `background: segment`. Writes OUT/segmenter.safetensors and its card.
+
+    For example:
+
+      active-recon train-segmenter data/train things/train --validation data/val
+    """
+    from active_recon.geometry.canonical import NetworkSpec
+    from active_recon.models.lifting_encoder import IMAGE_SIZE
+    from active_recon.models.segmenter import Segmenter, SegmenterConfig
+    from active_recon.models.segmenter_weights import begin_with, save_segmenter
+    from active_recon.models.weights_files import find_weights
+    from active_recon.reporting import by_step
+    from active_recon.training.loop import make_fabric, Run, TrainingConfig, TrainingStoppedError
+    from active_recon.training.segmenter import train_segmenter
+    from active_recon.training.silhouettes import silhouette_figures
+    from active_recon.volumes.voxels import FINE_RESOLUTION
+    import torch
+
+    checkpoint = out / 'checkpoint.safetensors'
+    if checkpoint.exists() and not resume:
+        raise ConfigError(f'{out}: holds another training ({checkpoint.name}); continue it with '
+                          '--resume, or name another folder with --out')
+    torch.set_num_threads(threads)
+    torch.manual_seed(seed)
+    training = TrainingConfig(steps, batch_size, learning_rate, 1, seed, bf16, True, 0,
+                              warmup_steps, checkpoint_every, validate_every=steps)
+    fabric = make_fabric(bf16, devices)
+    fabric.launch()
+    spec = NetworkSpec(IMAGE_SIZE, FINE_RESOLUTION, needs_front=False)
+    views = read_objects(data, 'training data', spec, at_once=False)
+    held_out = read_objects([validation], 'validation data', spec, at_once=False)
+    config = SegmenterConfig()
+    segmenter = Segmenter.from_config(config)
+    if init_from:
+        begin_with(segmenter, find_weights(init_from))
+    try:
+        with progress_bar('segmenter', steps) as advance:
+            reached = by_step(advance)
+
+            def report(step: int, measured: dict[str, float]) -> None:
+                reached(step, '  '.join(f'{name} {value:.4f}'
+                                        for name, value in measured.items()))
+
+            train_segmenter(segmenter, views, training, Run(fabric, checkpoint, report, resume))
+    except TrainingStoppedError as stopped:
+        typer.echo(str(stopped))
+        raise typer.Exit(130) from None
+    if not fabric.is_global_zero:
+        return
+    figures = silhouette_figures(segmenter.eval(), held_out)
+    typer.echo('IoU of silhouettes on validation: '
+               + ', '.join(f'{kind} {value:.3f}' for kind, value in figures.items()))
+    written = out / 'segmenter.safetensors'
+    save_segmenter(written, segmenter, config, {
+        'command': command_line(), 'training': training.to_dict(),
+        'data': {str(folder): sum(each.root == folder for each in views.folders)
+                 for folder in data},
+        'validation': figures})
+    typer.echo(f'wrote {written}')

@@ -1,0 +1,54 @@
+"""Photos on white by the segmenter, and by what all photos agree on."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from active_recon.errors import ViewError
+from active_recon.geometry.resampling import carried_back
+from active_recon.photos.cube import Cube
+from active_recon.photos.seen_photo import SeenPhoto
+from active_recon.photos.silhouette_fusion import segmented_silhouettes
+from active_recon.photos.views import PhotoView
+from active_recon.segmentation import FramedShares, on_white_by, Segmentation
+import numpy as np
+from numpy.typing import NDArray
+
+_UNKNOWN = np.float32(0.5)  # the object's share of pixels that no photo has
+
+
+def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmentation
+                    ) -> tuple[list[PhotoView], list[str]]:
+    """
+    Return views on white by what all of them agree is the object, and why others are left out.
+
+    Edges and what is in doubt are in between.
+    """
+    found, left_out = [], []
+    for view in views:
+        try:
+            found.append((view, segmentation.framed(view.image, cube.camera(view.camera, 1.0))))
+        except ViewError as error:
+            left_out.append(f'{view.name}: {error}')
+    agreed = agreed_shares([framed for _, framed in found])
+    shown = []
+    for (view, framed), share in zip(found, agreed, strict=True):
+        if share.max() <= _UNKNOWN:
+            left_out.append(f'{view.name}: the other photos see no object where the segmenter '
+                            'found one')
+            continue
+        whole = carried_back(share, framed.camera, cube.camera(view.camera, 1.0))
+        shown.append(replace(view, image=on_white_by(whole, view.image), mask=None,
+                             mask_source='segmenter'))
+    return shown, left_out
+
+
+def agreed_shares(framed: Sequence[FramedShares]) -> list[NDArray[np.float32]]:
+    """Return the object's share in each pixel, (S, S) each, that framed images agree on."""
+    photos, shares = [], []
+    for each in framed:
+        image = each.image[..., :3].astype(np.float32)
+        known = np.full(image.shape[:2], True)
+        photos.append(SeenPhoto(each.camera, image, image, known, np.zeros_like(image)))
+        seen = known if each.image.shape[2] == 3 else each.image[..., 3] > 127
+        shares.append(np.where(seen, each.shares, _UNKNOWN))
+    return segmented_silhouettes(photos, shares) if photos else []

@@ -1,0 +1,179 @@
+"""The segmenter: its laws, its files, its exported graph, and its training."""
+
+import math
+
+from active_recon.datasets.layout import list_objects
+from active_recon.datasets.making import make_dataset, shape_jobs
+from active_recon.datasets.views import read_views
+from active_recon.errors import ConfigError, WeightsError
+from active_recon.exporting.export import export
+from active_recon.models.lifting import Lifting
+from active_recon.models.segmenter import Segmenter, SegmenterConfig
+from active_recon.models.segmenter_weights import (
+    begin_with,
+    is_segmenter,
+    read_segmenter,
+    save_segmenter,
+)
+from active_recon.models.weights import Bundle, save_weights
+from active_recon.models.weights_files import find_weights, SHIPPED
+from active_recon.runtimes import load_segmenter_runtime, REMARK
+from active_recon.training.segmenter import SegmenterLearner, SHARES
+from active_recon.training.silhouettes import silhouette_ious
+from command_line import command
+import numpy as np
+import pytest
+from test_lifting import TINY
+import torch
+
+CONFIG = SegmenterConfig((4, 6, 8, 10), (4, 4, 6, 8))
+
+
+def fresh(seed=0):
+    torch.manual_seed(seed)
+    return Segmenter.from_config(CONFIG).eval()
+
+
+def images(count=2, channels=4, seed=0):
+    found = torch.rand(count, channels, 128, 128, generator=torch.Generator().manual_seed(seed))
+    found[:, 3:] = 1
+    return found
+
+
+def test_each_pixel_has_a_logit_and_images_do_not_depend_on_each_other():
+    segmenter, shown = fresh(), images(3)
+    with torch.inference_mode():
+        together = segmenter(shown)
+        assert together.shape == (3, 1, 128, 128)
+        torch.testing.assert_close(together[1:2], segmenter(shown[1:2]), rtol=1e-4, atol=1e-4)
+
+
+def test_what_a_camera_saw_nothing_of_has_no_say_and_a_missing_mask_is_all_seen():
+    segmenter, shown = fresh(), images()
+    with torch.inference_mode():
+        torch.testing.assert_close(segmenter(shown), segmenter(shown[:, :3]))
+        shown[:, 3, :40] = 0
+        other = shown.clone()
+        other[:, :3, :40] = 0.3
+        torch.testing.assert_close(segmenter(shown), segmenter(other))
+
+
+def test_sizes_that_make_no_network_are_refused():
+    with pytest.raises(ConfigError, match='invalid channels'):
+        SegmenterConfig(channels=(0, 1, 1, 1))
+
+
+def test_a_segmenter_is_written_and_read_and_other_files_are_refused(tmp_path):
+    path = tmp_path / 'one.safetensors'
+    save_segmenter(path, fresh(), CONFIG, {'seed': 0})
+    assert is_segmenter(path) and not is_segmenter(SHIPPED) and not is_segmenter(tmp_path / 'no')
+    read, shown = read_segmenter(path), images()
+    with torch.inference_mode():
+        torch.testing.assert_close(read(shown), fresh()(shown), rtol=0.02, atol=0.02)
+    with pytest.raises(WeightsError, match='no segmenter: expected one that `active-recon train-'):
+        read_segmenter(SHIPPED)
+    (tmp_path / 'half.safetensors').write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(WeightsError, match='no whole safetensors'):
+        read_segmenter(tmp_path / 'half.safetensors')
+
+
+def test_it_is_no_reconstruction_network():
+    with pytest.raises(WeightsError) as refusal:
+        find_weights('nothing')
+    assert 'segmenter' not in str(refusal.value)
+
+
+def test_it_begins_with_another_or_with_the_way_down_of_a_lifting_network(tmp_path):
+    torch.manual_seed(1)
+    network = Lifting.from_config(TINY).eval()
+    path = tmp_path / 'lifting.safetensors'
+    save_weights(path, Bundle(network, None, TINY, 0.4, model='lifting'))
+    segmenter = Segmenter.from_config(SegmenterConfig(TINY.encoder_channels, (4, 4, 6, 8)))
+    begin_with(segmenter, path)
+    torch.testing.assert_close(segmenter.down_8.state_dict(),
+                               network.encoder.down_8.state_dict(), rtol=2e-3, atol=1e-3)
+    other = tmp_path / 'segmenter.safetensors'
+    save_segmenter(other, fresh(3), CONFIG, {})
+    taken = fresh()
+    begin_with(taken, other)
+    torch.testing.assert_close(taken.state_dict(), read_segmenter(other).state_dict())
+    for wrong in (path, find_weights('carving')):
+        with pytest.raises(WeightsError):
+            begin_with(fresh(), wrong)
+
+
+def test_a_perfect_silhouette_costs_nothing_and_a_wrong_one_much():
+    alpha = torch.zeros(2, 128, 128)
+    alpha[:, 40:90, 30:80] = 1
+
+    class Told(torch.nn.Module):
+        def __init__(self, logits):
+            super().__init__()
+            self.logits = logits
+
+        def forward(self, images):
+            return self.logits[:, None]
+
+    right, wrong = (SegmenterLearner(Told(sign * 30 * (alpha - 0.5)))(images(), alpha)
+                    for sign in (1, -1))
+    assert right['loss'] < 1e-4 and right['soft IoU'] > 0.999
+    assert wrong['loss'] > 10 and wrong['soft IoU'] < 0.01
+    unseen = images()
+    unseen[:, 3] = 0
+    unseen[:, 3, :, 100:] = 1  # nothing of the object was seen, and nothing found
+    assert SegmenterLearner(Told(30 * (alpha - 0.5)))(unseen, alpha)['loss'] < 1e-3
+
+
+@pytest.fixture(scope='module')
+def lamps(tmp_path_factory):
+    out = tmp_path_factory.mktemp('lamps')
+    assert not [each.refusal for each in make_dataset(
+        shape_jobs('lamp', range(2), out), samples=1, fine=True) if each.refusal]
+    return out
+
+
+def test_the_shares_of_backgrounds_are_those_of_all_images():
+    assert math.isclose(sum(SHARES.values()), 1)
+
+
+def test_silhouettes_are_measured_where_they_were_seen(lamps):
+    views = read_views(list_objects(lamps), resolution=64, image_size=128, framed=True)
+    everything = silhouette_ious(lambda shown: torch.ones(len(shown), 1, 128, 128), views,
+                                 'white', 8)
+    nothing = silhouette_ious(lambda shown: -torch.ones(len(shown), 1, 128, 128), views,
+                              'white', 8)
+    assert (nothing == 0).all() and (everything > 0).all() and (everything < 0.9).all()
+
+
+def test_it_is_trained_and_resumed_from_the_command_line(lamps, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments = ('train-segmenter', lamps, '--validation', lamps, '--steps', 2, '--batch-size', 1,
+                 '--init-from', '', '--out', 'run', '--threads', 1)
+    assert command(monkeypatch, *arguments) == 0
+    assert 'IoU of silhouettes on validation: white ' in capsys.readouterr().out
+    assert is_segmenter(tmp_path / 'run/segmenter.safetensors')
+    assert command(monkeypatch, *arguments) == 2  # holds another training
+    assert command(monkeypatch, *arguments, '--resume') == 0
+
+
+@pytest.mark.parametrize('library', ['openvino', 'onnxruntime'])
+def test_an_exported_segmenter_answers_as_in_torch(library, tmp_path):
+    pytest.importorskip('onnx')
+    pytest.importorskip(library)
+    path = tmp_path / 'segmenter.safetensors'
+    save_segmenter(path, fresh(), CONFIG, {})
+    assert [each.name for each in export(path)] == ['segmenter-segment.onnx']
+    one, two = (load_segmenter_runtime(path, name, threads=1, precision='f32')
+                for name in (library, 'torch'))
+    assert library in one.provenance['computed_by']
+    for channels in (3, 4):
+        shown = np.random.default_rng(0).integers(0, 256, (128, 128, channels), np.uint8)
+        if channels == 4:
+            shown[..., 3] = 255 * (shown[..., 3] > 60)
+        np.testing.assert_allclose(one.segment(shown), two.segment(shown), atol=1e-3)
+    save_segmenter(path, fresh(1), CONFIG, {})
+    with pytest.raises(WeightsError, match='exported from other weights'):
+        load_segmenter_runtime(path, library)
+    again = load_segmenter_runtime(path)
+    assert 'torch' in again.provenance['computed_by'] and 'other weights' in again.provenance[
+        REMARK]
