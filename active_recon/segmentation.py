@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-IMAGE_SIZE = 128
 _UNSURE = 0.02  # shares up to this are 0, and from 1 less this on 1
 _LEAST = 0.002  # of the pixels around the cube that are rather the object than not
 
@@ -59,7 +58,7 @@ class Segmentation:
 
     def warm_up(self) -> None:
         """Run once, so that the first view is as fast as the others."""
-        self._runtime.segment(np.zeros((IMAGE_SIZE, IMAGE_SIZE, 3), np.uint8))
+        self._runtime.segment(np.zeros((self._runtime.image_size,) * 2 + (3,), np.uint8))
 
     def shares(self, image: NDArray[np.uint8], camera: Camera,
                object_size: float = 1.0) -> NDArray[np.float32]:
@@ -75,7 +74,7 @@ class Segmentation:
     def framed(self, image: NDArray[np.uint8], camera: Camera,
                object_size: float = 1.0) -> FramedShares:
         """Return what is found in the image around the object's cube; see `shares`."""
-        framed, target = framed_image(image, camera, object_size, IMAGE_SIZE)
+        framed, target = framed_image(image, camera, object_size, self._runtime.image_size)
         found = self._runtime.segment(framed)
         if framed.shape[2] == 4:
             found = np.where(framed[..., 3] > 127, found, np.float32(0))

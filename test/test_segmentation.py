@@ -21,6 +21,7 @@ OBJECT, WALL = (200, 30, 30), (20, 90, 160)
 class Red:
     """Finds what is red."""
 
+    image_size = 128
     provenance = {'computed_by': 'a test'}
 
     def segment(self, image):

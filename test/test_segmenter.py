@@ -1,5 +1,6 @@
 """The segmenter: its laws, its files, its exported graph, and its training."""
 
+import json
 import math
 
 from active_recon.datasets.layout import list_objects
@@ -177,3 +178,21 @@ def test_an_exported_segmenter_answers_as_in_torch(library, tmp_path):
     again = load_segmenter_runtime(path)
     assert 'torch' in again.provenance['computed_by'] and 'other weights' in again.provenance[
         REMARK]
+
+
+@pytest.mark.parametrize(('facts', 'words'), [
+    ({}, 'its metadata cannot be used: expected image_size as int'),
+    ({'image_size': 64}, 'contradicts its metadata: expected images of 64 pixels')])
+def test_an_exported_segmenter_that_contradicts_what_it_says_is_refused(tmp_path, facts, words):
+    onnx = pytest.importorskip('onnx')
+    pytest.importorskip('openvino')
+    path = tmp_path / 'segmenter.safetensors'
+    save_segmenter(path, fresh(), CONFIG, {})
+    file, = export(path)
+    graph = onnx.load(file)
+    told = json.loads(graph.metadata_props[0].value)
+    graph.metadata_props[0].value = json.dumps({**told, 'facts': facts})
+    onnx.save(graph, file)
+    with pytest.raises(WeightsError, match=words):
+        load_segmenter_runtime(path, 'openvino')
+    assert 'torch' in load_segmenter_runtime(path).provenance['computed_by']

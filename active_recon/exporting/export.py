@@ -16,6 +16,7 @@ from active_recon.exporting.parts import (
 )
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID
 from active_recon.models.depth_weights import load_refiner
+from active_recon.models.lifting_encoder import IMAGE_SIZE
 from active_recon.models.network import State
 from active_recon.models.scorer_weights import load_scorer
 from active_recon.models.segmenter_weights import is_segmenter, read_segmenter
@@ -55,7 +56,7 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
     """
     _require_onnx()
     if is_segmenter(weights):
-        told = GraphMetadata(SEGMENT_PART, weights_hash(weights), {}, {})
+        told = GraphMetadata(SEGMENT_PART, weights_hash(weights), {}, {'image_size': IMAGE_SIZE})
         part = segment_part(read_segmenter(weights))
         return _saved({SEGMENT_PART: _written('segmenter', part, told)}, weights, folder)
     bundle = load_weights(weights)

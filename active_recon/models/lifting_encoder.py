@@ -97,13 +97,35 @@ def shown_channels(images: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     return shown.contiguous(memory_format=torch.channels_last), seen, plain
 
 
-def halved(before: int, after: int, kernel: int = 3) -> nn.Sequential:
-    """Return a convolution to maps of half the side."""
+def _halved(before: int, after: int, kernel: int = 3) -> nn.Sequential:
     return nn.Sequential(nn.Conv2d(before, after, kernel, stride=2, padding=kernel // 2),
                          Norm(after), nn.ReLU())
 
 
-class PyramidEncoder(nn.Module):
+class DownwardPath(nn.Module):
+    """An encoder's way from what it is shown down to 8 pixels a side, and over all of it."""
+
+    def __init__(self, channels: tuple[int, int, int, int]) -> None:
+        super().__init__()
+        at_64, at_32, at_16, at_8 = channels
+        # No norm where the maps are wide: it would take longer than what it follows
+        self.down_64 = nn.Sequential(nn.Conv2d(SHOWN, at_64, 5, stride=2, padding=2), nn.ReLU(),
+                                     nn.Conv2d(at_64, at_64, 3, padding=1), nn.ReLU())
+        self.down_32 = nn.Sequential(_halved(at_64, at_32), Residual(at_32))
+        self.down_16 = nn.Sequential(_halved(at_32, at_16), Residual(at_16))
+        self.down_8 = nn.Sequential(_halved(at_16, at_8), Residual(at_8))
+        self.whole = nn.Linear(at_8, at_8)
+
+    def downward(self, shown: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return the maps of (B, 6, 128, 128) at 64, 32, 16 and 8 pixels a side."""
+        at_64 = self.down_64(shown)
+        at_32 = self.down_32(at_64)
+        at_16 = self.down_16(at_32)
+        at_8 = self.down_8(at_16)
+        return at_64, at_32, at_16, at_8 + self.whole(at_8.mean(dim=(2, 3)))[:, :, None, None]
+
+
+class PyramidEncoder(DownwardPath):
     """
     A pyramid down to 8 x 8 and up again, with lateral connections at 16, 32 and 64.
 
@@ -113,21 +135,14 @@ class PyramidEncoder(nn.Module):
 
     def __init__(self, channels: tuple[int, int, int, int], width: int, coarse: int,
                  fine: int) -> None:
-        super().__init__()
+        super().__init__(channels)
         at_64, at_32, at_16, at_8 = channels
-        # No norm where the maps are wide: it would take longer than what it follows
-        self.down_64 = nn.Sequential(nn.Conv2d(SHOWN, at_64, 5, stride=2, padding=2), nn.ReLU(),
-                                     nn.Conv2d(at_64, at_64, 3, padding=1), nn.ReLU())
-        self.down_32 = nn.Sequential(halved(at_64, at_32), Residual(at_32))
-        self.down_16 = nn.Sequential(halved(at_32, at_16), Residual(at_16))
-        self.down_8 = nn.Sequential(halved(at_16, at_8), Residual(at_8))
-        self.whole = nn.Linear(at_8, at_8)
         self.up_8 = nn.Conv2d(at_8, width, 1)
         self.lateral_16, self.lateral_32 = nn.Conv2d(at_16, width, 1), nn.Conv2d(at_32, width, 1)
-        self.smooth_16, self.smooth_32 = smooth(width), smooth(width)
+        self.smooth_16, self.smooth_32 = _smooth(width), _smooth(width)
         half = width // 2
         self.up_32, self.lateral_64 = nn.Conv2d(width, half, 1), nn.Conv2d(at_64, half, 1)
-        self.smooth_64 = smooth(half)
+        self.smooth_64 = _smooth(half)
         self.silhouette = nn.Conv2d(half, 4 * _AT_128, 1)
         self.shown_128 = nn.Conv2d(SHOWN, _AT_128, 3, padding=1)
         # Learned logits, and the weight of the difference from the border's colour
@@ -138,11 +153,7 @@ class PyramidEncoder(nn.Module):
     def forward(self, images: Tensor) -> Maps:
         """Return the maps of images (B, 3, 128, 128), or (B, 4, ...) with the mask of `seen`."""
         shown, seen, plain = shown_channels(images)
-        at_64 = self.down_64(shown)
-        at_32 = self.down_32(at_64)
-        at_16 = self.down_16(at_32)
-        at_8 = self.down_8(at_16)
-        at_8 = at_8 + self.whole(at_8.mean(dim=(2, 3)))[:, :, None, None]
+        at_64, at_32, at_16, at_8 = self.downward(shown)
         up_16 = self.smooth_16(_doubled(self.up_8(at_8)) + self.lateral_16(at_16))
         up_32 = self.smooth_32(_doubled(up_16) + self.lateral_32(at_32))
         up_64 = self.smooth_64(_doubled(self.up_32(up_32)) + self.lateral_64(at_64))
@@ -158,8 +169,7 @@ class PyramidEncoder(nn.Module):
         return Maps(coarse, fine, functional.avg_pool2d(seen, 2).to(fine.dtype), silhouette)
 
 
-def smooth(channels: int) -> nn.Sequential:
-    """Return a convolution that keeps the shape."""
+def _smooth(channels: int) -> nn.Sequential:
     return nn.Sequential(nn.Conv2d(channels, channels, 3, padding=1), nn.ReLU())
 
 

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.models.lifting_encoder import (
-    halved,
+    DownwardPath,
     Norm,
-    PyramidEncoder,
-    Residual,
     SHOWN,
     shown_channels,
 )
@@ -36,7 +34,7 @@ class SegmenterConfig(Config):
                               f'{self.to_dict()}')
 
 
-class Segmenter(nn.Module):
+class Segmenter(DownwardPath):
     """
     A U-Net from 128 to 8 pixels a side: what of an image around the object's cube is the object.
 
@@ -46,16 +44,10 @@ class Segmenter(nn.Module):
 
     def __init__(self, channels: tuple[int, int, int, int],
                  up_channels: tuple[int, int, int, int]) -> None:
-        super().__init__()
+        super().__init__(channels)
         at_64, at_32, at_16, at_8 = channels
         up_128, up_64, up_32, up_16 = up_channels
         self.shown_128 = nn.Sequential(nn.Conv2d(SHOWN, up_128, 3, padding=1), nn.ReLU())
-        self.down_64 = nn.Sequential(nn.Conv2d(SHOWN, at_64, 5, stride=2, padding=2), nn.ReLU(),
-                                     nn.Conv2d(at_64, at_64, 3, padding=1), nn.ReLU())
-        self.down_32 = nn.Sequential(halved(at_64, at_32), Residual(at_32))
-        self.down_16 = nn.Sequential(halved(at_32, at_16), Residual(at_16))
-        self.down_8 = nn.Sequential(halved(at_16, at_8), Residual(at_8))
-        self.whole = nn.Linear(at_8, at_8)
         self.up_16 = _Up(at_8, at_16, up_16)
         self.up_32 = _Up(up_16, at_32, up_32)
         self.up_64 = _Up(up_32, at_64, up_64)
@@ -67,8 +59,8 @@ class Segmenter(nn.Module):
         """Build the segmenter of a configuration, with fresh weights."""
         return cls(config.channels, config.up_channels)
 
-    def begin_with(self, encoder: PyramidEncoder) -> None:
-        """Take over the way down of an encoder; raises RuntimeError where its sizes differ."""
+    def begin_with(self, encoder: DownwardPath) -> None:
+        """Take over an encoder's way down; raises RuntimeError where its sizes differ."""
         for name in ('down_64', 'down_32', 'down_16', 'down_8', 'whole'):
             getattr(self, name).load_state_dict(getattr(encoder, name).state_dict())
 
@@ -79,11 +71,7 @@ class Segmenter(nn.Module):
         A fourth channel is 1 where the camera saw the pixel; the logits of others mean nothing.
         """
         shown, _, _ = shown_channels(images)
-        at_64 = self.down_64(shown)
-        at_32 = self.down_32(at_64)
-        at_16 = self.down_16(at_32)
-        at_8 = self.down_8(at_16)
-        at_8 = at_8 + self.whole(at_8.mean(dim=(2, 3)))[:, :, None, None]
+        at_64, at_32, at_16, at_8 = self.downward(shown)
         up_64 = self.up_64(self.up_32(self.up_16(at_8, at_16), at_32), at_64)
         found: Tensor = self.last(self.up_128(up_64, self.shown_128(shown)))
         return found

@@ -124,8 +124,12 @@ class SegmenterRuntime(Protocol):
     """
     Finds the object in an image around its cube.
 
+    - image_size: S, side of its images in pixels
     - provenance: what diagnostics tell of it
     """
+
+    @property
+    def image_size(self) -> int: ...
 
     @property
     def provenance(self) -> Mapping[str, str]: ...
@@ -134,8 +138,7 @@ class SegmenterRuntime(Protocol):
         """
         Return how likely each pixel is the object's, (S, S) in [0, 1].
 
-        Takes (S, S, 3 or 4) uint8 RGB of 128 pixels a side; the fourth channel is 255 where the
-        camera saw the pixel.
+        Takes (S, S, 3 or 4) uint8 RGB; the fourth channel is 255 where the camera saw the pixel.
         """
         ...
 

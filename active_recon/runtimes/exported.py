@@ -151,8 +151,8 @@ class ExportedDepthRuntime:
 class ExportedSegmenterRuntime:
     """A segmenter in a graph; see SegmenterRuntime."""
 
-    def __init__(self, graph: Graph) -> None:
-        self._graph = graph
+    def __init__(self, graph: Graph, image_size: int) -> None:
+        self._graph, self.image_size = graph, image_size
         self.provenance: Mapping[str, str] = {}
 
     def segment(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -229,8 +229,14 @@ def open_depth(weights: Path | None, open_graph: OpenGraph) -> ExportedDepthRunt
 
 def open_segmenter(weights: Path, open_graph: OpenGraph) -> ExportedSegmenterRuntime:
     """Return the segmenter that was exported beside its weights. Raises WeightsError."""
-    graph, _ = _opened(weights, SEGMENT_PART, weights_hash(weights), open_graph, True)
-    return ExportedSegmenterRuntime(graph)
+    graph, told = _opened(weights, SEGMENT_PART, weights_hash(weights), open_graph, True)
+    path = graph_path(weights, SEGMENT_PART)
+    _require_facts(path, told, {'image_size': int})
+    _require_image(path, graph, told.facts['image_size'])
+    if 'object' not in graph.outputs:
+        raise WeightsError(f'{path}: contradicts its metadata: expected the output object, got '
+                           f'{", ".join(graph.outputs)}')
+    return ExportedSegmenterRuntime(graph, told.facts['image_size'])
 
 
 def _opened(weights: Path, part: str, digest: str, open_graph: OpenGraph,
@@ -264,15 +270,20 @@ def _require_parts(weights: Path, graphs: Mapping[str, Graph], told: GraphMetada
         if not set(gives[part]) <= set(graph.outputs):
             raise WeightsError(f'{path}: contradicts its metadata: expected the output '
                                f'{gives[part][0]}, got {", ".join(graph.outputs)}')
-    image = tuple(graphs['encode'].inputs.get('image', ()))
+    _require_image(graph_path(weights, 'encode'), graphs['encode'], size)
+
+
+def _require_image(path: Path, graph: Graph, size: int) -> None:
+    """Raise WeightsError where a graph takes images of another size than its metadata tell."""
+    image = tuple(graph.inputs.get('image', ()))
     if image[2:] != (size, size):
-        raise WeightsError(f'{graph_path(weights, "encode")}: contradicts its metadata: expected '
-                           f'images of {size} pixels, got {image}')
+        raise WeightsError(f'{path}: contradicts its metadata: expected images of {size} pixels, '
+                           f'got {image}')
 
 
-def _require_facts(path: Path, told: GraphMetadata) -> None:
+def _require_facts(path: Path, told: GraphMetadata, facts: Mapping[str, type] = _FACTS) -> None:
     """Raise WeightsError where the metadata lack what a network says of itself."""
-    for name, kind in _FACTS.items():
+    for name, kind in facts.items():
         found = told.facts.get(name)
         if not isinstance(found, kind):
             raise WeightsError(f'{path}: its metadata cannot be used: expected {name} as '

@@ -32,7 +32,7 @@ class GraphMetadata:
       it has before the first view
     - facts: of a network `model`, `threshold`, `image_size`, `resolution`, `needs_front` and
       `config_sha256`; of a policy, those of its model, and its `policy_sha256`; of a depth
-      refiner its `depth_sha256`
+      refiner its `depth_sha256`; of a segmenter its `image_size`
     """
 
     part: str

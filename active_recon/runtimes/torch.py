@@ -10,6 +10,7 @@ from active_recon.geometry.cameras import Camera, orbit_camera
 from active_recon.geometry.canonical import network_image
 from active_recon.models.depth_refiner import DepthRefiner
 from active_recon.models.depth_weights import load_refiner
+from active_recon.models.lifting_encoder import IMAGE_SIZE
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.models.registry import network_entry
 from active_recon.models.scorer_weights import load_scorer
@@ -113,6 +114,7 @@ class TorchSegmenterRuntime:
 
     def __init__(self, segmenter: Segmenter, threads: int | None = None) -> None:
         self._segmenter, self._threads = segmenter.eval(), threads
+        self.image_size = IMAGE_SIZE
         self._device = next(segmenter.parameters()).device
         self.provenance: Mapping[str, str] = _provenance(self._device, threads)
 
