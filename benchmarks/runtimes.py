@@ -7,12 +7,13 @@ import subprocess
 import sys
 import time
 
-from active_recon.geometry.cameras import AZIMUTHS, Camera, orbit_camera
+from active_recon.geometry.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera
 from active_recon.geometry.canonical import network_image
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_runtime
 from active_recon.runtimes.precision import has_bf16, has_int8
+from active_recon.segmentation import Segmentation
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
@@ -34,6 +35,20 @@ print(peak_mb(os.getpid()))
 def runtime_figures() -> list[Figure]:
     """Return the figures of torch, and of openvino in f32, and bf16 and int8 if the CPU can."""
     return [*_views(1), *_views(2), *_plans(24, 1), *_plans(200, 20), *_starts()]
+
+
+def segmenter_figures() -> list[Figure]:
+    """Put the object on white by the segmenter, in an image of 640 x 480, on one thread."""
+    camera = orbit_camera(0.3, intrinsics=Intrinsics(600, 600, 320, 240, 640, 480))
+    tiles = np.kron(np.random.default_rng(0).integers(0, 256, (12, 16, 3), np.uint8),
+                    np.ones((40, 40, 1), np.uint8))
+    image = composite(Renderer(load_mesh(_CHAIR)).render(camera), tiles)
+    tasks = {}
+    for name in _RUNTIMES:
+        segmentation = Segmentation.load(threads=1, runtime=name)
+        tasks[f'the object put on white by the segmenter, {name}, threads: 1'] = (
+            lambda segmentation=segmentation: segmentation.on_white(image, camera))
+    return [Figure(name, 'ms', samples, None) for name, samples in interleaved(tasks).items()]
 
 
 def _views(threads: int) -> Iterator[Figure]:
