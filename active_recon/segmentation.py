@@ -1,5 +1,6 @@
 """The object on white before any background: a segmenter beside the camera's image."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -52,9 +53,9 @@ class Segmentation:
         return cls(load_segmenter_runtime(weights, runtime, device, threads, precision))
 
     @property
-    def computed_by(self) -> str:
-        """What runs the segmenter, in words."""
-        return self._runtime.provenance.get('computed_by', '')
+    def provenance(self) -> Mapping[str, str]:
+        """What diagnostics tell of the segmenter's runtime."""
+        return self._runtime.provenance
 
     def warm_up(self) -> None:
         """Run once, so that the first view is as fast as the others."""

@@ -18,7 +18,7 @@ from active_recon.models.segmenter_weights import (
 )
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.models.weights_files import find_weights, SHIPPED
-from active_recon.runtimes import load_segmenter_runtime, REMARK
+from active_recon.runtimes import load_runtime, load_segmenter_runtime, REMARK
 from active_recon.training.segmenter import SegmenterLearner, SHARES
 from active_recon.training.silhouettes import silhouette_ious
 from command_line import command
@@ -76,6 +76,15 @@ def test_a_segmenter_is_written_and_read_and_other_files_are_refused(tmp_path):
     (tmp_path / 'half.safetensors').write_bytes(path.read_bytes()[:1000])
     with pytest.raises(WeightsError, match='no whole safetensors'):
         read_segmenter(tmp_path / 'half.safetensors')
+
+
+@pytest.mark.parametrize('runtime', ['auto', 'torch', 'openvino', 'onnxruntime'])
+def test_weights_that_are_not_there_are_told_by_every_runtime(runtime, tmp_path):
+    if runtime not in ('auto', 'torch'):
+        pytest.importorskip(runtime)
+    for load in (load_segmenter_runtime, load_runtime):
+        with pytest.raises(WeightsError, match='nothing.safetensors: '):
+            load(tmp_path / 'nothing.safetensors', runtime)
 
 
 def test_it_is_no_reconstruction_network():

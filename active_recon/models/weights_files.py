@@ -88,8 +88,13 @@ def read_card(path: Path) -> dict[str, Any]:
 
 
 def weights_hash(path: Path | None = None) -> str:
-    """Return the SHA-256 of a weights file; None is the one that ships."""
-    return hashlib.sha256((path or SHIPPED).read_bytes()).hexdigest()
+    """Return the SHA-256 of a weights file; None is the one that ships. Raises WeightsError."""
+    path = path or SHIPPED
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise WeightsError(f'{path}: cannot be read: expected weights (.safetensors), got: '
+                           f'{error.strerror}') from error
 
 
 def config_hash(config: Config | dict[str, Any]) -> str:

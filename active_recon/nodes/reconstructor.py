@@ -95,8 +95,8 @@ class ReconstructorNode(ManagedNode):
         provenance = self._reconstructor.provenance
         self._diagnostics.set_value('Weights SHA-256', provenance.get('weights_sha256', ''))
         tell_of_runtime(self._diagnostics, provenance)
-        self._diagnostics.set_value(
-            'Segmenter', self._segmentation.computed_by if self._segmentation else '')
+        tell_of_runtime(self._diagnostics, self._segmentation.provenance if self._segmentation
+                        else {}, 'Segmenter')
         self.create_service(Trigger, 'start_episode', self._on_start)
         self.create_service(Trigger, 'save_state', self._on_save_state)
         self.create_service(Trigger, 'load_state', self._on_load_state)
