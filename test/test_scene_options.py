@@ -2,7 +2,6 @@
 
 import math
 
-from active_recon.acquisition.background import Background
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.rebuilt import lacks_reconstruction, rebuilt
 from active_recon.bags.runs.scene import parse_background, Scene
@@ -73,7 +72,10 @@ def test_a_background_is_taken_away_as_it_is_told(tmp_path):
                       Scene(background=how, empty_scene=empty))
         assert (found[0].image[0, 0] == 255).all()
         assert (found[0].image[12, 16] == (200, 30, 40)).all()
-    assert parse_background('segment') == (Background('segment'), None)
+    how, nothing = parse_background('segment')
+    found = views(tmp_path / 'segment', on_green() + joints(), Scene(background=how))
+    assert nothing is None and (found[0].image[0, 0] == 255).all()
+    assert np.abs(found[0].image[12, 16] - np.array((200, 30, 40))).max() < 40
     for wrong in ('grey', '0,300,64', str(tmp_path)):
         with pytest.raises(ConfigError):
             parse_background(wrong)
