@@ -2,7 +2,7 @@
 
 from active_recon.datasets.views import ViewSet
 from active_recon.models.segmenter import Segmenter
-from active_recon.training.loop import Draw, Run, train_steps, TrainingConfig
+from active_recon.training.loop import Draw, Run, share_of_batch, train_steps, TrainingConfig
 from active_recon.training.posed_batches import draw_posed_batch
 import numpy as np
 import torch
@@ -41,10 +41,11 @@ class SegmenterLearner(nn.Module):
 def train_segmenter(segmenter: Segmenter, views: ViewSet, config: TrainingConfig,
                     run: Run) -> None:
     """Train a segmenter in place on random views of random objects; see `train_steps`."""
+    size = share_of_batch(config, run.fabric)
 
     def draw(step: int) -> Draw:
-        rng = np.random.default_rng([config.seed, step])
-        batch = draw_posed_batch(views, config.batch_size, VIEWS, rng, config.augment, SHARES)
+        rng = np.random.default_rng([config.seed, step, run.fabric.global_rank])
+        batch = draw_posed_batch(views, size, VIEWS, rng, config.augment, SHARES)
         return Draw((batch.images.flatten(0, 1), batch.alpha.flatten(0, 1)), batch.objects)
 
     train_steps(run, SegmenterLearner(segmenter), segmenter, config,
