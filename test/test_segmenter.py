@@ -2,6 +2,7 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
@@ -19,6 +20,8 @@ from active_recon.models.segmenter_weights import (
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.models.weights_files import find_weights, SHIPPED
 from active_recon.runtimes import load_runtime, load_segmenter_runtime, REMARK
+from active_recon.training import segmenter as training
+from active_recon.training.loop import Run, TrainingConfig
 from active_recon.training.segmenter import SegmenterLearner, SHARES
 from active_recon.training.silhouettes import silhouette_ious
 from command_line import command
@@ -160,7 +163,9 @@ def test_it_is_trained_and_resumed_from_the_command_line(lamps, tmp_path, monkey
     arguments = ('train-segmenter', lamps, '--validation', lamps, '--steps', 2, '--batch-size', 1,
                  '--init-from', '', '--out', 'run', '--threads', 1)
     assert command(monkeypatch, *arguments) == 0
-    assert 'IoU of silhouettes on validation: white ' in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert 'IoU of silhouettes on validation: white ' in said.out
+    assert 'warning: 2 of 2 validation objects are trained on too: their IoU is too h' in said.err
     assert is_segmenter(tmp_path / 'run/segmenter.safetensors')
     assert command(monkeypatch, *arguments) == 2  # holds another training
     assert command(monkeypatch, *arguments, '--resume') == 0
@@ -205,3 +210,16 @@ def test_an_exported_segmenter_that_contradicts_what_it_says_is_refused(tmp_path
     with pytest.raises(WeightsError, match=words):
         load_segmenter_runtime(path, 'openvino')
     assert 'torch' in load_segmenter_runtime(path).provenance['computed_by']
+
+
+def test_processes_that_share_a_batch_draw_other_objects(lamps, tmp_path, monkeypatch):
+    views = read_views(list_objects(lamps), resolution=64, image_size=128, framed=True)
+    drawn = []
+    monkeypatch.setattr(training, 'train_steps',
+                        lambda *given, **more: drawn.append(given[6](0).arguments[0]))
+    config = TrainingConfig(1, batch_size=4)
+    for rank in range(2):
+        fabric = SimpleNamespace(world_size=2, global_rank=rank)
+        training.train_segmenter(fresh(), views, config, Run(fabric, tmp_path, print))
+    assert [len(images) for images in drawn] == [4, 4]  # two objects of two images each
+    assert not torch.equal(*drawn)

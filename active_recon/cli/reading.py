@@ -70,3 +70,12 @@ def _print_left_out(title: str, count: int, missing: Sequence[str],
     if missing or unreadable:
         typer.echo(f'{title}: {count} read, {len(missing)} missing, {len(unreadable)} left out',
                    err=True)
+
+
+def warn_of_shared_objects(training: 'ViewSet', held_out: 'ViewSet', so: str) -> None:
+    """Warn where validation objects are among the training objects, and of what follows."""
+    trained = {folder.images_folder.resolve() for folder in training.folders}
+    shared = sum(folder.images_folder.resolve() in trained for folder in held_out.folders)
+    if shared:
+        typer.echo(f'warning: {shared} of {len(held_out)} validation objects are trained on too: '
+                   f'{so}', err=True)

@@ -6,12 +6,11 @@ from pathlib import Path
 import sys
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.reading import read_objects, Split
+from active_recon.cli.reading import read_objects, Split, warn_of_shared_objects
 from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.datasets.views import ViewSet
     from active_recon.models.weights import Bundle
 
 
@@ -154,7 +153,8 @@ def train(
     training = read_objects(data, 'training data', asked, split_file, 'train', at_once=False)
     held_out = read_objects(validation, 'validation data', asked, split_file, 'val')
     if fabric.is_global_zero:
-        _warn_of_shared_objects(training, held_out)
+        warn_of_shared_objects(training, held_out, 'the threshold is biased, and their IoU is '
+                               'too high')
     with SummaryLog(out / 'tensorboard', held_out) as log:
         try:
             bundle = train_plan(plan, training, held_out, out, log.reporting, fabric, resume,
@@ -179,12 +179,3 @@ def _begun(path: Path) -> 'Bundle':
     from active_recon.models.weights_files import read_card
 
     return replace(load_weights(path), card=read_card(path))
-
-
-def _warn_of_shared_objects(training: 'ViewSet', held_out: 'ViewSet') -> None:
-    """Warn where validation objects are among the training objects: their IoU is then too high."""
-    trained = {folder.images_folder.resolve() for folder in training.folders}
-    shared = sum(folder.images_folder.resolve() in trained for folder in held_out.folders)
-    if shared:
-        typer.echo(f'warning: {shared} of {len(held_out)} validation objects are trained on too: '
-                   'the threshold is biased, and their IoU is too high', err=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from active_recon.cli.command_line import command_line
-from active_recon.cli.progress import progress_bar
+from active_recon.cli.one_training import checkpoint_in, shown_steps
 from active_recon.cli.reading import read_objects
 from active_recon.errors import ConfigError
 import typer
@@ -55,18 +55,15 @@ def train_depth(
     from active_recon.models.lifting import Lifting
     from active_recon.models.weights import load_weights
     from active_recon.models.weights_files import depth_path, find_weights, weights_hash
-    from active_recon.reporting import by_step
     from active_recon.training.depth import calibrate_depth, train_depth
-    from active_recon.training.loop import make_fabric, Run, TrainingConfig, TrainingStoppedError
+    from active_recon.training.loop import make_fabric, Run, TrainingConfig
     import torch
 
-    path, checkpoint = find_weights(model), out / 'checkpoint.safetensors'
+    path = find_weights(model)
     network = load_weights(path).reconstruction
     if not isinstance(network, Lifting):
         raise ConfigError(f'--model: no such network: expected lifting, got {model!r}')
-    if checkpoint.exists() and not resume:
-        raise ConfigError(f'{out}: holds another training ({checkpoint.name}); continue it with '
-                          '--resume, or name another folder with --out')
+    checkpoint = checkpoint_in(out, resume)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
     training = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, augment, 0,
@@ -77,19 +74,9 @@ def train_depth(
     held_out = read_objects([validation], 'validation data', network.spec, depth=True)
     config = DepthRefinerConfig(features=network.initial_state(1)['coarse_sum'].shape[1])
     refiner, digest = DepthRefiner.from_config(config), weights_hash(path)
-    try:
-        with progress_bar('depth', steps) as advance:
-            reached = by_step(advance)
-
-            def report(step: int, measured: dict[str, float]) -> None:
-                reached(step, '  '.join(f'{name} {value:.4f}'
-                                        for name, value in measured.items()))
-
-            train_depth(refiner, network, views, training,
-                        Run(fabric, checkpoint, report, resume), {'network_sha256': digest})
-    except TrainingStoppedError as stopped:
-        typer.echo(str(stopped))
-        raise typer.Exit(130) from None
+    with shown_steps('depth', steps) as report:
+        train_depth(refiner, network, views, training,
+                    Run(fabric, checkpoint, report, resume), {'network_sha256': digest})
     scale, bias = calibrate_depth(refiner, network, held_out)
     typer.echo(f'calibrated on validation: {scale:.3f} logit {bias:+.3f}')
     written = out / depth_path(path).name

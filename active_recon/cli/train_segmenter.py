@@ -4,9 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 from active_recon.cli.command_line import command_line
-from active_recon.cli.progress import progress_bar
-from active_recon.cli.reading import read_objects
-from active_recon.errors import ConfigError
+from active_recon.cli.one_training import checkpoint_in, shown_steps
+from active_recon.cli.reading import read_objects, warn_of_shared_objects
 import typer
 
 
@@ -52,17 +51,13 @@ def train_segmenter(
     from active_recon.models.segmenter import Segmenter, SegmenterConfig
     from active_recon.models.segmenter_weights import begin_with, save_segmenter
     from active_recon.models.weights_files import find_weights
-    from active_recon.reporting import by_step
-    from active_recon.training.loop import make_fabric, Run, TrainingConfig, TrainingStoppedError
+    from active_recon.training.loop import make_fabric, Run, TrainingConfig
     from active_recon.training.segmenter import train_segmenter
     from active_recon.training.silhouettes import silhouette_figures
     from active_recon.volumes.voxels import FINE_RESOLUTION
     import torch
 
-    checkpoint = out / 'checkpoint.safetensors'
-    if checkpoint.exists() and not resume:
-        raise ConfigError(f'{out}: holds another training ({checkpoint.name}); continue it with '
-                          '--resume, or name another folder with --out')
+    checkpoint = checkpoint_in(out, resume)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
     training = TrainingConfig(steps, batch_size, learning_rate, 1, seed, bf16, True, 0,
@@ -72,22 +67,14 @@ def train_segmenter(
     spec = NetworkSpec(IMAGE_SIZE, FINE_RESOLUTION, needs_front=False)
     views = read_objects(data, 'training data', spec, at_once=False)
     held_out = read_objects([validation], 'validation data', spec, at_once=False)
+    if fabric.is_global_zero:
+        warn_of_shared_objects(views, held_out, 'their IoU is too high')
     config = SegmenterConfig()
     segmenter = Segmenter.from_config(config)
     if init_from:
         begin_with(segmenter, find_weights(init_from))
-    try:
-        with progress_bar('segmenter', steps) as advance:
-            reached = by_step(advance)
-
-            def report(step: int, measured: dict[str, float]) -> None:
-                reached(step, '  '.join(f'{name} {value:.4f}'
-                                        for name, value in measured.items()))
-
-            train_segmenter(segmenter, views, training, Run(fabric, checkpoint, report, resume))
-    except TrainingStoppedError as stopped:
-        typer.echo(str(stopped))
-        raise typer.Exit(130) from None
+    with shown_steps('segmenter', steps) as report:
+        train_segmenter(segmenter, views, training, Run(fabric, checkpoint, report, resume))
     if not fabric.is_global_zero:
         return
     figures = silhouette_figures(segmenter.eval(), held_out)

@@ -12,11 +12,11 @@ from active_recon.geometry.cameras import (
 )
 from active_recon.geometry.framing import cube_corners, require_in_image
 from active_recon.geometry.resampling import (
+    opencv_turn,
     reduction,
     SAMPLE_EVERY,
     seen_by,
     seen_within,
-    turn_between,
 )
 import cv2
 import numpy as np
@@ -121,8 +121,7 @@ def framed_layers(
     target = framing_camera(camera, object_size, image_size)
     lens, size = camera.intrinsics, (image_size, image_size)
     if lens.distortion is None and lens.fx < SAMPLE_EVERY * target.intrinsics.fx:
-        half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # OpenCV counts from centres
-        to_source = np.linalg.inv(half) @ turn_between(camera, target) @ half
+        to_source = opencv_turn(camera, target)
         whole = np.full(layers.shape[:2], 255, np.uint8)
         carried, there = (cv2.warpPerspective(each, to_source, size,
                                               flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)

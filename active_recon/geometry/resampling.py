@@ -100,9 +100,8 @@ def carried_back(framed: NDArray[np.float32], target: Camera,
     """
     lens = camera.intrinsics
     if lens.distortion is None:
-        half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])  # OpenCV counts from centres
-        moved = np.linalg.inv(half) @ turn_between(camera, target) @ half
-        return np.asarray(cv2.warpPerspective(framed, moved, (lens.width, lens.height)))
+        return np.asarray(cv2.warpPerspective(framed, opencv_turn(camera, target),
+                                              (lens.width, lens.height)))
     by = max(1.0, max(lens.width, lens.height) / _CARRIED_SIDE)
     few = Camera(camera.pose, lens.resized(round(lens.width / by), round(lens.height / by)))
     rays = few.ray_directions()
@@ -166,6 +165,12 @@ def turn_between(camera: Camera, target: Camera) -> NDArray[np.float64]:
     """Return the homography, (3, 3), from the target's pixels to those of a camera beside it."""
     return np.asarray(camera.intrinsics.matrix @ camera.pose[:3, :3].T @ target.pose[:3, :3]
                       @ np.linalg.inv(target.intrinsics.matrix))
+
+
+def opencv_turn(camera: Camera, target: Camera) -> NDArray[np.float64]:
+    """Return `turn_between` for OpenCV, whose (0, 0) is the centre of the first pixel."""
+    half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+    return np.asarray(np.linalg.inv(half) @ turn_between(camera, target) @ half)
 
 
 def _is_whole_image(seen: _Places, camera: Camera, size: int) -> bool:

@@ -92,10 +92,8 @@ class ExportedRuntime:
 
         `seen_from` is its camera: `pose` (1, 4, 4) and `intrinsics` (1, 3, 3).
         """
-        wanted = self._encode.inputs['image'][1]
-        if wanted is not None and planes.shape[1] < wanted:  # a missing mask of pixels seen is 1
-            planes = np.pad(planes, ((0, 0), (0, 1), (0, 0), (0, 0)), constant_values=1)
-        return self._encode.run({'image': planes, **seen_from})['encoded']
+        return self._encode.run({'image': _as_wanted(self._encode, planes),
+                                 **seen_from})['encoded']
 
     def update(self, encoded: NDArray[np.float32], seen_from: Arrays, state: State) -> State:
         """Return the next state after an encoded image."""
@@ -157,14 +155,19 @@ class ExportedSegmenterRuntime:
 
     def segment(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Return how likely each pixel is the object's; see SegmenterRuntime."""
-        found = self._graph.run({'image': planes_of(image, 4)})['object']
+        found = self._graph.run({'image': _as_wanted(self._graph, planes_of(image))})['object']
         return np.asarray(found[0, 0])
 
 
-def planes_of(image: NDArray[np.uint8], channels: int | None = None) -> NDArray[np.float32]:
-    """Return an image as (1, C, S, S) in [0, 1]; a mask of pixels seen that is missing is 1."""
-    planes = image.transpose(2, 0, 1)[None] * np.float32(1 / 255)
-    if channels is not None and planes.shape[1] < channels:
+def planes_of(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return an image, (S, S, C) uint8, as (1, C, S, S) in [0, 1]."""
+    return np.asarray(image.transpose(2, 0, 1)[None] * np.float32(1 / 255))
+
+
+def _as_wanted(graph: Graph, planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return planes (1, C, S, S) as a graph takes them; a missing mask of pixels seen is 1."""
+    wanted = graph.inputs['image'][1]
+    if wanted is not None and planes.shape[1] < wanted:
         planes = np.pad(planes, ((0, 0), (0, 1), (0, 0), (0, 0)), constant_values=1)
     return planes
 

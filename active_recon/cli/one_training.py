@@ -1,0 +1,42 @@
+"""What commands of a single training share: its checkpoint, and its progress."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from active_recon.cli.progress import progress_bar
+from active_recon.errors import ConfigError
+from active_recon.reporting import by_step
+import typer
+
+
+def checkpoint_in(out: Path, resume: bool) -> Path:
+    """Return where a training's checkpoint lies; raises ConfigError on another training's."""
+    checkpoint = out / 'checkpoint.safetensors'
+    if checkpoint.exists() and not resume:
+        raise ConfigError(f'{out}: holds another training ({checkpoint.name}); continue it with '
+                          '--resume, or name another folder with --out')
+    return checkpoint
+
+
+@contextmanager
+def shown_steps(title: str, steps: int) -> Iterator[Callable[[int, dict[str, float]], None]]:
+    """
+    Yield the report of a training, which takes each step and what was measured.
+
+    A training that is stopped ends the command with its message.
+    """
+    from active_recon.training.loop import TrainingStoppedError
+
+    try:
+        with progress_bar(title, steps) as advance:
+            reached = by_step(advance)
+
+            def report(step: int, measured: dict[str, float]) -> None:
+                reached(step, '  '.join(f'{name} {value:.4f}'
+                                        for name, value in measured.items()))
+
+            yield report
+    except TrainingStoppedError as stopped:
+        typer.echo(str(stopped))
+        raise typer.Exit(130) from None
