@@ -117,19 +117,15 @@ def with_table(text: str) -> str:
 
 
 def table() -> Iterator[str]:
-    """Yield the lines of the table of IoU before backgrounds of each kind."""
-    yield ('| objects | background | as it is: 1 / 3 / 5 views | segmenter | together '
-           '| GrabCut: 5 views | true mask: 5 | segmenter less as it is: 5 | together less as '
-           'it is: 5 |')
+    """Yield the lines of the table of IoU after the last view before backgrounds of each kind."""
+    yield f'| objects | background | {" | ".join(WAYS)} | segmenter gains | together gains |'
     yield '|---|---|---|---|---|---|---|---|---|'
     for root, kinds in json.loads(RESULTS.read_text())['sets'].items():
         for kind, found in kinds.items():
-            ious = (' / '.join(f'{each["mean"]:.3f}' for each in found[way])
-                    for way in ('as it is', 'segmenter', 'together'))
-            last = (f'{found[way][-1]["mean"]:.3f}' for way in ('GrabCut', 'true mask'))
+            ious = (f'{found[way][-1]["mean"]:.3f}' for way in WAYS)
             gains = (found['gain'][way][-1] for way in ('segmenter', 'together'))
             yield '| ' + ' | '.join([
-                _SETS[Path(root).name] if kind == KINDS[0] else '', kind, *ious, *last,
+                _SETS[Path(root).name] if kind == KINDS[0] else '', kind, *ious,
                 *(f'{each["mean"]:+.3f} [{each["low"]:.3f}, {each["high"]:.3f}]'
                   for each in gains)]) + ' |'
 
