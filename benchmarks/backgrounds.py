@@ -118,16 +118,17 @@ def with_table(text: str) -> str:
 
 def table() -> Iterator[str]:
     """Yield the lines of the table of IoU after the last view before backgrounds of each kind."""
-    yield f'| objects | background | {" | ".join(WAYS)} | segmenter gains | together gains |'
-    yield '|---|---|---|---|---|---|---|---|---|'
+    yield '| objects | background | as it is | GrabCut | true mask | segmenter | together |'
+    yield '|---|---|---|---|---|---|---|'
     for root, kinds in json.loads(RESULTS.read_text())['sets'].items():
         for kind, found in kinds.items():
-            ious = (f'{found[way][-1]["mean"]:.3f}' for way in WAYS)
-            gains = (found['gain'][way][-1] for way in ('segmenter', 'together'))
+            means = {way: f'{found[way][-1]["mean"]:.3f}' for way in WAYS}
+            gains = {way: '{mean:+.3f} [{low:.3f}, {high:.3f}]'.format(**found['gain'][way][-1])
+                     for way in ('segmenter', 'together')}
             yield '| ' + ' | '.join([
-                _SETS[Path(root).name] if kind == KINDS[0] else '', kind, *ious,
-                *(f'{each["mean"]:+.3f} [{each["low"]:.3f}, {each["high"]:.3f}]'
-                  for each in gains)]) + ' |'
+                _SETS[Path(root).name] if kind == KINDS[0] else '', kind,
+                *(means[way] for way in ('as it is', 'GrabCut', 'true mask')),
+                *(f'{means[way]}: {gain}' for way, gain in gains.items())]) + ' |'
 
 
 def photo_table() -> Iterator[str]:
