@@ -16,13 +16,15 @@ from active_recon.bags.runs.run_writing import write_run
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Camera
+from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
+from active_recon.photos.cube import first_cube
 from active_recon.photos.doubts import doubts
 from active_recon.photos.picture import shape_picture
-from active_recon.photos.reconstruct import from_files, Options
+from active_recon.photos.reconstruct import from_files, from_views, Options
 from active_recon.photos.saving import save_shape
 from active_recon.photos.transforms_json import FLIP
-from active_recon.photos.views import _mask
+from active_recon.photos.views import _mask, view_of
 from active_recon.volumes.binvox import read_binvox
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import iou
@@ -101,12 +103,49 @@ def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, view
     assert own.size == read.size == BOX[3]
 
 
-def test_before_clutter_the_segmenter_finds_the_object_and_a_mask_of_one_photo_tells_otherwise(
-        views, rgba, tmp_path):
+@pytest.fixture(scope='module')
+def cluttered(rgba):
+    """Return the photos before tiles of any colours."""
     rng = np.random.default_rng(0)
     tiles = [np.kron(rng.integers(0, 256, (9, 12, 3), np.uint8), np.ones((20, 20, 1), np.uint8))
              for _ in rgba]
-    cluttered = [on_plain(*both) for both in zip(rgba, tiles, strict=True)]
+    return [on_plain(*both) for both in zip(rgba, tiles, strict=True)]
+
+
+@pytest.mark.parametrize('background', ['auto', 'segment'])
+def test_before_clutter_the_cube_is_found_too(views, cluttered, tmp_path, background):
+    shape = active_recon.reconstruct(write_photos(tmp_path, views, cluttered),
+                                     background=background)
+    assert shape.background == 'the segmenter' and not shape.left_out
+    np.testing.assert_allclose(shape.cube.centre, CENTRE, atol=0.2 * SIDE)
+    assert SIDE < shape.cube.side < 1.5 * SIDE
+    assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.5
+
+
+def test_a_cube_that_is_searched_in_vain_stays_as_wide_as_it_was(views, cluttered, tmp_path):
+    shape = active_recon.reconstruct(write_photos(tmp_path, views, cluttered),
+                                     background='network')
+    assert shape.cube.side < 1.01 * first_cube(views, None).side
+    assert len(shape.views) == COUNT and shape.quality.lower_bound < 0.3
+
+
+def test_the_segmenter_looks_at_the_cube_of_the_size_that_is_given(views, cluttered, monkeypatch):
+    looked_at = []
+
+    def segmented(given, cube, segmentation):
+        looked_at.append(cube.side)
+        return given, []
+
+    monkeypatch.setattr('active_recon.photos.reconstruct.segmented_views', segmented)
+    photos = [view_of(str(number), *both)
+              for number, both in enumerate(zip(cluttered, views, strict=True))]
+    shape = from_views(photos, CameraFile('a table', (), metric=True),
+                       Options(background='segment', size=2 * SIDE))
+    assert looked_at == [shape.cube.side] == [2 * SIDE]
+
+
+def test_before_clutter_the_segmenter_finds_the_object_and_a_mask_of_one_photo_tells_otherwise(
+        views, rgba, cluttered, tmp_path):
     folder = write_photos(tmp_path / 'clutter', views, cluttered)
     ious = {}
     for background in ('auto', 'network'):

@@ -113,6 +113,22 @@ def test_photos_that_agree_outvote_one_that_lacks_a_part_and_colours_find_it_aga
     assert agreed_shares([]) == []
 
 
+def test_the_colours_of_pixels_that_a_camera_did_not_see_tell_nothing():
+    found = []
+    for unseen in (0, 255):
+        framed = []
+        for azimuth in np.arange(5) * 1.2:
+            where = framing_camera(orbit_camera(azimuth, 0.4, 2.5, LENS), 1.0, 128)
+            inside = ball(where)
+            image = np.where(inside[..., None], np.uint8(0), np.uint8(WALL))
+            image = np.dstack([image, np.full(inside.shape, 255, np.uint8)])
+            image[:, :60] = unseen, unseen, unseen, 0
+            shares = np.where(inside & (image[..., 3] > 0), 0.8, 0.1).astype(np.float32)
+            framed.append(FramedShares(image, shares, where))
+        found.append(np.stack(agreed_shares(framed))[:, :, 64:])
+    np.testing.assert_allclose(*found, atol=0.03)
+
+
 def ball(where, radius=0.3):
     """Return the pixels of a camera's image that show a ball about the origin."""
     rays = where.ray_directions()

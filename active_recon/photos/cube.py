@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 MARGIN = 1.09
 """Side of the cube relative to the longest side of the object's box."""
 _LEAST_ANGLE_SHARE = 1e-3
-_WIDER = 1.6
+WIDER, NARROWER = 1.6, 0.75
+"""
+Side of the first cube relative to the photos' width: wider than they are, or as a segmenter needs
+it, to which a photo that is small in the cube's image is all object.
+"""
 _OF_DISTANCE = 1.1  # the cube's corners are 0.87 sides away from its centre
 
 
@@ -101,19 +105,21 @@ def meeting_point(cameras: Sequence[Camera]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.solve(normal, moment))
 
 
-def first_cube(cameras: Sequence[Camera], up: NDArray[np.float64] | None) -> Cube:
+def first_cube(cameras: Sequence[Camera], up: NDArray[np.float64] | None,
+               share: float = WIDER) -> Cube:
     """
-    Return a generous cube where the optical axes meet: wider than the photos at that place.
+    Return a cube where the optical axes meet, of a share of the photos' width at that place.
 
-    An object may fill its photos. All cameras stay outside of the cube. `up` None: the mean of
-    what is up in the photos. Raises DataError as `meeting_point` does.
+    It is wider than the photos by default: an object may fill them. All cameras stay outside of
+    the cube. `up` None: the mean of what is up in the photos. Raises DataError as `meeting_point`
+    does.
     """
     centre = meeting_point(cameras)
     distances = [float(np.linalg.norm(camera.position - centre)) for camera in cameras]
     lenses = [camera.intrinsics for camera in cameras]
     widths = [distance * min(lens.width / lens.fx, lens.height / lens.fy)
               for distance, lens in zip(distances, lenses, strict=True)]
-    side = min(_WIDER * float(np.median(widths)), _OF_DISTANCE * min(distances))
+    side = min(share * float(np.median(widths)), _OF_DISTANCE * min(distances))
     return Cube(centre, side, upward(cameras) if up is None else up)
 
 

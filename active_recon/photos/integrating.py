@@ -1,6 +1,7 @@
 """Views of photos through the network; and the object's cube, found from what comes out."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 from active_recon.errors import DataError, ViewError
@@ -14,9 +15,11 @@ from active_recon.photos.hull import (
     object_box,
     seen_cells,
 )
+from active_recon.photos.segmented_views import segmented_cells
 from active_recon.photos.shape import TakenView
 from active_recon.photos.views import PhotoView
 from active_recon.reconstructor import Reconstructor
+from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.depth_images import DepthImage
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
@@ -29,6 +32,7 @@ Advance = Callable[[int, str], None]
 _SEARCHED_VIEWS = 8
 _ROUNDS = 4
 _HULL_CELLS = 48
+_WIDER = 1.2  # than where the search begins is the cube at most, before any background
 _SAME = 0.08  # relative change of the cube below which the search ends
 
 
@@ -89,12 +93,15 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
     `grounded`, only above 0 of the world's `up`. Raises DataError where nothing is.
     """
     some = even_choice(views, _SEARCHED_VIEWS)
-    cube = start
+    cube, largest = start, start.side * (_WIDER if background == 'segment' else 1.0)
     for _ in range(_ROUNDS):
         cameras = [cube.camera(view.camera, 1.0) for view in some]
         if all(view.mask is not None for view in some):
             cells = hull(depth_in_masks(some, cameras, _HULL_CELLS))
             cells &= seen_cells(cameras, _HULL_CELLS)
+        elif background == 'segment':
+            cells = segmented_cells(some, cube, shipped_segmentation())
+            cells &= seen_cells(cameras, len(cells))
         else:
             taken, _ = integrate(some, cube, 1.0, reconstructor, background)
             cells = taken[-1].known.grid.occupied(reconstructor.threshold)
@@ -103,6 +110,7 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
             raise DataError('object not found: expected one where the photos look, found nothing '
                             'there; give its place by --box, or masks by --masks', 'no_cube')
         before, cube = cube, cube.part(box)
+        cube = replace(cube, side=min(cube.side, largest))
         moved = float(np.linalg.norm(cube.centre - before.centre))
         if max(moved, abs(cube.side - before.side)) < _SAME * before.side:
             break

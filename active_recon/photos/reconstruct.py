@@ -10,7 +10,7 @@ from active_recon.photos.backgrounds import BACKGROUNDS, named, separated
 from active_recon.photos.board_masks import board_views
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
-from active_recon.photos.cube import Cube, first_cube, upward
+from active_recon.photos.cube import Cube, first_cube, NARROWER, upward, WIDER
 from active_recon.photos.doubts import doubts
 from active_recon.photos.files import in_order_of, open_photos, photo_paths
 from active_recon.photos.integrating import carved, even_choice, found_cube, integrate
@@ -144,22 +144,25 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
     if wrong:
         raise DataError(f'{file.source}: {wrong}', 'convention')
     views, empty, cube = _separated(views, file, cube, options.background)
+    background = options.background
+    if background == 'auto' and all(view.mask is None for view in views):
+        background = 'segment'
     if cube is None:
         with reporting('finding the object', 1) as advance:
-            cube = found_cube(views, first_cube(poses, up), reconstructor, options.background,
-                              file.board is not None)
+            start = first_cube(poses, up, NARROWER if background == 'segment' else WIDER)
+            cube = found_cube(views, start, reconstructor, background, file.board is not None)
             advance(1, '')
-    if options.background == 'segment' or (
-            options.background == 'auto' and all(view.mask is None for view in views)):
-        views, unfound = segmented_views(views, cube, shipped_segmentation())
-        empty = [*empty, *unfound]
-        if not views:
-            raise DataError(f'object not found: {empty[0]}', 'no_object')
     if options.size and file.metric and options.box is None:
         cube = cube.of_side(options.size, file.board is not None)
+    shown = views
+    if background == 'segment':
+        shown, unfound = segmented_views(views, cube, shipped_segmentation())
+        empty = [*empty, *unfound]
+        if not shown:
+            raise DataError(f'object not found: {empty[0]}', 'no_object')
     size = options.size or cube.side * options.unit
     with reporting('reconstructing', len(views)) as advance:
-        taken, unseen = integrate(views, cube, size, reconstructor, options.background, advance,
+        taken, unseen = integrate(shown, cube, size, reconstructor, background, advance,
                                   with_depth=True)
     grid, covered = carved(taken[-1].known.grid, reconstructor.threshold, views, cube)
     if file.board is not None:
@@ -167,7 +170,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         grid = VoxelGrid(occupancy, grid.size)
     return Shape(grid, reconstructor.threshold, taken, cube,
                  named([view.background for view in taken]), [*left_out, *empty, *unseen],
-                 [*doubts(taken, views, cube, reconstructor, options.background, covered,
+                 [*doubts(taken, views, cube, reconstructor, background, covered,
                           file.looks),
                   *_without_depth(views, taken)], dict(reconstructor.provenance))
 

@@ -1,13 +1,14 @@
 """Photos on white by the segmenter, and by what all photos agree on."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from active_recon.errors import ViewError
 from active_recon.geometry.resampling import carried_back
 from active_recon.photos.cube import Cube
 from active_recon.photos.seen_photo import SeenPhoto
-from active_recon.photos.silhouette_fusion import segmented_silhouettes
+from active_recon.photos.silhouette_fusion import CELLS, segmented_silhouettes
 from active_recon.photos.views import PhotoView
 from active_recon.segmentation import FramedShares, on_white_by, Segmentation
 import numpy as np
@@ -42,13 +43,28 @@ def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmen
     return shown, left_out
 
 
+def segmented_cells(views: Sequence[PhotoView], cube: Cube,
+                    segmentation: Segmentation) -> NDArray[np.bool_]:
+    """Return the cells of a cube, (C, C, C), that the views agree are the object."""
+    found = []
+    for view in views:
+        with suppress(ViewError):
+            found.append(segmentation.framed(view.image, cube.camera(view.camera, 1.0)))
+    return _agreed(found)[1] if found else np.zeros((CELLS,) * 3, np.bool_)
+
+
 def agreed_shares(framed: Sequence[FramedShares]) -> list[NDArray[np.float32]]:
     """Return the object's share in each pixel, (S, S) each, that framed images agree on."""
-    photos, shares = [], []
+    return _agreed(framed)[0] if framed else []
+
+
+def _agreed(framed: Sequence[FramedShares]
+            ) -> tuple[list[NDArray[np.float32]], NDArray[np.bool_]]:
+    """Return the shares and the cells, (C, C, C), that framed images agree on."""
+    photos = []
     for each in framed:
         image = each.image[..., :3].astype(np.float32)
-        known = np.full(image.shape[:2], True)
-        photos.append(SeenPhoto(each.camera, image, image, known, np.zeros_like(image)))
-        seen = known if each.image.shape[2] == 3 else each.image[..., 3] > 127
-        shares.append(np.where(seen, each.shares, _UNKNOWN))
-    return segmented_silhouettes(photos, shares) if photos else []
+        seen = (np.full(image.shape[:2], True) if each.image.shape[2] == 3
+                else each.image[..., 3] > 127)
+        photos.append(SeenPhoto(each.camera, image, image, seen, np.zeros_like(image)))
+    return segmented_silhouettes(photos, [each.shares for each in framed])

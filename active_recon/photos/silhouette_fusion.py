@@ -10,7 +10,7 @@ models", CVPR 2005.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from active_recon.geometry.cameras import Camera
@@ -92,26 +92,32 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
     return found, ((total > 0) & above).reshape((CELLS,) * 3)
 
 
-def segmented_silhouettes(photos: Sequence[SeenPhoto],
-                          shares: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
+def segmented_silhouettes(photos: Sequence[SeenPhoto], shares: Sequence[NDArray[np.float32]]
+                          ) -> tuple[list[NDArray[np.float32]], NDArray[np.bool_]]:
     """
-    Return the object's share in each pixel, (H, W) in [0, 1] each, by those of a segmenter.
+    Return the object's share in each pixel, (H, W) in [0, 1] each, and its cells, (S, S, S).
 
-    The cameras are in the object frame, lengths in sides of the cube.
+    `shares` are those of a segmenter. The cameras are in the object frame, lengths in sides of the
+    cube. Pixels that are not `known`, which the camera did not see, tell nothing.
     """
     everywhere = np.full(CELLS ** 3, True)
     places = [_place(photo.camera, everywhere) for photo in photos]
+    places = [replace(place, shown=place.shown & photo.known[place.down, place.across])
+              for photo, place in zip(photos, places, strict=True)]
     sure = [share.clip(_LEAST_SHARE, 1 - _LEAST_SHARE) for share in shares]
     logits = [np.log(share / (1 - share)) for share in sure]
 
     def by_both(found: Sequence[NDArray[np.float32]]) -> list[Logits]:
-        of_object, of_rest = (_colors(photos, parts) for parts in (
-            [share > 0.7 for share in found], [share < 0.3 for share in found]))
-        return [np.clip(logit + np.clip(_density(of_object, photo.even)
-                                        - _density(of_rest, photo.even), -_MOST, _MOST),
-                        -_MOST, _MOST) for photo, logit in zip(photos, logits, strict=True)]
+        of_object, of_rest = (_colors(photos, [part & photo.known for part, photo in zip(
+            parts, photos, strict=True)]) for parts in (
+                [share > 0.7 for share in found], [share < 0.3 for share in found]))
+        return [np.where(photo.known, np.clip(
+            logit + np.clip(_density(of_object, photo.even) - _density(of_rest, photo.even),
+                            -_MOST, _MOST), -_MOST, _MOST), 0.0)
+            for photo, logit in zip(photos, logits, strict=True)]
 
-    return _agreed(photos, places, by_both(shares), by_both, _SEGMENTED_SHARE)[0]
+    found, total = _agreed(photos, places, by_both(shares), by_both, _SEGMENTED_SHARE)
+    return found, (total > 0).reshape((CELLS,) * 3)
 
 
 def _agreed(photos: Sequence[SeenPhoto], places: Sequence['_Place'], own: list[Logits],
