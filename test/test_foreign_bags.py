@@ -3,14 +3,16 @@
 import math
 
 from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import Topics
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS
 from foreign_recordings import AZIMUTHS, cameras, IMAGES, images, joints, png, TIMES
-from loop_bags import BEGIN, PERIOD, write_bag
+from loop_bags import BEGIN, DELAY, header, PERIOD, write_bag
 from msg_tools.images import image_to_msg
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header
 
 
@@ -66,6 +68,27 @@ def test_joints_without_stamps_are_joined_on_receive_times(tmp_path):
     assert azimuths(views(tmp_path / 'run', images() + unstamped)) == AZIMUTHS
 
 
+@pytest.mark.parametrize('poses', [joints, lambda: list(cameras(late=2))])
+def test_images_without_stamps_are_joined_on_receive_times_and_stamped_with_them(tmp_path, poses):
+    unstamped = images()
+    for _, _, msg in unstamped:
+        msg.header = Header()
+    found = views(tmp_path / 'run', unstamped + poses())
+    assert azimuths(found) == AZIMUTHS
+    assert {view.stamp - DELAY for view in found} <= {time for time, _ in TIMES}
+
+
+def test_of_a_fast_joint_only_the_angles_around_an_image_become_poses(tmp_path, monkeypatch):
+    placed = []
+    monkeypatch.setattr(Scene, 'pose_at', lambda self, angle, turned: (
+        placed.append(angle), self.orbit_pose(angle))[1])
+    fast = [(time + step * PERIOD // 100, '/table', JointState(
+        header=header(time + step * PERIOD // 100, ''), name=['turn'],
+        position=[AZIMUTHS[number]])) for time, number in TIMES for step in range(-50, 50)]
+    assert azimuths(views(tmp_path / 'run', images() + fast)) == AZIMUTHS
+    assert len(placed) <= 3 * len(TIMES)
+
+
 def test_camera_info_of_no_calibrated_camera_is_as_good_as_none(tmp_path):
     messages = [*images(), *cameras()]
     for _, topic, msg in messages:
@@ -99,12 +122,13 @@ def test_without_camera_info_a_pose_tells_its_azimuth_alone(tmp_path):
     assert found[0].camera.distance == pytest.approx(2.1)
 
 
-def test_topics_of_one_kind_are_told_apart_by_name(tmp_path):
+def test_topics_of_one_kind_are_told_apart_by_name_with_or_without_the_slash(tmp_path):
     folder = write_bag(tmp_path / 'run', images() + images('/cam/depth') + joints())
     with pytest.raises(DataError, match='/cam/color, /cam/depth: choose one with --image'):
         read_run(folder)
-    (episode,) = read_run(folder, Topics(image='/cam/color')).episodes
-    assert len(episode.views) == 3
+    for name in ('/cam/color', 'cam/color'):
+        (episode,) = read_run(folder, Topics(image=name)).episodes
+        assert len(episode.views) == 3
     with pytest.raises(DataError, match='no camera images on /cam/none: expected'):
         read_run(folder, Topics(image='/cam/none'))
 

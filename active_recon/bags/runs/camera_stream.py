@@ -1,8 +1,9 @@
 """The camera in a bag: images joined with poses as in the reconstructor's node."""
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import islice
 import math
 from typing import Any
 
@@ -34,8 +35,9 @@ class CameraStream:
     Poses are interpolated and rejected as in the node. If the bag has azimuths only and the scene
     no camera position, or if it has no camera info of a calibrated camera, the camera is assumed
     at that azimuth on the scene's orbit, with a lens whose shorter side matches the canonical
-    camera. Azimuths without stamps are joined with the images on their receive times. Raises
-    ConfigError if the scene repeats what the bag has.
+    camera. Where images or azimuths have no stamps, they are joined on their receive times, and
+    an image without one has its receive time as its stamp. Raises ConfigError if the scene
+    repeats what the bag has.
 
     - assumed: in words, what neither the bag nor the scene states; complete once `views` ended
     - received: receive times by topic name in the loop and by stamp, nanoseconds
@@ -49,9 +51,9 @@ class CameraStream:
         self._topics = topics
         self._scene = scene
         self._reporting = reporting
-        self._unstamped = False
+        self._unstamped = self._unstamped_images = False
         self._lenses: list[tuple[int, Intrinsics]] = []
-        self._poses: list[tuple[int, NDArray[np.float64]]] = []
+        self._poses: list[tuple[int, NDArray[np.float64] | float]] = []
         self.images: list[tuple[int, int]] = []
         self.assumed: list[str] = []
         self.received: dict[str, dict[int, int]] = {
@@ -80,14 +82,17 @@ class CameraStream:
         for message in self._bag.messages({self._camera.image.name}):
             advance(1, '')
             msg = read_message(message)
-            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            stamp = (message.received if self._unstamped_images
+                     else nanoseconds_from_stamp(msg.header.stamp))
             self.images.append((stamp, message.received))
             if not wanted(stamp):
                 continue
             self.received[IMAGE_ROLE].setdefault(stamp, message.received)
             time = message.received if self._unstamped else stamp
+            # Of a fast tracker's poses only those around an image are of use
+            fed = max(fed, bisect_left(self._poses, time, key=_stamp) - 1)
             while fed < len(self._poses) and (fed == 0 or self._poses[fed - 1][0] < time):
-                joiner.add_pose(*self._poses[fed])
+                joiner.add_pose(self._poses[fed][0], self._placed(self._poses[fed][1]))
                 fed += 1
             try:
                 joiner.add_intrinsics(time, self._lens(time, *size_from_msg(msg)))
@@ -119,13 +124,17 @@ class CameraStream:
             except MessageError as error:
                 yield error
         self._place()
-        self._unstamped = not any(stamp for stamp, _, _ in poses)
-        self._poses = [(received if self._unstamped else stamp, self._placed(pose))
+        self._unstamped_images = not any(
+            nanoseconds_from_stamp(read_message(message).header.stamp)
+            for message in islice(self._bag.messages({self._camera.image.name}), 2))
+        self._unstamped = self._unstamped_images or not any(stamp for stamp, _, _ in poses)
+        self._poses = [(received if self._unstamped else stamp, pose)
                        for stamp, received, pose in poses]
         self._poses.sort(key=_stamp)
         self._lenses.sort(key=_stamp)
 
-    def _pose(self, msg: Any) -> NDArray[np.float64]:
+    def _pose(self, msg: Any) -> NDArray[np.float64] | float:
+        """Return the camera's pose, or its azimuth where the bag has no more."""
         kind = self._camera.azimuth.type_name
         if kind == POSE:
             return pose_from_msg(msg, self._topics.object_frame)
@@ -133,7 +142,7 @@ class CameraStream:
                  else float(msg.data))
         if not math.isfinite(angle):
             raise MessageError(f'azimuth not finite: got {angle}', 'azimuth')
-        return self._scene.pose_at(angle, self._topics.turned_object)
+        return angle
 
     def _place(self) -> None:
         """Decide how much of the camera is known; raise ConfigError on redundant options."""
@@ -144,8 +153,10 @@ class CameraStream:
         scene.reject_redundant(azimuth.name, has_poses, has_poses and bool(self._lenses))
         self.assumed = scene.assumed(self._camera.image.name, has_poses, recorded)
 
-    def _placed(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _placed(self, known: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Return the pose, or one on the orbit at its azimuth if no lens is known."""
+        pose = (self._scene.pose_at(known, self._topics.turned_object)
+                if isinstance(known, float) else known)
         if self._lenses or self._scene.camera_position is not None:
             return pose
         return self._scene.orbit_pose(Camera(pose).azimuth)

@@ -31,6 +31,8 @@ class Topics:
     """
     The topics with what a view needs; '' finds a topic by its name in the loop or by its type.
 
+    Names may lack the first '/'.
+
     - image: sensor_msgs Image or CompressedImage; camera_info: sensor_msgs CameraInfo
     - azimuth: geometry_msgs PoseStamped of the camera; or radians, as a sensor_msgs JointState or
       a std_msgs Float64
@@ -161,7 +163,8 @@ class _Search:
     def _fitting(self, name: str, types: Sequence[str]) -> list[TopicSummary]:
         """Return the topics of the types with that name, or all but the loop's own."""
         return [topic for topic in self._present if topic.type_name in types and (
-            topic.name == name if name else not topic.name.endswith(_OF_THE_LOOP))]
+            topic.name.lstrip('/') == name.lstrip('/') if name
+            else not topic.name.endswith(_OF_THE_LOOP))]
 
     def _known_by_name(self, name: str, fitting: Sequence[TopicSummary],
                        usual: str) -> list[TopicSummary]:
