@@ -1,6 +1,6 @@
 """What of a bag can be played."""
 
-from active_recon.bags.runs.playing import played_topics
+from active_recon.bags.runs.playing import played_messages, played_topics
 from active_recon.bags.storage.metadata import Topic
 from active_recon.errors import ConfigError, DataError
 from mcap.opcode import Opcode
@@ -47,6 +47,20 @@ def test_topics_are_played_with_the_qos_that_they_were_offered_with(bag, bare):
 def test_topics_are_chosen_by_name_with_or_without_the_slash(bag):
     for names in ('episode', '/episode', 'episode, /episode'):
         assert [topic.name for topic in played_topics(bag.folder, 0.5, names)] == ['/episode']
+
+
+def test_messages_are_played_in_the_order_of_reception_however_they_lie_in_the_bag(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        for number in (2, 3, 0, 1):
+            bag.write('/episode', cdr(header(number)), time_of(number), time_of(number))
+            bag.flush()
+            bag.write('/camera/image_raw', cdr(image(number)), time_of(number), time_of(number))
+            bag.flush()
+    played = list(played_messages(bag.folder, {'/episode', '/camera/image_raw'}))
+    assert [each.received for each in played] == [
+        time_of(number) for number in range(4) for _ in range(2)]
+    assert [each.topic for each in played] == ['/episode', '/camera/image_raw'] * 4
+    assert len(list(played_messages(bag.folder, {'/episode'}))) == 4
 
 
 @pytest.mark.parametrize('rate', [0.0, -1.0, float('nan'), float('inf')])

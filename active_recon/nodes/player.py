@@ -1,12 +1,9 @@
 """ROS node that plays a bag: serialized messages at their reception times, and the clock."""
 
-from collections.abc import Iterator
 from pathlib import Path
 import time
 
-from active_recon.bags.runs.playing import played_topics
-from active_recon.bags.storage.bag import RawMessage
-from active_recon.bags.storage.opening import open_bag
+from active_recon.bags.runs.playing import played_messages, played_topics
 from active_recon.errors import ConfigError
 from active_recon.nodes.runtime.definitions import message_class
 from active_recon.nodes.runtime.parameters import Parameters
@@ -51,7 +48,7 @@ class PlayerNode(Node):
                 profile.depth = 1
             self._out[topic.name] = self.create_publisher(kind, topic.name, profile)
         self._clock_pub = None if CLOCK in self._out else self.create_publisher(Clock, CLOCK, 10)
-        self._messages = self._read(bag)
+        self._messages = played_messages(bag, self._out)
         self._next = next(self._messages, None)
         self._begin = self._next.received if self._next is not None else 0
         self._made_at = time.monotonic()
@@ -60,9 +57,6 @@ class PlayerNode(Node):
         self.get_logger().info(f'playing {len(topics)} topics of {bag} at rate {self._rate:g}')
         # A steady clock: with use_sim_time the node would wait for the clock it publishes.
         self.create_timer(_TICK_S, self._play, clock=SystemClock(clock_type=ClockType.STEADY_TIME))
-
-    def _read(self, bag: Path) -> Iterator[RawMessage]:
-        return open_bag(bag).messages(self._out.keys())
 
     def _play(self) -> None:
         """Publish the messages that are due."""
