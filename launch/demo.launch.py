@@ -13,8 +13,9 @@ ARGUMENTS = {
     'namespace': ('', 'namespace of the nodes and their topics'),
     'params_file': (
         PathJoinSubstitution([SHARE, 'config', 'demo.yaml']), 'parameters file of the nodes'),
-    'use_sim_time': ('false', 'whether to use the time on /clock'),
-    'autostart': ('true', 'whether reconstructor and view planner activate themselves'),
+    'use_sim_time': ('false', 'whether to use the time on /clock, unless params_file tells'),
+    'autostart': ('true', 'whether reconstructor and view planner activate themselves, unless '
+                  'params_file tells'),
     'single_process': ('false', 'whether reconstructor and view planner share a process'),
     'log_level': ('info', 'debug, info, warn, error or fatal'),
 }
@@ -27,8 +28,9 @@ def generate_launch_description():
           for name, (default, description) in ARGUMENTS.items()),
         Node(package='active_recon', executable='turntable_camera', name='turntable_camera',
              namespace=value['namespace'], output='screen',
-             parameters=[value['params_file'], {
-                 'use_sim_time': ParameterValue(value['use_sim_time'], value_type=bool)}],
+             parameters=[{
+                 'use_sim_time': ParameterValue(value['use_sim_time'], value_type=bool)},
+                 value['params_file']],
              arguments=['--ros-args', '--log-level', value['log_level']]),
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(

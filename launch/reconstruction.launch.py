@@ -13,8 +13,9 @@ ARGUMENTS = {
     'params_file': (
         PathJoinSubstitution([FindPackageShare('active_recon'), 'config', 'arm.yaml']),
         'parameters file of the nodes'),
-    'use_sim_time': ('false', 'whether to use the time on /clock'),
-    'autostart': ('true', 'whether the nodes configure and activate themselves'),
+    'use_sim_time': ('false', 'whether to use the time on /clock, unless params_file tells'),
+    'autostart': ('true', 'whether the nodes configure and activate themselves, unless '
+                  'params_file tells'),
     'single_process': ('false', 'whether reconstructor and view planner share a process'),
     'camera': ('false', 'whether to start the node camera, for a camera without a driver; its '
                'source is in params_file'),
@@ -39,9 +40,11 @@ def generate_launch_description():
     log_level = ['--ros-args', '--log-level', value['log_level']]
     apart, together = (condition(value['single_process'])
                        for condition in (UnlessCondition, IfCondition))
-    parameters = [value['params_file'], {
-        'use_sim_time': ParameterValue(value['use_sim_time'], value_type=bool)}]
-    managed = [*parameters, {'autostart': ParameterValue(value['autostart'], value_type=bool)}]
+    # Of a parameter that is given twice the last holds: the file's, not an argument's default
+    use_sim_time, autostart = ({name: ParameterValue(value[name], value_type=bool)}
+                               for name in ('use_sim_time', 'autostart'))
+    parameters = [use_sim_time, value['params_file']]
+    managed = [use_sim_time, autostart, value['params_file']]
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),

@@ -122,6 +122,14 @@ def test_every_parameter_that_is_set_is_one_of_its_node(described, name):
                     assert parameters.keys() <= known | {'use_sim_time'}
 
 
+@pytest.mark.parametrize('name', FILES)
+def test_what_the_parameters_file_says_is_given_last_and_so_holds(described, name):
+    for node in described(name).find('Node'):
+        *arguments, file = node.kwargs['parameters']
+        assert file.args == ('params_file',)
+        assert arguments and all(isinstance(each, dict) for each in arguments)
+
+
 def test_what_shares_a_process_is_what_would_have_processes_apart(described):
     conditions = {}
     for node in described('reconstruction.launch.py').find('Node'):
