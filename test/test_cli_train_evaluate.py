@@ -117,9 +117,12 @@ def test_the_paper_s_network_with_cameras_goes_from_data_to_figures(
     assert all(0 <= value['mean'] <= 1 for each in found.values() for value in each['iou'])
 
 
-def test_validation_objects_that_are_trained_on_are_told(dataset, tmp_path, monkeypatch, capsys):
-    assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0)) == 0
-    assert '6 of 6 validation objects are trained on too' in capsys.readouterr().err
+def test_validation_objects_that_are_trained_on_are_told_wherever_they_lie(
+        dataset, tmp_path, monkeypatch, capsys):
+    copied = shutil.copytree(dataset, tmp_path / 'copy')
+    asked = training(dataset, tmp_path, '--policy-steps', 0, '--validation', copied)
+    assert command(monkeypatch, *asked) == 0
+    assert '12 of 12 validation objects are trained on too' in capsys.readouterr().err
 
 
 def test_only_weights_with_a_policy_say_how_far_apart_its_views_stay(

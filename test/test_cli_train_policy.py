@@ -43,6 +43,7 @@ def test_a_policy_is_learned_in_two_rounds_and_chooses(
                  '--objects', 2, '--candidates', 4, '--starts', 1, '--views', 3, '--epochs', 2,
                  '--threads', 1]
     assert command(monkeypatch, 'train-policy', *arguments) == 0
+    assert '6 of 6 validation objects are trained on too' in capsys.readouterr().err
     made = tmp_path / 'run' / 'carving-scorer.safetensors'
     card = json.loads(made.with_suffix('.json').read_text())
     assert len(card['rounds']) == 2 and card['rounds'][1]['train_states'] >= 4

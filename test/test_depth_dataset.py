@@ -118,7 +118,8 @@ def test_a_sample_is_what_the_network_says_alone_and_what_its_seed_draws(views):
     torch.testing.assert_close(one.logits, network.decode(state), rtol=1e-3, atol=1e-3)
 
 
-def test_a_refiner_is_trained_and_loaded_from_the_command_line(deep, tmp_path, monkeypatch):
+def test_a_refiner_is_trained_and_loaded_from_the_command_line(
+        deep, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     torch.manual_seed(0)
     weights = tmp_path / 'lifting.safetensors'
@@ -127,6 +128,7 @@ def test_a_refiner_is_trained_and_loaded_from_the_command_line(deep, tmp_path, m
     arguments = ('train-depth', deep, '--validation', deep, '--model', weights, '--steps', 2,
                  '--batch-size', 1, '--max-views', 1, '--out', 'run', '--threads', 1)
     assert command(monkeypatch, *arguments) == 0
+    assert 'validation objects are trained on too: the calibr' in capsys.readouterr().err
     made = tmp_path / 'run' / 'lifting-depth.safetensors'
     (tmp_path / made.name).write_bytes(made.read_bytes())
     refiner = load_refiner(weights)

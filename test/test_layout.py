@@ -130,3 +130,18 @@ def test_an_image_that_cannot_be_written_leaves_the_object_incomplete(tmp_path):
     with pytest.raises(DataError, match='01.png: cannot be written'):
         write_object(folder, IMAGES, CAMERAS, GRID)
     assert not folder.complete
+
+
+def test_an_object_that_is_rendered_into_another_folder_is_still_the_same(folder, tmp_path):
+    elsewhere = ObjectFolder(tmp_path / 'other', folder.category, folder.name)
+    write_object(elsewhere, IMAGES[:1], CAMERAS[:1], GRID)
+    assert folder.is_copy_of(elsewhere) and folder.is_copy_of(folder)
+
+
+def test_other_names_and_other_voxels_are_other_objects(folder, tmp_path):
+    twin = ObjectFolder(tmp_path, folder.category, 'two')
+    write_object(twin, IMAGES, CAMERAS, GRID)
+    namesake = ObjectFolder(tmp_path / 'other', folder.category, folder.name)
+    write_object(namesake, IMAGES, CAMERAS, VoxelGrid(1 - GRID.occupancy))
+    unfinished = ObjectFolder(tmp_path / 'third', folder.category, folder.name)
+    assert not any(map(folder.is_copy_of, (twin, namesake, unfinished)))

@@ -1,5 +1,6 @@
 """Reading datasets with a progress bar and a list of the objects left out."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
@@ -9,6 +10,7 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.datasets.layout import ObjectFolder
     from active_recon.datasets.views import ViewSet
     from active_recon.geometry.canonical import NetworkSpec
 
@@ -72,10 +74,14 @@ def _print_left_out(title: str, count: int, missing: Sequence[str],
                    err=True)
 
 
-def warn_of_shared_objects(training: 'ViewSet', held_out: 'ViewSet', so: str) -> None:
-    """Warn where validation objects are among the training objects, and of what follows."""
-    trained = {folder.images_folder.resolve() for folder in training.folders}
-    shared = sum(folder.images_folder.resolve() in trained for folder in held_out.folders)
+def warn_of_shared_objects(training: 'Sequence[ObjectFolder]', held_out: 'Sequence[ObjectFolder]',
+                           so: str) -> None:
+    """Warn where validation objects are training objects, of any folder, and of what follows."""
+    trained = defaultdict(list)
+    for folder in training:
+        trained[folder.category, folder.name].append(folder)
+    shared = sum(any(map(folder.is_copy_of, trained.get((folder.category, folder.name), ())))
+                 for folder in held_out)
     if shared:
         typer.echo(f'warning: {shared} of {len(held_out)} validation objects are trained on too: '
                    f'{so}', err=True)

@@ -153,8 +153,8 @@ def train(
     training = read_objects(data, 'training data', asked, split_file, 'train', at_once=False)
     held_out = read_objects(validation, 'validation data', asked, split_file, 'val')
     if fabric.is_global_zero:
-        warn_of_shared_objects(training, held_out, 'the threshold is biased, and their IoU is '
-                               'too high')
+        warn_of_shared_objects(training.folders, held_out.folders,
+                               'the threshold is biased, and their IoU is too high')
     with SummaryLog(out / 'tensorboard', held_out) as log:
         try:
             bundle = train_plan(plan, training, held_out, out, log.reporting, fabric, resume,

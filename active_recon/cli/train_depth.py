@@ -5,7 +5,7 @@ from typing import Annotated
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.one_training import checkpoint_in, shown_steps
-from active_recon.cli.reading import read_objects
+from active_recon.cli.reading import read_objects, warn_of_shared_objects
 from active_recon.errors import ConfigError
 import typer
 
@@ -72,6 +72,7 @@ def train_depth(
     fabric.launch()
     views = read_objects(data, 'training data', network.spec, at_once=False, depth=True)
     held_out = read_objects([validation], 'validation data', network.spec, depth=True)
+    warn_of_shared_objects(views.folders, held_out.folders, 'the calibration is biased')
     config = DepthRefinerConfig(features=network.initial_state(1)['coarse_sum'].shape[1])
     refiner, digest = DepthRefiner.from_config(config), weights_hash(path)
     with shown_steps('depth', steps) as report:

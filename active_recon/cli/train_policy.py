@@ -7,6 +7,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 from active_recon.cli.cluster_option import Cluster, reachable, workers_of
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.reading import warn_of_shared_objects
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 import typer
@@ -72,6 +73,7 @@ def train_policy(
 
       active-recon train-policy turn/train things/train --validation turn/val --out runs/policy
     """
+    from active_recon.datasets.layout import list_objects
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.models.scorer_weights import load_scorer_of_any_network, save_scorer
     from active_recon.models.view_scorer import ScorerConfig
@@ -100,6 +102,9 @@ def train_policy(
     held_out: list[LookedStates] = []
     begun = None if init_from is None else load_scorer_of_any_network(init_from)
     scorer_to_train(config, begun)  # refuses other sizes before anything is measured
+    trained, tested = ([each for folder in folders for each in list_objects(folder)]
+                       for folders in (data, validation))
+    warn_of_shared_objects(trained, tested, 'the expected gains are biased')
     scorer = begun
     told: list[dict[str, Any]] = []
     for number in range(1, rounds + 1):

@@ -68,7 +68,7 @@ def train_segmenter(
     views = read_objects(data, 'training data', spec, at_once=False)
     held_out = read_objects([validation], 'validation data', spec, at_once=False)
     if fabric.is_global_zero:
-        warn_of_shared_objects(views, held_out, 'their IoU is too high')
+        warn_of_shared_objects(views.folders, held_out.folders, 'their IoU is too high')
     config = SegmenterConfig()
     segmenter = Segmenter.from_config(config)
     if init_from:

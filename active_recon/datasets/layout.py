@@ -20,6 +20,7 @@ that is metres); 0 is no value.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import filecmp
 import json
 import math
 from pathlib import Path
@@ -27,7 +28,7 @@ from pathlib import Path
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.volumes.binvox import binvox_side, read_binvox, write_binvox
-from active_recon.volumes.voxels import RESOLUTION, VoxelGrid
+from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION, VoxelGrid
 from active_recon.whole_files import whole_file
 import cv2
 import numpy as np
@@ -141,6 +142,21 @@ class ObjectFolder:
     def complete(self) -> bool:
         """Whether the object was written completely: its voxels are written last."""
         return self.voxels_path().is_file()
+
+    def is_copy_of(self, other: 'ObjectFolder') -> bool:
+        """
+        Return whether it is the same object, in the same folder or rendered into another one.
+
+        Then it has the same name, which makers of shapes give once for a seed, and the same
+        voxels, which other shapes of one name have not. An object that was turned
+        (`Viewing.turned`) in one folder only has others.
+        """
+        if (self.category, self.name) != (other.category, other.name):
+            return False
+        return self.images_folder.resolve() == other.images_folder.resolve() or any(
+            mine.is_file() and theirs.is_file() and filecmp.cmp(mine, theirs, shallow=False)
+            for mine, theirs in ((self.voxels_path(cells), other.voxels_path(cells))
+                                 for cells in (RESOLUTION, FINE_RESOLUTION)))
 
 
 def list_objects(root: Path) -> list[ObjectFolder]:
