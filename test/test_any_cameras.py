@@ -1,5 +1,7 @@
 """Views of any cameras: drawn, written, read and framed as the robot frames them."""
 
+import shutil
+
 from active_recon.datasets import framed
 from active_recon.datasets.drawn_cameras import draw_camera, filling_distance, TURNTABLE, Viewing
 from active_recon.datasets.layout import list_objects, ObjectFolder, write_object
@@ -242,3 +244,13 @@ def test_objects_that_cannot_be_read_are_listed(made, tmp_path):
     assert len(views) == 4 and len(views.unreadable) == 1
     with pytest.raises(DataError, match='no readable object'):
         read_views(list_objects(tmp_path), framed=True)
+
+
+def test_an_image_of_another_size_than_its_camera_s_is_left_out(made, tmp_path):
+    path = shutil.copytree(made, tmp_path / 'copy') / 'ShapeNetRendering/chair/chair-000001'
+    image = path / 'rendering' / '02.png'
+    cv2.imwrite(str(image), cv2.resize(cv2.imread(str(image), cv2.IMREAD_UNCHANGED), (200, 200)))
+    views = read_views(list_objects(tmp_path / 'copy'), resolution=64, image_size=128, framed=True)
+    assert len(views) == 3
+    assert views.unreadable == (
+        f'{image}: wrong size: expected 160 x 160 pixels, as its camera says, got 200 x 200',)

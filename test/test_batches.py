@@ -62,6 +62,14 @@ def test_the_views_of_a_sequence_differ(views):
     assert (np.sort(chosen, axis=0) == np.arange(24)[:, None]).all()
 
 
+@pytest.mark.parametrize('augment', (False, True))
+def test_a_sequence_has_no_more_views_than_its_objects(views, augment):
+    few = dataclasses.replace(views, images=views.images[:, :2], poses=views.poses[:, :2],
+                              intrinsics=views.intrinsics[:, :2])
+    batch = draw(few, size=3, length=5, augment=augment)
+    assert batch.images.shape[:2] == batch.cameras.poses.shape[:2] == (2, 3)
+
+
 def test_every_object_is_drawn_and_half_of_the_sequences_are_mirrored(views):
     batch = draw(views, size=400, augment=False)
     _, mirrored = sources(views, batch)

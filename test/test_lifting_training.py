@@ -85,6 +85,12 @@ def test_the_same_seed_draws_the_same_batch(seen_anyhow):
     assert not torch.equal(first.images, other.images)
 
 
+@pytest.mark.parametrize('augment', (False, True))
+def test_a_sequence_has_no_more_views_than_its_objects(seen_anyhow, augment):
+    batch = draw_posed_batch(seen_anyhow, 2, 9, np.random.default_rng(0), augment)
+    assert batch.images.shape[:2] == batch.cameras.poses.shape[:2] == (8, 2)
+
+
 def test_pictures_are_in_range_and_lose_only_what_they_say(seen_anyhow):
     objects, chosen = torch.arange(4).expand(3, 4), torch.arange(3)[:, None].expand(3, 4)
     seen = seen_anyhow.seen[objects, chosen]

@@ -57,7 +57,7 @@ def train(
         min=0, max=180, help='Smallest angle between a goal and the views taken, degrees. '
                              'Default: 60; 0, as in the paper, if joint.')] = None,
     max_views: Annotated[int, typer.Option(
-        min=1, max=24, help='Longest training sequence, in views.')] = 5,
+        min=1, max=24, help='Longest training sequence, in views; at most all of an object.')] = 5,
     curriculum_fraction: Annotated[float, typer.Option(
         help='Fraction of the steps, at the start, with sequences of at most two views.')] = 0.5,
     volume_loss: Annotated[str | None, typer.Option(

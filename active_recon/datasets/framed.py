@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from pathlib import Path
 
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.errors import DataError
@@ -54,18 +55,17 @@ class FramedViews:
 
     def read_image(self, index: int, view: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
         """Read an image, (S, S, 4), and its mask `seen`, (S, S); raises DataError on bad ones."""
-        layers = np.asarray(weighted(self.folders[index].image(
-            self._numbers[index][view])).round(), np.uint8)
-        return framed_layers(layers, self._shown[index][view], self._sides[index], self._size)[:2]
+        number, camera = self._numbers[index][view], self._shown[index][view]
+        image = self.folders[index].image(number)
+        _require_size(image, camera, self.folders[index].images_folder / f'{number:02d}.png')
+        layers = np.asarray(weighted(image).round(), np.uint8)
+        return framed_layers(layers, camera, self._sides[index], self._size)[:2]
 
     def read_depth(self, index: int, view: int) -> NDArray[np.float32]:
         """Read a depth image, (S, S), in sides of the grid; raises DataError on bad ones."""
         number, camera = self._numbers[index][view], self._shown[index][view]
         depth = self.folders[index].depth(number)
-        if depth.shape != (camera.intrinsics.height, camera.intrinsics.width):
-            raise DataError(f'{self.folders[index].depth_path(number)}: wrong size: expected '
-                            f'{camera.intrinsics.height} x {camera.intrinsics.width} pixels, as '
-                            f'its camera says, got {depth.shape[0]} x {depth.shape[1]}')
+        _require_size(depth, camera, self.folders[index].depth_path(number))
         side = self._sides[index]
         target = framing_camera(camera, side, self._size)
         return np.asarray(depth_seen_by(target, depth, camera) / side, np.float32)
@@ -73,6 +73,14 @@ class FramedViews:
     def read_voxels(self, index: int) -> NDArray[np.bool_]:
         """Read the voxels of one object, (R, R, R); raises DataError where they are unreadable."""
         return self.folders[index].voxels(self._resolution).occupied(0.5)
+
+
+def _require_size(image: NDArray[np.generic], camera: Camera, path: Path) -> None:
+    height, width = image.shape[:2]
+    if (height, width) != (camera.intrinsics.height, camera.intrinsics.width):
+        raise DataError(f'{path}: wrong size: expected {camera.intrinsics.height} x '
+                        f'{camera.intrinsics.width} pixels, as its camera says, got {height} x '
+                        f'{width}')
 
 
 class OnDemand:

@@ -31,9 +31,11 @@ def draw_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
     """
     Draw objects with different random views of each, augmented unless `augment` is off.
 
-    Half of the sequences are mirrored in the object's plane y = 0, voxels and cameras with the
-    images. Without augmentation the same views of the same objects have a plain white background.
+    There are `length` views of each, or all that an object has, if these are fewer. Half of the
+    sequences are mirrored in the object's plane y = 0, voxels and cameras with the images.
+    Without augmentation the same views of the same objects have a plain white background.
     """
+    length = min(length, views.images.shape[1])
     objects = torch.from_numpy(rng.integers(len(views), size=size))
     order = rng.random((size, views.images.shape[1])).argsort(axis=1)
     chosen = torch.from_numpy(order[:, :length].T.copy())  # (T, B)

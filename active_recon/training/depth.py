@@ -97,7 +97,6 @@ def calibrate_depth(refiner: DepthRefiner, network: Lifting,
     rng = np.random.default_rng(0)
     found, truth = [], []
     for length in LENGTHS:
-        length = min(length, validation.images.shape[1])
         batch = draw_posed_batch(validation, min(_CALIBRATED, len(validation)), length, rng,
                                  augment=False)
         sample = depth_sample(network, batch, rng)

@@ -37,9 +37,11 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
     """
     Draw objects with different random views of each, turned by quarters and mirrored at random.
 
-    With `augment` the images get backgrounds, of kinds in these shares, light and noise, and the
-    poses small errors.
+    There are `length` views of each, or all that an object has, if these are fewer. With `augment`
+    the images get backgrounds, of kinds in these shares, light and noise, and the poses small
+    errors.
     """
+    length = min(length, views.images.shape[1])
     objects = torch.from_numpy(rng.integers(len(views), size=size))
     order = rng.random((size, views.images.shape[1])).argsort(axis=1)
     chosen = torch.from_numpy(order[:, :length].T.copy())  # (T, B)
