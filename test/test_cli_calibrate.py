@@ -153,9 +153,15 @@ def test_the_board_to_print_comes_with_its_size(tmp_path):
     (['images', '--object-size', 1, '--step-deg', 15, '--mount-frame', 'flange'],
      '--mount-frame without --poses'),
     (['nowhere', '--object-size', 1], 'nowhere'),
+    (['images', '--object-size', 1, '--step-deg', 'nan'], '--step-deg: not finite'),
+    (['images', '--object-size', 1, '--board-thickness-mm', 'inf'], 'board_thickness: not finite'),
+    (['images', '--object-size', 1, '--camera-azimuth-deg', 'nan'], 'azimuth_at_zero: not finite'),
 ])
-def test_options_that_do_not_go_together_are_refused(options, said, tmp_path, monkeypatch):
+def test_options_that_cannot_be_or_do_not_go_together_are_refused(
+        options, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / 'images').mkdir()
+    (tmp_path / 'images' / 'one.png').touch()
     assert said in refusal(*options)
 
 

@@ -187,6 +187,8 @@ def test_a_turned_object_turns_the_goals_on_a_dome_with_it(kind, yaw):
     ({'reachable_views': LISTED[:-1]}, 'reachable_views: not views: expected azimuth, elevation'),
     ({'reachable_views': (0.0, 1.7, 0.0)}, 'reachable_views: out of range: .* got 1.7 and'),
     ({'reachable_views': (0.0, 0.7, -1.0)}, 'reachable_views: out of range: .* got 0.7 and -1'),
+    ({'reachable_views': (0.0, 0.0, 0.0, -90.0, 0.0, 0.0)},
+     'reachable_views: out of range: .* rad, got -90; is it in degrees?'),
     ({'reachable_views': (0.5, 0.7, 1.0, 0.5, 0.7, 2.0)}, 'two in one direction'),
     ({'reachable_views': (0.5, 0.7, 1.0, 0.5 + math.tau, 0.7, 1.0)}, 'two in one direction'),
     ({'reachable_views': (0.0, 0.7, 1.0, 6.2832, 0.7, 1.0)}, 'two in one direction'),

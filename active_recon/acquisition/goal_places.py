@@ -22,6 +22,7 @@ from active_recon.geometry.view_distance import view_distance
 import numpy as np
 from numpy.typing import NDArray
 
+_MOST_TURNS = 2 * TURN  # of an azimuth of a list: more are degrees
 STEEPEST = 1.5
 """Largest elevation of a goal that a parameter can name, radians: beyond, nothing is upright."""
 RING_DISTANCE = math.radians(20)
@@ -185,6 +186,9 @@ def _listed(limits: MotionLimits, distance: float, views: Sequence[float]) -> Li
     if len(views) % 3 or not np.isfinite(views).all():
         raise ConfigError('reachable_views: not views: expected azimuth, elevation (rad) and '
                           f'distance (m; 0 for `distance`) of each, got {list(views)}')
+    if any(abs(azimuth) > _MOST_TURNS for azimuth in views[::3]):
+        raise ConfigError('reachable_views: out of range: expected azimuths of at most two turns, '
+                          f'rad, got {max(views[::3], key=abs):g}; is it in degrees?')
     places = tuple((wrap_azimuth(azimuth), float(elevation), float(away or distance))
                    for azimuth, elevation, away in zip(*(views[at::3] for at in range(3)),
                                                        strict=True))

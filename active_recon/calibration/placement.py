@@ -1,6 +1,7 @@
 """The object frame on the plate: its origin is half the object's cube above it."""
 
 from dataclasses import dataclass
+import math
 
 from active_recon.calibration.board import Board
 from active_recon.calibration.turntable import TurntableFit
@@ -22,7 +23,7 @@ class Placement:
     - azimuth_at_zero: azimuth of the camera at table angle 0, radians; it fixes the x axis of the
       object frame, the object's front
 
-    Raises ConfigError unless `object_size` is finite and above 0.
+    Raises ConfigError unless all are finite and `object_size` is above 0.
     """
 
     object_size: float
@@ -34,6 +35,10 @@ class Placement:
         if not 0 < self.object_size < np.inf:
             raise ConfigError('object_size: out of range: expected metres above 0, got '
                               f'{self.object_size}')
+        for name in ('board_thickness', 'azimuth_at_zero'):
+            if not math.isfinite(getattr(self, name)):
+                raise ConfigError(f'{name}: not finite: expected a number, got '
+                                  f'{getattr(self, name)}')
 
     @property
     def above_board(self) -> float:

@@ -95,6 +95,8 @@ def calibrate(
 
     if sum(one is not None for one in (step_deg, angles_deg, poses)) > 1:
         raise ConfigError('several of --step-deg, --angles-deg and --poses: give one of them')
+    if step_deg is not None and not math.isfinite(step_deg):
+        raise ConfigError(f'--step-deg: not finite: expected degrees, got {step_deg}')
     paths = image_paths(images)
     names = [path.name for path in paths]
     placement = Placement(
