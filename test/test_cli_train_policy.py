@@ -4,6 +4,8 @@ import json
 import shutil
 
 from active_recon.cli.main import main
+from active_recon.datasets.drawn_cameras import Viewing
+from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.errors import WeightsError
 from active_recon.models.scorer_weights import save_scorer
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
@@ -101,3 +103,13 @@ def test_a_network_that_needs_the_front_is_refused(dataset, tmp_path, monkeypatc
     assert command(monkeypatch, 'train-policy', dataset, '--validation', dataset, '--model',
                    '2d3d', '--out', tmp_path, '--threads', 1) == 2
     assert 'expected one that takes any cameras' in capsys.readouterr().err
+
+
+def test_objects_of_two_views_have_no_gains_to_choose_by(weights, tmp_path, monkeypatch, capsys):
+    list(make_dataset(shape_jobs('lamp', range(2), tmp_path / 'few'), 1,
+                      viewing=Viewing('any', 2)))
+    assert command(monkeypatch, 'train-policy', tmp_path / 'few', '--validation',
+                   tmp_path / 'few', '--model', weights, '--out', tmp_path / 'run',
+                   '--threads', 1) == 2
+    said = capsys.readouterr().err
+    assert 'no object whose gains can be measured: expected one or more with voxels and 3' in said

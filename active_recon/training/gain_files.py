@@ -31,6 +31,7 @@ import numpy as np
 import torch
 
 _MIXED = ('random', 'farthest', 'uniform')
+_FEWEST = 3  # candidates that leave a choice after the first view
 _LEFT_OUT = {'data', 'mesh'}  # kinds of errors of objects that cannot be read
 _BY_GAIN = 0.4  # share of the episodes in which the best view is taken, where no policy is given
 
@@ -54,7 +55,7 @@ class Collecting(Config):
 
     def __post_init__(self) -> None:
         """Reject numbers that leave no choice."""
-        if min(self.objects, self.starts) < 1 or self.views < 2 or self.candidates < 3:
+        if min(self.objects, self.starts) < 1 or self.views < 2 or self.candidates < _FEWEST:
             raise ConfigError('Collecting: no choice left: expected 1 object, 1 start, 2 views '
                               f'and 3 candidates or more, got {self.objects}, {self.starts}, '
                               f'{self.views} and {self.candidates}')
@@ -92,7 +93,7 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
     files = [path for folder in folders if (path := _file(out, folder)).is_file()]
     if not files:
         raise DataError(f'{out}: no object whose gains can be measured: expected one or more '
-                        'with images and voxels, got none')
+                        f'with voxels and {_FEWEST} images, got none')
     return files
 
 
@@ -114,6 +115,9 @@ def _measured(folder: ObjectFolder, entrant: Entrant, collecting: Collecting,
     seed = int.from_bytes(_key(folder)[:6], 'big')
     rng = np.random.default_rng(seed)
     scene = read_scene([folder], [entrant.network])
+    if scene.view_count < _FEWEST:
+        raise DataError(f'{folder.images_folder}: no choice of views: expected {_FEWEST} or more, '
+                        f'got {scene.view_count}')
     shown = scene.framed[entrant.network.image_size]
     views = some_views(shown, spread_views(scene.view_count, collecting.candidates, rng))
     side = max(side for side in entrant.sides if side in scene.truths)
