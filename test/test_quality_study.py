@@ -3,6 +3,9 @@
 from dataclasses import replace
 import json
 
+from active_recon.datasets.drawn_cameras import Viewing
+from active_recon.datasets.layout import list_objects
+from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.datasets.views import read_views
 from active_recon.errors import DataError
 from active_recon.evaluation.quality.faults import (
@@ -32,6 +35,7 @@ from active_recon.evaluation.quality.shells import hollow_share
 from active_recon.evaluation.quality.study import study
 from active_recon.evaluation.quality.summary import markdown
 from active_recon.models.lifting import Lifting, LiftingConfig
+from active_recon.models.weights import Bundle, save_weights
 from active_recon.models.weights_files import SHIPPED, weights_hash
 from active_recon.policies import Choice
 from active_recon.policies.geometric import HeuristicPolicy
@@ -183,9 +187,6 @@ def test_a_solid_is_not_hollow_and_a_box_without_a_bottom_is():
 @pytest.fixture(scope='module')
 def seen(tmp_path_factory):
     """Two objects from any cameras."""
-    from active_recon.datasets.drawn_cameras import Viewing
-    from active_recon.datasets.making import make_dataset, shape_jobs
-
     out = tmp_path_factory.mktemp('any')
     jobs = shape_jobs('chair', range(2), out)
     assert not any(each.refusal for each in make_dataset(
@@ -279,6 +280,23 @@ def test_a_study_of_nothing_and_an_unknown_fault_are_refused(tmp_path, monkeypat
     assert 'nothing to measure' in refusal(monkeypatch, capsys, 'quality', 'study')
     assert 'unknown value' in refusal(monkeypatch, capsys, 'quality', 'measure', tmp_path,
                                       tmp_path / 'm.npz', '--fault', 'luck')
+
+
+def test_objects_that_cannot_be_read_are_left_out_by_name(tmp_path, monkeypatch, capsys):
+    data, config = tmp_path / 'data', LiftingConfig((8, 8, 8, 8), 8, 8, 4, 4, (8, 8, 8), 8)
+    list(make_dataset(shape_jobs('lamp', range(5), data), 1, fine=True, viewing=Viewing('any', 2)))
+    save_weights(tmp_path / 'lifting.safetensors', Bundle(
+        Lifting.from_config(config).eval(), None, config, 0.4, model='lifting'))
+    asked = ('quality', 'measure', data, tmp_path / 'm.npz', '--model',
+             tmp_path / 'lifting.safetensors', '--views', 1, '--threads', 1)
+    *others, last = list_objects(data)
+    last.voxels_path(64).unlink()
+    assert command(monkeypatch, *asked) == 0
+    assert str(last.voxels_path(64)) in capsys.readouterr().err
+    assert len(Measured.read(tmp_path / 'm.npz').iou) == 4
+    for folder in others:
+        folder.voxels_path(64).unlink()
+    assert refusal(monkeypatch, capsys, *asked).endswith('expected at least one, got none')
 
 
 def test_more_episodes_of_the_same_objects_make_no_narrower_interval(tables):

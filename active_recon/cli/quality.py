@@ -6,7 +6,7 @@ from typing import Annotated
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, DataError
 import typer
 
 quality = typer.Typer(help='How good a shape is, judged without the truth.', no_args_is_help=True)
@@ -61,14 +61,24 @@ def measure(
         views=views, weights=weights, threads=threads)) if kind == LEARNED else None
     out.parent.mkdir(parents=True, exist_ok=True)
     folders = chosen_folders(list_objects(data), None, objects, seed)
-    parts = []
+    parts, left_out = [], []
     with progress_bar(f'measuring {data.name}', len(folders)) as advance:
         for at in range(0, len(folders), _BATCH):
-            some = read_views(folders[at:at + _BATCH], resolution=network.resolution,
-                              image_size=network.image_size, framed=True)
-            parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
-                                  seed + at, policy))
-            advance(len(some), '')
+            few = folders[at:at + _BATCH]
+            try:
+                some = read_views(few, resolution=network.resolution,
+                                  image_size=network.image_size, framed=True)
+            except DataError as error:  # of these few no one; perhaps of the others
+                left_out.append(str(error))
+            else:
+                left_out += some.unreadable
+                parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
+                                      seed + at, policy))
+            advance(len(few), '')
+    for reason in left_out:
+        typer.echo(f'left out: {reason}', err=True)
+    if not parts:
+        raise DataError(f'{data}: no readable object: expected at least one, got none')
     Measured.joined(parts).write(out)
     typer.echo(f'wrote {out}')
 
