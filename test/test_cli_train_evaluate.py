@@ -305,6 +305,16 @@ def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given(
         run / 'weights.safetensors'))
 
 
+@pytest.mark.parametrize(('model', 'begun'), [('2d3d-attention', 'lifting'), ('2d3d', 'carving'),
+                                              ('lifting', '2d3d-attention')])
+def test_weights_of_another_network_are_refused(
+        dataset, tmp_path, monkeypatch, capsys, model, begun):
+    line = refusal(monkeypatch, capsys, *training(
+        dataset, tmp_path, '--model', model, '--init-from', begun))
+    assert f'{model}: begun with weights of another network' in line
+    assert f'got those of {begun}; name it by --model' in line
+
+
 def test_a_policy_alone_leaves_its_reconstruction_as_it_was(run, dataset, tmp_path, monkeypatch):
     out = tmp_path / 'policy'
     assert command(monkeypatch, *training(

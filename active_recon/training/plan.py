@@ -57,7 +57,12 @@ class Plan:
 
     def __post_init__(self) -> None:
         """Reject what cannot be trained together."""
-        if network_entry(self.model).policy is None and (self.joint or self.policy):
+        entry = network_entry(self.model)
+        if self.begun and not isinstance(self.begun.config, entry.config):
+            raise ConfigError(f'{self.model}: begun with weights of another network: expected '
+                              f'those of {self.model}, got those of {self.begun.model}; name it '
+                              'by --model')
+        if entry.policy is None and (self.joint or self.policy):
             raise ConfigError(f'{self.model}: no view policy in this model: expected one with an '
                               'attentive part; leave the policy out, or train 2d3d-attention')
         if self.joint and self.policy:
