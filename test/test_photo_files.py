@@ -10,6 +10,7 @@ from active_recon.photos.files import (
     photo_paths,
     read_photo,
 )
+from active_recon.photos.large_images import opened as opened_large
 from active_recon.photos.views import load_views, view_of
 import cv2
 import numpy as np
@@ -105,6 +106,16 @@ def test_a_hundred_megapixels_are_reduced_and_their_lens_with_them(tmp_path):
     side = views[0].image.shape[0]
     assert side <= LARGEST_SIDE and (views[0].image == 77).all()
     assert views[0].camera.intrinsics.fx == pytest.approx(0.9 * side)
+
+
+def test_a_photo_beyond_the_limit_of_pillow_is_read_and_the_limit_stays(tmp_path, monkeypatch):
+    Image.fromarray(drawn()).save(tmp_path / 'photo.png')
+    monkeypatch.setattr(Image, 'MAX_IMAGE_PIXELS', 100)
+    assert read_photo(opened(tmp_path / 'photo.png')).shape == (30, 40, 3)
+    assert Image.MAX_IMAGE_PIXELS == 100
+    with pytest.raises(DataError, match='30 x 40|40 x 30'), opened_large(
+            tmp_path / 'photo.png', most_pixels=1199):
+        pass
 
 
 def test_the_same_photo_twice_is_used_once(tmp_path):

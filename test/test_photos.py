@@ -394,6 +394,14 @@ def test_the_folder_of_photos_is_not_written_to(plain):
     assert not (plain / 'picture.png').exists()
 
 
+@pytest.mark.parametrize('full', [1, 255, 65535])
+def test_a_mask_is_the_object_where_it_is_more_than_half_of_its_full_value(full, tmp_path):
+    shares = np.linspace(0, 1, 8)[None].repeat(8, axis=0)
+    levels = np.rint(full * shares).astype(np.uint8 if full == 1 else np.uint16)
+    Image.fromarray(levels).save(tmp_path / 'mask.png')
+    np.testing.assert_array_equal(_mask(tmp_path / 'mask.png', 8, 8), shares > 0.5)
+
+
 def test_an_opaque_alpha_channel_is_no_mask(tmp_path):
     grey = np.zeros((8, 8), np.uint8)
     grey[2:5, 3:6] = 255

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import hashlib
 import math
 from pathlib import Path
-import warnings
 
 from active_recon.calibration.files import in_order, SUFFIXES
 from active_recon.errors import ConfigError, DataError
 from active_recon.photos.depth_files import is_depth
+from active_recon.photos.large_images import opened
 import numpy as np
 from numpy.typing import NDArray
 from PIL import ExifTags, Image
@@ -23,14 +23,14 @@ ORDERS = ('name', 'time')
 """By their names, 2 before 10, or by when they were taken."""
 LARGEST_SIDE = 2048
 """Pixels a side to which larger photos are reduced: far more than any network's image has."""
-_MOST_PIXELS = 400_000_000
 _FILM_DIAGONAL = math.hypot(36, 24)  # millimetres, of the film that EXIF's equivalent refers to
 _TURNED = {2: Image.Transpose.FLIP_LEFT_RIGHT, 3: Image.Transpose.ROTATE_180,
            4: Image.Transpose.FLIP_TOP_BOTTOM, 5: Image.Transpose.TRANSPOSE,
            6: Image.Transpose.ROTATE_270, 7: Image.Transpose.TRANSVERSE,
            8: Image.Transpose.ROTATE_90}
 _WITH_MEANS = {'L', 'RGB', 'RGBA', 'CMYK'}
-_UNREADABLE = (OSError, SyntaxError, ValueError, Image.DecompressionBombError)
+UNREADABLE = (OSError, SyntaxError, ValueError)
+"""What Pillow raises on files that are not whole images."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
     try:
         digest = hashlib.sha256(path.read_bytes()).digest()
         photo = _opened(path)
-    except (DataError, *_UNREADABLE) as error:
+    except (DataError, *UNREADABLE) as error:
         raise DataError(f'{path.name}: not readable: expected a whole image, got: '
                         f'{error}') from error
     if known.setdefault(digest, path.name) != path.name:
@@ -146,15 +146,13 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
     or has a format without a meaning in colours.
     """
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter('ignore', Image.DecompressionBombWarning)
-            with Image.open(photo.path) as image:
-                if max(image.size) > LARGEST_SIDE:
-                    # A JPEG is then decoded at an eighth to a half of its size
-                    image.draft('RGB', (LARGEST_SIDE, LARGEST_SIDE))
-                image.load()
-                pixels = _reduced(_eight_bits(_reduced(image)))
-    except _UNREADABLE as error:
+        with opened(photo.path) as image:
+            if max(image.size) > LARGEST_SIDE:
+                # A JPEG is then decoded at an eighth to a half of its size
+                image.draft('RGB', (LARGEST_SIDE, LARGEST_SIDE))
+            image.load()
+            pixels = _reduced(_eight_bits(_reduced(image)))
+    except (DataError, *UNREADABLE) as error:
         raise DataError(f'{photo.name}: not readable: expected a whole image, got: '
                         f'{error}') from error
     if upright and photo.orientation in _TURNED:
@@ -163,16 +161,11 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
 
 
 def _opened(path: Path) -> PhotoFile:
-    with warnings.catch_warnings():
-        warnings.simplefilter('ignore', Image.DecompressionBombWarning)
-        with Image.open(path) as image:
-            if image.width * image.height > _MOST_PIXELS:
-                raise DataError(f'{image.width} x {image.height} pixels, more than '
-                                f'{_MOST_PIXELS / 1e6:.0f} million')
-            exif = Image.Image.getexif(image)  # that of PNG would decode the whole image
-            turned = exif.get(ExifTags.Base.Orientation, 1)
-            return PhotoFile(path, image.size, turned if turned in _TURNED else 1,
-                             _focal(exif, image.size), _taken(exif))
+    with opened(path) as image:
+        exif = Image.Image.getexif(image)  # that of PNG would decode the whole image
+        turned = exif.get(ExifTags.Base.Orientation, 1)
+        return PhotoFile(path, image.size, turned if turned in _TURNED else 1,
+                         _focal(exif, image.size), _taken(exif))
 
 
 def _focal(exif: Image.Exif, size: tuple[int, int]) -> float | None:

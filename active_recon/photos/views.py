@@ -8,14 +8,15 @@ from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.photos.camera_file import PosedPhoto
 from active_recon.photos.depth_files import depth_files, read_depth
-from active_recon.photos.files import ENDINGS, read_photo
+from active_recon.photos.files import ENDINGS, read_photo, UNREADABLE
+from active_recon.photos.large_images import opened
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 _SEE_THROUGH = 250  # alpha below which a photo has an alpha channel worth the name
 _EMPTY_SHARE = 0.02
+_FULL = (1, 255, 65535)  # the object in masks of labels, of 8 and of 16 bits
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,18 +133,19 @@ def _masks_by_stem(folder: Path | None) -> dict[str, Path]:
 
 def _mask(path: Path, width: int, height: int) -> NDArray[np.bool_]:
     try:
-        with Image.open(path) as image:
+        with opened(path) as image:
             alpha = image.getchannel('A') if image.mode in ('RGBA', 'LA') else None
             if alpha is None or alpha.getextrema() == (255, 255):  # an opaque one masks nothing
-                alpha = image.convert('L')
-            grey = np.asarray(alpha)
-    except (OSError, SyntaxError, ValueError) as error:
+                alpha = image if image.mode.startswith('I') else image.convert('L')
+            grey = np.asarray(alpha, np.float32)
+    except (DataError, *UNREADABLE) as error:
         raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
     if abs(grey.shape[1] * height - width * grey.shape[0]) > 0.01 * width * grey.shape[0]:
         raise DataError(f'{path}: no mask of the right size: expected {width} x {height} pixels '
                         f'or the same shape, got {grey.shape[1]} x {grey.shape[0]}')
-    sized = cv2.resize(np.asarray(grey, np.uint8), (width, height), interpolation=cv2.INTER_AREA)
-    found = np.asarray(sized > (127 if sized.max() > 1 else 0))
+    full = next((most for most in _FULL if grey.max() <= most), _FULL[-1])
+    sized = cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
+    found = np.asarray(sized > full / 2)
     if not found.any():
         raise DataError(f'{path}: empty mask: expected an object in it, got only background')
     return found

@@ -18,16 +18,15 @@ import secrets
 import socket
 import threading
 from typing import Any
-import warnings
 
-from active_recon.errors import ConfigError
-from active_recon.photos.files import HEIC_ADVICE
+from active_recon.errors import ConfigError, DataError
+from active_recon.photos.files import HEIC_ADVICE, UNREADABLE
+from active_recon.photos.large_images import opened
 from active_recon.viewer.address import HOST
 from active_recon.watching.upload_page import PAGE
 from active_recon.watching.watcher import Progress, Verdicts
 from active_recon.whole_files import whole_file
 import cv2
-from PIL import Image
 
 LARGEST_UPLOAD = 30_000_000
 """Bytes of a photo."""
@@ -120,19 +119,15 @@ def refusal(photo: bytes) -> str:
 def _format(photo: bytes) -> str:
     """Return the format by the content, '' where it is none of those allowed, or cut off."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter('ignore', Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(photo), formats=tuple(_SUFFIXES)) as image:
-                if image.width * image.height > _MOST_PIXELS:
-                    return ''
-                kind = str(image.format)
-                if kind == 'PNG':
-                    image.verify()  # by its checksums
-                else:
-                    image.draft('RGB', (_READ_SIDE, _READ_SIDE))  # at a fraction of its size
-                    image.load()
-                return kind
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        with opened(io.BytesIO(photo), _MOST_PIXELS, tuple(_SUFFIXES)) as image:
+            kind = str(image.format)
+            if kind == 'PNG':
+                image.verify()  # by its checksums
+            else:
+                image.draft('RGB', (_READ_SIDE, _READ_SIDE))  # at a fraction of its size
+                image.load()
+            return kind
+    except (DataError, *UNREADABLE):
         return ''
 
 
