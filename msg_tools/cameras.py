@@ -72,6 +72,9 @@ def _distortion(msg: CameraInfo) -> Distortion | None:
     coefficients = tuple(float(value) for value in msg.d)
     if not any(coefficients) and msg.distortion_model in ('', *MODELS):
         return None
+    most = max(MODELS.get(msg.distortion_model, (len(coefficients),)))
+    if not any(coefficients[most:]):  # OpenCV has 14, of which calibrations set some to 0
+        coefficients = coefficients[:most]
     try:
         return Distortion(msg.distortion_model, coefficients)
     except ViewError as error:

@@ -78,10 +78,22 @@ def test_coefficients_that_are_all_zero_are_a_pinhole(model, count):
     assert intrinsics_from_msg(info) == CANONICAL_INTRINSICS
 
 
+@pytest.mark.parametrize('name', LENSES)
+def test_zeros_after_the_coefficients_of_a_model_change_nothing(name):
+    lens = Intrinsics(500, 510, 320, 240, 640, 480, LENSES[name])
+    info = intrinsics_to_msg(lens, OBJECT)
+    info.d = [*info.d, *[0.0] * (14 - len(info.d))]
+    points = [[0.3, -0.2, 0.1], [-0.4, 0.1, 0.3]]
+    shown, same = (Camera(orbit_camera(0.5).pose, each).project(points)[0]
+                   for each in (intrinsics_from_msg(info), lens))
+    np.testing.assert_array_equal(shown, same)
+
+
 @pytest.mark.parametrize(('model', 'coefficients', 'said'), [
     ('', [0.1] * 5, "model: expected one of plumb_bob.*got ''"),
     ('fov', [0.0] * 5, "model: expected one of plumb_bob.*got 'fov'"),
     ('plumb_bob', [0.1], 'coefficients: expected 4 or 5 of plumb_bob, got 1'),
+    ('plumb_bob', [0.1] * 14, 'coefficients: expected 4 or 5 of plumb_bob, got 14'),
     ('equidistant', [math.nan] * 4, 'coefficients: expected finite')])
 def test_a_distortion_of_no_known_lens_is_refused(model, coefficients, said):
     info = intrinsics_to_msg(CANONICAL_INTRINSICS, OBJECT)
