@@ -25,7 +25,7 @@ def bags(tmp_path, monkeypatch, run):
     asked = []
 
     def read_run(path, topics, scene):
-        if not path.is_dir():
+        if not path.is_dir() and path.suffix != '.mcap':
             raise DataError(f'{path}: expected a bag')
         asked.append((topics, scene))
         return replace(run, path=path, parameters={})
@@ -56,6 +56,13 @@ def test_page_lies_in_the_bag_unless_it_is_told_otherwise(bags, tmp_path):
     report(bags[0], '--out', tmp_path / 'new' / 'page.html')
     assert (tmp_path / 'new' / 'page.html').read_bytes() == (
         bags[0] / 'report.html').read_bytes()
+
+
+def test_pages_of_bags_that_are_files_of_one_folder_lie_beside_each_other(bags, tmp_path):
+    for name in ('one', 'two'):
+        (tmp_path / f'{name}.mcap').touch()
+        assert report(tmp_path / f'{name}.mcap').exit_code == 0
+    assert sorted(path.name for path in tmp_path.glob('*.html')) == ['one.html', 'two.html']
 
 
 def test_every_bag_has_its_part_and_its_letter(bags, tmp_path):

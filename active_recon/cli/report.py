@@ -24,7 +24,8 @@ def report(
     topics: 'Topics',
     scene: 'Scene',
     out: Annotated[Path | None, typer.Option(
-        help='HTML file; default: report.html in the first bag.')] = None,
+        help='HTML file; default: report.html in the first bag, or BAG.html beside it if it is a '
+             'file.')] = None,
     truth: Annotated[list[Path] | None, typer.Option(
         help='True shape of the object, for the IoU: a mesh file in metres in the object frame, '
              'a .binvox file, or bed, car, chair, sofa, table; one for all bags, or one for each '
@@ -64,7 +65,8 @@ def report(
     if not truths and (fit or up or front):
         raise ConfigError('--fit, --up and --front need --truth: give it too')
     files = [TruthFile(each, fit, up, front) for each in truths]
-    path = out or (bags[0] if bags[0].is_dir() else bags[0].parent) / 'report.html'
+    first = bags[0]
+    path = out or (first / 'report.html' if first.is_dir() else first.with_suffix('.html'))
     subjects: list[Subject] = []
     with progress_bar('reading', len(bags)) as advance:
         for index, bag in enumerate(bags):
