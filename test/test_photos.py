@@ -31,6 +31,7 @@ from active_recon.volumes.voxels import iou
 from judged_quality import quality_of
 import numpy as np
 from photo_scene import cameras, CENTRE, on_plain, rendered, SIDE, thing, write_photos
+import photo_table
 from PIL import Image
 import pytest
 import trimesh
@@ -158,6 +159,27 @@ def test_before_clutter_the_segmenter_finds_the_object_and_a_mask_of_one_photo_t
             Camera(np.block([[each.pose[:3, :3], (each.position - CENTRE)[:, None]],
                              [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views], BOX[3])
     assert 'alpha channels (1)' in mixed.background and 'own' in mixed.background
+
+
+def test_a_few_photos_with_an_edge_of_one_colour_are_before_clutter_like_the_others(
+        views, rgba, cluttered, tmp_path):
+    folder = write_photos(tmp_path / 'mixed', views, [on_plain(rgba[0]), *cluttered[1:]])
+    shape = active_recon.reconstruct(folder, box=BOX)
+    assert shape.background == 'the segmenter'
+    assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.5
+
+
+def test_an_object_on_a_table_with_a_pattern_is_found():
+    rng = np.random.default_rng(0)
+    mesh = photo_table.centred(thing(), 0.14)
+    seen_by = photo_table.around(8, 0.42, rng)
+    images, _ = photo_table.photographed(mesh, seen_by, 'boards', rng)
+    shape = from_views([view_of(str(number), *both) for number, both
+                        in enumerate(zip(images, seen_by, strict=True))],
+                       CameraFile('a table', (), np.array([0.0, 0.0, 1.0])))
+    assert shape.background == 'the segmenter'
+    assert 0.9 * 0.14 < shape.size < 1.4 * 0.14
+    np.testing.assert_allclose(shape.cube.centre, 0, atol=0.02)
 
 
 def test_masks_of_files_and_an_alpha_channel_say_the_same(views, rgba, tmp_path):

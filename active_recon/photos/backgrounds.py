@@ -18,10 +18,10 @@ BACKGROUNDS = ('auto', 'plain', 'network', 'segment', 'grabcut', 'rembg')
 """
 `auto`: the object on white by its mask from a file or alpha channel; without one as `network`,
 and where the background is plain, cells that only show it are cut off; where no photo has a mask
-or a plain background, as `segment`. `plain`: on white by the colour of a plain background.
-`network`: the photo as it is, of which the network finds the silhouette itself. `segment`: on
-white by the segmenter that ships and by what all photos agree on. `grabcut`: on white by GrabCut,
-begun from the projected cube. `rembg`: on white by the package of that name.
+and few have a plain background, as `segment`. `plain`: on white by the colour of a plain
+background. `network`: the photo as it is, of which the network finds the silhouette itself.
+`segment`: on white by the segmenter that ships and by what all photos agree on. `grabcut`: on
+white by GrabCut, begun from the projected cube. `rembg`: on white by the package of that name.
 """
 _FRAME = 0.0125  # width of the photo's edge that is looked at, relative to its longer side
 _PLAIN_SHARE = 0.75  # of the edge: the object may reach over the rest
@@ -50,6 +50,16 @@ def separated(view: PhotoView, background: str) -> PhotoView:
         return view
     mask = off_plain(view.image)
     return view if mask is None else replace(view, mask=mask, mask_source='plain')
+
+
+def before_clutter(views: Sequence[PhotoView]) -> bool:
+    """
+    Return whether separated views need a segmenter: no mask is known, and most are not plain.
+
+    A few photos of any room happen to have an edge of one colour.
+    """
+    return (all(view.mask_source in ('', 'plain') for view in views)
+            and sum(view.mask_source == 'plain' for view in views) < len(views) / 2)
 
 
 def off_plain(image: NDArray[np.uint8]) -> NDArray[np.bool_] | None:

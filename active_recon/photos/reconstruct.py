@@ -6,7 +6,7 @@ from pathlib import Path
 
 from active_recon.errors import ConfigError, DataError, ViewError
 from active_recon.geometry.cameras import Camera
-from active_recon.photos.backgrounds import BACKGROUNDS, named, separated
+from active_recon.photos.backgrounds import BACKGROUNDS, before_clutter, named, separated
 from active_recon.photos.board_masks import board_views
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
@@ -145,8 +145,9 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         raise DataError(f'{file.source}: {wrong}', 'convention')
     views, empty, cube = _separated(views, file, cube, options.background)
     background = options.background
-    if background == 'auto' and all(view.mask is None for view in views):
-        background = 'segment'
+    if background == 'auto' and before_clutter(views):
+        background, views = 'segment', [
+            replace(view, mask=None, mask_source='') for view in views]
     if cube is None:
         with reporting('finding the object', 1) as advance:
             start = first_cube(poses, up, NARROWER if background == 'segment' else WIDER)
