@@ -10,11 +10,13 @@ of them, and the command is timed as a user runs it. Rendered photos are of the 
 ship, before plain backgrounds of many colours with noise and uneven light; they tell what each way
 to treat a background is worth where the truth is known. Others stand on a printed board before
 clutter, whose lens and poses are found from the photos, beside true masks and true poses; then as
-a phone in the hand takes them: rolling exposure, blur, JPEG 80.
+a phone in the hand takes them: rolling exposure, blur, JPEG 80. Others stand on a table with a
+pattern, where poses are known and masks are not, and the cube is told or found.
 """
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 import json
 from pathlib import Path
 import subprocess
@@ -29,28 +31,33 @@ from active_recon.evaluation.posed.photographs import averaged, EVEN, even_views
 from active_recon.evaluation.statistics import mean_interval
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.photos.camera_file import CameraFile
-from active_recon.photos.reconstruct import from_views, reconstruct
+from active_recon.photos.cube import MARGIN
+from active_recon.photos.reconstruct import from_views, Options, reconstruct
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import BoardCameras
 from active_recon.photos.views import PhotoView
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
-from active_recon.volumes.voxels import iou
+from active_recon.volumes.voxels import cell_centers, iou
 import numpy as np
 from numpy.typing import NDArray
 from phone_photos import as_of_a_phone
 from photo_board import around, photographed, standing
+import photo_table
 from PIL import Image
 from rendered_boards import BOARD
 
 WAYS = ('auto', 'plain', 'network')
+TABLE_WAYS = ('the cube found', 'the cube told', 'the cube told, `--background network`',
+              'the cube told, true masks')
 MODELS = Path(__file__).parent / 'real_cc0'
 _LENS = Intrinsics(700, 700, 320, 240, 640, 480)
 _GOAL = 0.8  # of the dinosaur, from the first photo on
 _VIEWS = 5
 _BOARD_VIEWS = 12
 _PHONE_VIEWS = 8
+_TABLE_VIEWS = 8
 _SIZE = 0.14  # of an object on the board, metres
 _MARKS = '<!-- photos: begin -->', '<!-- photos: end -->'
 Taken = Callable[[NDArray[np.uint8], np.random.Generator], NDArray[np.uint8]]
@@ -65,12 +72,14 @@ def main() -> None:
     parser.add_argument('--objects', type=int, default=30, help='objects on the board')
     parser.add_argument('--out', type=Path, default=Path('photos.json'))
     parser.add_argument('--parts', nargs='*', default=[
-        'photographs', 'command_s', 'rendered', 'board', 'phone'], help='others stay as they are')
+        'photographs', 'command_s', 'rendered', 'board', 'phone', 'table'],
+        help='others stay as they are')
     options = parser.parse_args()
     measure = {'photographs': lambda: _photographs(options.photos),
                'command_s': lambda: _timed(options.photos, options.runs), 'rendered': _rendered,
                'board': lambda: _on_board(options.objects, _BOARD_VIEWS),
-               'phone': lambda: _on_board(options.objects, _PHONE_VIEWS, as_of_a_phone)}
+               'phone': lambda: _on_board(options.objects, _PHONE_VIEWS, as_of_a_phone),
+               'table': lambda: _on_table(options.objects)}
     result = json.loads(options.out.read_text()) if options.out.exists() else {}
     result['command'] = ('PYTHONPATH=test python -m benchmarks.photos photos/dino_sparse_ring '
                          '--out docs/results/photos.json')
@@ -95,6 +104,9 @@ def table(result: Mapping[str, Any]) -> str:
                     f'{words} | {_told(rendered["iou"][way])} | |')
     rows += _board_rows(board, 'photos', 0.03)
     rows += _board_rows(result['phone'], 'photos as of a phone', 0.06)
+    tables = result['table']
+    rows += [f'| {len(tables["objects"])} models on tables before clutter, {tables["views"]} '
+             f'photos, {way} | {_told(told)} | |' for way, told in tables['iou'].items()]
     return '\n'.join(rows)
 
 
@@ -198,8 +210,7 @@ def _on_board(count: int, views: int, taken: Taken = lambda image, rng: image) -
 
     `taken` makes what the camera stores of an image.
     """
-    files = sorted(MODELS.glob('*/*.glb'))
-    files = [files[number * len(files) // count] for number in range(count)]
+    files = _some(count)
     found: dict[str, list[float]] = {'found': [], 'true masks': [], 'true masks and poses': []}
     for number, file in enumerate(files):
         mesh = standing(load_mesh(file), _SIZE)
@@ -225,6 +236,57 @@ def _on_board(count: int, views: int, taken: Taken = lambda image, rng: image) -
               file=sys.stderr, flush=True)
     return {'objects': [file.stem for file in files], 'views': views,
             'each': found, 'iou': {way: _interval(values) for way, values in found.items()}}
+
+
+def _on_table(count: int) -> dict[str, Any]:
+    """Return the IoU of objects on tables, by what is known beside the poses, with intervals."""
+    found: dict[str, list[float]] = {way: [] for way in TABLE_WAYS}
+    models, file = _some(count), CameraFile('true', (), np.array([0.0, 0.0, 1.0]))
+    for number, model in enumerate(models):
+        rng = np.random.default_rng(number)
+        mesh = photo_table.centred(load_mesh(model), _SIZE)
+        cameras = photo_table.around(_TABLE_VIEWS, 3 * _SIZE, rng)
+        pattern = list(photo_table.PATTERNS)[number % len(photo_table.PATTERNS)]
+        images, masks = photo_table.photographed(mesh, cameras, pattern, rng)
+        views = [PhotoView(str(view), image, camera) for view, (image, camera)
+                 in enumerate(zip(images, cameras, strict=True))]
+        masked = [replace(view, mask=mask, mask_source='masks')
+                  for view, mask in zip(views, masks, strict=True)]
+        told = Options(box=(0.0, 0.0, 0.0, MARGIN * _SIZE))
+        for way, (some, options) in zip(TABLE_WAYS, (
+                (views, Options()), (views, told),
+                (views, replace(told, background='network')), (masked, told)), strict=True):
+            try:
+                shape = from_views(some, file, options)
+                found[way].append(_iou_around(shape, mesh))
+            except ActiveReconError as error:
+                print(f'nothing: {error}', file=sys.stderr)  # noqa: T201
+                found[way].append(0.0)
+        print(model.stem, pattern, {  # noqa: T201
+            way: round(values[-1], 3) for way, values in found.items()},
+            file=sys.stderr, flush=True)
+    return {'objects': [model.stem for model in models], 'views': _TABLE_VIEWS,
+            'each': found, 'iou': {way: _interval(values) for way, values in found.items()}}
+
+
+def _iou_around(shape: Shape, mesh: Any) -> float:
+    """Return the IoU with a mesh about the origin, in a cube twice as wide as its longest side."""
+    cells, side = 128, 2 * float(mesh.extents.max())
+    placed = mesh.copy()
+    placed.apply_scale(1 / side)
+    points = np.c_[cell_centers(cells) * side, np.ones(cells ** 3)]
+    local = (points @ np.linalg.inv(shape.world_from_object).T)[:, :3] / shape.size + 0.5
+    own = len(shape.occupancy)
+    at = np.floor(local * own).astype(int)
+    inside = ((at >= 0) & (at < own)).all(axis=1)
+    occupied = np.zeros(cells ** 3, np.bool_)
+    occupied[inside] = shape.occupancy[tuple(at[inside].T)] > shape.threshold
+    return float(iou(occupied.reshape((cells,) * 3), voxelise(placed, cells).occupied(0.5)))
+
+
+def _some(count: int) -> list[Path]:
+    files = sorted(MODELS.glob('*/*.glb'))
+    return [files[number * len(files) // count] for number in range(count)]
 
 
 def _tried(folder: Path) -> Shape | None:
