@@ -1,0 +1,21 @@
+"""What a soak counts as missed."""
+
+from dataclasses import replace
+
+from benchmarks.memory import MemoryUse
+from benchmarks.soak import as_markdown, FLAGGED, Soak
+
+USE = MemoryUse(warm_mb=100.0, end_mb=100.0, growth_mb=0.0, peak_mb=101.0)
+SOAK = Soak('soak', 1.0, 2, 0.0, 20, 20, 100, 100, {}, '', 10.0, 20.0, {'reconstructor': USE}, 1.0)
+
+
+def test_views_flagged_by_mistake_count_only_beyond_their_share():
+    for flagged, missed in ((5, []), (6, ['6 views flagged as unusual'])):
+        soak = replace(SOAK, faults={FLAGGED: flagged})
+        assert soak.missed == missed
+        assert '| refusals, warnings and losses | 0 | 0 |' in as_markdown(soak)
+
+
+def test_any_other_fault_is_missed_by_its_name():
+    soak = replace(SOAK, faults={'/reconstructor dropped/overtaken': 2})
+    assert soak.missed == ['/reconstructor dropped/overtaken: 2']
