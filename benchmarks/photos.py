@@ -16,7 +16,6 @@ pattern, where poses are known and masks are not, and the cube is told or found.
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 import json
 from pathlib import Path
 import subprocess
@@ -28,37 +27,30 @@ from typing import Any
 from active_recon.datasets.middlebury import PosedPhotographs, read_photographs
 from active_recon.errors import ActiveReconError
 from active_recon.evaluation.posed.photographs import averaged, EVEN, even_views, hull
-from active_recon.evaluation.statistics import mean_interval
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.photos.camera_file import CameraFile
-from active_recon.photos.cube import MARGIN
-from active_recon.photos.reconstruct import from_views, Options, reconstruct
+from active_recon.photos.reconstruct import from_views, reconstruct
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import BoardCameras
 from active_recon.photos.views import PhotoView
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
-from active_recon.volumes.voxels import cell_centers, iou
+from active_recon.volumes.voxels import iou
+from benchmarks.photos_on_tables import interval, MODELS, on_tables, SIZE, some_models
 import numpy as np
 from numpy.typing import NDArray
 from phone_photos import as_of_a_phone
 from photo_board import around, photographed, standing
-import photo_table
 from PIL import Image
 from rendered_boards import BOARD
 
 WAYS = ('auto', 'plain', 'network')
-TABLE_WAYS = ('the cube found', 'the cube told', 'the cube told, `--background network`',
-              'the cube told, true masks')
-MODELS = Path(__file__).parent / 'real_cc0'
 _LENS = Intrinsics(700, 700, 320, 240, 640, 480)
 _GOAL = 0.8  # of the dinosaur, from the first photo on
 _VIEWS = 5
 _BOARD_VIEWS = 12
 _PHONE_VIEWS = 8
-_TABLE_VIEWS = 8
-_SIZE = 0.14  # of an object on the board, metres
 _MARKS = '<!-- photos: begin -->', '<!-- photos: end -->'
 Taken = Callable[[NDArray[np.uint8], np.random.Generator], NDArray[np.uint8]]
 _EVERY = 3  # of the models that ship
@@ -79,7 +71,7 @@ def main() -> None:
                'command_s': lambda: _timed(options.photos, options.runs), 'rendered': _rendered,
                'board': lambda: _on_board(options.objects, _BOARD_VIEWS),
                'phone': lambda: _on_board(options.objects, _PHONE_VIEWS, as_of_a_phone),
-               'table': lambda: _on_table(options.objects)}
+               'table': lambda: on_tables(options.objects)}
     result = json.loads(options.out.read_text()) if options.out.exists() else {}
     result['command'] = ('PYTHONPATH=test python -m benchmarks.photos photos/dino_sparse_ring '
                          '--out docs/results/photos.json')
@@ -175,7 +167,7 @@ def _rendered() -> dict[str, Any]:
         print({way: round(values[-1], 3) for way, values in found.items()},  # noqa: T201
               file=sys.stderr, flush=True)
     return {'objects': [file.stem for file in files], 'views': _VIEWS,
-            'iou': {way: _interval(values) for way, values in found.items()}}
+            'iou': {way: interval(values) for way, values in found.items()}}
 
 
 def _of_model(file: Path, seed: int) -> Iterator[tuple[str, float]]:
@@ -210,11 +202,11 @@ def _on_board(count: int, views: int, taken: Taken = lambda image, rng: image) -
 
     `taken` makes what the camera stores of an image.
     """
-    files = _some(count)
+    files = some_models(count)
     found: dict[str, list[float]] = {'found': [], 'true masks': [], 'true masks and poses': []}
     for number, file in enumerate(files):
-        mesh = standing(load_mesh(file), _SIZE)
-        cameras = around(views, _SIZE / 3, number)
+        mesh = standing(load_mesh(file), SIZE)
+        cameras = around(views, SIZE / 3, number)
         images, masks = photographed(mesh, cameras, number)
         rng = np.random.default_rng(number)
         images = [taken(image, rng) for image in images]
@@ -235,58 +227,7 @@ def _on_board(count: int, views: int, taken: Taken = lambda image, rng: image) -
         print(file.stem, {way: round(values[-1], 3) for way, values in found.items()},  # noqa: T201
               file=sys.stderr, flush=True)
     return {'objects': [file.stem for file in files], 'views': views,
-            'each': found, 'iou': {way: _interval(values) for way, values in found.items()}}
-
-
-def _on_table(count: int) -> dict[str, Any]:
-    """Return the IoU of objects on tables, by what is known beside the poses, with intervals."""
-    found: dict[str, list[float]] = {way: [] for way in TABLE_WAYS}
-    models, file = _some(count), CameraFile('true', (), np.array([0.0, 0.0, 1.0]))
-    for number, model in enumerate(models):
-        rng = np.random.default_rng(number)
-        mesh = photo_table.centred(load_mesh(model), _SIZE)
-        cameras = photo_table.around(_TABLE_VIEWS, 3 * _SIZE, rng)
-        pattern = list(photo_table.PATTERNS)[number % len(photo_table.PATTERNS)]
-        images, masks = photo_table.photographed(mesh, cameras, pattern, rng)
-        views = [PhotoView(str(view), image, camera) for view, (image, camera)
-                 in enumerate(zip(images, cameras, strict=True))]
-        masked = [replace(view, mask=mask, mask_source='masks')
-                  for view, mask in zip(views, masks, strict=True)]
-        told = Options(box=(0.0, 0.0, 0.0, MARGIN * _SIZE))
-        for way, (some, options) in zip(TABLE_WAYS, (
-                (views, Options()), (views, told),
-                (views, replace(told, background='network')), (masked, told)), strict=True):
-            try:
-                shape = from_views(some, file, options)
-                found[way].append(_iou_around(shape, mesh))
-            except ActiveReconError as error:
-                print(f'nothing: {error}', file=sys.stderr)  # noqa: T201
-                found[way].append(0.0)
-        print(model.stem, pattern, {  # noqa: T201
-            way: round(values[-1], 3) for way, values in found.items()},
-            file=sys.stderr, flush=True)
-    return {'objects': [model.stem for model in models], 'views': _TABLE_VIEWS,
-            'each': found, 'iou': {way: _interval(values) for way, values in found.items()}}
-
-
-def _iou_around(shape: Shape, mesh: Any) -> float:
-    """Return the IoU with a mesh about the origin, in a cube twice as wide as its longest side."""
-    cells, side = 128, 2 * float(mesh.extents.max())
-    placed = mesh.copy()
-    placed.apply_scale(1 / side)
-    points = np.c_[cell_centers(cells) * side, np.ones(cells ** 3)]
-    local = (points @ np.linalg.inv(shape.world_from_object).T)[:, :3] / shape.size + 0.5
-    own = len(shape.occupancy)
-    at = np.floor(local * own).astype(int)
-    inside = ((at >= 0) & (at < own)).all(axis=1)
-    occupied = np.zeros(cells ** 3, np.bool_)
-    occupied[inside] = shape.occupancy[tuple(at[inside].T)] > shape.threshold
-    return float(iou(occupied.reshape((cells,) * 3), voxelise(placed, cells).occupied(0.5)))
-
-
-def _some(count: int) -> list[Path]:
-    files = sorted(MODELS.glob('*/*.glb'))
-    return [files[number * len(files) // count] for number in range(count)]
+            'each': found, 'iou': {way: interval(values) for way, values in found.items()}}
 
 
 def _tried(folder: Path) -> Shape | None:
@@ -304,11 +245,6 @@ def _iou(shape: Shape, mesh: Any) -> float:
     placed.apply_transform(np.diag([*[1 / shape.size] * 3, 1.0]))
     truth = voxelise(placed, len(shape.occupancy)).occupied(0.5)
     return float(iou(shape.occupancy > shape.threshold, truth))
-
-
-def _interval(values: Sequence[float]) -> Mapping[str, float]:
-    found = mean_interval(np.array(values))
-    return {'mean': found.mean, 'low': found.low, 'high': found.high}
 
 
 if __name__ == '__main__':

@@ -1,0 +1,85 @@
+"""Photos of objects on tables before clutter: poses are known, masks are not."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+import sys
+from typing import Any
+
+from active_recon.errors import ActiveReconError
+from active_recon.evaluation.statistics import mean_interval
+from active_recon.photos.camera_file import CameraFile
+from active_recon.photos.cube import MARGIN
+from active_recon.photos.reconstruct import from_views, Options
+from active_recon.photos.shape import Shape
+from active_recon.photos.views import PhotoView
+from active_recon.volumes.meshes import load_mesh
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import cell_centers, iou
+import numpy as np
+from photo_table import around, centred, PATTERNS, photographed
+
+MODELS = Path(__file__).parent / 'real_cc0'
+SIZE = 0.14
+"""Of an object on a table or board, metres."""
+_WAYS = ('the cube found', 'the cube told', 'the cube told, `--background network`',
+         'the cube told, true masks')
+_VIEWS = 8
+
+
+def on_tables(count: int) -> dict[str, Any]:
+    """Return the IoU of objects on tables, by what is known beside the poses, with intervals."""
+    found: dict[str, list[float]] = {way: [] for way in _WAYS}
+    models, file = some_models(count), CameraFile('true', (), np.array([0.0, 0.0, 1.0]))
+    for number, model in enumerate(models):
+        rng = np.random.default_rng(number)
+        mesh = centred(load_mesh(model), SIZE)
+        cameras = around(_VIEWS, 3 * SIZE, rng)
+        pattern = list(PATTERNS)[number % len(PATTERNS)]
+        images, masks = photographed(mesh, cameras, pattern, rng)
+        views = [PhotoView(str(view), image, camera) for view, (image, camera)
+                 in enumerate(zip(images, cameras, strict=True))]
+        masked = [replace(view, mask=mask, mask_source='masks')
+                  for view, mask in zip(views, masks, strict=True)]
+        told = Options(box=(0.0, 0.0, 0.0, MARGIN * SIZE))
+        for way, (some, options) in zip(_WAYS, (
+                (views, Options()), (views, told),
+                (views, replace(told, background='network')), (masked, told)), strict=True):
+            try:
+                shape = from_views(some, file, options)
+                found[way].append(_iou_around(shape, mesh))
+            except ActiveReconError as error:
+                print(f'nothing: {error}', file=sys.stderr)  # noqa: T201
+                found[way].append(0.0)
+        print(model.stem, pattern, {  # noqa: T201
+            way: round(values[-1], 3) for way, values in found.items()},
+            file=sys.stderr, flush=True)
+    return {'objects': [model.stem for model in models], 'views': _VIEWS,
+            'each': found, 'iou': {way: interval(values) for way, values in found.items()}}
+
+
+def _iou_around(shape: Shape, mesh: Any) -> float:
+    """Return the IoU with a mesh about the origin, in a cube twice as wide as its longest side."""
+    cells, side = 128, 2 * float(mesh.extents.max())
+    placed = mesh.copy()
+    placed.apply_scale(1 / side)
+    points = np.c_[cell_centers(cells) * side, np.ones(cells ** 3)]
+    local = (points @ np.linalg.inv(shape.world_from_object).T)[:, :3] / shape.size + 0.5
+    own = len(shape.occupancy)
+    at = np.floor(local * own).astype(int)
+    inside = ((at >= 0) & (at < own)).all(axis=1)
+    occupied = np.zeros(cells ** 3, np.bool_)
+    occupied[inside] = shape.occupancy[tuple(at[inside].T)] > shape.threshold
+    return float(iou(occupied.reshape((cells,) * 3), voxelise(placed, cells).occupied(0.5)))
+
+
+def some_models(count: int) -> list[Path]:
+    """Return the files of so many of the models that ship, at even steps."""
+    files = sorted(MODELS.glob('*/*.glb'))
+    return [files[number * len(files) // count] for number in range(count)]
+
+
+def interval(values: Sequence[float]) -> Mapping[str, float]:
+    """Return the mean of objects and its interval, ready for JSON."""
+    found = mean_interval(np.array(values))
+    return {'mean': found.mean, 'low': found.low, 'high': found.high}
