@@ -29,8 +29,6 @@ _TURNED = {2: Image.Transpose.FLIP_LEFT_RIGHT, 3: Image.Transpose.ROTATE_180,
            6: Image.Transpose.ROTATE_270, 7: Image.Transpose.TRANSVERSE,
            8: Image.Transpose.ROTATE_90}
 _WITH_MEANS = {'L', 'RGB', 'RGBA', 'CMYK'}
-UNREADABLE = (OSError, SyntaxError, ValueError)
-"""What Pillow raises on files that are not whole images."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +109,7 @@ def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
     try:
         digest = hashlib.sha256(path.read_bytes()).digest()
         photo = _opened(path)
-    except (DataError, *UNREADABLE) as error:
+    except (DataError, OSError) as error:
         raise DataError(f'{path.name}: not readable: expected a whole image, got: '
                         f'{error}') from error
     if known.setdefault(digest, path.name) != path.name:
@@ -152,7 +150,7 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
                 image.draft('RGB', (LARGEST_SIDE, LARGEST_SIDE))
             image.load()
             pixels = _reduced(_eight_bits(_reduced(image)))
-    except (DataError, *UNREADABLE) as error:
+    except DataError as error:
         raise DataError(f'{photo.name}: not readable: expected a whole image, got: '
                         f'{error}') from error
     if upright and photo.orientation in _TURNED:

@@ -10,6 +10,7 @@ from active_recon.errors import DataError
 from PIL import Image
 
 MOST_PIXELS = 400_000_000
+_UNREADABLE = (OSError, SyntaxError, ValueError)  # what Pillow raises, also as pixels are read
 _PILLOWS_LIMIT = Lock()
 
 
@@ -19,16 +20,23 @@ def opened(source: Path | BinaryIO, most_pixels: int = MOST_PIXELS,
     """
     Open an image; phones take photos beyond Pillow's own limit of 179 megapixels.
 
-    Raises DataError where it has more than `most_pixels`, and as `Image.open` does.
+    Raises DataError where it has more than `most_pixels`, and where it is found, as it is opened
+    or as its pixels are read, to be no whole image.
     """
+    try:
+        with _opened(source, formats) as image:
+            if image.width * image.height > most_pixels:
+                raise DataError(f'{image.width} x {image.height} pixels, more than '
+                                f'{most_pixels / 1e6:.0f} million')
+            yield image
+    except _UNREADABLE as error:
+        raise DataError(str(error)) from error
+
+
+def _opened(source: Path | BinaryIO, formats: tuple[str, ...] | None) -> Image.Image:
     with _PILLOWS_LIMIT:
         limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
         try:
-            image = Image.open(source, formats=formats)
+            return Image.open(source, formats=formats)
         finally:
             Image.MAX_IMAGE_PIXELS = limit
-    with image:
-        if image.width * image.height > most_pixels:
-            raise DataError(f'{image.width} x {image.height} pixels, more than '
-                            f'{most_pixels / 1e6:.0f} million')
-        yield image

@@ -8,7 +8,7 @@ from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.photos.camera_file import PosedPhoto
 from active_recon.photos.depth_files import depth_files, read_depth
-from active_recon.photos.files import ENDINGS, read_photo, UNREADABLE
+from active_recon.photos.files import ENDINGS, read_photo
 from active_recon.photos.large_images import opened
 import cv2
 import numpy as np
@@ -138,7 +138,7 @@ def _mask(path: Path, width: int, height: int) -> NDArray[np.bool_]:
             if alpha is None or alpha.getextrema() == (255, 255):  # an opaque one masks nothing
                 alpha = image if image.mode.startswith('I') else image.convert('L')
             grey = np.asarray(alpha, np.float32)
-    except (DataError, *UNREADABLE) as error:
+    except DataError as error:
         raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
     if abs(grey.shape[1] * height - width * grey.shape[0]) > 0.01 * width * grey.shape[0]:
         raise DataError(f'{path}: no mask of the right size: expected {width} x {height} pixels '

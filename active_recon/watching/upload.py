@@ -20,7 +20,7 @@ import threading
 from typing import Any
 
 from active_recon.errors import ConfigError, DataError
-from active_recon.photos.files import HEIC_ADVICE, UNREADABLE
+from active_recon.photos.files import HEIC_ADVICE
 from active_recon.photos.large_images import opened
 from active_recon.viewer.address import HOST
 from active_recon.watching.upload_page import PAGE
@@ -127,7 +127,7 @@ def _format(photo: bytes) -> str:
                 image.draft('RGB', (_READ_SIDE, _READ_SIDE))  # at a fraction of its size
                 image.load()
             return kind
-    except (DataError, *UNREADABLE):
+    except DataError:
         return ''
 
 
