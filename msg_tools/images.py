@@ -15,13 +15,21 @@ from std_msgs.msg import Header
 _BYTE: np.dtype[Any] = np.dtype(np.uint8)
 _FLOAT: np.dtype[Any] = np.dtype(np.float32)
 ENCODINGS = {'rgb8': (_BYTE, 3), 'bgr8': (_BYTE, 3), 'rgba8': (_BYTE, 4), 'bgra8': (_BYTE, 4),
-             'mono8': (_BYTE, 1), '8UC3': (_BYTE, 3), '32FC3': (_FLOAT, 3)}
+             'mono8': (_BYTE, 1), '8UC3': (_BYTE, 3), '32FC3': (_FLOAT, 3),
+             'yuv422': (_BYTE, 2), 'uyvy': (_BYTE, 2), 'yuv422_yuy2': (_BYTE, 2),
+             'yuyv': (_BYTE, 2), 'bayer_rggb8': (_BYTE, 1), 'bayer_bggr8': (_BYTE, 1),
+             'bayer_gbrg8': (_BYTE, 1), 'bayer_grbg8': (_BYTE, 1)}
 MASK_ENCODINGS = ('mono8', '8UC1')
 DEPTH_ENCODINGS: dict[str, np.dtype[Any]] = {
     encoding: np.dtype(kind) for encoding, kind in (
         ('16UC1', np.uint16), ('mono16', np.uint16), ('32FC1', np.float32))}
 _TO_RGB = {'bgr8': cv2.COLOR_BGR2RGB, '8UC3': cv2.COLOR_BGR2RGB, 'mono8': cv2.COLOR_GRAY2RGB,
-           'rgba8': cv2.COLOR_RGBA2RGB, 'bgra8': cv2.COLOR_BGRA2RGB}
+           'rgba8': cv2.COLOR_RGBA2RGB, 'bgra8': cv2.COLOR_BGRA2RGB,
+           'yuv422': cv2.COLOR_YUV2RGB_UYVY, 'uyvy': cv2.COLOR_YUV2RGB_UYVY,
+           'yuv422_yuy2': cv2.COLOR_YUV2RGB_YUY2, 'yuyv': cv2.COLOR_YUV2RGB_YUY2,
+           'bayer_rggb8': cv2.COLOR_BayerRGGB2RGB, 'bayer_bggr8': cv2.COLOR_BayerBGGR2RGB,
+           'bayer_gbrg8': cv2.COLOR_BayerGBRG2RGB, 'bayer_grbg8': cv2.COLOR_BayerGRBG2RGB}
+_LEAST_BAYER = 3  # pixels a side: a smaller image has no pixel with all neighbours
 
 
 def image_from_msg(msg: Image) -> NDArray[np.uint8]:
@@ -29,7 +37,9 @@ def image_from_msg(msg: Image) -> NDArray[np.uint8]:
     Return a camera's image, (height, width, 3) uint8 RGB.
 
     Reads rgb8, bgr8, mono8, rgba8 and bgra8 (laid on white where transparent), 8UC3 as OpenCV's
-    blue, green, red, and 32FC3, RGB in [0, 1]. An image of rgb8 shares the message's memory.
+    blue, green, red, 32FC3, RGB in [0, 1], uyvy (also named yuv422) and yuyv (yuv422_yuy2), of
+    BT.601 in [16, 235], and 8-bit Bayer patterns, whose missing colours are interpolated. An
+    image of rgb8 shares the message's memory.
     Raises MessageError as `image_size_from_msg` does, and on values of 32FC3 that are NaN or out
     of range.
     """
@@ -136,17 +146,25 @@ def _image_msg(pixels: NDArray[Any], encoding: str,
 def _layout(msg: Image) -> tuple[np.dtype[Any], int]:
     """Return the type of the values and their number in a pixel."""
     if msg.encoding not in ENCODINGS:
-        hint = ('; debayer it first, for example with image_proc'
-                if msg.encoding.startswith('bayer_') else '')
         raise MessageError(f'unknown image encoding: expected one of {", ".join(ENCODINGS)}, '
-                           f'got {msg.encoding!r}{hint}', 'encoding')
+                           f'got {msg.encoding!r}', 'encoding')
     return ENCODINGS[msg.encoding]
+
+
+def _is_yuv(encoding: str) -> bool:
+    return ENCODINGS.get(encoding) == (_BYTE, 2)
 
 
 def _check_size(msg: Image, dtype: np.dtype[Any], channels: int) -> None:
     if msg.height == 0 or msg.width == 0:
         raise MessageError('empty image: expected a height and a width above 0, '
                            f'got {msg.height} x {msg.width}', 'image_size')
+    if _is_yuv(msg.encoding) and msg.width % 2:
+        raise MessageError(f'invalid image width: expected an even one for {msg.encoding}, got '
+                           f'{msg.width}', 'image_size')
+    if msg.encoding.startswith('bayer_') and min(msg.height, msg.width) < _LEAST_BAYER:
+        raise MessageError(f'image too small: expected {_LEAST_BAYER} pixels a side or more for '
+                           f'{msg.encoding}, got {msg.height} x {msg.width}', 'image_size')
     row = msg.width * channels * dtype.itemsize
     if msg.step < row:
         raise MessageError(f'invalid image rows: expected at least {row} bytes for {msg.width} '

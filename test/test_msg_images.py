@@ -46,14 +46,52 @@ def encoded(image, encoding, bigendian):
     return np.dstack([pixels, opaque]) if encoding.endswith('a8') else pixels
 
 
-def test_a_raw_sensor_s_image_is_rejected_with_what_to_do():
-    with pytest.raises(MessageError, match="got 'bayer_rggb8'; debayer it first"):
-        image_from_msg(message(np.zeros((2, 3), np.uint8), 'bayer_rggb8'))
+RAW = {'bayer_rggb8': 'rggb', 'bayer_bggr8': 'bggr', 'bayer_gbrg8': 'gbrg',
+       'bayer_grbg8': 'grbg'}
+YUV = {'yuv422': (1, 0), 'uyvy': (1, 0), 'yuv422_yuy2': (0, 1), 'yuyv': (0, 1)}
+"""Where the first of two bytes with the brightness is, and with the colours."""
+
+
+def smooth(rng, height, width):
+    """Return an image whose colours change by as good as nothing from pixel to pixel."""
+    low, high = rng.uniform(0, 255, (2, 3))
+    across, down = np.linspace(0, 1, width), np.linspace(0, 1, height)[:, None]
+    share = (across + down)[..., None] / 2
+    return np.rint(low + share * (high - low)).astype(np.uint8)
+
+
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('encoding', RAW)
+def test_a_raw_sensor_s_image_has_the_colors_that_the_sensor_saw(encoding, seed):
+    image = smooth(np.random.default_rng(seed), 121, 200)
+    raw = np.zeros(image.shape[:2], np.uint8)
+    for place, color in enumerate(RAW[encoding]):
+        row, column = divmod(place, 2)
+        raw[row::2, column::2] = image[row::2, column::2, 'rgb'.index(color)]
+    found = image_from_msg(message(raw, encoding, padding=seed)).astype(int)
+    assert np.abs(found - image).max() <= 4
+
+
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('encoding', YUV)
+def test_an_image_of_brightness_and_shared_colors_comes_back_nearly_as_it_was(encoding, seed):
+    image = smooth(np.random.default_rng(seed), 50, 200)
+    # ITU-R BT.601, of studio range: Y in [16, 235], U and V in [16, 240]
+    red, green, blue = np.moveaxis(image / 255, -1, 0)
+    y = 65.481 * red + 128.553 * green + 24.966 * blue + 16
+    u = 128 - 37.797 * red - 74.203 * green + 112 * blue
+    v = 128 + 112 * red - 93.786 * green - 18.214 * blue
+    bright, color = YUV[encoding]
+    packed = np.zeros((*image.shape[:2], 2))
+    packed[..., bright] = y
+    packed[:, 0::2, color], packed[:, 1::2, color] = u[:, 0::2], v[:, 0::2]
+    found = image_from_msg(message(np.rint(packed).astype(np.uint8), encoding, padding=seed))
+    assert np.abs(found.astype(int) - image).max() <= 4
 
 
 @pytest.mark.parametrize('seed', range(6))
 @pytest.mark.parametrize('bigendian', [False, True])
-@pytest.mark.parametrize('encoding', ENCODINGS)
+@pytest.mark.parametrize('encoding', sorted({*ENCODINGS} - {*RAW, *YUV}))
 def test_every_encoding_says_the_same_in_any_size_row_length_and_byte_order(
         encoding, bigendian, seed):
     rng = np.random.default_rng(seed)
@@ -109,6 +147,8 @@ FLOAT = np.full((2, 2, 3), 0.5, np.float32)
     (message(RGB, 'yuv9'), 'encoding', "one of rgb8.*got 'yuv9'"),
     (short(message(RGB, 'rgb8')), 'image_bytes', 'expected 72 bytes.*got 71'),
     (message(RGB[..., :1], 'rgb8'), 'image_bytes', 'at least 18 bytes.*step of 6'),
+    (message(RGB[:, :5, :2], 'yuyv'), 'image_size', 'even one for yuyv, got 5'),
+    (message(RGB[:2, :, :1], 'bayer_rggb8'), 'image_size', '3 pixels a side.*got 2 x 6'),
     (message(FLOAT * np.nan, '32FC3'), 'image_values', r'in \[0, 1\], got nan to nan'),
     (message(FLOAT * 4, '32FC3'), 'image_values', 'got 2.0 to 2.0'),
     (message(-FLOAT, '32FC3'), 'image_values', 'got -0.5 to -0.5')])
