@@ -27,9 +27,9 @@ def play(
     Example: active-recon play bags/2026-11-21_14-30-00 --rate 2
     --topics camera/image_raw,camera/camera_info,camera/pose
     """
-    from active_recon.bags.runs.playing import played_topics
+    from active_recon.bags.runs.playing import played
 
-    played_topics(bag, rate, topics, bag_progress(bag))
+    played(bag, rate, topics, bag_progress(bag))
     # The node replaces this process and receives its Ctrl-C
     os.execv(sys.executable, [
         sys.executable, '-m', 'active_recon.nodes.player', '--ros-args',

@@ -3,7 +3,7 @@
 from pathlib import Path
 import time
 
-from active_recon.bags.runs.playing import played_messages, played_topics
+from active_recon.bags.runs.playing import played
 from active_recon.errors import ConfigError
 from active_recon.nodes.runtime.definitions import message_class
 from active_recon.nodes.runtime.parameters import Parameters
@@ -34,9 +34,9 @@ class PlayerNode(Node):
         super().__init__('player')
         params = Parameters(self, PlayerParameters).values
         bag, self._rate = Path(params.bag), params.rate
-        topics = played_topics(bag, self._rate, params.topics)
+        playing = played(bag, self._rate, params.topics)
         self._out = {}
-        for topic in topics:
+        for topic in playing.topics:
             try:
                 kind = message_class(topic.type_name)
             except (ImportError, AttributeError, ValueError) as error:
@@ -48,13 +48,14 @@ class PlayerNode(Node):
                 profile.depth = 1
             self._out[topic.name] = self.create_publisher(kind, topic.name, profile)
         self._clock_pub = None if CLOCK in self._out else self.create_publisher(Clock, CLOCK, 10)
-        self._messages = played_messages(bag, self._out)
+        self._messages = playing.messages()
         self._next = next(self._messages, None)
         self._begin = self._next.received if self._next is not None else 0
         self._made_at = time.monotonic()
         self._started_at: float | None = None
         self._clock_at = self._logged_at = 0.0
-        self.get_logger().info(f'playing {len(topics)} topics of {bag} at rate {self._rate:g}')
+        self.get_logger().info(f'playing {len(playing.topics)} topics of {bag} at rate '
+                               f'{self._rate:g}')
         # A steady clock: with use_sim_time the node would wait for the clock it publishes.
         self.create_timer(_TICK_S, self._play, clock=SystemClock(clock_type=ClockType.STEADY_TIME))
 

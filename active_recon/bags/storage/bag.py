@@ -22,11 +22,16 @@ class RawMessage:
 
 @dataclass(frozen=True)
 class BagSummary:
-    """The content of a bag; `begin` and `end` are receive times in ns, 0 if it has no message."""
+    """
+    The content of a bag; `begin` and `end` are receive times in ns, 0 if it has no message.
+
+    `late` is the longest time in ns that a message was received before one that lies ahead of it.
+    """
 
     topics: list[TopicSummary]
     begin: int
     end: int
+    late: int
     provenance: Mapping[str, str]
     parameters: Mapping[str, Mapping[str, Any]]
 
@@ -36,7 +41,8 @@ def bag_summary(topics: Iterable[Topic], contents: Contents, provenance: Mapping
     """Return the summary of the counted messages; topics in the order of their names."""
     counted = [TopicSummary(topic.name, topic.type_name, contents.counts[topic.name], topic.qos)
                for topic in sorted(topics, key=lambda topic: topic.name)]
-    return BagSummary(counted, contents.begin, contents.end, provenance, parameters)
+    return BagSummary(counted, contents.begin, contents.end, contents.late, provenance,
+                      parameters)
 
 
 class Bag(Protocol):

@@ -48,30 +48,40 @@ class Topic:
 
 @dataclass
 class Contents:
-    """How many messages each topic has, and the span of their receive times, nanoseconds."""
+    """
+    How many messages each topic has, and the span of their receive times, nanoseconds.
+
+    `late` is the longest time that a message was received before one that lies ahead of it.
+    """
 
     counts: Counter[str] = field(default_factory=Counter)
     begin: int = 0
     end: int = 0
+    late: int = 0
 
     def add(self, topic: str, time: int) -> None:
         """Count one message."""
         self.begin = min(self.begin, time) if self.counts else time
         self.end = max(self.end, time)
+        self.late = max(self.late, self.end - time)
         self.counts[topic] += 1
 
     def copy(self) -> 'Contents':
         """Return an independent copy."""
-        return Contents(self.counts.copy(), self.begin, self.end)
+        return Contents(self.counts.copy(), self.begin, self.end, self.late)
 
 
 def total(parts: Iterable[Contents]) -> Contents:
-    """Return the sum of the contents of several files."""
-    filled = [part for part in parts if part.counts]
-    if not filled:
-        return Contents()
-    counts = sum((part.counts for part in filled), Counter[str]())
-    return Contents(counts, min(part.begin for part in filled), max(part.end for part in filled))
+    """Return the sum of the contents of several files, in their order."""
+    whole = Contents()
+    for part in parts:
+        if not whole.counts:
+            whole = part.copy()
+        elif part.counts:
+            late = max(whole.late, part.late, whole.end - part.begin)
+            whole = Contents(whole.counts + part.counts, min(whole.begin, part.begin),
+                             max(whole.end, part.end), late)
+    return whole
 
 
 def bag_information(files: Sequence[tuple[str, Contents]],
