@@ -199,13 +199,22 @@ def test_images_whose_poses_are_of_another_time_are_refused(tmp_path):
     refusal(write_bag(tmp_path / 'run', entries), 'no image has an azimuth: .*pose')
 
 
-def test_decreasing_stamps_are_refused(tmp_path):
-    backwards = list(reversed(images())) + joints()
-    refusal(write_bag(tmp_path / 'run', backwards, one_by_one=True), 'the stamps decrease')
+def test_an_image_that_is_older_than_the_last_is_left_out_and_counted(tmp_path):
+    first, second, *rest = images()
+    swapped = write_bag(tmp_path / 'run', [second, first, *rest, *joints()], one_by_one=True)
+    in_order = read_run(write_bag(tmp_path / 'other', [second, *rest, *joints()],
+                                  one_by_one=True))
+    run = read_run(swapped)
+    assert run.counters['bag']['refused/out_of_order'] == 1
+    assert [view.stamp for view in run.episodes[0].views] == [
+        view.stamp for view in in_order.episodes[0].views]
+
+
+def test_images_of_a_loop_that_are_older_than_the_last_are_missing(tmp_path):
     ours = [entry for entry in RUN.messages if entry[1] != '/camera/image_raw']
     pictures = [entry for entry in RUN.messages if entry[1] == '/camera/image_raw']
     refusal(write_bag(tmp_path / 'ours', [*ours, *reversed(pictures)], one_by_one=True),
-            'the stamps decrease')
+            'view 1 .* is missing: image out of order')
 
 
 def test_a_view_whose_image_was_lost_is_named(tmp_path):

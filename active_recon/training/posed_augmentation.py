@@ -18,25 +18,28 @@ SHARES = {'white': 0.16, 'plain': 0.12, 'gradient': 0.08, 'noise': 0.1, 'clutter
 MOST_TURN, MOST_SHIFT = np.radians(1.0), 0.01
 """The largest pose errors: radians, and a fraction of the distance."""
 _CUT_SHARE, _MOST_CUT = 0.12, 0.4  # of the views, and of a view's side
-_TABLE_SHARE = 0.3  # of the sequences
+TABLE_SHARE = 0.3
+"""The fraction of the sequences whose object stands on a table."""
 _NOISE, _DARKEST, _BRIGHTEST = 0.03, 0.6, 2.2
 
 
 def augment_posed(images: Tensor, seen: Tensor, cameras: Cameras, voxels: Tensor, views: ViewSet,
-                  rng: np.random.Generator, shares: Mapping[str, float] = SHARES) -> Tensor:
+                  rng: np.random.Generator, shares: Mapping[str, float] = SHARES,
+                  table_share: float = TABLE_SHARE) -> Tensor:
     """
     Return augmented images (T, B, 4, S, S) in [0, 1] of premultiplied ones (T, B, S, S, 4) uint8.
 
     Some objects, of voxels (B, R, R, R), stand on a table. The fourth channel is 1 where the
     image has the pixel: `seen` (T, B, S, S) bool, less what is cropped from some views. `shares`
-    are those of the kinds of backgrounds. `rng` is the only source of randomness.
+    are those of the kinds of backgrounds, `table_share` that of tables. `rng` is the only source
+    of randomness.
     """
     length, size, side = images.shape[:3]
     planes = images.permute(0, 1, 4, 2, 3).float().div_(255)
     planes[:, :, :3] = augmentation.jitter_colors(planes, rng)
     kinds = augmentation.draw_kinds(shares, size, rng)
     behind = augmentation.draw_backgrounds(kinds, BACKGROUNDS, views, length, rng)
-    on_table = torch.from_numpy(np.flatnonzero(rng.random(size) < _TABLE_SHARE))
+    on_table = torch.from_numpy(np.flatnonzero(rng.random(size) < table_share))
     if len(on_table):
         table = draw_tables(Cameras(cameras.poses[:, on_table], cameras.intrinsics[:, on_table]),
                             voxels[on_table], side, rng)

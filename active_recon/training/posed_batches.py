@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from active_recon.datasets.views import ViewSet, with_seen
 from active_recon.models.network import Cameras
 from active_recon.training.batches import mirror_some
-from active_recon.training.posed_augmentation import augment_posed, perturb_poses, SHARES
+from active_recon.training.posed_augmentation import (
+    augment_posed,
+    perturb_poses,
+    SHARES,
+    TABLE_SHARE,
+)
 import numpy as np
 import torch
 from torch import Tensor
@@ -33,13 +38,14 @@ class PosedBatch:
 
 
 def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Generator,
-                     augment: bool = True, shares: Mapping[str, float] = SHARES) -> PosedBatch:
+                     augment: bool = True, shares: Mapping[str, float] = SHARES,
+                     table_share: float = TABLE_SHARE) -> PosedBatch:
     """
     Draw objects with different random views of each, turned by quarters and mirrored at random.
 
     There are `length` views of each, or all that an object has, if these are fewer. With `augment`
-    the images get backgrounds, of kinds in these shares, light and noise, and the poses small
-    errors.
+    the images get backgrounds, of kinds in these shares, light and noise, some objects a table,
+    and the poses small errors.
     """
     length = min(length, views.images.shape[1])
     objects = torch.from_numpy(rng.integers(len(views), size=size))
@@ -63,7 +69,8 @@ def draw_posed_batch(views: ViewSet, size: int, length: int, rng: np.random.Gene
         voxels[row] = turned_by_quarters(voxels[row], int(quarter))
     alpha = images[..., 3].float() / 255
     if augment:
-        return PosedBatch(augment_posed(images, seen, cameras, voxels, views, rng, shares),
+        return PosedBatch(augment_posed(images, seen, cameras, voxels, views, rng, shares,
+                                        table_share),
                           perturb_poses(cameras, rng), alpha,
                           voxels, objects, depths)
     planes = images.permute(0, 1, 4, 2, 3).float() / 255

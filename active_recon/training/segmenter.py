@@ -12,6 +12,8 @@ from torch.nn import functional
 SHARES = {'white': 0.04, 'plain': 0.08, 'gradient': 0.08, 'noise': 0.16, 'clutter': 0.2,
           'pieces': 0.2, 'tiles': 0.14, 'black': 0.06, 'dark': 0.04}
 """The fraction of the images that have each kind of background: mostly those that are hard."""
+TABLE_SHARE = 0.45
+"""The fraction of the images in which the object stands on a table: most photos are such."""
 VIEWS = 2
 """Images of each object in a step, before one background."""
 
@@ -45,9 +47,10 @@ def train_segmenter(segmenter: Segmenter, views: ViewSet, config: TrainingConfig
 
     def draw(step: int) -> Draw:
         rng = np.random.default_rng([config.seed, step, run.fabric.global_rank])
-        batch = draw_posed_batch(views, size, VIEWS, rng, config.augment, SHARES)
+        batch = draw_posed_batch(views, size, VIEWS, rng, config.augment, SHARES,
+                                 TABLE_SHARE)
         return Draw((batch.images.flatten(0, 1), batch.alpha.flatten(0, 1)), batch.objects)
 
     train_steps(run, SegmenterLearner(segmenter), segmenter, config,
-                {'training': config.to_dict(), 'backgrounds': SHARES}, views, draw, dict,
-                weight_decay=0.01)
+                {'training': config.to_dict(), 'backgrounds': SHARES, 'tables': TABLE_SHARE},
+                views, draw, dict, weight_decay=0.01)

@@ -1,5 +1,7 @@
 """A table that the object stands on, with a texture and the object's shadow, seen by each view."""
 
+from collections.abc import Sequence
+
 from active_recon.models.network import Cameras
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from torch.nn import functional
 
 _REACH = 1.5  # half the side of the shadow's map, in sides of the grid
 _SHADOW_SIDE, _SOLID_SIDE, _TEXTURE_SIDE = 96, 32, 64
+_SPOTTED = 0.15  # share of the tables
 _NARROWEST, _WIDEST = 0.6, 4.0  # half sides of tables, in sides of the grid
 
 
@@ -59,20 +62,33 @@ def _looked_up(maps: Tensor, where: Tensor) -> Tensor:
 
 
 def _textures(count: int, rng: np.random.Generator) -> Tensor:
-    """Return textures of tables, (B, 3, h, w): plain, grained, or checked, in two colours."""
+    """
+    Return textures of tables, (B, 3, h, w).
+
+    They are plain, grained, checked or of boards in two colours, or have spots of all colours.
+    """
     fine = _TEXTURE_SIDE
     grain = _tensor(rng.random((count, 1, fine, fine)))
-    coarse = functional.interpolate(_tensor(rng.random((count, 1, fine // 8, fine // 8))),
-                                    size=(fine, fine), mode='bilinear')
+    coarse = _drawn(rng, [1, fine // 8, fine // 8], count)
     cells = torch.arange(fine) // 2
     checks = ((cells + cells[:, None]) % 2).float().expand(count, 1, fine, fine)
-    kind = torch.from_numpy(rng.integers(4, size=(count, 1, 1, 1)))
-    share = torch.where(kind == 0, coarse, torch.where(
-        kind == 1, grain, torch.where(kind == 2, checks, 0.5 * (grain + coarse))))
+    boards = torch.cat([_drawn(rng, [1, *rng.integers((2, 24), (8, fine + 1))])
+                        for _ in range(count)])
+    kinds = torch.stack([coarse, grain, checks, 0.5 * (grain + coarse), boards])
+    share = kinds[torch.from_numpy(rng.integers(len(kinds), size=count)), torch.arange(count)]
     grey = rng.uniform(0.05, 1, (2, count, 1, 1, 1))
     hue = grey + rng.random((2, count, 1, 1, 1)) ** 2 * (rng.random((2, count, 3, 1, 1)) - grey)
     first, second = _tensor(hue)
-    return torch.lerp(first, second, share * _tensor(rng.random((count, 1, 1, 1))))
+    two = torch.lerp(first, second, share * _tensor(rng.random((count, 1, 1, 1))))
+    spots = torch.cat([_drawn(rng, [3, *rng.integers(6, fine + 1, 2)]) for _ in range(count)])
+    return torch.where(torch.from_numpy(rng.random((count, 1, 1, 1)) < _SPOTTED), spots, two)
+
+
+def _drawn(rng: np.random.Generator, shape: Sequence[int], count: int = 1) -> Tensor:
+    """Return random patterns in [0, 1] of so many channels and cells, (B, C, h, w)."""
+    side = _TEXTURE_SIDE
+    return functional.interpolate(_tensor(rng.random((count, *shape))), size=(side, side),
+                                  mode='bilinear')
 
 
 def _shadows(solid: Tensor, bottom: Tensor, rng: np.random.Generator) -> Tensor:

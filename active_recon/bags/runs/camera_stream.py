@@ -16,7 +16,7 @@ from active_recon.bags.storage.message_types import (
     POSE,
     read_message,
 )
-from active_recon.errors import DataError, MessageError
+from active_recon.errors import MessageError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics
 from active_recon.reporting import Advance, Reporting, silent
 from msg_tools.camera_images import size_from_msg
@@ -60,11 +60,7 @@ class CameraStream:
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
     def views(self, wanted: Callable[[int], bool]) -> Iterator[View | MessageError]:
-        """
-        Yield the images with wanted stamps and their cameras, or the errors that reject them.
-
-        Raises DataError if the stamps of the images decrease.
-        """
+        """Yield the images with wanted stamps and their cameras, or the errors that reject them."""
         yield from self._read_cameras()
         with self._reporting('reading the images', self._camera.image.count) as advance:
             yield from self._joined(wanted, advance)
@@ -98,9 +94,6 @@ class CameraStream:
                 joiner.add_intrinsics(time, self._lens(time, *size_from_msg(msg)))
                 joiner.add_image(time, msg, now=0)
             except MessageError as error:
-                if error.kind == 'out_of_order':
-                    raise DataError(f'{message.topic}: the stamps decrease: {error}',
-                                    error.kind) from error
                 yield error
                 continue
             for view in joiner.joined(now=math.inf):  # nothing more is to come
