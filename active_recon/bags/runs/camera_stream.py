@@ -60,7 +60,7 @@ class CameraStream:
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
     def views(self, wanted: Callable[[int], bool]) -> Iterator[View | MessageError]:
-        """Yield the images with wanted stamps and their cameras, or the errors that reject them."""
+        """Yield the wanted images with their cameras, or the errors that reject them."""
         yield from self._read_cameras()
         with self._reporting('reading the images', self._camera.image.count) as advance:
             yield from self._joined(wanted, advance)
