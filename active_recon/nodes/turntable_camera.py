@@ -146,20 +146,19 @@ class TurntableCameraNode(QosWarnings):
             response.message = one_line(error)
             return response
         shown, self._shown = self._shown, None  # no image of the old object in the new episode
-        begun = await self._begin_episode()
-        if not begun:
+        refusal = await self._begin_episode()
+        if refusal:
             self._shown = shown
             response.message = ('no new episode: expected the reconstructor to begin one, but it '
-                                f'did not answer within {ANSWER_S:g} s; the object is still the '
-                                'same')
+                                f'{refusal}; the object is still the same')
             return response
         self._index, self._shown = index, following
         response.success = True
         response.message = f'{following.name} ({index + 1} of {len(self._objects)})'
         return response
 
-    async def _begin_episode(self) -> bool:
-        """Request a new episode of the reconstructor; return whether it began one in time."""
+    async def _begin_episode(self) -> str:
+        """Request a new episode of the reconstructor; return why it did not begin one, or ''."""
         answered = Future()
         late = self.create_timer(
             ANSWER_S, lambda: answered.done() or answered.set_result(None), clock=STEADY)
@@ -168,7 +167,9 @@ class TurntableCameraNode(QosWarnings):
             lambda call: answered.done() or answered.set_result(call.result()))
         answer = await answered
         self.destroy_timer(late)
-        return answer is not None and answer.success
+        if answer is None:
+            return f'did not answer within {ANSWER_S:g} s'
+        return '' if answer.success else f'answered: {answer.message}'
 
 
 def _at_start(params: TurntableCameraParameters) -> Orbit:

@@ -142,6 +142,21 @@ def test_a_reconstructor_hears_nothing_while_inactive_and_then_begins_an_episode
     camera.show()
 
 
+def test_a_turntable_that_shows_no_next_object_tells_what_the_reconstructor_answered(
+        start_node, bench, box):
+    def refuse(_request, response):
+        response.message = 'this node is inactive'
+        return response
+
+    bench.node.create_service(Trigger, 'start_episode', refuse)
+    start_node('turntable_camera', mesh=box)
+    answer = bench.call('next_object')
+    assert not answer.success
+    assert answer.message == (
+        'no new episode: expected the reconstructor to begin one, but it answered: this node is '
+        'inactive; the object is still the same')
+
+
 def test_cleaning_up_frees_the_network(ros):
     node = ReconstructorNode()
     try:
