@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 import os
+import re
 import time
 from typing import Any
 
@@ -170,8 +171,9 @@ def running_nodes(namespace: str = '', timeout_s: float = 5.0) -> Iterator[Runni
 
 
 def _tells_of(status: str, node: str) -> bool:
-    """Return whether a status is of a node: others name theirs `node: what`."""
-    return status.lstrip('/').startswith((node.lstrip('/'), node.rpartition('/')[2]))
+    """Return whether a status is of a node: its full name; others begin theirs with `node`."""
+    own = re.split(r'[^\w/]', status, maxsplit=1)[0]
+    return own in (node, node.lstrip('/'), node.rpartition('/')[2])
 
 
 def _nothing() -> None:

@@ -141,6 +141,21 @@ def test_the_status_names_a_node_that_tells_nothing(told, shared_bench):
     assert re.search(r'^/view_planner  WARN', said, re.MULTILINE)
 
 
+@pytest.mark.parametrize('namespace', ['/cell', '/'])
+def test_the_status_names_a_silent_node_whose_name_is_like_that_of_another(
+        told, shared_bench, namespace):
+    warned_status(told)
+    # Beside /view_planner one of its name in a namespace, and one whose name begins that name
+    silent = Node('view_planner' if namespace == '/cell' else 'view', namespace=namespace,
+                  context=shared_bench.node.context)
+    try:
+        silent.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        name = silent.get_fully_qualified_name()
+        assert f'\n{name}  nothing heard in 3 s' in told(0, 'status', '--timeout', '3')
+    finally:
+        silent.destroy_node()
+
+
 def test_the_status_leaves_hidden_nodes_out(told, shared_bench):
     warned_status(told)
     hidden = Node('_watching', context=shared_bench.node.context)
