@@ -17,6 +17,10 @@ class StampJoiner:
         """Forget all incomplete parts."""
         self._parts.clear()
 
+    def expect(self, name: str) -> None:
+        """Expect another part of each stamp, of those that are incomplete, too."""
+        self._names |= {name}
+
     def forget_before(self, stamp: int) -> None:
         """Forget the parts with earlier stamps."""
         self._parts = {each: parts for each, parts in self._parts.items() if each >= stamp}

@@ -7,9 +7,14 @@ import shutil
 from active_recon.geometry.cameras import Camera
 from active_recon.models.weights_files import find_weights, SHIPPED
 from active_recon.parameters.declaration import NEW_START
+from active_recon.volumes.voxels import VoxelGrid
 from geometry_msgs.msg import PoseStamped
+from judged_quality import quality_of
 from msg_tools.cameras import pose_from_msg
 from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
+from msg_tools.stamps import stamp_from_nanoseconds
+from msg_tools.voxels import voxel_grid_to_msg
+import numpy as np
 import pytest
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -18,7 +23,7 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 
 from .conftest import FakeCamera, FakeReconstructor, LATCHED_QOS
@@ -113,6 +118,23 @@ def test_a_policy_that_is_changed_goes_on_from_what_the_episode_has_seen(
     assert change(bench, 'view_planner', max_views=3)['max_views'].successful
     fake.show(latent, third)
     bench.until(lambda: fake.done[-1].frame_id == 'max_views', 'the end after three views')
+
+
+def test_a_view_that_waits_for_its_quality_is_not_lost_to_a_policy_that_wants_probabilities(
+        start_node, bench, latent):  # noqa: F811
+    planner = start_node('view_planner', policy='farthest', start_azimuth=0.0)
+    fake = FakeReconstructor(bench, ('episode', *FakeReconstructor.PARTS, 'quality'))
+    fake.begin('only')
+    fake.wait_goal(0)
+    stamp = fake.show(latent, 0.0)
+    assert not bench.within(1.0, lambda: bench.counts('view_planner').get('views'))
+    assert change(bench, 'view_planner', policy='visible_entropy')['policy'].successful
+    bench.advertise(PointCloud2, 'probabilities', LATCHED_QOS).publish(voxel_grid_to_msg(
+        VoxelGrid(np.full((8, 8, 8), 0.5, np.float32)), 0.02,
+        Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')))
+    fake.show(latent, 0.0, stamp, parts=('quality',), quality=quality_of())
+    fake.wait_goal(stamp)
+    assert not planner.log('refused')
 
 
 def test_a_policy_whose_weights_are_missing_is_refused_and_the_last_one_stays(

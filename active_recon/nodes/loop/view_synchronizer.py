@@ -44,8 +44,8 @@ class ViewSynchronizer:
         self._node = node
         self._diagnostics = diagnostics
         self._on_view, self._on_waiting, self._on_camera = on_view, on_waiting, on_camera
-        self._parts = ['latent', 'camera', 'entropy']
-        self._joiner = StampJoiner(self._parts)
+        self._joiner = StampJoiner(['latent', 'camera', 'entropy'])
+        self._has_volume = False
         self._begin = 0
         self._matched_at: float | None = None
         self.last: tuple[int, PlannerView] | None = None
@@ -61,10 +61,14 @@ class ViewSynchronizer:
 
     def subscribe_volume(self, object_size: float) -> None:
         """Join the probabilities, too, of a voxel grid of that side in metres, for the policy."""
-        if 'volume' in self._parts:
+        if self._has_volume:
             return
-        self._parts.append('volume')
-        self._joiner = StampJoiner(self._parts)
+        self._has_volume = True
+        self._joiner.expect('volume')
+        for stamp, parts in self._waiting.items():  # what is latched completes the last of them
+            for name, part in parts.items():
+                self._joiner.add(name, stamp, part)
+        self._waiting.clear()
         self._inputs.append(self._node.create_subscription(
             PointCloud2, 'probabilities',
             self._on('volume', lambda msg: voxel_grid_from_msg(msg, object_size)), LATCHED_QOS))
