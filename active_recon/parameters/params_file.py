@@ -92,9 +92,19 @@ def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _as_ros_reads(parameter: Declared, value: object) -> object:
-    """Return a value with the numbers that YAML's older version takes for text: nan, 1e-3."""
+    """
+    Return a value with the numbers that YAML's older version takes for text: nan, 1e-3.
+
+    Raises ConfigError on what ROS does not read: nothing, and integers among other numbers.
+    """
+    if value is None:
+        raise ConfigError(f'parameter {parameter.name}: no value: expected {parameter.expected}, '
+                          f'got nothing{"; an empty list is []" if parameter.of else ""}')
     if float not in (parameter.kind, parameter.of):
         return value
+    if isinstance(value, list) and len({type(each) is int for each in value}) > 1:
+        raise ConfigError(f'parameter {parameter.name}: not of one type: expected all numbers of '
+                          f'a list with a point, as 0.0 is, for ROS, got {value!r}')
     return [floating(each) for each in value] if isinstance(value, list) else floating(value)
 
 

@@ -110,6 +110,11 @@ def test_the_driver_of_a_turntable_is_left_out_and_named(tmp_path):
     ('recorder: {ros__parameters: 1}', 'recorder: not a mapping: expected names with values, got '
                                        '1'),
     ('recorder: {ros__parameters: {output: a}}', 'no parameter output; did you mean output_dir'),
+    ('view_planner: {ros__parameters: {elevation_range: [0, 1.2]}}',
+     'parameter elevation_range: not of one type: expected all numbers of a list with a point, as '
+     r'0.0 is, for ROS, got \[0, 1.2\]'),
+    ('view_planner: {ros__parameters: {reachable_views: }}',
+     'parameter reachable_views: no value: expected a list.* got nothing; an empty list is '),
     ('recorder: {ros__parameters: {max_bag_size_mb: 0}}',
      'recorder: parameter max_bag_size_mb: invalid value: expected an integer from 1 to 1000000, '
      'got 0')])
