@@ -4,8 +4,10 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+import re
 import time
 
+from active_recon.errors import ConfigError
 from active_recon.interrupts import held_interrupts
 from active_recon.launching.processes import NodeProcesses
 from active_recon.nodes.runtime.composable import COMPOSABLE
@@ -44,7 +46,8 @@ def run_up(start: Start, say: Callable[[str], None]) -> None:
 
     Raises ConfigError on an invalid file, NodeError where a node ends by itself.
     """
-    namespace = f'/{start.namespace.strip("/")}' if start.namespace else ''
+    namespace = f'/{start.namespace.strip("/")}'.rstrip('/')
+    _check_names(namespace, start.remaps)
     names = list(read_params_file(start.params_file))
     check_reach(start.params_file, namespace)
     together = [name for name in names if name in COMPOSABLE] if start.single_process else []
@@ -64,3 +67,15 @@ def run_up(start: Start, say: Callable[[str], None]) -> None:
             nodes.check()
             time.sleep(_CHECK_EVERY_S)
     say('the nodes are stopped')
+
+
+def _check_names(namespace: str, remaps: Sequence[str]) -> None:
+    """Raise ConfigError on what ROS takes for no namespace, and on rules that rename nodes."""
+    if not re.fullmatch(r'(/[A-Za-z_]\w*)*', namespace, re.ASCII):
+        raise ConfigError(f'--namespace {namespace}: no namespace of ROS: expected letters '
+                          'without accents, digits and _, no digit first, and / between parts')
+    for rule in remaps:
+        if re.match(r'[^:]*:?__(ns|name|node):=', rule):
+            raise ConfigError(f'-r {rule}: another name for nodes, which would get nothing of '
+                              'their parameters: expected a topic or a service; a namespace is '
+                              'given by --namespace')

@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 
+from active_recon.errors import ConfigError
+from active_recon.launching.up import run_up, Start
 from geometry_msgs.msg import PoseStamped
 import pytest
 
@@ -97,7 +99,7 @@ def test_a_terminal_that_is_closed_stops_the_nodes_and_completes_the_bag(up, ben
 
 
 def test_where_one_node_ends_the_others_are_stopped_and_the_command_fails(up, bench, tmp_path):
-    process = up(TWO)
+    process = up(TWO.replace('/**', ''), '--namespace', '/')
     bench.until(lambda: len(node_pids(tmp_path)) == 2, 'the nodes')
     bench.until(lambda: '/view_planner' in bench.node.get_fully_qualified_node_names(), 'one')
     os.kill(node_pids(tmp_path)[0], signal.SIGKILL)
@@ -114,6 +116,19 @@ def test_a_file_that_cannot_be_used_starts_nothing(up, tmp_path):
 
 def test_a_file_of_another_namespace_starts_nothing(up):
     assert up(TWO.replace('/**/recorder', 'recorder'), '--namespace', 'cell').wait(BUDGET_S) == 2
+
+
+@pytest.mark.parametrize(('namespace', 'remaps', 'said'), [
+    ('cell-1', (), '--namespace /cell-1: no namespace of ROS: expected'),
+    ('größer', (), '--namespace /größer: no namespace of ROS: expected'),
+    ('', ('__ns:=/cell',), '-r __ns:=/cell: another name for nodes'),
+    ('', ('recorder:__node:=mine',), '-r recorder:__node:=mine: another name for nodes')])
+def test_names_that_nodes_cannot_have_or_by_which_they_get_nothing_of_the_file_start_nothing(
+        tmp_path, namespace, remaps, said):
+    file = tmp_path / 'nodes.yaml'
+    file.write_text(TWO)
+    with pytest.raises(ConfigError, match=f'^{said}'):
+        run_up(Start(file, namespace, remaps), lambda _line: None)
 
 
 def test_nodes_that_share_a_process_answer_a_view_with_a_goal(up, bench, tmp_path):
