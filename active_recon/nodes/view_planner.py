@@ -62,7 +62,8 @@ class ViewPlannerNode(ManagedNode):
     def activate(self) -> None:
         """Subscribe to the reconstructor, and continue from its latched messages."""
         self._episode: Episode | None = None
-        self._begun_at = self.get_clock().now().nanoseconds
+        # 0 before the first message of a simulation's clock: any episode may then be older
+        self._begun_at: float = self.get_clock().now().nanoseconds or math.inf
         inputs = AwaitedInputs(self, self._diagnostics)
         self.add_cleanup(inputs.clear)
         self._first_view = FirstView(self, inputs, self._diagnostics,
