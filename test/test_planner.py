@@ -572,3 +572,14 @@ def test_what_a_policy_returns_wrongly_is_refused_and_nothing_has_changed(spoil,
     with pytest.raises(ViewError, match=said):
         planner.add_view(LATENT, goal.camera, 1.0)
     assert planner.plan() is goal
+
+
+def test_a_goal_that_was_given_up_leaves_out_no_other_azimuth_that_is_listed_later():
+    before = Planner(FarthestPolicy(), limits=MotionLimits(reachable_azimuths=(0.0, 2.0)))
+    before.give_up(before.first_goal(orbit_camera(0.0)).camera)
+    after = Planner(FarthestPolicy(), limits=MotionLimits(reachable_azimuths=(0.0, 0.5)))
+    after.go_on_from(before)
+    assert after.plan().camera.azimuth == pytest.approx(0.5)
+    after = Planner(FarthestPolicy(), limits=MotionLimits(reachable_azimuths=(0.5,)))
+    after.go_on_from(before)
+    assert after.plan().camera.azimuth == pytest.approx(0.5)

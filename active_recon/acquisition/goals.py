@@ -59,6 +59,8 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
         options.insert(0, wanted.camera)
         nearest = np.insert(nearest, 0, nearest_camera(wanted.camera, candidates))
         scores = np.append(scores.max(), scores)
+    # One outside of the limits, which changed since, tells nothing of the candidate near it
+    failed = [each for each in failed if limits.allows(each.azimuth)]
     azimuths = np.array([option.azimuth for option in options])
     is_failed, is_taken = (np.isin(nearest, nearest_cameras(cameras, candidates))
                            for cameras in (failed, taken))
