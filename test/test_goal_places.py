@@ -1,6 +1,7 @@
 """Where goals can stand: domes and listed views, their limits, and the planner's goals there."""
 
 import math
+from pathlib import Path
 
 from active_recon.acquisition.goal_places import Dome, goal_places
 from active_recon.acquisition.motion import MotionLimits
@@ -59,6 +60,11 @@ def test_the_candidates_of_a_dome_are_about_as_far_from_each_other_everywhere():
     anywhere = np.random.default_rng(0).normal(size=(2000, 3))
     anywhere /= np.linalg.norm(anywhere, axis=1, keepdims=True)
     assert direction_distance(anywhere[:, None], seen).min(axis=1).max() < math.radians(15)
+
+
+def test_a_dome_has_as_many_candidates_as_the_documentation_tells():
+    page = (Path(__file__).parents[1] / 'doc/operation.md').read_text()
+    assert f'from 0 to 1.2 rad there are {len(candidates(elevation_range=(0.0, 1.2)))}.' in page
 
 
 def test_the_widest_ring_of_a_dome_has_the_azimuths_of_a_turntable():
