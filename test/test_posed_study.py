@@ -25,6 +25,7 @@ from active_recon.evaluation.posed.study import Extent, study_set
 from active_recon.evaluation.posed.summary import figure, markdown, robustness_figures
 from active_recon.models.carving import Carving
 from active_recon.models.lifted import projected, projection
+from active_recon.models.weights_files import find_weights
 from active_recon.training.gain_files import collect_gains, Collecting
 from active_recon.training.view_gains import ViewGains
 from active_recon.volumes.voxels import iou, turned
@@ -323,3 +324,17 @@ def test_entrants_are_named_apart():
         load_entrants(' , ')
     with pytest.raises(WeightsError, match='no such file'):
         load_entrants('carving,x=none.safetensors')
+
+
+def test_the_path_of_an_entrant_may_have_an_equals_sign_in_it(tmp_path, monkeypatch):
+    file = tmp_path / 'lr=1e-3' / 'mine.safetensors'
+    file.parent.mkdir()
+    file.write_bytes(find_weights('carving').read_bytes())
+    plain, named = load_entrants(f'{file},new={file}')
+    assert (plain.name, named.name) == ('mine', 'new')
+    assert plain.path == named.path == file
+    monkeypatch.chdir(tmp_path)
+    [near] = load_entrants('lr=1e-3/mine.safetensors')
+    assert near.name == 'mine'
+    with pytest.raises(WeightsError, match=r'a/lr=1/none.safetensors: no such file'):
+        load_entrants('a/lr=1/none.safetensors')

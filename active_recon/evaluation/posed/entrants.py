@@ -50,15 +50,17 @@ def load_entrants(models: str, runtime: str = 'torch', bfloat16: bool = False,
     """
     Load networks named `MODEL,MODEL,...`: each a model that ships, a file, or `NAME=FILE`.
 
-    For what runs them see `network_in`, which raises too. Raises ConfigError on an empty list or
-    where two have the same name, WeightsError where weights are missing.
+    Paths may have `=` in them, names no slash. For what runs them see `network_in`, which raises
+    too. Raises ConfigError on an empty list or where two have the same name, WeightsError where
+    weights are missing.
     """
     entrants: list[Entrant] = []
     for asked in filter(None, (part.strip() for part in models.split(','))):
-        name, named, file = asked.rpartition('=')
-        path = find_weights(file)
+        name, named, file = asked.partition('=')
+        is_named = bool(named) and '/' not in name and not Path(asked).is_file()
+        path = find_weights(file if is_named else asked)
         bundle = load_weights(path)
-        name = name if named else Path(path).stem
+        name = name if is_named else Path(path).stem
         if any(other.name == name for other in entrants):
             raise ConfigError('models: ambiguous name: expected a different name for each, got '
                               f'{name!r} twice; name one as NAME=FILE')
