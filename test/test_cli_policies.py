@@ -1,8 +1,10 @@
 """`active-recon policies`, from the command line to the files that it writes."""
 
 import json
+from shutil import copytree
 
 from active_recon.cli.main import main
+from active_recon.datasets.layout import list_objects
 import pytest
 import torch
 
@@ -37,9 +39,20 @@ def test_policies_are_measured_set_by_set_and_told_in_a_table(dataset, tmp_path,
     assert '| oracle |' in text and 'the repeatable gap' in text
 
 
+def test_a_sequence_whose_motion_costs_is_found_on_the_training_objects(
+        dataset, tmp_path, monkeypatch):
+    assert command(monkeypatch, dataset, '--model', 'carving', '--policies', 'sequence@1e-6',
+                   '--training', dataset, '--training-objects', 2, '--objects', 2, '--starts', 1,
+                   '--views', 2, '--threads', 1, '--out', tmp_path) == 0
+    result = json.loads((tmp_path / 'policies.json').read_text())
+    assert list(result['sets'][0]['policies']) == ['sequence@1e-6']
+    assert len(result['sequence']['offsets_deg']) == 1
+
+
 @pytest.mark.parametrize(('arguments', 'said'), [
     (['--policies', 'random,best'], "got 'best'"),
     (['--policies', 'sequence'], 'no training objects: expected --training'),
+    (['--policies', 'sequence@0.1'], 'no training objects: expected --training'),
     (['--model', 'carving,lifting'], 'several networks: expected one'),
     (['--category', 'ship'], 'no such objects'),
 ])
@@ -50,3 +63,13 @@ def test_what_cannot_be_measured_is_refused_in_one_line(
                    *arguments, '--threads', 1, '--out', tmp_path) == 2
     line = [line for line in capsys.readouterr().err.splitlines() if 'active-recon: ' in line]
     assert len(line) == 1 and said in line[0]
+
+
+def test_a_lone_object_is_not_swapped_for_itself(dataset, tmp_path, monkeypatch, capsys):
+    first = list_objects(dataset)[0]
+    for part in (first.images_folder, first.voxels_path().parent):
+        copytree(part, tmp_path / 'one' / part.relative_to(dataset))
+    capsys.readouterr()
+    assert command(monkeypatch, tmp_path / 'one', '--policies', 'random,swapped', '--threads', 1,
+                   '--out', tmp_path) == 2
+    assert 'no other object to show: expected two or more' in capsys.readouterr().err

@@ -348,6 +348,9 @@ def test_policies_that_there_are_not_and_episodes_without_a_choice_are_refused()
         Episodes(('random',), count=1)
     with pytest.raises(ConfigError, match="expected NAME@COST .* got 'uniform@much'"):
         Episodes(('random', 'uniform@much'))
+    for name in ('peeking@0.1', 'oracle@0.1', 'together@0.1'):
+        with pytest.raises(ConfigError, match=f'oracle and together without, got {name!r}'):
+            Episodes(('random', name))
     assert {'attention', 'sequence', 'peeking', 'oracle'} <= set(known_names())
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, DataError
 from active_recon.policies import POLICIES
 import typer
 
@@ -84,14 +84,15 @@ def policies(
     wanted = [*_UNLEARNED, *learned, *['sequence'] * (training is not None), 'peeking', 'oracle']
     if names is not None:
         wanted = [name.strip() for name in names.split(',') if name.strip()]
-    if 'sequence' in wanted and training is None:
+    has_sequence = 'sequence' in {name.partition('@')[0] for name in wanted}
+    if has_sequence and training is None:
         raise ConfigError('policies: no training objects: expected --training with a folder, on '
                           'which a sequence is found, got none; give one, or leave sequence out')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, bf16)
     result: dict[str, Any] = {
         'command': command_line(), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}
-    if training is not None and 'sequence' in wanted:
+    if training is not None and has_sequence:
         result['sequence'] = _sequence(training, entrant, episodes,
                                        Extent(category, training_objects))
     for folder in data:
@@ -122,6 +123,9 @@ def _set_figures(folder: Path, entrant: 'Entrant', episodes: 'Episodes', extent:
     import numpy as np
 
     scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
+    if len(scene) < 2 and any(name.startswith('swapped') for name in episodes.policies):
+        raise DataError(f'{folder}: no other object to show: expected two or more for swapped, '
+                        'got one; give more, or leave swapped out')
     offsets = None if sequence is None else np.radians(sequence['offsets_deg'])
     with progress_bar(f'choosing views of {folder.name}', len(scene)) as advance:
         found = run_episodes(scene, entrant, episodes, offsets, lambda done: advance(done, ''))

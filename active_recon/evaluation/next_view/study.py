@@ -65,6 +65,10 @@ class Episodes:
         if unknown := [name for name in self.policies if _parted(name)[0] not in known]:
             raise ConfigError(f'policies: no such policy: expected some of {", ".join(known)}, '
                               f'got {unknown[0]!r}')
+        if ahead := [name for name in self.policies
+                     if '@' in name and _parted(name)[0] in (*_WORTH, TOGETHER)]:
+            raise ConfigError('policies: no cost of motion: expected NAME@COST of a policy, and '
+                              f'peeking, oracle and together without, got {ahead[0]!r}')
         if self.count < 2:
             raise ConfigError('views: nothing to choose: expected 2 views of an episode or more, '
                               f'got {self.count}')
