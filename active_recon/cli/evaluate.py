@@ -36,8 +36,7 @@ def evaluate(
         help="Folder of test objects in R2N2's layout, or of PASCAL3D+, whose photographs are "
              'reconstructed from a single view.')],
     model: Annotated[str | None, typer.Option(
-        help='Name of a model that ships, or a .safetensors file; default: '
-             '2d3d-attention.')] = None,
+        help='Name of a model that ships, or a .safetensors file; default: lifting.')] = None,
     policy: Annotated[str | None, typer.Option(
         help=f'Policies, separated by commas: {", ".join(POLICIES)}, oracle (uses the true '
              'shape; takes ninety times as long). Default: those that use the cameras only, and '
