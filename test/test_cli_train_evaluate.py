@@ -247,6 +247,16 @@ def test_two_weights_files_are_compared_on_the_same_episodes(
         monkeypatch, capsys, *arguments, '--paired')
 
 
+def test_a_policy_that_is_named_twice_is_measured_once(dataset, tmp_path, monkeypatch):
+    out = tmp_path / 'found.json'
+    assert command(monkeypatch, 'evaluate', dataset, '--model', '2d3d', '--policy',
+                   'random, farthest,random', '--views', 2, '--starts', 1, '--seeds', 2, '--json',
+                   out, '--threads', 1) == 0
+    found = json.loads(out.read_text())['policies']
+    assert {name: figures['seeds'] for name, figures in found.items()} == {
+        'random': 2, 'farthest': 1}
+
+
 def test_an_object_that_cannot_be_read_is_listed(run, dataset, tmp_path, monkeypatch, capsys):
     import shutil
     copy = tmp_path / 'copy'
@@ -273,6 +283,10 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
         (('evaluate', dataset, '--model', nothing), 'no such file: expected weights'),
         (('evaluate', dataset, '--model', '2d4d'), '2d4d: neither a weights file'),
         (('evaluate', dataset, '--model', weights, '--policy', 'random,best'), "'best'"),
+        (('evaluate', dataset, '--model', weights, '--against', 'carving'),
+         'expected weights of 32 cells a side, as those of --model, got 64'),
+        (('evaluate', dataset, '--model', weights, '--policy', 'random, random', '--paired'),
+         'expected two in --policy, got 1'),
         (('evaluate', dataset, '--model', weights, '--training', dataset),
          '--training: no validation objects'),
     ]:

@@ -94,6 +94,7 @@ def evaluate(
     from active_recon.evaluation.paired import paired as between
     from active_recon.evaluation.paired import require_same_episodes, write_rows
     from active_recon.evaluation.policy_study import compare, run_all
+    from active_recon.models.weights import load_weights
     from active_recon.models.weights_files import find_weights, weights_hash
     import torch
 
@@ -101,10 +102,17 @@ def evaluate(
     if training and validation is None:
         raise ConfigError('--training: no validation objects: expected --validation too, on which '
                           'the threshold of the mean shape is chosen, got none')
-    named = policy.split(',') if policy else []
+    named = list(dict.fromkeys(map(str.strip, policy.split(',')))) if policy else []
     if paired and len(named) != 2:
         raise ConfigError('--paired: wrong number of policies: expected two in --policy, got '
                           f'{len(named)}')
+    if against:
+        one, two = (load_weights(find_weights(each)).reconstruction.resolution
+                    for each in (model, against))
+        if one != two:
+            raise ConfigError(f'--against: another resolution: expected weights of {one} cells a '
+                              f'side, as those of --model, got {two}; `active-recon study` '
+                              'measures networks of several at the same cells')
     torch.set_num_threads(threads)
     plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
                           split_file, bf16, threads, runtime)
