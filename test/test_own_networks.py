@@ -4,6 +4,7 @@ from pathlib import Path
 import re
 
 from active_recon.errors import ConfigError, WeightsError
+from active_recon.evaluation.posed.entrants import load_entrants
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.models import registry
 from active_recon.models.network import Cameras
@@ -124,6 +125,9 @@ class Flat(Net):
 class AnyCamera(Net):
     needs_front = False
 
+class Coarse(Net):
+    resolution = 16
+
 class NoSize(Net):
     image_size = None
 
@@ -143,7 +147,7 @@ def own_file(tmp_path, monkeypatch):
 
 
 def test_a_network_with_tensors_that_are_not_stored_is_loaded(own_file, tmp_path, monkeypatch):
-    monkeypatch.setenv(OWN_NETWORKS, f'{own_file}:Unsaved')
+    monkeypatch.setenv(OWN_NETWORKS, f'{own_file}:AnyCamera, {own_file}:Unsaved')
     entry = network_entry('Unsaved')
     config = entry.sizes['small']
     network = entry.build(config)
@@ -153,6 +157,16 @@ def test_a_network_with_tensors_that_are_not_stored_is_loaded(own_file, tmp_path
     assert loaded.rates == network.rates
     for name in ('grid', 'plain'):
         torch.testing.assert_close(getattr(loaded, name), getattr(network, name))
+
+
+def test_a_network_whose_resolution_no_data_have_is_not_compared(own_file, tmp_path, monkeypatch):
+    monkeypatch.setenv(OWN_NETWORKS, f'{own_file}:Coarse')
+    entry = network_entry('Coarse')
+    config = entry.sizes['small']
+    path = tmp_path / 'coarse.safetensors'
+    save_weights(path, Bundle(entry.build(config), None, config, 0.5, model='Coarse'))
+    with pytest.raises(ConfigError, match='coarse: no true voxels .* 32 or 64 cells .* got 16'):
+        load_entrants(f'carving,{path}')
 
 
 @pytest.mark.parametrize(('name', 'said'), [

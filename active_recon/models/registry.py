@@ -109,7 +109,7 @@ def network_entry(name: str) -> NetworkEntry:
     if name in NETWORKS:
         return NETWORKS[name]
     if name not in _OWN:
-        for reference in filter(None, os.environ.get(OWN_NETWORKS, '').split(',')):
+        for reference in map(str.strip, os.environ.get(OWN_NETWORKS, '').split(',')):
             if reference.rpartition(':')[2] == name:
                 named_network(reference)
     if name in _OWN:

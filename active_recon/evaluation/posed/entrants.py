@@ -51,8 +51,8 @@ def load_entrants(models: str, runtime: str = 'torch', bfloat16: bool = False,
     Load networks named `MODEL,MODEL,...`: each a model that ships, a file, or `NAME=FILE`.
 
     Paths may have `=` in them, names no slash. For what runs them see `network_in`, which raises
-    too. Raises ConfigError on an empty list or where two have the same name, WeightsError where
-    weights are missing.
+    too. Raises ConfigError on an empty list, where two have the same name, or where one has no
+    resolution that data have; WeightsError where weights are missing.
     """
     entrants: list[Entrant] = []
     for asked in filter(None, (part.strip() for part in models.split(','))):
@@ -67,6 +67,9 @@ def load_entrants(models: str, runtime: str = 'torch', bfloat16: bool = False,
         network = network_in(runtime, path, bundle, bfloat16, threads)
         entrants.append(Entrant(name, network, dict.fromkeys(
             SIDES, bundle.threshold), weights=weights_hash(path), path=path))
+        if not entrants[-1].sides:
+            raise ConfigError(f'{name}: no true voxels to measure it with: expected a network of '
+                              f'32 or 64 cells a side, got {network.resolution}')
     if not entrants:
         raise ConfigError('models: empty list: expected one or more, separated by commas, got '
                           'none')
