@@ -74,13 +74,15 @@ def test_a_file_that_has_no_network_is_refused(tmp_path):
 def package(tmp_path, monkeypatch):
     """Install a package that offers a network and a policy."""
     (tmp_path / 'mine.py').write_text(
-        EXAMPLE.read_text() + '\nfrom active_recon.policies.geometric import FarthestPolicy\n')
+        EXAMPLE.read_text() + '\nfrom active_recon.policies.geometric import FarthestPolicy\n'
+        'class Needy(FarthestPolicy):\n    def __init__(self, weight): pass\n')
     metadata = tmp_path / 'mine-1.0.dist-info'
     metadata.mkdir()
     (metadata / 'METADATA').write_text('Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n')
     (metadata / 'entry_points.txt').write_text(
         f'[{NETWORKS_GROUP}]\nmine = mine:Net\nbroken = mine:Nothing\n'
-        f'[{POLICIES_GROUP}]\nfar = mine:FarthestPolicy\n')
+        f'[{POLICIES_GROUP}]\nfar = mine:FarthestPolicy\nneedy = mine:Needy\n'
+        'sizes = mine:Sizes\n')
     monkeypatch.syspath_prepend(tmp_path)
     installed.cache_clear()
     yield
@@ -93,6 +95,13 @@ def test_what_an_installed_package_offers_is_known_by_its_name(package):
     assert _installed('far')(PolicyOptions()).initial_state(1) == {}
     with pytest.raises(ConfigError, match='broken: cannot be imported'):
         network_entry('broken')
+
+
+def test_what_an_installed_package_offers_as_a_policy_and_is_none_is_refused(package):
+    with pytest.raises(ConfigError, match="needy: cannot be made: .* got TypeError: .*'weight'"):
+        _installed('needy')(PolicyOptions())
+    with pytest.raises(ConfigError, match='sizes: no policy: .* got a Sizes without wants_volume'):
+        _installed('sizes')(PolicyOptions())
 
 
 OWN = """

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from active_recon.errors import ConfigError
+from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.models.weights_files import read_metadata, SHIPPED
 from active_recon.plugins import installed, load_installed, POLICIES_GROUP
 from active_recon.policies.attention import AttentionPolicy
@@ -97,11 +97,24 @@ POLICIES: dict[str, PolicyEntry] = {
 }
 
 
+_PARTS = ('wants_volume', 'initial_state', 'choose')
+
+
 def _installed(name: str) -> Callable[[PolicyOptions], Policy]:
     """Return what makes a policy of an installed package, imported when it is made."""
     def make(options: PolicyOptions) -> Policy:
         found = load_installed(POLICIES_GROUP, name)
-        made: Policy = found.make(options) if isinstance(found, PolicyEntry) else found()
+        try:
+            made: Policy = found.make(options) if isinstance(found, PolicyEntry) else found()
+        except ActiveReconError:
+            raise
+        except Exception as error:  # whatever the package raises
+            raise ConfigError(f'{name}: cannot be made: expected a callable without arguments '
+                              f'that returns a policy, or a PolicyEntry, got '
+                              f'{type(error).__name__}: {error}') from error
+        if lacking := [part for part in _PARTS if not hasattr(made, part)]:
+            raise ConfigError(f'{name}: no policy: expected one with {", ".join(_PARTS)}, got a '
+                              f'{type(made).__name__} without {", ".join(lacking)}')
         return made
     return make
 
