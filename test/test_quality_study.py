@@ -161,9 +161,19 @@ def test_what_was_measured_comes_back_from_its_file(tmp_path):
     again = Measured.read(tmp_path / 'm.npz')
     assert np.array_equal(again.numbers, measured.numbers)
     assert again.episode.tolist() == measured.episode.tolist()
-    (tmp_path / 'm.npz').write_text('no')
-    with pytest.raises(DataError, match='no measured qualities'):
-        Measured.read(tmp_path / 'm.npz')
+    whole = (tmp_path / 'm.npz').read_bytes()
+    for damaged in (b'no', b'', whole[:len(whole) // 2]):
+        (tmp_path / 'm.npz').write_bytes(damaged)
+        with pytest.raises(DataError, match='no measured qualities'):
+            Measured.read(tmp_path / 'm.npz')
+
+
+def test_what_was_measured_with_several_networks_is_not_joined():
+    measured = made_up(5, 8)
+    other = replace(measured, latents=measured.latents[:, 1:])
+    assert len(Measured.joined([measured, measured])) == 2 * len(measured)
+    with pytest.raises(DataError, match='measured with several networks'):
+        Measured.joined([measured, other])
 
 
 def test_without_faults_to_learn_nothing_is_fitted():

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self
+from zipfile import BadZipFile
 
 from active_recon.datasets.views import ViewSet
 from active_recon.environment import run_episode, TimeStep
@@ -67,7 +68,12 @@ class Measured:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return all rows of several."""
+        """Return all rows of several; raises DataError where they are of other networks."""
+        widths = {part.latents.shape[1:] + part.numbers.shape[1:] for part in parts}
+        if len(widths) > 1:
+            raise DataError('quality: measured with several networks: expected files of one, got '
+                            'latents and features of other lengths: '
+                            f'{", ".join(map(str, sorted(widths)))}')
         return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts])
                       for each in fields(cls)})
 
@@ -81,9 +87,9 @@ class Measured:
     def read(cls, path: Path) -> Self:
         """Read it again; raises DataError where it cannot be read."""
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            with path.open('rb') as file, np.load(file, allow_pickle=False) as stored:
                 return cls(**{each.name: stored[each.name] for each in fields(cls)})
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
             raise DataError(f'{path}: no measured qualities: expected a file that `active-recon '
                             f'quality measure` wrote, got: {error!r}') from error
 
