@@ -147,14 +147,16 @@ def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Vie
 
     if not jobs:
         raise DataError('no objects to make: expected at least one, got none with these options')
-    rejected = []
+    rejected, kept = [], 0
     with workers_of(cluster, workers) as crew, progress_bar(title, len(jobs)) as advance:
         outcomes = make_dataset(jobs, samples, 1, fine, viewing, depth, crew, reads)
         for outcome in told(outcomes, crew, advance):
+            kept += outcome.kept
             if outcome.refusal:
                 rejected.append(outcome)
     rejected.sort(key=lambda outcome: (outcome.folder.category, outcome.folder.name))
-    typer.echo(f'{len(jobs) - len(rejected)} of {len(jobs)} objects made')
+    before = f', {kept} of them finished before, kept as they are' if kept else ''
+    typer.echo(f'{len(jobs) - len(rejected)} of {len(jobs)} objects made{before}')
     for outcome in rejected:
         typer.echo(f'rejected: {outcome.folder.category}/{outcome.folder.name}: '
                    f'{outcome.refusal}', err=True)

@@ -46,10 +46,11 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a job: made or already present, or rejected with a reason (`refusal`)."""
+    """Result of a job: made, kept as it was, or rejected with a reason (`refusal`)."""
 
     folder: ObjectFolder
     refusal: str = ''
+    kept: bool = False
 
 
 def yawed(mesh: trimesh.Trimesh, yaw: float) -> trimesh.Trimesh:
@@ -110,8 +111,9 @@ def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = T
     Render and voxelise one object at 32 cells a side, with `fine` also at 64.
 
     Each image pixel averages `samples` x `samples` rays. With `depth` there is a depth image,
-    without noise, beside each image. Existing files are kept, if they are of the same cameras and
-    shape. Errors become the outcome's `refusal`; raises OSError where there is no room to write.
+    without noise, beside each image. Existing files are kept, if they are of the same cameras;
+    where some are lacking, of the same shape, too. Errors become the outcome's `refusal`; raises
+    OSError where there is no room to write.
     """
     lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
     lacks_depth = depth and not job.folder.has_depth
@@ -120,7 +122,7 @@ def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = T
         if finished:
             _check_cameras(job.folder, viewing)
             if not (lacks_fine or lacks_depth):
-                return Outcome(job.folder)
+                return Outcome(job.folder, kept=True)
         mesh = job.make_mesh()
         yaw = viewing.yaw(_name(job.folder))
         if yaw:
