@@ -259,7 +259,7 @@ def test_a_policy_that_is_named_twice_is_measured_once(dataset, tmp_path, monkey
 
 def test_an_object_that_cannot_be_read_is_listed(run, dataset, tmp_path, monkeypatch, capsys):
     import shutil
-    copy = tmp_path / 'copy'
+    copy = tmp_path / 'a copy'
     shutil.copytree(dataset, copy)
     next(copy.rglob('model.binvox')).write_bytes(b'#binvox 1\n')
     out = tmp_path / 'found.json'
@@ -268,6 +268,7 @@ def test_an_object_that_cannot_be_read_is_listed(run, dataset, tmp_path, monkeyp
         '--starts', 1, '--policy', 'uniform', '--json', out, '--threads', 1) == 0
     found = json.loads(out.read_text())
     assert found['objects'] == 5
+    assert f"evaluate '{copy}' --model" in found['command']
     assert len(found['unreadable']) == 1
     assert 'model.binvox' in capsys.readouterr().err
     assert 'latent_swap' not in found

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 import json
+from pathlib import Path
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.evaluation.statistics import Interval
@@ -96,6 +97,8 @@ def test_the_same_result_is_the_same_files(study, tmp_path):
 
 def test_a_command_names_what_is_not_usual():
     assert Study().command('table1') == 'active-recon paper table1'
+    assert Study(data=Path('my data')).command('fig5') == (
+        "active-recon paper fig5 --data 'my data'")
     told = Study(training=('train', 'real_train'), samples=10, model='2d3d').command('all')
     assert told == ('active-recon paper all --model 2d3d --samples 10 --training train '
                     '--training real_train')

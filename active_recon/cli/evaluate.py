@@ -4,7 +4,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 import json
 from pathlib import Path
-import sys
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from active_recon.cli.cluster_option import (
     require_cluster,
     workers_of,
 )
+from active_recon.cli.command_line import command_line
 from active_recon.cli.evaluate_studies import print_baselines, print_latent_swap, print_yaw
 from active_recon.cli.intervals import difference, line, spread
 from active_recon.cli.progress import progress_bar
@@ -131,7 +131,7 @@ def evaluate(
         other = measure(find_weights(against), folder, crew) if against else None
     trial = own.trial
     result: dict[str, Any] = {
-        'command': ' '.join(['active-recon', *sys.argv[1:]]),
+        'command': command_line(),
         'model': own.bundle.model, 'weights': weights_hash(own.weights),
         'threshold': trial.threshold, 'objects': len(trial.views), 'episodes': len(trial.objects),
         'unreadable': list(trial.views.unreadable), **compare(trial, own.runs)}

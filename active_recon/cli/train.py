@@ -3,9 +3,9 @@
 from dataclasses import replace
 import math
 from pathlib import Path
-import sys
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.command_line import command_line
 from active_recon.cli.reading import read_objects, Split, warn_of_shared_objects
 from active_recon.errors import ConfigError
 import typer
@@ -164,7 +164,7 @@ def train(
                 typer.echo(str(stopped))
             raise typer.Exit(130) from None
     if fabric.is_global_zero:
-        bundle.card.update(command=' '.join(['active-recon', *sys.argv[1:]]),
+        bundle.card.update(command=command_line(),
                            generators_sha256=generators_hash())
         weights = out / 'weights.safetensors'
         save_weights(weights, bundle)

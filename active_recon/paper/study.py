@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 import hashlib
 from pathlib import Path
+import shlex
 from typing import Any
 
 from active_recon.cluster import Crew
@@ -131,7 +132,7 @@ class Study:
                 words += [f'--{option.replace("_", "-")}', str(value)]
         if self.training != usual.training:
             words += [word for name in self.training for word in ('--training', name)]
-        return ' '.join(words)
+        return shlex.join(words)
 
     def training_sets(self, category: str = '', resolution: int = RESOLUTION) -> list[Objects]:
         """Return the objects that the systems are trained on."""
