@@ -210,6 +210,7 @@ def test_a_model_without_a_view_policy_is_measured_under_the_others(
     found = json.loads(out.read_text())
     assert set(found['policies']) == {'random', 'uniform', 'farthest'}
     assert not {'latent_swap', 'yaw'} & found.keys()  # nobody asked for them
+    monkeypatch.setattr('active_recon.evaluation.trial.run_policy', None)  # nothing is measured
     assert '--latent-study: cannot swap latents' in refusal(
         monkeypatch, capsys, *arguments, '--latent-study')
     assert 'no view policy: expected weights that contain one' in refusal(

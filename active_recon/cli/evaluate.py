@@ -15,7 +15,12 @@ from active_recon.cli.cluster_option import (
     workers_of,
 )
 from active_recon.cli.command_line import command_line
-from active_recon.cli.evaluate_studies import print_baselines, print_latent_swap, print_yaw
+from active_recon.cli.evaluate_studies import (
+    print_baselines,
+    print_latent_swap,
+    print_yaw,
+    require_swappable,
+)
 from active_recon.cli.intervals import difference, line, spread
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import Split
@@ -117,8 +122,11 @@ def evaluate(
     plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
                           split_file, bf16, threads, runtime)
 
-    def measure(weights: Path, folder: Path | None, crew: 'Crew | None') -> _Measured:
+    def measure(weights: Path, folder: Path | None, crew: 'Crew | None',
+                swapped: bool = False) -> _Measured:
         bundle, trial, every = plan.prepared(weights, folder, tell=True)
+        if swapped:  # before hours of measuring
+            require_swappable(trial, bundle)
         if crew is not None:
             run_on_crew(plan, weights, trial, every, crew)
         return _Measured(weights, bundle, trial, run_all(trial, every, progress_bar))
@@ -127,7 +135,7 @@ def evaluate(
         crew = stack.enter_context(workers_of(cluster, workers)) if cluster else None
         folder = cache if cache or not cluster else Path(
             stack.enter_context(TemporaryDirectory()))
-        own = measure(find_weights(model), folder, crew)
+        own = measure(find_weights(model), folder, crew, latent_study)
         other = measure(find_weights(against), folder, crew) if against else None
     trial = own.trial
     result: dict[str, Any] = {

@@ -29,20 +29,21 @@ def print_yaw(trial: 'Trial') -> dict[str, dict[str, float]]:
     return found
 
 
-def print_latent_swap(trial: 'Trial', bundle: 'Bundle') -> dict[str, Any]:
-    """
-    Measure and print what the attention policy loses with another object's latent.
+def require_swappable(trial: 'Trial', bundle: 'Bundle') -> None:
+    """Raise ConfigError without an attention policy, or with fewer than two objects or views."""
+    if bundle.attention is None or len(trial.views) < 2 or trial.count < 2:
+        raise ConfigError('--latent-study: cannot swap latents: expected a model with an '
+                          'attention policy, two objects or more and two views or more')
 
-    Raises ConfigError without such a policy, or with fewer than two objects or views.
-    """
+
+def print_latent_swap(trial: 'Trial', bundle: 'Bundle') -> dict[str, Any]:
+    """Measure and print what the attention policy loses with another object's latent."""
     from active_recon.evaluation.ablations import latent_swap_ablation
     from active_recon.policies import learned_policy
     from active_recon.runtimes.torch import TorchPolicyRuntime
 
     attention = bundle.attention
-    if attention is None or len(trial.views) < 2 or trial.count < 2:
-        raise ConfigError('--latent-study: cannot swap latents: expected a model with an '
-                          'attention policy, two objects or more and two views or more')
+    assert attention is not None
     objects, first = _few_starts(trial)
     with progress_bar("other objects' latents", 2 * len(objects)) as advance:
         swap = latent_swap_ablation(
