@@ -33,6 +33,13 @@ def test_a_row_tells_its_file_and_its_front(tmp_path):
     assert rows[0].file == tmp_path / 'chair/one.ply'
 
 
+def test_a_manifest_of_a_spreadsheet_begins_with_the_mark_of_utf_8(tmp_path):
+    path = write(tmp_path, {**ROW, 'source': 'Zoë'})
+    plain = read_manifest(path)
+    path.write_bytes(b'\xef\xbb\xbf' + path.read_bytes())
+    assert read_manifest(path) == plain
+
+
 def test_a_known_front_is_turned_to_plus_x(tmp_path):
     (tmp_path / 'chair').mkdir()
     CONE.export(tmp_path / 'chair/one.ply')

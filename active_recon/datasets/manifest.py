@@ -51,7 +51,7 @@ class ModelRow:
 def read_manifest(path: Path) -> list[ModelRow]:
     """Read the rows of a manifest (CSV); raises DataError where it is unreadable or invalid."""
     try:
-        with path.open(newline='') as file:
+        with path.open(newline='', encoding='utf-8-sig') as file:  # spreadsheets write the mark
             rows = list(csv.DictReader(file))
     except (OSError, ValueError, csv.Error) as error:
         raise DataError(f'{path}: no readable manifest: expected a CSV file, got: '
