@@ -25,7 +25,9 @@ def made(tmp_path_factory):
     return out
 
 
-def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, monkeypatch):
+def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, monkeypatch,
+                                                      capsys):
+    (tmp_path / 'study-0-earlier.png').touch()
     assert command(monkeypatch, 'study', made, dataset, '--models', 'carving,2d3d-attention',
                    '--counts', '1,3', '--surfaces', '', '--disturbed-views', 0, '--training', made,
                    '--threads', 1, '--out', tmp_path) == 0
@@ -37,7 +39,10 @@ def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, m
     assert len(posed['models']['carving']['random']['iou_64']) == 2
     assert posed['baselines']['nearest training image']['iou_64']['mean'] == 1
     assert '2d3d-attention is left out' in (tmp_path / 'study.md').read_text()
-    pictures = sorted(tmp_path.glob('study-*.png'))
+    told = [line for line in capsys.readouterr().out.splitlines() if line.startswith('wrote ')]
+    pictures = sorted(tmp_path.glob('study-*.png'))[1:]
+    assert told == [f'wrote {path}' for path in (
+        tmp_path / 'study.json', tmp_path / 'study.md', *pictures)]
     assert len(pictures) == 2 and all(cv2.imread(str(path)) is not None for path in pictures)
 
 

@@ -108,9 +108,8 @@ def study(
         _write(result, out)  # keeps the results if a later folder fails
     if photos is not None:
         result['photographs'] = _photographs(photos, box, up, entrants)
-    _write(result, out)
-    for name in sorted(path.name for path in out.glob('study*')):
-        typer.echo(f'wrote {out / name}')
+    for path in _write(result, out):
+        typer.echo(f'wrote {path}')
 
 
 def _those_that_ship() -> str:
@@ -140,14 +139,18 @@ def _photographs(folder: Path, box: str | None, up: str, entrants: list[Any]) ->
         return photograph_figures(photographs, entrants, advance=lambda done: advance(done, ''))
 
 
-def _write(result: Mapping[str, Any], out: Path) -> None:
+def _write(result: Mapping[str, Any], out: Path) -> list[Path]:
+    """Write all files, and return their paths."""
     from active_recon.evaluation.posed.summary import markdown
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / 'study.json').write_text(json.dumps(result, indent=1) + '\n')
-    (out / 'study.md').write_text(markdown(result))
+    written = [out / 'study.json', out / 'study.md']
+    written[0].write_text(json.dumps(result, indent=1) + '\n')
+    written[1].write_text(markdown(result))
     for number, figures in enumerate(result['sets']):
-        _draw(figures, out / f'study-{number}-{Path(figures["data"]).name}.png')
+        written.append(out / f'study-{number}-{Path(figures["data"]).name}.png')
+        _draw(figures, written[-1])
+    return written
 
 
 def _draw(figures: Mapping[str, Any], path: Path) -> None:
