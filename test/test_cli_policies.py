@@ -1,6 +1,9 @@
 """`active-recon policies`, from the command line to the files that it writes."""
 
+import errno
+from importlib import import_module
 import json
+from pathlib import Path
 from shutil import copytree
 
 from active_recon.cli.main import main
@@ -73,3 +76,21 @@ def test_a_lone_object_is_not_swapped_for_itself(dataset, tmp_path, monkeypatch,
     assert command(monkeypatch, tmp_path / 'one', '--policies', 'random,swapped', '--threads', 1,
                    '--out', tmp_path) == 2
     assert 'no other object to show: expected two or more' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('name', ['policies', 'study'])
+def test_what_was_measured_stays_where_the_disk_is_full_later(name, tmp_path, monkeypatch):
+    write = import_module(f'active_recon.cli.{name}')._write
+    result = {'command': 'a command', 'sets': []}
+    write(result, tmp_path)
+    before = (tmp_path / f'{name}.json').read_text()
+    whole = Path.write_text
+
+    def full(path, text):
+        whole(path, text[:5])
+        raise OSError(errno.ENOSPC, 'no space left')
+
+    monkeypatch.setattr(Path, 'write_text', full)
+    with pytest.raises(OSError, match='no space left'):
+        write({**result, 'model': 'carving'}, tmp_path)
+    assert (tmp_path / f'{name}.json').read_text() == before

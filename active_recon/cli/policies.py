@@ -10,6 +10,7 @@ from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError, DataError
 from active_recon.policies import POLICIES
+from active_recon.whole_files import whole_file
 import typer
 
 if TYPE_CHECKING:
@@ -139,5 +140,7 @@ def _write(result: Mapping[str, Any], out: Path) -> None:
     from active_recon.evaluation.next_view.summary import markdown
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / 'policies.json').write_text(json.dumps(result, indent=1) + '\n')
-    (out / 'policies.md').write_text(markdown(result))
+    for name, text in (('policies.json', json.dumps(result, indent=1) + '\n'),
+                       ('policies.md', markdown(result))):
+        with whole_file(out / name) as unfinished:
+            unfinished.write_text(text)

@@ -9,6 +9,7 @@ from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
+from active_recon.whole_files import whole_file
 import typer
 
 _SHIPPED = ('lifting', 'carving', '2d3d-attention')
@@ -145,8 +146,10 @@ def _write(result: Mapping[str, Any], out: Path) -> list[Path]:
 
     out.mkdir(parents=True, exist_ok=True)
     written = [out / 'study.json', out / 'study.md']
-    written[0].write_text(json.dumps(result, indent=1) + '\n')
-    written[1].write_text(markdown(result))
+    for path, text in zip(written, (json.dumps(result, indent=1) + '\n', markdown(result)),
+                          strict=True):
+        with whole_file(path) as unfinished:
+            unfinished.write_text(text)
     for number, figures in enumerate(result['sets']):
         written.append(out / f'study-{number}-{Path(figures["data"]).name}.png')
         _draw(figures, written[-1])
