@@ -52,6 +52,8 @@ def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypa
 
     assert 'got neither' in refused()
     assert 'whole numbers' in refused(made, '--counts', '1,two')
+    assert 'surfaces: not measured: expected numbers of views out of --counts 1,3, got 1,5' in (
+        refused(made, '--counts', '1,3', '--surfaces', '1,5'))
     assert 'got none' in refused(made, '--models', ',')
     assert 'same objects twice: expected other objects than those measured' in refused(
         made, '--models', 'carving', '--validation', made)

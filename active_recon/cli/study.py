@@ -36,9 +36,10 @@ def study(
              'sign.')] = 'y',
     counts: Annotated[str, typer.Option(
         help='Numbers of views after which the reconstruction is measured.')] = '1,2,3,5,8,12,24',
-    surfaces: Annotated[str, typer.Option(
+    surfaces: Annotated[str | None, typer.Option(
         help='Numbers of views, out of --counts, after which the mesh is compared with the true '
-             "one: F-scores, Chamfer distance, normals. '' skips this.")] = '1,5',
+             "one: F-scores, Chamfer distance, normals. '' skips this. Default: those of 1,5 that "
+             'are in --counts.')] = None,
     validation: Annotated[Path | None, typer.Option(
         help='Folder of other objects, on which thresholds and temperatures are chosen; default: '
              "the threshold in each model's card, and no temperature.")] = None,
@@ -89,7 +90,11 @@ def study(
         raise ConfigError('study: nothing to measure: expected folders of objects, or --photos '
                           'with a folder of photographs, got neither')
     torch.set_num_threads(threads)
-    plan = Plan(_numbers('counts', counts), _numbers('surfaces', surfaces), seed, bf16)
+    plan = Plan(_numbers('counts', counts),
+                _numbers('surfaces', '1,5' if surfaces is None else surfaces), seed, bf16)
+    if surfaces is not None and not set(plan.surfaces) <= set(plan.counts):
+        raise ConfigError('surfaces: not measured: expected numbers of views out of --counts '
+                          f'{counts}, got {surfaces}')
     extent = Extent(category, objects, disturbed_views, disturbed_objects)
     entrants = load_entrants(models or _those_that_ship(), runtime, bf16, threads)
     if validation is not None:
