@@ -5,6 +5,7 @@ from typing import Any
 
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.view_distance import at_one_elevation, directions_of, view_distance
+from active_recon.meshes.files import glb
 from active_recon.policies.reasons import GoalReason
 from active_recon.view_colors import Color, view_color
 from active_recon.viewer.state import LoopState, Scores
@@ -99,9 +100,9 @@ class Scene:
         self._remove('/surface')
         if surface is not None:
             corners = surface.triangles.reshape(-1, 3) / self._size
-            self._objects['/surface'] = self._scene.add_mesh_trimesh('/surface', trimesh.Trimesh(
+            self._objects['/surface'] = self._scene.add_glb('/surface', glb(trimesh.Trimesh(
                 corners, np.arange(len(corners)).reshape(-1, 3), process=False,
-                vertex_colors=surface.colors.reshape(-1, 3)))
+                vertex_colors=surface.colors.reshape(-1, 3))))
 
     def _draw_scores(self, scores: Scores | None) -> None:
         if scores is None:

@@ -1,8 +1,10 @@
 """Mesh files read into the object frame, z up and front +x, optionally fitted to the grid."""
 
 from pathlib import Path
+from typing import Any
 
 from active_recon.errors import ConfigError, MeshError
+from active_recon.volumes.srgb import from_linear
 import numpy as np
 from numpy.typing import NDArray
 import trimesh
@@ -58,6 +60,7 @@ def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
 
     `up` and `front` are the file's axes (for example 'y' and '-z'). By default glTF and GLB are y
     up with the front at +z, as their standard says, other formats z up with the front at +x.
+    Vertex colours are sRGB, those of glTF too, whose files have them linear beside a material.
     Raises MeshError where the file is missing, is not a mesh or has no face with an area,
     ConfigError on invalid axes.
     """
@@ -74,7 +77,24 @@ def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
     if not np.isfinite(mesh.vertices).all() or not mesh.extents.max() > 0 or not mesh.area > 0:
         raise MeshError(f'{path}: no surface: expected faces with finite corners and an area, got '
                         f'extents {mesh.extents}')
+    if path.suffix.lower() in GLTF:
+        _take_corner_colors(mesh, path)
     transform = np.eye(4)
     transform[:3, :3] = rotation
     mesh.apply_transform(transform)
     return mesh
+
+
+def _take_corner_colors(mesh: trimesh.Trimesh, path: Path) -> None:
+    """Let the colours of the corners in a glTF file be the mesh's where it has no others."""
+    visual: Any = mesh.visual
+    if visual.kind != 'texture' or visual.uv is not None or getattr(
+            visual.material, 'baseColorFactor', None) is not None:
+        return
+    # They are lost where trimesh makes one mesh of a file
+    scene: Any = trimesh.load(path, force='scene', process=False)
+    light = [part.visual.vertex_attributes['color'] for part in scene.geometry.values()
+             if 'color' in getattr(part.visual, 'vertex_attributes', ())]
+    if len(scene.geometry) == len(light) == 1 and len(light[0]) == len(mesh.vertices):
+        mesh.visual = trimesh.visual.ColorVisuals(
+            mesh, vertex_colors=from_linear(light[0][:, :3]))

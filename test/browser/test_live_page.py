@@ -13,10 +13,11 @@ from active_recon.policies.reasons import GoalReason
 from active_recon.viewer.page import Page
 from active_recon.viewer.playback import PLAY, Playback
 from active_recon.viewer.state import LoopState, Observer, Scores
-from active_recon.viewer.view_result import ViewResult
+from active_recon.viewer.view_result import Surface, ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
+import trimesh
 
 pytestmark = pytest.mark.browser
 PHONE = (390, 844)
@@ -123,6 +124,26 @@ def test_a_new_view_changes_what_is_shown_and_nothing_complains(page, chromium):
           lambda picture: apart(empty, picture) < 0.003, 'an empty turntable again')
     assert '1 view, the last 3 s ago.' in chromium.text()
     assert 'No publisher on /next_view yet.' in chromium.text()
+    assert not chromium.errors()
+
+
+def test_a_surface_in_colours_has_them_on_every_side(page, chromium):
+    box = trimesh.creation.box((0.9, 0.9, 0.9))
+    colors = np.tile(np.array([180, 60, 20], np.uint8), (len(box.faces), 3, 1))
+    state = LoopState('a', surface=Surface(box.triangles, colors))
+    opened(chromium, page.url)
+    empty = shown(chromium, lambda: page.draw(LoopState('a')))
+    page.draw(state)
+    chromium.until(lambda: 'In colours' in chromium.text(), 'the choice of colours')
+    chromium.run("""[...document.querySelectorAll('input[type=checkbox]')].find(
+        (one) => one.offsetParent).click()""")
+    picture = shown(chromium, lambda: page.draw(state),
+                    lambda picture: apart(empty, picture) > 0.02, 'the surface')
+    red, green, blue = picture[np.abs(picture - empty).max(axis=-1) > 60].T
+    inside = red > 2 * blue  # not the blocks at its outline
+    assert inside.mean() > 0.8
+    assert red[inside].min() > 60
+    assert np.median(green[inside] / red[inside]) < 0.45
     assert not chromium.errors()
 
 
