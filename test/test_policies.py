@@ -117,6 +117,11 @@ def test_the_first_of_many_views_of_uniform_are_spread_over_the_turn(latent):
     assert np.diff(np.append(first, first[0] + math.tau)).max() < 1.7 * math.tau / 8
 
 
+def test_uniform_for_views_without_a_limit_needs_no_room_for_them(latent):
+    first = np.sort(episode(UniformPolicy(10 ** 15), 1.3, 8, latent))
+    assert np.diff(np.append(first, first[0] + math.tau)).max() < 1.7 * math.tau / 8
+
+
 def test_uniform_keeps_to_its_sweep_however_roughly_it_is_followed(latent):
     choice, _ = choose(UniformPolicy(4), latent[:1], np.array([[1.0, 2.9, 3.9]]))
     assert choice.azimuth[0] == pytest.approx(1.0 + 3 * math.pi / 2)

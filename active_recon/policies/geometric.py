@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 _GOLDEN = (math.sqrt(5) - 1) / 2
 _MOST_IN_TURN = 24
 """Views of a ring up to which an even sweep takes them one beside the other."""
+_MOST = 1000
+"""Views up to which their places are spread; a limit that stands for none may be any number."""
 
 
 class HeuristicPolicy:
@@ -55,7 +57,7 @@ class UniformPolicy(HeuristicPolicy):
     """
 
     def __init__(self, views: int) -> None:
-        self._views = max(views, 1)
+        self._views = min(max(views, 1), _MOST)
         self._step = TURN / self._views
         around = np.arange(self._views) * (1 - _GOLDEN) % 1
         self._order: NDArray[np.intp] = np.argsort(np.argsort(around))
