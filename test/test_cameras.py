@@ -127,11 +127,12 @@ def test_a_lens_on_another_size_of_image_sees_the_same():
 
 
 @pytest.mark.parametrize('pose', [
-    np.eye(3), np.full((4, 4), np.nan), np.diag([2.0, 1, 1, 1]), np.diag([-1.0, 1, 1, 1])],
-    ids=['3 x 3', 'nan', 'stretched', 'mirrored'])
+    np.eye(3), np.full((4, 4), np.nan), np.diag([2.0, 1, 1, 1]), np.diag([-1.0, 1, 1, 1]),
+    orbit_camera(0.4).pose.T, np.diag([1.0, 1, 1, 2])],
+    ids=['3 x 3', 'nan', 'stretched', 'mirrored', 'transposed', 'scaled'])
 def test_a_pose_that_is_not_rigid_is_refused(pose):
-    with pytest.raises(ViewError, match='invalid camera pose: expected a '
-                       '(finite|rotation)') as refusal:
+    with pytest.raises(ViewError, match='invalid camera pose: expected (a finite|a rotation|0, 0, '
+                       '0, 1 as its last row)') as refusal:
         Camera(pose)
     assert refusal.value.kind == 'pose'
 

@@ -96,7 +96,7 @@ class Intrinsics:
                           -(-self.width // by), -(-self.height // by), self.distortion)
 
 
-_EYE = np.eye(3)
+_EYE, _LAST_ROW = np.eye(3), np.array([0.0, 0, 0, 1])
 _FOCAL = 35 / 32 * 137  # R2N2's lens and sensor, verified by reprojection
 CANONICAL_INTRINSICS = Intrinsics(_FOCAL, _FOCAL, 68.5, 68.5, 137, 137)
 
@@ -106,7 +106,8 @@ class Camera:
     """
     A pose in the object frame, (4, 4) object from optical frame in metres, and the intrinsics.
 
-    The pose is copied. Raises ViewError unless the pose is finite and its rotation a rotation.
+    The pose is copied. Raises ViewError unless the pose is finite, its rotation a rotation, and
+    its last row 0, 0, 0, 1.
     """
 
     pose: NDArray[np.float64]
@@ -125,6 +126,9 @@ class Camera:
                 or np.linalg.det(rotation) < 0):  # a reflection
             raise ViewError('invalid camera pose: expected a rotation in it, '
                             f'got\n{rotation}', 'pose')
+        if np.abs(self.pose[3] - _LAST_ROW).max() > 1e-4:
+            raise ViewError('invalid camera pose: expected 0, 0, 0, 1 as its last row, got '
+                            f'{self.pose[3]}; is it transposed?', 'pose')
 
     @property
     def position(self) -> NDArray[np.float64]:
