@@ -383,6 +383,7 @@ def test_weights_that_were_not_exported_are_told_with_what_to_do(tmp_path, libra
     ('onnxruntime', {'precision': 'int8'}, 'int8 is not for the runtime onnxruntime'),
     ('onnxruntime', {'device': 'cuda'}, 'device: cuda not available: expected one that this'),
     ('torch', {'precision': 'bf16'}, 'bf16 is not for the runtime torch'),
+    ('torch', {'device': 'gpu'}, "device: unknown value: expected one of torch.*, got 'gpu'"),
     ('tensorflow', {}, 'runtime: unknown value: expected one of auto, openvino, torch, onnxr')])
 def test_what_a_runtime_has_not_is_refused(library, wrong, words):
     with pytest.raises(ConfigError, match=words):

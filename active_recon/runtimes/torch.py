@@ -165,9 +165,14 @@ def load_segmenter(weights: Path, device: str, threads: int | None,
 
 def _require(device: str, precision: str) -> None:
     require_f32(precision, 'torch')
-    if device == 'cuda' and not torch.cuda.is_available():
-        raise ConfigError('parameter device: cuda not available: expected a device that torch can '
-                          'use, but this torch finds no GPU; use cpu')
+    try:
+        kind = torch.device(device).type
+    except RuntimeError as error:
+        raise ConfigError('parameter device: unknown value: expected one of torch, such as cpu or '
+                          f'cuda, got {device!r}') from error
+    if kind == 'cuda' and not torch.cuda.is_available():
+        raise ConfigError(f'parameter device: {device} not available: expected a device that '
+                          'torch can use, but this torch finds no GPU; use cpu')
 
 
 def _provenance(device: torch.device, threads: int | None) -> dict[str, str]:
