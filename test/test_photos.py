@@ -99,7 +99,10 @@ def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, view
     placed = [Camera(np.block([[each.pose[:3, :3], (each.position - CENTRE)[:, None]],
                                [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views]
     own = active_recon.reconstruct([on_plain(image) for image in rgba], placed, BOX[3], views=3)
+    stacked = active_recon.reconstruct(
+        np.stack([on_plain(image) for image in rgba]), placed, BOX[3], views=3)
     read = active_recon.reconstruct(plain, box=BOX, views=3)
+    np.testing.assert_array_equal(stacked.occupancy, own.occupancy)
     np.testing.assert_allclose(own.occupancy, read.occupancy, atol=1e-4)
     assert own.size == read.size == BOX[3]
 
@@ -318,6 +321,12 @@ def test_a_place_without_an_object_is_refused(plain, rgba, views, tmp_path):
 def test_options_that_cannot_be_are_refused(how, expected, plain):
     with pytest.raises(ConfigError, match=expected):
         active_recon.reconstruct(plain, **how)
+
+
+@pytest.mark.parametrize('how', [{'masks': 'masks'}, {'unit': 0.001}, {'order': 'time'}])
+def test_what_is_for_files_is_refused_beside_pixels(how, rgba, views):
+    with pytest.raises(ConfigError, match='not for images with cameras of their own'):
+        active_recon.reconstruct(rgba[:1], views[:1], 0.3, **how)
 
 
 def test_pixels_without_cameras_are_refused(rgba, views):

@@ -91,7 +91,8 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
     camera for each image in the object frame, whose origin is the centre of the object's cube.
     `size` is the side of that cube in metres. With a camera file it only sets the scale, and the
     cube is found unless `box` (x, y, z, side, in the file's units) or the file tells it. The rest
-    is as in `Options`. Raises ActiveReconError where no photo can be used.
+    is as in `Options`; `masks`, `unit` and `order` are for files alone. Raises ActiveReconError
+    where no photo can be used.
     """
     options = Options(box, unit, size, up, None, background, None if masks is None else
                       Path(masks), views, model, threads, order)
@@ -187,7 +188,13 @@ def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Op
     if options.size is None:
         raise ConfigError("size: missing: expected the side of the object's cube in metres, "
                           'about the origin of the frame that the cameras are in')
-    if len(images) != len(cameras) or not images:
+    for name, given, instead in (
+            ('masks', options.masks is not None, 'give pixels with an alpha channel'),
+            ('unit', options.unit != 1, 'give cameras in metres'),
+            ('order', options.order != 'name', 'give the images in their order')):
+        if given:
+            raise ConfigError(f'{name}: not for images with cameras of their own: {instead}')
+    if len(images) != len(cameras) or len(images) == 0:
         raise ConfigError(f'cameras: expected one for each of {len(images)} images, got '
                           f'{len(cameras)}')
     views = []
