@@ -239,6 +239,12 @@ def test_binvox_is_read_by_other_software_with_y_up(tmp_path):
     np.testing.assert_array_equal(np.argwhere(read.matrix), [[6, 2, 8 - 1 - 1]])
 
 
+def test_other_programs_find_the_cube_of_a_binvox_about_the_origin(tmp_path):
+    write_binvox(VoxelGrid(np.ones((8, 8, 8), np.float32), 0.4), tmp_path / 'model.binvox')
+    read = trimesh.load(tmp_path / 'model.binvox')
+    np.testing.assert_allclose(read.bounds.mean(axis=0), 0, atol=0.4 / 8)
+
+
 def binvox(data: bytes, dim: str = '2 2 2', scale: str = '1') -> bytes:
     return f'#binvox 1\ndim {dim}\ntranslate 0 0 0\nscale {scale}\ndata\n'.encode() + data
 

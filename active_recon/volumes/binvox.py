@@ -58,6 +58,8 @@ def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
     """
     Write the occupied cells as binvox, as `read_binvox` reads them; the file appears whole.
 
+    For other programs, its translate puts the cube's centre at the origin.
+
     Not by trimesh: it writes other bytes, and its run lengths overflow for grids that it has read.
     """
     cells = grid.occupied(threshold)[:, ::-1, :].reshape(-1).astype(np.uint8)
@@ -67,7 +69,9 @@ def write_binvox(grid: VoxelGrid, path: Path, threshold: float = 0.5) -> None:
         whole, rest = divmod(int(length), 255)
         runs += bytes((value, 255)) * whole + (bytes((value, rest)) if rest else b'')
     dims = ' '.join(map(str, grid.occupancy.shape))
-    header = f'#binvox 1\ndim {dims}\ntranslate 0 0 0\nscale {grid.size:.9g}\ndata\n'
+    corner = f'{-grid.size / 2:.9g}'  # the cube's lowest, along each axis
+    header = (f'#binvox 1\ndim {dims}\ntranslate {corner} {corner} {corner}\n'
+              f'scale {grid.size:.9g}\ndata\n')
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as unfinished:
         unfinished.write_bytes(header.encode() + runs)
