@@ -3,6 +3,7 @@
 from dataclasses import replace
 import json
 import math
+from pathlib import Path
 import shutil
 import sys
 from types import ModuleType
@@ -474,6 +475,16 @@ def test_a_cache_that_cannot_be_written_is_done_without(exported, tmp_path, monk
         assert told['computed_by'].startswith('openvino')
         assert ('compiled networks cannot be kept there: ' in told.get(REMARK, '')) == bool(place)
         assert '\n' not in told.get(REMARK, '')
+
+
+def test_a_user_without_a_home_keeps_nothing_that_was_compiled(exported, monkeypatch):
+    def without_home(path):
+        raise RuntimeError('Could not determine home directory.')
+
+    for variable in (VARIABLE, 'XDG_CACHE_HOME'):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setattr(Path, 'expanduser', without_home)
+    assert load_runtime(exported['ptn'], 'openvino', threads=1).provenance
 
 
 def test_a_scorer_trained_since_the_export_is_not_mistaken_for_the_exported_one(tmp_path):

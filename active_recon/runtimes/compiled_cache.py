@@ -15,7 +15,10 @@ def cache_folder() -> Path | None:
     chosen = os.environ.get(VARIABLE)
     if chosen is not None:
         return Path(chosen) if chosen else None
-    return Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser() / 'active_recon'
+    try:
+        return Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser() / 'active_recon'
+    except RuntimeError:  # a user without a home, as in a container
+        return None
 
 
 def compiled_path(exported: bytes, name: str, *made_by: str) -> Path | None:
