@@ -25,7 +25,7 @@ from active_recon.viewer.state import (
     Scores,
     thumbnail,
 )
-from active_recon.viewer.view_result import ViewResult
+from active_recon.viewer.view_result import Surface, ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
@@ -274,6 +274,19 @@ def test_what_nodes_warn_of_stands_right_after_how_far_the_loop_is():
     told = ['reconstructor: no image', 'view_planner: no episode']
     assert status_lines(links(), LoopState(), problems)[1:3] == told
     assert status_lines(links(publishers=0), LoopState(), problems)[1:] == told
+
+
+def test_a_surface_that_is_heard_before_its_episode_is_kept():
+    observer = Observer()
+    surface = Surface(np.zeros((1, 3, 3)), np.zeros((1, 3, 3), np.uint8))
+    observer.set_surface(110, surface)
+    observer.begin_episode('a', 100)
+    assert observer.state.surface is surface
+    observer.begin_episode('b', 120)
+    assert observer.state.surface is None
+    observer.set_surface(130, surface)
+    observer.begin_episode('c', 10)  # the clock was set back
+    assert observer.state.surface is None
 
 
 def test_an_image_of_the_last_episode_is_not_that_of_the_next():

@@ -64,6 +64,7 @@ class Observer:
         self.state = LoopState()
         self._begin = 0
         self._goal_stamp = self._scores_stamp = self._done_stamp = self._image_stamp = -1
+        self._surface_stamp = -1
         self._quality: tuple[int, Quality | None] = -1, None
         self._reason: tuple[int, GoalReason | None] = -1, None
 
@@ -73,6 +74,7 @@ class Observer:
             return
         if begin < self._begin:  # the clock jumped back, as when a recording is played
             self._goal_stamp = self._scores_stamp = self._done_stamp = self._image_stamp = -1
+            self._surface_stamp = -1
         known = self.state
         views = tuple(view for view in known.views if view.stamp >= begin >= self._begin)
         self._begin = begin
@@ -83,7 +85,8 @@ class Observer:
             known.goal if self._goal_stamp >= begin else None,
             known.scores if self._scores_stamp >= begin else None,
             known.done if self._done_stamp >= begin else '',
-            known.goal_reason if self._goal_stamp >= begin else None)
+            known.goal_reason if self._goal_stamp >= begin else None,
+            known.surface if self._surface_stamp >= begin else None)
 
     def set_camera(self, camera: Camera | None = None,
                    picture: NDArray[np.uint8] | None = None) -> None:
@@ -95,6 +98,7 @@ class Observer:
     def set_surface(self, stamp: int, surface: Surface | None) -> None:
         """Set the surface after the view with a stamp in nanoseconds; None: there is none."""
         if stamp >= self._begin:
+            self._surface_stamp = stamp
             self.state = replace(self.state, surface=surface)
 
     def add_view(self, view: ViewResult, grid: VoxelGrid | None,
