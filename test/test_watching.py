@@ -12,13 +12,14 @@ from active_recon.photos.reconstruct import from_files, Options
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 from active_recon.policies.stopping import StoppingRule
 from active_recon.runtimes import precision
+from active_recon.volumes.voxels import VoxelGrid
 from active_recon.watching.advice import Adviser, ELEVATIONS
 from active_recon.watching.arrivals import Arrivals, SETTLED_S
 from active_recon.watching.collection import Collection
 from active_recon.watching.directions import where_to_stand
 from active_recon.watching.sketch import NEXT_COLOR, SIDE, sketch
-from active_recon.watching.watch_page import loop_state, qr_code
-from active_recon.watching.watcher import Watcher
+from active_recon.watching.watch_page import loop_state, qr_code, WatchPage
+from active_recon.watching.watcher import Progress, Watcher
 import cv2
 import numpy as np
 from photo_scene import cameras, on_plain, rendered, write_photos
@@ -250,6 +251,18 @@ def test_the_page_s_state_has_a_goal_until_there_are_enough(shape, adviser):
     assert state.goal is not None and len(state.views) == 3 and state.grid is shape.grid
     enough = loop_state(shape, Adviser(StoppingRule(3)).advice(shape))
     assert enough.goal is None and enough.done == 'max_views' and enough.scores is not None
+
+
+def test_the_page_goes_on_with_a_shape_that_has_no_surface(shape):
+    empty = replace(shape, grid=VoxelGrid(np.zeros_like(shape.occupancy), shape.size))
+    page = WatchPage(0, 'http://127.0.0.1:1/word/')
+    try:
+        page._page._in_colors.value = True
+        for each in (shape, empty, shape):
+            page.draw(Progress(shape=each))
+            assert (page._state.surface is None) == (each is empty)
+    finally:
+        page.close()
 
 
 def test_a_phone_reads_the_address_from_the_page():

@@ -34,6 +34,16 @@ def loop_state(shape: Shape, advice: Advice | None) -> LoopState:
     return replace(state, scores=scores, goal=goal.camera, goal_reason=advice.why)
 
 
+def _surface(shape: Shape) -> Surface | None:
+    """Return a shape's surface in colours; None where no cell is occupied."""
+    if not shape.grid.occupied(shape.threshold).any():
+        return None
+    mesh = shape.mesh()
+    painted: Any = mesh.visual
+    colors = np.asarray(painted.vertex_colors, np.uint8)[mesh.faces][..., :3]
+    return Surface(mesh.triangles, colors)
+
+
 def qr_code(words: str) -> NDArray[np.uint8]:
     """Return words for a phone's camera to read, (H, W, 3) uint8 RGB."""
     code = np.pad(cv2.QRCodeEncoder.create().encode(words), _QUIET, constant_values=255)
@@ -63,10 +73,7 @@ class WatchPage:
         shape = progress.shape
         if self._page.in_colors and shape is not None and shape is not self._colored:
             self._colored = shape
-            mesh = shape.mesh()
-            painted: Any = mesh.visual
-            colors = np.asarray(painted.vertex_colors, np.uint8)[mesh.faces][..., :3]
-            self._state = replace(self._state, surface=Surface(mesh.triangles, colors))
+            self._state = replace(self._state, surface=_surface(shape))
         self._page.draw(self._state)
 
     def _show(self, progress: Progress) -> None:
