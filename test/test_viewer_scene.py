@@ -1,8 +1,14 @@
 """What viser is given to show: the bars are as high as the scores, however often they change."""
 
+import math
 from types import SimpleNamespace
 
-from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
+from active_recon.geometry.cameras import (
+    AZIMUTHS,
+    CANONICAL_INTRINSICS,
+    Intrinsics,
+    orbit_camera,
+)
 from active_recon.viewer.scene import relative_scores, Scene, score_boxes
 from active_recon.viewer.state import LoopState, Scores
 from active_recon.volumes.voxels import VoxelGrid
@@ -15,12 +21,17 @@ class Shown:
 
     def __init__(self):
         self.boxes = {}
+        self.cameras = {}
 
     def add_batched_meshes_simple(self, name, vertices, faces, wxyzs, positions, **others):
         self.boxes[name] = SimpleNamespace(
             vertices=vertices, batched_wxyzs=wxyzs, batched_positions=positions,
             remove=lambda: None, **others)
         return self.boxes[name]
+
+    def add_camera_frustum(self, name, fov, aspect, **others):
+        self.cameras[name] = SimpleNamespace(fov=fov, aspect=aspect, **others)
+        return self.cameras[name]
 
     def __getattr__(self, name):
         return lambda *args, **kwargs: SimpleNamespace()
@@ -52,6 +63,15 @@ def test_bars_are_as_high_as_the_scores_say_at_first_and_when_they_change(shown)
         np.testing.assert_allclose(found, 0.3 * relative_scores(scores), rtol=1e-5)
         # They stand on the floor
         np.testing.assert_allclose(bars.batched_positions[:, 2] - found / 2, -0.5, atol=1e-6)
+
+
+def test_a_camera_has_the_shape_of_its_images_once_its_lens_is_known(shown):
+    scene = Scene(shown, 1.0)
+    for lens in (CANONICAL_INTRINSICS, Intrinsics(600, 600, 320, 180, 640, 360)):
+        scene.draw(LoopState(camera=orbit_camera(0.3, intrinsics=lens)), 0.5)
+    camera = shown.cameras['/camera']
+    assert camera.aspect == pytest.approx(640 / 360)
+    assert camera.fov == pytest.approx(2 * math.atan(180 / 600))
 
 
 def test_scores_at_several_elevations_are_cubes_in_their_directions_the_larger_the_better():

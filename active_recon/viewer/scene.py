@@ -156,13 +156,13 @@ class Scene:
 
     def _frustum(self, name: str, camera: Camera, color: Color,
                  image: NDArray[np.uint8] | None, scale: float = _FRUSTUM) -> Any:
-        lens = camera.intrinsics
         return self._scene.add_camera_frustum(
-            name, 2 * math.atan(lens.height / 2 / lens.fy), lens.width / lens.height, scale=scale,
-            color=color, image=image, thickness=0.012, cast_shadow=False,
+            name, *_angle_and_aspect(camera), scale=scale, color=color, image=image,
+            thickness=0.012, cast_shadow=False,
             wxyz=SO3.from_matrix(camera.pose[:3, :3]).wxyz, position=camera.position / self._size)
 
     def _place(self, frustum: Any, camera: Camera) -> None:
+        frustum.fov, frustum.aspect = _angle_and_aspect(camera)
         frustum.position = camera.position / self._size
         frustum.wxyz = SO3.from_matrix(camera.pose[:3, :3]).wxyz
 
@@ -196,6 +196,12 @@ class Scene:
         known = self._objects.pop(name, None)
         if known is not None:
             known.remove()
+
+
+def _angle_and_aspect(camera: Camera) -> tuple[float, float]:
+    """Return a camera's angle from the top of its image to its bottom, radians, and its aspect."""
+    lens = camera.intrinsics
+    return 2 * math.atan(lens.height / 2 / lens.fy), lens.width / lens.height
 
 
 def _at_same_place(view: ViewResult, others: tuple[ViewResult, ...]) -> int:
