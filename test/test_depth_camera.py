@@ -192,3 +192,17 @@ def test_depth_that_cannot_be_right_is_refused_in_a_line(metres, said):
         usable_depth(DepthImage(metres), PLACED, SIZE)
     assert caught.value.kind == 'depth'
     assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize('distance', [0.5, 1.0])
+def test_a_wrong_distance_before_a_camera_that_is_near_is_not_called_one_in_millimetres(distance):
+    near = orbit_camera(0.4, 0.5, distance * SIZE, LENS)
+    with pytest.raises(ViewError, match='its unit, its scale and its alignment'):
+        usable_depth(DepthImage(np.full_like(BALL, 5 * SIZE)), near, SIZE)
+
+
+def test_metres_read_as_millimetres_are_noticed_before_a_camera_that_is_near():
+    near = orbit_camera(0.4, 0.5, SIZE, LENS)
+    with pytest.raises(ViewError, match='metres read as millimetres'):
+        usable_depth(DepthImage(np.full_like(BALL, SIZE / 1000)), near, SIZE)
+    usable_depth(DepthImage(np.full_like(BALL, SIZE)), near, SIZE)

@@ -72,7 +72,7 @@ def _require_fitting(depth: NDArray[np.float32], camera: Camera, object_size: fl
     hint = '; are its unit, its scale and its alignment with the image right?'
     if _fits(found * MM_PER_METRE, near, far):
         hint = '; metres read as millimetres? 16 bits are millimetres, floats are metres'
-    elif _fits(found / MM_PER_METRE, near, far):
+    elif near > 0 and _fits(found / MM_PER_METRE, near, far):
         hint = '; millimetres read as metres? 16 bits are millimetres, floats are metres'
     raise ViewError(
         "depth contradicts the camera: expected distances in the object's cube, "
@@ -81,5 +81,6 @@ def _require_fitting(depth: NDArray[np.float32], camera: Camera, object_size: fl
 
 
 def _fits(depth: NDArray[np.floating], near: float, far: float) -> bool:
-    within = (depth > near - _MARGIN) & (depth < far + _MARGIN)
+    # The margin does not reach a camera that is near: a thousandth of any distance would be in it
+    within = (depth > max(near - _MARGIN, near / 2)) & (depth < far + _MARGIN)
     return float(within.mean()) >= _LEAST_WITHIN
