@@ -61,3 +61,18 @@ def test_shadows_are_one_connected_share_of_a_table_without_which_it_is_lighter(
     assert_close(with_post[:, :, 3], without[:, :, 3])
     assert (with_post[:, :, :3] <= without[:, :, :3] + 1e-4).float().mean() > 0.97
     assert (with_post[:, :, :3] < without[:, :, :3] - 0.02).any()
+
+
+def test_most_tables_have_two_colors_and_some_have_spots_of_all():
+    count = 60
+    cameras = Cameras(*(part[:1, :1].expand(1, count, *part.shape[2:])
+                        for part in seen_from(1.2)))
+    low = torch.zeros(count, 64, 64, 64)
+    low[:, 32, 32, 0] = 1  # hardly a shadow
+    seen = draw_tables(cameras, low, SIDE, np.random.default_rng(7))[0]
+    of_all = 0
+    for table in seen:
+        colors = table[:3, table[3] > 0].T.double()
+        spread = torch.linalg.svdvals(colors - colors.mean(dim=0))
+        of_all += int(spread[1] > 0.3 * spread[0])
+    assert 0.05 * count <= of_all <= 0.3 * count  # 15 % of them
