@@ -241,6 +241,15 @@ def test_measured_are_all_objects_after_every_view(seen):
     assert np.isnan(spoilt.iou).all() and set(spoilt.fault) == {'mask'}
 
 
+def test_views_that_are_of_no_turntable_are_of_a_kind_and_of_episodes_of_their_own(seen):
+    torch.manual_seed(0)
+    network = Lifting.from_config(LiftingConfig((8, 8, 8, 8), 8, 8, 4, 4, (8, 8, 8), 8)).eval()
+    at_one_height = replace(seen, poses=seen.poses[:, :1].expand_as(seen.poses).contiguous())
+    around, everywhere = (measure(views, network, 0.1, 1) for views in (at_one_height, seen))
+    assert set(around.kind) == {'random'} and set(everywhere.kind) == {'random, any'}
+    assert not set(around.episode) & set(everywhere.episode)
+
+
 class Recalled(HeuristicPolicy):
     """Takes the views of an order, (N, T)."""
 
@@ -259,7 +268,7 @@ def test_a_policy_chooses_the_views_after_the_first(seen):
     drawn = measure(seen, network, 0.1, 3)
     same = measure(seen, network, 0.1, 3, 'attention', policy=Recalled(order))
     np.testing.assert_array_equal(same.numbers, drawn.numbers)
-    assert set(same.kind) == {'attention'}
+    assert set(same.kind) == {'attention, any'}
     other = measure(seen, network, 0.1, 3, 'attention', policy=Recalled(order[:, [0, 2, 1]]))
     at_two = drawn.count == 2
     assert (other.numbers[at_two] != drawn.numbers[at_two]).any()

@@ -14,7 +14,7 @@ from active_recon.evaluation.quality.faults import FAULTS, sources_of
 from active_recon.evaluation.quality.shells import HOLLOW, hollow_share
 from active_recon.evaluation.rollouts import Observer, RenderedObjects, Seen
 from active_recon.geometry.cameras import Camera, Intrinsics
-from active_recon.geometry.view_distance import pose_directions
+from active_recon.geometry.view_distance import at_one_elevation, pose_directions
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.policies import Policy
 from active_recon.quality.features import features
@@ -39,7 +39,7 @@ class Measured:
       fault makes it meaningless; hollow: (N,), see `hollow_share`
     - count: (N,), views so far; episode: (N,), the same for all of one episode
     - object, source: (N,), names; fault: (N,), '' for none; kind: (N,), of KINDS, what chose the
-      views
+      views, with `, any` where they are not of a turntable
     """
 
     numbers: NDArray[np.float64]
@@ -115,10 +115,13 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
     """
     Measure the objects of a set after 1 to `count` views each, all at once.
 
-    A policy chooses the views after the first of each; `kind` is then its name. Raises DataError
-    where the network keeps no foreground, from which silhouettes are had.
+    A policy chooses the views after the first of each; `kind` is then its name. Views that are
+    not of a turntable are of a kind of their own, `KIND, any`. Raises DataError where the network
+    keeps no foreground, from which silhouettes are had.
     """
     shown = FAULTS[fault](views, seed) if fault else views
+    around = at_one_elevation(pose_directions(views.poses.numpy())).all()
+    called = kind if around else f'{kind}, any'
     count = min(count, shown.poses.shape[1])
     order = torch.from_numpy(orders_of(shown, kind, count, seed))
     observer, objects = Observer(network, shown), torch.arange(len(shown))
@@ -147,9 +150,9 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
         np.array(numbers), np.array(pools), np.array(ious),
         np.array([hollow_share(truth.numpy()) for truth in views.voxels])[at_row],
         np.array(counts),
-        np.array([f'{name} {kind} {fault} {seed}' for name in names])[at_row], names[at_row],
+        np.array([f'{name} {called} {fault} {seed}' for name in names])[at_row], names[at_row],
         np.array(sources_of(views.folders))[at_row], np.full(len(rows), fault, '<U16'),
-        np.full(len(rows), kind, '<U16'))
+        np.full(len(rows), called, '<U16'))
 
 
 def _ordered(order: torch.Tensor) -> Callable[[TimeStep[torch.Tensor, Seen]], torch.Tensor]:
