@@ -23,6 +23,7 @@ DEEP ?= --train 40 --val 8
 DEEP_THINGS ?= --category thing --train 500 --val 0
 POLICY ?= --objects 270 --epochs 20 --workers 2 --threads 1
 DEPTH_STEPS ?= 1500
+KNOWN_OBJECTS ?= 500
 FAULTS ?= unknown pose object_size mask
 KINDS ?= even attention
 
@@ -74,6 +75,7 @@ $(RUN)/real_train.rendered:
 $(RUN)/real_val.rendered:
 	@mkdir -p $(RUN)
 	$(AR) render $(MESHES)/manifest.csv $(RUN)/real_val --split val --fine
+	$(AR) render $(MESHES)/manifest.csv $(RUN)/any_real_val --split val $(ANY)
 	@touch $@
 
 # The network
@@ -98,12 +100,16 @@ $(RUN)/policy/weights-scorer.safetensors: $(NETWORK).safetensors $(RUN)/turn.ren
 
 MEASURE = $(AR) quality measure --model $(NETWORK).safetensors
 JUDGED := $(if $(REAL_VAL),$(RUN)/real_val,$(RUN)/turn/val)
+JUDGED_ANY := $(if $(REAL_VAL),$(RUN)/any_real_val,$(RUN)/data/val)
 $(RUN)/quality/known-%.npz: $(NETWORK).safetensors $(RUN)/turn.rendered
 	@mkdir -p $(@D)
-	$(MEASURE) $(RUN)/$*/train $@ --views 6
+	$(MEASURE) $(RUN)/$*/train $@ --views 6 --objects $(KNOWN_OBJECTS)
 $(RUN)/quality/known-turn_real.npz: $(NETWORK).safetensors $(RUN)/real_train.rendered
 	@mkdir -p $(@D)
-	$(MEASURE) $(RUN)/turn_real $@ --views 6
+	$(MEASURE) $(RUN)/turn_real $@ --views 6 --objects $(KNOWN_OBJECTS)
+$(RUN)/quality/known-any_real.npz: $(NETWORK).safetensors $(RUN)/real_train.rendered
+	@mkdir -p $(@D)
+	$(MEASURE) $(RUN)/real_train $@ --views 6 --objects $(KNOWN_OBJECTS)
 $(RUN)/quality/judged.npz: $(NETWORK).safetensors $(RUN)/turn.rendered \
 		$(REAL_VAL:%=$(RUN)/%.rendered)
 	@mkdir -p $(@D)
@@ -112,10 +118,15 @@ $(RUN)/quality/judged-by-%.npz: $(RUN)/quality/judged.npz $(RUN)/policy/weights-
 	$(MEASURE) $(JUDGED) $@ --views 6 --kind $*
 $(RUN)/quality/judged-%.npz: $(RUN)/quality/judged.npz
 	$(MEASURE) $(JUDGED) $@ --views 6 --fault $*
-KNOWN := turn turn_things $(REAL:%=turn_real)
+$(RUN)/quality/judged-any.npz: $(RUN)/quality/judged.npz
+	$(MEASURE) $(JUDGED_ANY) $@ --views 6
+$(RUN)/quality/judged-any-%.npz: $(RUN)/quality/judged.npz
+	$(MEASURE) $(JUDGED_ANY) $@ --views 6 --fault $*
+KNOWN := turn turn_things data things $(if $(REAL),turn_real any_real)
 $(NETWORK)-quality.json: $(KNOWN:%=$(RUN)/quality/known-%.npz) \
 		$(RUN)/quality/judged.npz $(FAULTS:%=$(RUN)/quality/judged-%.npz) \
-		$(KINDS:%=$(RUN)/quality/judged-by-%.npz)
+		$(KINDS:%=$(RUN)/quality/judged-by-%.npz) \
+		$(RUN)/quality/judged-any.npz $(FAULTS:%=$(RUN)/quality/judged-any-%.npz)
 	$(AR) quality fit --model $(NETWORK).safetensors --out $@ \
 		$(patsubst %,--known %,$(filter $(RUN)/quality/known%,$^)) \
 		$(patsubst %,--calibration %,$(filter $(RUN)/quality/judged%,$^))
