@@ -151,15 +151,11 @@ def _layout(msg: Image) -> tuple[np.dtype[Any], int]:
     return ENCODINGS[msg.encoding]
 
 
-def _is_yuv(encoding: str) -> bool:
-    return ENCODINGS.get(encoding) == (_BYTE, 2)
-
-
 def _check_size(msg: Image, dtype: np.dtype[Any], channels: int) -> None:
     if msg.height == 0 or msg.width == 0:
         raise MessageError('empty image: expected a height and a width above 0, '
                            f'got {msg.height} x {msg.width}', 'image_size')
-    if _is_yuv(msg.encoding) and msg.width % 2:
+    if (dtype, channels) == (_BYTE, 2) and msg.width % 2:  # YUV: two pixels share their colours
         raise MessageError(f'invalid image width: expected an even one for {msg.encoding}, got '
                            f'{msg.width}', 'image_size')
     if msg.encoding.startswith('bayer_') and min(msg.height, msg.width) < _LEAST_BAYER:

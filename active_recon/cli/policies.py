@@ -1,16 +1,15 @@
 """`active-recon policies`: what view policies are worth on a network of posed views."""
 
 from collections.abc import Mapping
-import json
 from pathlib import Path
 from typing import Annotated, Any, TYPE_CHECKING
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
+from active_recon.cli.study_files import write_study
 from active_recon.errors import ConfigError, DataError
 from active_recon.policies import POLICIES
-from active_recon.whole_files import whole_file
 import typer
 
 if TYPE_CHECKING:
@@ -139,8 +138,4 @@ def _set_figures(folder: Path, entrant: 'Entrant', episodes: 'Episodes', extent:
 def _write(result: Mapping[str, Any], out: Path) -> None:
     from active_recon.evaluation.next_view.summary import markdown
 
-    out.mkdir(parents=True, exist_ok=True)
-    for name, text in (('policies.json', json.dumps(result, indent=1) + '\n'),
-                       ('policies.md', markdown(result))):
-        with whole_file(out / name) as unfinished:
-            unfinished.write_text(text)
+    write_study(result, markdown(result), out, 'policies')

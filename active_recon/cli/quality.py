@@ -1,11 +1,11 @@
 """`active-recon quality`: measures, fits and tests how the quality of a shape is judged."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.study_files import write_study
 from active_recon.errors import ConfigError, DataError
 import typer
 
@@ -153,7 +153,5 @@ def study(
         sets[f'{halved[0].stem}, second half'] = together.rows(~halves(together))
     result = {'command': command_line(), 'weights_sha256': found.weights_sha256,
               'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}
-    out.mkdir(parents=True, exist_ok=True)
-    (out / 'quality.json').write_text(json.dumps(result, indent=1) + '\n')
-    (out / 'quality.md').write_text(markdown(result))
-    typer.echo(f'wrote {out / "quality.json"} and {out / "quality.md"}')
+    figures, page = write_study(result, markdown(result), out, 'quality')
+    typer.echo(f'wrote {figures} and {page}')

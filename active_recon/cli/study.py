@@ -1,15 +1,14 @@
 """`active-recon study`: compares networks on the same posed views."""
 
 from collections.abc import Mapping
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
+from active_recon.cli.study_files import write_study
 from active_recon.errors import ConfigError
-from active_recon.whole_files import whole_file
 import typer
 
 _SHIPPED = ('lifting', 'carving', '2d3d-attention')
@@ -149,12 +148,7 @@ def _write(result: Mapping[str, Any], out: Path) -> list[Path]:
     """Write all files, and return their paths."""
     from active_recon.evaluation.posed.summary import markdown
 
-    out.mkdir(parents=True, exist_ok=True)
-    written = [out / 'study.json', out / 'study.md']
-    for path, text in zip(written, (json.dumps(result, indent=1) + '\n', markdown(result)),
-                          strict=True):
-        with whole_file(path) as unfinished:
-            unfinished.write_text(text)
+    written = write_study(result, markdown(result), out, 'study')
     for number, figures in enumerate(result['sets']):
         written.append(out / f'study-{number}-{Path(figures["data"]).name}.png')
         _draw(figures, written[-1])
