@@ -25,7 +25,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full doc html bench soak policies weights ready chromium lint clean
+.PHONY: help venv demo golden test test-full doc html bench soak policies weights ready read-doc chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -52,7 +52,7 @@ test-full: ready .venv/full  ## every test, high counts and soak too
 
 # What the tests begin with; two at a time, since each keeps one core busy.
 ready:
-	@$(MAKE) --no-print-directory -j2 lint html chromium .venv/colcon/installed
+	@$(MAKE) --no-print-directory -j2 lint read-doc chromium .venv/colcon/installed
 
 # The pages are tested in Debian's Chromium, which only root can install.
 chromium:
@@ -68,6 +68,12 @@ chromium:
 doc: html  ## the documentation, built and opened; ARGS=--no-open only builds
 	@$(if $(filter --no-open,$(ARGS)),echo build/doc/index.html,$(BIN)/python -m webbrowser \
 		'file://$(CURDIR)/build/doc/index.html')
+
+# The theme repeats the whole navigation on each page: half of the time, for nothing to check.
+read-doc: .venv/installed
+	@echo '== checking the documentation'
+	@$(BIN)/python -m sphinx -q -W --keep-going -b html -D html_theme=basic \
+		-d build/doc-check/.doctrees doc build/doc-check
 
 html: .venv/installed
 	@echo '== building the documentation'

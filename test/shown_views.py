@@ -40,4 +40,5 @@ def part_of(views: ViewSet, objects: slice = slice(None), chosen: slice = slice(
     return replace(views, images=views.images[objects, chosen],
                    poses=views.poses[objects, chosen],
                    intrinsics=views.intrinsics[objects, chosen], voxels=views.voxels[objects],
-                   folders=views.folders[objects])
+                   folders=views.folders[objects],
+                   seen=None if views.seen is None else views.seen[objects, chosen])

@@ -4,6 +4,7 @@ import json
 import math
 import shutil
 
+from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import weights_hash
 from command_line import command, refusal
@@ -11,6 +12,15 @@ import pytest
 from safetensors.torch import load_file
 import torch
 from torch.testing import assert_close
+
+
+@pytest.fixture(scope='module')
+def dataset(tmp_path_factory):
+    """Return a folder of a lamp and a table: what is measured takes as long as its objects."""
+    out = tmp_path_factory.mktemp('dataset')
+    jobs = [job for category in ('lamp', 'table') for job in shape_jobs(category, range(1), out)]
+    assert not [outcome.refusal for outcome in make_dataset(jobs, samples=1) if outcome.refusal]
+    return out
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +56,7 @@ def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, datase
     card = json.loads((run / 'weights.json').read_text())
     assert card['threshold'] == bundle.threshold
     assert card['command'].startswith('active-recon train ')
-    assert card['data'] == {str(dataset): 6}
+    assert card['data'] == {str(dataset): 2}
     assert card['reconstruction']['steps'] == card['policy']['steps'] == 2
     assert card['reconstruction']['silhouette_weight'] == 0.6
     assert len(card['generators_sha256']) == 64
@@ -55,7 +65,7 @@ def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, datase
 def test_a_training_is_validated_on_the_objects_of_every_folder(
         dataset, tmp_path, monkeypatch, capsys):
     assert command(monkeypatch, *training(dataset, tmp_path, '--validation', dataset)) == 0
-    assert f'reading validation data: {2 * 6}/{2 * 6}' in capsys.readouterr().out
+    assert f'reading validation data: {2 * 2}/{2 * 2}' in capsys.readouterr().out
 
 
 def test_a_training_that_is_done_is_resumed_to_the_same_weights(run, dataset, monkeypatch):
@@ -122,7 +132,7 @@ def test_validation_objects_that_are_trained_on_are_told_wherever_they_lie(
     copied = shutil.copytree(dataset, tmp_path / 'copy')
     asked = training(dataset, tmp_path, '--policy-steps', 0, '--validation', copied)
     assert command(monkeypatch, *asked) == 0
-    assert '12 of 12 validation objects are trained on too' in capsys.readouterr().err
+    assert '4 of 4 validation objects are trained on too' in capsys.readouterr().err
 
 
 def test_only_weights_with_a_policy_say_how_far_apart_its_views_stay(
@@ -155,7 +165,7 @@ def test_an_evaluation_measures_all_that_it_says(run, dataset, tmp_path, monkeyp
     assert found['command'].startswith('active-recon evaluate ')
     assert found['weights'] == weights_hash(run / 'weights.safetensors')
     assert found['threshold'] == load_weights(run / 'weights.safetensors').threshold
-    assert (found['objects'], found['episodes'], found['unreadable']) == (6, 12, [])
+    assert (found['objects'], found['episodes'], found['unreadable']) == (2, 4, [])
     assert set(found['policies']) == {'random', 'uniform', 'farthest', 'attention'}
     for figures in found['policies'].values():
         assert set(figures) == {'seeds', 'iou', 'auc', 'entropy', 'paper_entropy', 'rotation',
@@ -238,7 +248,7 @@ def test_two_weights_files_are_compared_on_the_same_episodes(
     assert 'random minus farthest: ' in told
     with rows.open() as file:
         lines = list(csv.DictReader(file))
-    assert len(lines) == 2 * 2 * 12 * 2  # models, policies, episodes, views
+    assert len(lines) == 2 * 2 * 4 * 2  # models, policies, episodes, views
     first = [float(line['iou']) for line in lines
              if line['model'] == str(weights) and line['policy'] == 'random'
              and line['view'] == '1']
@@ -268,7 +278,7 @@ def test_an_object_that_cannot_be_read_is_listed(run, dataset, tmp_path, monkeyp
         monkeypatch, 'evaluate', copy, '--model', run / 'weights.safetensors', '--views', 1,
         '--starts', 1, '--policy', 'uniform', '--json', out, '--threads', 1) == 0
     found = json.loads(out.read_text())
-    assert found['objects'] == 5
+    assert found['objects'] == 1
     assert f"evaluate '{copy}' --model" in found['command']
     assert len(found['unreadable']) == 1
     assert 'model.binvox' in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """The segmenter: its laws, its files, its exported graph, and its training."""
 
+from functools import partial
 import json
 import math
 from types import SimpleNamespace
@@ -21,6 +22,7 @@ from active_recon.models.weights import Bundle, save_weights
 from active_recon.models.weights_files import find_weights, SHIPPED
 from active_recon.runtimes import load_runtime, load_segmenter_runtime, REMARK
 from active_recon.training import segmenter as training
+from active_recon.training import silhouettes
 from active_recon.training.loop import Run, TrainingConfig
 from active_recon.training.segmenter import SegmenterLearner, SHARES
 from active_recon.training.silhouettes import silhouette_ious
@@ -160,6 +162,8 @@ def test_silhouettes_are_measured_where_they_were_seen(lamps):
 
 def test_it_is_trained_and_resumed_from_the_command_line(lamps, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(silhouettes, 'silhouette_figures',
+                        partial(silhouettes.silhouette_figures, count=2))
     arguments = ('train-segmenter', lamps, '--validation', lamps, '--steps', 2, '--batch-size', 1,
                  '--init-from', '', '--out', 'run', '--threads', 1)
     assert command(monkeypatch, *arguments) == 0

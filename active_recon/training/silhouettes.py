@@ -38,6 +38,7 @@ def silhouette_ious(find: Callable[[Tensor], Tensor], views: ViewSet, kind: str,
 
 
 def silhouette_figures(find: Callable[[Tensor], Tensor], views: ViewSet,
-                       kinds: Sequence[str] = KINDS) -> dict[str, float]:
+                       kinds: Sequence[str] = KINDS, count: int = 256) -> dict[str, float]:
     """Return the mean IoU of silhouettes before backgrounds of each kind; see above."""
-    return {kind: round(float(silhouette_ious(find, views, kind).mean()), 4) for kind in kinds}
+    return {kind: round(float(silhouette_ious(find, views, kind, count).mean()), 4)
+            for kind in kinds}
