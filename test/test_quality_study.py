@@ -49,7 +49,7 @@ import torch
 COUNTS = 3
 
 
-def made_up(objects, seed, fault='', noise=0.4, sources=20, kind='random'):
+def made_up(objects, seed, fault='', noise=0.4, sources=20, kind='random', weights='abc'):
     """Return episodes whose log odds of IoU are a feature's, with noise; faults shift another."""
     rng = np.random.default_rng(seed)
     count = np.tile(np.arange(1, COUNTS + 1), objects)
@@ -65,7 +65,8 @@ def made_up(objects, seed, fault='', noise=0.4, sources=20, kind='random'):
         numbers, rng.normal(size=(len(count), 4)), np.full(len(count), np.nan) if fault else iou,
         np.zeros(len(count)), count, np.array([f'{name} {fault}' for name in names]), names,
         np.array([f'source {each % sources}' for each in item]),
-        np.full(len(count), fault, '<U16'), np.full(len(count), kind, '<U16'))
+        np.full(len(count), fault, '<U16'), np.full(len(count), kind, '<U16'),
+        np.full(len(count), weights))
 
 
 @pytest.fixture(scope='module')
@@ -170,7 +171,7 @@ def test_what_was_measured_comes_back_from_its_file(tmp_path):
 
 def test_what_was_measured_with_several_networks_is_not_joined():
     measured = made_up(5, 8)
-    other = replace(measured, latents=measured.latents[:, 1:])
+    other = made_up(5, 8, weights='def')
     assert len(Measured.joined([measured, measured])) == 2 * len(measured)
     with pytest.raises(DataError, match='measured with several networks'):
         Measured.joined([measured, other])
@@ -277,15 +278,16 @@ def test_a_policy_chooses_the_views_after_the_first(seen):
 
 
 def test_the_commands_fit_tables_and_test_them_on_the_other_half(tmp_path, monkeypatch):
-    made_up(200, 0).write(tmp_path / 'known.npz')
-    made_up(200, 1).write(tmp_path / 'real.npz')
-    faults = Measured.joined([made_up(60, 1, fault) for fault in FAULTS])
+    shipped = weights_hash(SHIPPED)
+    made_up(200, 0, weights=shipped).write(tmp_path / 'known.npz')
+    made_up(200, 1, weights=shipped).write(tmp_path / 'real.npz')
+    faults = Measured.joined([made_up(60, 1, fault, weights=shipped) for fault in FAULTS])
     faults.write(tmp_path / 'faults.npz')
     assert command(monkeypatch, 'quality', 'fit', '--known', tmp_path / 'known.npz',
                    '--calibration', tmp_path / 'real.npz', '--calibration',
                    tmp_path / 'faults.npz', '--out', tmp_path / 'tables.json') == 0
     tables = QualityTables.read(tmp_path / 'tables.json')
-    assert tables.weights_sha256 == weights_hash(SHIPPED)
+    assert tables.weights_sha256 == shipped
     assert command(monkeypatch, 'quality', 'study', tmp_path / 'known.npz', '--halved',
                    tmp_path / 'real.npz', '--halved', tmp_path / 'faults.npz', '--tables',
                    tmp_path / 'tables.json', '--out', tmp_path) == 0
@@ -293,6 +295,21 @@ def test_the_commands_fit_tables_and_test_them_on_the_other_half(tmp_path, monke
     assert (whole['objects'], half['objects']) == (200, 100)
     used = json.loads((tmp_path / 'tables.json').read_text())['calibrated_on']
     assert not set(used) & set(half['sources'])
+
+
+def test_what_was_measured_with_another_network_is_refused(tmp_path, monkeypatch, capsys, tables):
+    made_up(3, 0).write(tmp_path / 'abc.npz')
+    made_up(3, 0, weights='def').write(tmp_path / 'def.npz')
+    tables.write(tmp_path / 'tables.json')
+    abc, other = tmp_path / 'abc.npz', tmp_path / 'def.npz'
+    assert 'with several networks: expected files of one, got weights abc, def' in refusal(
+        monkeypatch, capsys, 'quality', 'study', abc, other, '--tables', tmp_path / 'tables.json')
+    assert 'with other weights: expected abc, got def' in refusal(
+        monkeypatch, capsys, 'quality', 'study', other, '--tables', tmp_path / 'tables.json')
+    assert f'with other weights: expected {weights_hash(SHIPPED)[:12]}, got abc' in refusal(
+        monkeypatch, capsys, 'quality', 'fit', '--known', abc, '--calibration', abc, '--out',
+        tmp_path / 'new.json')
+    assert not (tmp_path / 'new.json').exists()
 
 
 def test_a_study_of_nothing_and_an_unknown_fault_are_refused(tmp_path, monkeypatch, capsys):

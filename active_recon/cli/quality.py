@@ -45,7 +45,7 @@ def measure(
     from active_recon.evaluation.quality.measuring import KINDS, LEARNED, Measured
     from active_recon.evaluation.quality.measuring import measure as measured
     from active_recon.models.weights import load_weights
-    from active_recon.models.weights_files import find_weights
+    from active_recon.models.weights_files import find_weights, weights_hash
     from active_recon.policies import load_policy, PolicyOptions
     import torch
 
@@ -73,7 +73,7 @@ def measure(
             else:
                 left_out += some.unreadable
                 parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
-                                      seed + at, policy))
+                                      seed + at, policy, weights_hash(weights)))
             advance(len(few), '')
     for reason in left_out:
         typer.echo(f'left out: {reason}', err=True)
@@ -107,10 +107,11 @@ def fit(
     from active_recon.quality.tables import tables_path
 
     weights = find_weights(model)
-    together = Measured.joined([Measured.read(path) for path in calibration])
+    sha256 = weights_hash(weights)
+    together = Measured.joined([Measured.read(path) for path in calibration]).checked(sha256)
     first = together.rows(halves(together))
-    tables = fitted(Measured.joined([Measured.read(path) for path in known]), first,
-                    weights_hash(weights))
+    tables = fitted(Measured.joined([Measured.read(path) for path in known]).checked(sha256),
+                    first, sha256)
     path = out or tables_path(weights)
     tables.write(path, command=command_line(), calibrated_on=sorted(set(first.source.tolist())))
     typer.echo(f'wrote {path}')
@@ -145,13 +146,14 @@ def study(
         raise ConfigError('study: nothing to measure: expected files of `quality measure`, or '
                           '--halved with some, got neither')
     found = QualityTables.read(tables or tables_path(find_weights(model)))
-    sets = {}
+    sha256, sets = found.weights_sha256, {}
     if files:
-        sets[files[0].stem] = Measured.joined([Measured.read(path) for path in files])
+        sets[files[0].stem] = Measured.joined(
+            [Measured.read(path) for path in files]).checked(sha256)
     if halved:
-        together = Measured.joined([Measured.read(path) for path in halved])
+        together = Measured.joined([Measured.read(path) for path in halved]).checked(sha256)
         sets[f'{halved[0].stem}, second half'] = together.rows(~halves(together))
-    result = {'command': command_line(), 'weights_sha256': found.weights_sha256,
+    result = {'command': command_line(), 'weights_sha256': sha256,
               'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}
     figures, page = write_study(result, markdown(result), out, 'quality')
     typer.echo(f'wrote {figures} and {page}')

@@ -40,6 +40,7 @@ class Measured:
     - count: (N,), views so far; episode: (N,), the same for all of one episode
     - object, source: (N,), names; fault: (N,), '' for none; kind: (N,), of KINDS, what chose the
       views, with `, any` where they are not of a turntable
+    - weights: (N,), the sha256 of the network's weights
     """
 
     numbers: NDArray[np.float64]
@@ -52,6 +53,7 @@ class Measured:
     source: NDArray[np.str_]
     fault: NDArray[np.str_]
     kind: NDArray[np.str_]
+    weights: NDArray[np.str_]
 
     def __len__(self) -> int:
         """Return N."""
@@ -68,14 +70,20 @@ class Measured:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return all rows of several; raises DataError where they are of other networks."""
-        widths = {part.latents.shape[1:] + part.numbers.shape[1:] for part in parts}
-        if len(widths) > 1:
+        """Return all rows of several; raises DataError where they are of several networks."""
+        networks = {name for part in parts for name in part.weights.tolist()}
+        if len(networks) > 1:
             raise DataError('quality: measured with several networks: expected files of one, got '
-                            'latents and features of other lengths: '
-                            f'{", ".join(map(str, sorted(widths)))}')
+                            f'weights {", ".join(name[:12] for name in sorted(networks))}')
         return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts])
                       for each in fields(cls)})
+
+    def checked(self, weights_sha256: str) -> Self:
+        """Return it; raises DataError where it was measured with other weights."""
+        for other in {*self.weights.tolist()} - {weights_sha256}:
+            raise DataError(f'quality: measured with other weights: expected {weights_sha256[:12]}'
+                            f', got {other[:12]}; give the right --model, or measure anew')
+        return self
 
     def write(self, path: Path) -> None:
         """Write it as an npz file."""
@@ -111,7 +119,7 @@ def orders_of(views: ViewSet, kind: str, count: int, seed: int) -> Order:
 @torch.inference_mode()
 def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, count: int,
             kind: str = 'random', fault: str = '', seed: int = 0,
-            policy: Policy | None = None) -> Measured:
+            policy: Policy | None = None, weights_sha256: str = '') -> Measured:
     """
     Measure the objects of a set after 1 to `count` views each, all at once.
 
@@ -152,7 +160,7 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
         np.array(counts),
         np.array([f'{name} {called} {fault} {seed}' for name in names])[at_row], names[at_row],
         np.array(sources_of(views.folders))[at_row], np.full(len(rows), fault, '<U16'),
-        np.full(len(rows), called, '<U16'))
+        np.full(len(rows), called, '<U16'), np.full(len(rows), weights_sha256))
 
 
 def _ordered(order: torch.Tensor) -> Callable[[TimeStep[torch.Tensor, Seen]], torch.Tensor]:
