@@ -256,6 +256,11 @@ class Planner:
         return self._goal
 
     @property
+    def lacks_gains(self) -> bool:
+        """Whether the policy's last scores are no expected gains, which `min_gain` needs."""
+        return not self.sweeps and self._choice is not None and not self._choice.is_gain
+
+    @property
     def sweeps(self) -> bool:
         """Whether an even sweep chooses in the policy's place: the last view is unusual."""
         last = self._views[-1].quality if self._views else None

@@ -362,7 +362,9 @@ class Knowing:
     (True, 3, 'gain_too_small'), (False, 4, 'max_views')])
 def test_it_stops_where_no_view_gains_enough_if_the_policy_knows(is_gain, count, reason):
     planner = Planner(Knowing([0.1, 0.03, 0.01, 0.1], is_gain), 4, 0, min_gain=0.02)
+    assert not planner.lacks_gains
     assert ends_after(planner, [None] * 4) == (count, reason)
+    assert planner.lacks_gains != is_gain
 
 
 @pytest.mark.parametrize('name', ['target_quality', 'min_gain'])

@@ -8,7 +8,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
 from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy
-from active_recon.nodes.loop.target_warning import tell_target
+from active_recon.nodes.loop.target_warning import tell_min_gain, tell_target
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.loop.view_synchronizer import ViewSynchronizer
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
@@ -104,6 +104,7 @@ class ViewPlannerNode(ManagedNode):
             tell_target(self._diagnostics, params, loaded.in_use)
             self._loaded, self._planner = loaded, planner
             tell_of_runtime(self._diagnostics, planner.provenance)
+            self._tell_min_gain(params.min_gain)
             if not self.is_active:
                 return
             self._timeout_timer.wake()
@@ -192,6 +193,7 @@ class ViewPlannerNode(ManagedNode):
         name = self._loaded.in_use.name
         self._diagnostics.set_value('Policy', (
             f'even sweep instead of {name}: unusual views' if self._planner.sweeps else name))
+        self._tell_min_gain(self._params.values.min_gain)
         self._follow(decision, stamp)
         if decision.goal is not None:
             self._diagnostics.record_latency(stamp)
@@ -207,6 +209,10 @@ class ViewPlannerNode(ManagedNode):
         self._done = True
         self._publish_done(stamp, decision.reason)
         self.get_logger().info(f'done: {decision.reason}')
+
+    def _tell_min_gain(self, min_gain: float) -> None:
+        tell_min_gain(self._diagnostics, min_gain, self._loaded.in_use.name,
+                      self._planner.lacks_gains)
 
     def _tell_reason(self) -> None:
         """Tell why the goal that was just published is worth its view, where that is known."""

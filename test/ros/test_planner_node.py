@@ -159,7 +159,8 @@ def test_a_planner_waits_for_the_quality_of_a_view_and_stops_by_it(start_node, b
 
 
 def test_a_sweep_in_the_policy_s_place_is_told_while_views_are_unusual(start_node, bench, latent):
-    start_node('view_planner', policy='farthest', start_azimuth=1.0, entropy_tolerance=0.0)
+    start_node('view_planner', policy='farthest', start_azimuth=1.0, entropy_tolerance=0.0,
+               min_gain=0.01)
     fake = FakeReconstructor(bench, ('episode', *FakeReconstructor.PARTS, 'quality'))
     fake.begin('only')
     stamp = 0
@@ -170,3 +171,5 @@ def test_a_sweep_in_the_policy_s_place_is_told_while_views_are_unusual(start_nod
                           quality=quality_of(suspect=suspect))
         fake.wait_goal(stamp)
         bench.until(lambda: bench.state('view_planner').facts['Policy'] == told, told)  # noqa: B023
+        bench.until(lambda: ('min_gain 0.01 has no effect' in bench.state('view_planner').problem)
+                    != bool(suspect), 'that only scores of the policy are no gains')  # noqa: B023

@@ -1,4 +1,4 @@
-"""Warns of a target quality that the tables of the weights never promise."""
+"""Warns of a target quality, and of a least gain, that end no episode."""
 
 from active_recon.errors import WeightsError
 from active_recon.models.weights_files import find_weights
@@ -9,6 +9,7 @@ from active_recon.policies import POLICIES, PolicyInUse
 from active_recon.quality.tables import QualityTables, tables_path
 
 _WARNING = 'target_quality'
+_GAIN_WARNING = 'min_gain'
 
 
 def tell_target(diagnostics: Diagnostics, params: ViewPlannerParameters,
@@ -22,6 +23,18 @@ def tell_target(diagnostics: Diagnostics, params: ViewPlannerParameters,
             'reasons'))
     else:
         diagnostics.clear_warning(_WARNING)
+
+
+def tell_min_gain(diagnostics: Diagnostics, min_gain: float, policy: str,
+                  lacks_gains: bool) -> None:
+    """Warn while the scores of the policy are not what the least gain is compared with."""
+    if min_gain and lacks_gains:
+        diagnostics.raise_warning(_GAIN_WARNING, (
+            f'min_gain {min_gain:g} has no effect: expected a policy whose scores are expected '
+            f'gains, as those of attention with lifting weights, got {policy}; an episode ends '
+            'for other reasons'))
+    else:
+        diagnostics.clear_warning(_GAIN_WARNING)
 
 
 def _problem(params: ViewPlannerParameters, in_use: PolicyInUse) -> str:
