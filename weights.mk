@@ -1,7 +1,7 @@
 # The default weights from scratch: `make weights MESHES=FOLDER`, resumable at every step.
 #
-# Renders the training data, trains the network, its view policy, the tables of its quality and its
-# depth refiner, and puts all of it, exported, into RUN/weights. What stands is not made again, an
+# Renders the training data, trains the network, its view policy, the tables of its quality, its depth
+# refiner and a segmenter, and puts all of it, exported, into RUN/weights. What stands is not made again, an
 # interrupted training continues. The numbers below are about those of the weights that ship, whose
 # stages were trained one after the other, two of them side by side; fewer are faster.
 #
@@ -23,6 +23,7 @@ DEEP ?= --train 40 --val 8
 DEEP_THINGS ?= --category thing --train 500 --val 0
 POLICY ?= --objects 270 --epochs 20 --workers 2 --threads 1
 DEPTH_STEPS ?= 1500
+SEGMENTER_STEPS ?= 19000
 KNOWN_OBJECTS ?= 500
 FAULTS ?= unknown pose object_size mask
 KINDS ?= even attention
@@ -136,14 +137,26 @@ $(RUN)/depth/weights-depth.safetensors: $(NETWORK).safetensors $(RUN)/deep.rende
 		--validation $(RUN)/deep/val --model $(NETWORK).safetensors --out $(RUN)/depth \
 		--steps $(DEPTH_STEPS) --threads 1 --resume
 
+# What goes with every network: the segmenter
+$(RUN)/segmenter/segmenter.safetensors: $(NETWORK).safetensors $(RUN)/data.rendered \
+		$(RUN)/things.rendered $(RUN)/turn.rendered $(REAL:%=$(RUN)/%.rendered)
+	$(AR) train-segmenter $(RUN)/data/train $(RUN)/things/train $(REAL:%=$(RUN)/%) \
+		$(RUN)/turn/train $(RUN)/turn_things/train $(REAL:%=$(RUN)/turn_real) \
+		--validation $(RUN)/data/val --init-from $(NETWORK).safetensors --out $(@D) \
+		--steps $(SEGMENTER_STEPS) --learning-rate 1.5e-3 --warmup-steps 200 \
+		--devices $(DEVICES) --threads 1 --resume
+
 # All of it in one folder, under the name by which it is loaded
 $(RUN)/exported: $(NETWORK).safetensors $(RUN)/policy/weights-scorer.safetensors \
-		$(NETWORK)-quality.json $(RUN)/depth/weights-depth.safetensors
+		$(NETWORK)-quality.json $(RUN)/depth/weights-depth.safetensors \
+		$(RUN)/segmenter/segmenter.safetensors
 	@mkdir -p $(RUN)/weights
 	@for name in $(NAMES); do for folder in lifting policy depth; do \
 		if test -e $(RUN)/$$folder/weights$$name; then \
 		cp $(RUN)/$$folder/weights$$name $(RUN)/weights/lifting$$name; fi; done; done
+	@cp $(RUN)/segmenter/segmenter.safetensors $(RUN)/segmenter/segmenter.json $(RUN)/weights
 	$(AR) export $(RUN)/weights/lifting.safetensors
+	$(AR) export $(RUN)/weights/segmenter.safetensors
 	@touch $@
 	@echo "wrote $(RUN)/weights: load it by --model or the parameter weights, \
-	$(RUN)/weights/lifting.safetensors"
+	$(RUN)/weights/lifting.safetensors; the segmenter beside it by the parameter segmenter"

@@ -1,10 +1,12 @@
 """Networks and policies of one's own: from an installed package, or from a Python file."""
 
 from functools import cache
+import hashlib
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 import sys
+from types import ModuleType
 from typing import Any
 
 from active_recon.errors import ConfigError
@@ -55,3 +57,12 @@ def load_from_file(reference: str) -> Any:
     if not hasattr(module, name):
         raise ConfigError(f'{path}: has no {name}')
     return getattr(module, name)
+
+
+def code_hash(made: object) -> str:
+    """Return the SHA-256 of the file that an object's class is in; '' where that is ours."""
+    module: ModuleType | None = sys.modules.get(type(made).__module__)
+    path = getattr(module, '__file__', None)
+    if path is None or type(made).__module__.partition('.')[0] == __package__:
+        return ''
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()

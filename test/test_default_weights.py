@@ -7,6 +7,7 @@ import sys
 
 from active_recon.models.depth_weights import load_refiner
 from active_recon.models.scorer_weights import load_scorer
+from active_recon.models.segmenter_weights import is_segmenter
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import weights_hash
 import pytest
@@ -20,6 +21,7 @@ ROOT = Path(__file__).parent.parent
 CHAIRS, THING = '--category chair --train 2 --val 2', '--category thing --train 1 --val 0'
 TINY = {
     'AR': f'{sys.executable} -m active_recon.cli.main', 'STEPS': 1, 'DEVICES': 1, 'DEPTH_STEPS': 1,
+    'SEGMENTER_STEPS': 1,
     'PARAMETRIC': CHAIRS, 'TURNTABLE': CHAIRS, 'DOME': CHAIRS, 'DEEP': CHAIRS,
     'THINGS': THING, 'TURNTABLE_THINGS': THING, 'DOME_THINGS': THING, 'DEEP_THINGS': THING,
     'POLICY': '--objects 2 --rounds 1 --starts 1 --views 2 --epochs 1'}
@@ -50,8 +52,10 @@ def test_all_that_belongs_to_the_network_is_written_beside_it_and_loads(run):
     assert load_scorer(weights).members and load_refiner(weights) is not None
     quality = (run / 'weights' / 'lifting-quality.json').read_text()
     assert weights_hash(weights) in quality
+    assert is_segmenter(weights.with_name('segmenter.safetensors'))
     assert {path.name for path in weights.parent.glob('*.onnx')} == {
-        f'lifting-{graph}.onnx' for graph in ('encode', 'update', 'decode', 'policy', 'depth')}
+        'segmenter-segment.onnx',
+        *(f'lifting-{graph}.onnx' for graph in ('encode', 'update', 'decode', 'policy', 'depth'))}
 
 
 def test_a_second_start_makes_nothing_again(run):

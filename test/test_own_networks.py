@@ -2,9 +2,12 @@
 
 from pathlib import Path
 import re
+import sys
 
 from active_recon.errors import ConfigError, WeightsError
+from active_recon.evaluation.contenders import contenders
 from active_recon.evaluation.posed.entrants import load_entrants
+from active_recon.evaluation.trial import Trial
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.models import registry
 from active_recon.models.network import Cameras
@@ -17,7 +20,8 @@ from active_recon.models.registry import (
 from active_recon.models.trial import try_network
 from active_recon.models.weights import Bundle, load_weights, save_weights
 from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLICIES_GROUP
-from active_recon.policies.registry import _installed, PolicyOptions
+from active_recon.policies import POLICIES
+from active_recon.policies.registry import _installed, PolicyEntry, PolicyOptions
 from command_line import command, refusal
 import pytest
 import torch
@@ -75,13 +79,14 @@ def package(tmp_path, monkeypatch):
     """Install a package that offers a network and a policy."""
     (tmp_path / 'mine.py').write_text(
         EXAMPLE.read_text() + '\nfrom active_recon.policies.geometric import FarthestPolicy\n'
+        'class Near(FarthestPolicy):\n    pass\n'
         'class Needy(FarthestPolicy):\n    def __init__(self, weight): pass\n')
     metadata = tmp_path / 'mine-1.0.dist-info'
     metadata.mkdir()
     (metadata / 'METADATA').write_text('Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n')
     (metadata / 'entry_points.txt').write_text(
         f'[{NETWORKS_GROUP}]\nmine = mine:Net\nbroken = mine:Nothing\n'
-        f'[{POLICIES_GROUP}]\nfar = mine:FarthestPolicy\nneedy = mine:Needy\n'
+        f'[{POLICIES_GROUP}]\nfar = mine:FarthestPolicy\nnear = mine:Near\nneedy = mine:Needy\n'
         'sizes = mine:Sizes\n')
     monkeypatch.syspath_prepend(tmp_path)
     installed.cache_clear()
@@ -102,6 +107,26 @@ def test_what_an_installed_package_offers_as_a_policy_and_is_none_is_refused(pac
         _installed('needy')(PolicyOptions())
     with pytest.raises(ConfigError, match='sizes: no policy: .* got a Sizes without wants_volume'):
         _installed('sizes')(PolicyOptions())
+
+
+def test_what_is_kept_of_a_network_or_policy_of_one_s_own_is_that_of_its_code(
+        package, views, tmp_path, monkeypatch):
+    monkeypatch.setitem(POLICIES, 'near', PolicyEntry(_installed('near'), ('seed',)))
+
+    def kept():
+        monkeypatch.delitem(sys.modules, 'mine', raising=False)
+        entry = network_entry('mine')
+        torch.manual_seed(0)
+        trial = Trial(entry.build(entry.sizes['small']), 0.5, views, cache=tmp_path)
+        (own,), (ours,) = (contenders([name], seeds=1) for name in ('near', 'random'))
+        return trial.folder, trial.cached(own, 0).name, trial.cached(ours, 0).name
+
+    before = kept()
+    assert kept() == before
+    with (tmp_path / 'mine.py').open('a') as file:
+        file.write('# another version\n')
+    folder, own, ours = kept()
+    assert folder != before[0] and own != before[1] and ours == before[2]
 
 
 OWN = """

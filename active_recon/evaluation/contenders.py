@@ -8,6 +8,7 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.evaluation.trial import Contender
 from active_recon.models.weights import state_hash
 from active_recon.models.weights_files import PAPER_MODEL
+from active_recon.plugins import code_hash, installed, POLICIES_GROUP
 from active_recon.policies import learned_policy, load_policy, POLICIES, Policy, PolicyOptions
 from active_recon.runtimes.torch import TorchPolicyRuntime
 import numpy as np
@@ -53,7 +54,8 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
             made += [Contender(name, f'{name}-{_model_hash(each)}', partial(_learned, model, each))
                      for each in attentions]
         elif POLICIES[name].draws:
-            made += [Contender(name, f'{name}-{each}', partial(_heuristic, name, count))
+            code = _own_code(name, count)
+            made += [Contender(name, f'{name}-{each}', partial(_heuristic, name, count), code)
                      for each in range(seed, seed + seeds)]
         else:
             made.append(Contender(name, name, partial(_heuristic, name, count)))
@@ -62,6 +64,12 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
 
 def _heuristic(name: str, count: int, rng: np.random.Generator) -> Policy:
     return load_policy(name, PolicyOptions(rng, count))
+
+
+def _own_code(name: str, count: int) -> str:
+    """Return the hash of the code of an installed package's policy, '' for one of ours."""
+    return (code_hash(_heuristic(name, count, np.random.default_rng(0)))
+            if name in installed(POLICIES_GROUP) else '')
 
 
 def _learned(model: str, module: nn.Module, rng: np.random.Generator) -> Policy:

@@ -15,6 +15,7 @@ from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.rollouts import batches
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import state_hash
+from active_recon.plugins import code_hash
 from active_recon.policies import Policy
 from active_recon.whole_files import whole_file
 import numpy as np
@@ -30,12 +31,14 @@ class Contender:
     A policy with one seed.
 
     `make` builds it from a random generator; None stands for the greedy oracle, which is not a
-    policy, since it uses the truth. `key` identifies its results on disk.
+    policy, since it uses the truth. `key` identifies its results on disk, with `code`, the hash
+    of a policy's own code.
     """
 
     policy: str
     key: str
     make: Callable[[np.random.Generator], Policy] | None
+    code: str = ''
 
 
 class Trial:
@@ -47,7 +50,8 @@ class Trial:
     - seed: of the first views
     - bfloat16: the network runs in mixed precision
     - cache: folder that caches episodes, or None; the subfolder's name is a hash of everything
-      that they depend on (the network's weights, the data, the numbers above)
+      that they depend on (the network's weights and, where it is one's own, its code, the data,
+      the numbers above)
     """
 
     def __init__(self, network: ReconstructionNetwork, threshold: float, views: ViewSet,
@@ -59,6 +63,8 @@ class Trial:
         self.identity: dict[str, Any] = {
             'network': state_hash(network), 'threshold': threshold, 'data': data_hash(views),
             'starts': starts, 'views': count, 'seed': seed, 'bfloat16': bfloat16}
+        if own := code_hash(network):
+            self.identity['code'] = own
         self.folder = cache and _folder(cache, self.identity)
 
     @property
@@ -84,7 +90,8 @@ class Trial:
 
     def cached(self, contender: Contender, block: int) -> Path | None:
         """Return the path of a block's episodes in the cache; None where there is no cache."""
-        return self.folder and self.folder / f'{contender.key}-{block:03d}.npz'
+        name = f'{contender.key}{contender.code[:16]}-{block:03d}.npz'
+        return self.folder and self.folder / name
 
     def run_block(self, contender: Contender, block: int,
                   progress: Callable[[int], None] = lambda done: None) -> Episodes:
