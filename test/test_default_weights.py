@@ -31,7 +31,7 @@ def made(run: Path, goal: str = 'weights', **options: object) -> str:
     """Run weights.mk; return what it printed."""
     asked = [f'{name}={value}' for name, value in {'RUN': run, **TINY, **options}.items()]
     done = subprocess.run(['make', '-f', 'weights.mk', goal, *asked], cwd=ROOT, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=900)
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=3600)
     assert done.returncode == 0, done.stdout[-2000:]
     return done.stdout
 
