@@ -6,6 +6,7 @@ import re
 from active_recon.calibration.arm import fit_arm
 from active_recon.calibration.board import detect_all, Detection
 from active_recon.calibration.fit import overall_error, rigid
+from active_recon.calibration.hand_eye import hand_eye
 from active_recon.calibration.lens import project, write_lens
 from active_recon.calibration.placement import Placement
 from active_recon.cli.main import app
@@ -83,10 +84,8 @@ def test_an_arm_that_is_not_quite_where_it_says_is_forgiven():
              @ rigid(np.array([0, 0, rng.normal(0, 0.3)]), np.zeros(3)) for _ in range(12)]
     mounts = mounts_of(views) @ np.stack([
         rigid(rng.normal(0, math.radians(0.1), 3), rng.normal(0, 0.0005, 3)) for _ in views])
-    seen = [Detection(str(index), BOARD.corners, project(
-        LENS, BOARD.corners, np.linalg.inv(BOARD_FROM_OBJECT @ view)), (640, 480))
-        for index, view in enumerate(views)]
-    assert_same(fit_arm(seen, LENS, mounts).mount_from_camera, MOUNT_FROM_CAMERA, 3e-3, 0.4)
+    found = fit_arm(drawn_from(views), LENS, mounts)
+    assert_same(found.mount_from_camera, MOUNT_FROM_CAMERA, 3e-3, 0.4)
 
 
 def test_the_order_of_the_images_does_not_matter(seen, found):
@@ -113,10 +112,41 @@ def test_poses_of_another_scale_than_the_board_are_refused(seen, scale):
     assert refusal.value.kind == 'scale'
 
 
-def test_poses_of_other_images_are_refused(seen):
-    with pytest.raises(DataError, match='wrong scale: |images contradict the motion: ') as refusal:
-        fit_arm(seen, LENS, np.roll(mounts_of(VIEWS), 1, axis=0))
-    assert refusal.value.kind in ('scale', 'reprojection')
+def test_views_of_one_point_from_one_distance_are_enough_and_tell_nothing_of_the_scale(found):
+    views = [orbit_camera(azimuth, elevation, 0.45).pose @ rigid(
+        np.array([0, 0, roll]), np.zeros(3)) for azimuth, elevation, roll in (
+        (0.0, 0.9, 0.0), (1.0, 0.7, 0.3), (2.1, 1.1, -0.4), (3.2, 0.8, 0.8), (4.4, 1.0, 0.1))]
+    orbit = fit_arm(drawn_from(views), LENS, mounts_of(views))
+    assert_same(orbit.mount_from_camera, MOUNT_FROM_CAMERA, 1e-4, 0.01)
+    assert found.scale_known
+    assert not orbit.scale_known
+
+
+def drawn_from(views):
+    """Return what is seen without any error."""
+    return [Detection(str(index), BOARD.corners, project(
+        LENS, BOARD.corners, np.linalg.inv(BOARD_FROM_OBJECT @ view)), (640, 480))
+        for index, view in enumerate(views)]
+
+
+def test_poses_of_other_images_are_refused():
+    with pytest.raises(DataError, match='wrong pose: expected the camera to turn') as refusal:
+        fit_arm(drawn_from(VIEWS), LENS, np.roll(mounts_of(VIEWS), 1, axis=0))
+    assert refusal.value.kind == 'rotation'
+
+
+def test_a_pose_that_is_not_of_its_image_is_named():
+    mounts = mounts_of(VIEWS)
+    mounts[3, :3, :3] = Rotation.from_quat(  # w x y z
+        np.roll(Rotation.from_matrix(mounts[3, :3, :3]).as_quat(), 1)).as_matrix()
+    with pytest.raises(DataError, match='^3: wrong pose: .* quaternions x y z w'):
+        fit_arm(drawn_from(VIEWS), LENS, mounts)
+
+
+def test_a_board_that_moved_is_not_told_as_one_of_another_scale():
+    moved = np.stack([np.linalg.inv(BOARD_FROM_OBJECT @ view) for view in VIEWS])
+    moved[-1] = moved[-1] @ rigid(np.zeros(3), np.array([0.05, 0.02, 0]))
+    assert hand_eye(mounts_of(VIEWS), moved, [str(index) for index in range(8)]).scale_known
 
 
 def test_poses_about_one_axis_alone_are_refused():

@@ -21,6 +21,7 @@ from active_recon.calibration.remarks import (
     of_elevation,
     of_errors,
     of_missing,
+    SCALE_UNKNOWN,
 )
 from active_recon.calibration.turntable import FEWEST_IMAGES as FEWEST_OF_TABLE
 from active_recon.calibration.turntable import fit_turntable
@@ -110,11 +111,12 @@ def calibrate_arm(images: BoardImages, placement: Placement,
     detected = _detect_board(images, FEWEST_OF_ARM, reporting)
     found = fit_arm(detected.seen, detected.lens,
                     np.stack([mounts[one.name] for one in detected.seen]))
+    remarks = detected.remarks if found.scale_known else [*detected.remarks, SCALE_UNKNOWN]
     board_from_object = placement.on_board(images.board)
     size: dict[str, Any] = {
         'object_size': placement.object_size, 'object_frame': frames.object}
     return _calibration(
-        found.images, detected.lens, board_from_object, placement, detected.remarks,
+        found.images, detected.lens, board_from_object, placement, remarks,
         {'reconstructor': {**size, 'pose_source': 'tf'}, 'view_planner': size},
         {(frames.base, frames.object): found.base_from_board @ board_from_object,
          (frames.mount, frames.camera): found.mount_from_camera})

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 _LARGEST_ERROR = 1 / 128  # in image widths
 _OUTLIER = 1.0  # pixels
+_MOST_STEPS = 100  # a fit takes 2 to 20; without a limit, contradictions take minutes
 _BEHIND = 1e4  # pixels: residual of points that a step has put behind the camera
 
 BoardPoses = Callable[[NDArray[np.float64]], Sequence[NDArray[np.float64]]]
@@ -69,7 +70,7 @@ def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses,
         sparsity = csr_matrix(np.repeat(
             depends, [*counts, *[1] * (len(depends) - len(seen))], axis=0).astype(int))
     return np.asarray(least_squares(apart, start, x_scale='jac', loss='soft_l1', f_scale=_OUTLIER,
-                                    jac_sparsity=sparsity).x)
+                                    jac_sparsity=sparsity, max_nfev=_MOST_STEPS).x)
 
 
 def fitted_images(seen: Sequence[Detection], lens: Intrinsics,

@@ -27,6 +27,10 @@ LENS_HALF_KNOWN = (
 DIRECTION_UNKNOWN = (
     "The direction of the turntable's angle is unknown: give --step-deg or --angles-deg, or set "
     'turntable_direction to 1 (counter-clockwise seen from above) or -1.')
+SCALE_UNKNOWN = (
+    'All images look at one point from one distance: squares of another size, or poses in another '
+    'unit than metres, would not be noticed. Measure a square, or add images from nearer and '
+    'farther.')
 
 
 def of_missing(names: Sequence[str]) -> list[str]:
