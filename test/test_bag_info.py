@@ -71,6 +71,12 @@ def test_the_topics_of_other_peoples_bags_are_options(tmp_path):
     assert '3 views at azimuths 0, 274, 188 degrees' in told
 
 
+def test_images_that_cannot_become_views_are_told_with_the_reason(tmp_path):
+    told = info(write_bag(tmp_path / 'run', images() + joints()[:6]))
+    assert '2 views at azimuths 0, 86 degrees' in told
+    assert '\n3 images were dropped: no camera pose arrived close enough to them' in told
+
+
 def test_what_is_no_bag_is_refused(tmp_path):
     with pytest.raises(DataError, match='no bag there'):
         info(tmp_path / 'none')

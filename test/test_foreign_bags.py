@@ -94,7 +94,9 @@ def test_camera_info_of_no_calibrated_camera_is_as_good_as_none(tmp_path):
     for _, topic, msg in messages:
         if topic == '/info':
             msg.k = [0.0] * 9
-    found = views(tmp_path / 'run', messages)
+    run = read_run(write_bag(tmp_path / 'run', messages))
+    assert run.counters['bag']['refused/unusable_camera_info'] == len(TIMES)
+    found = run.episodes[0].views
     assert azimuths(found) == AZIMUTHS
     assert found[0].camera.distance == pytest.approx(2.1)
     assert found[0].camera.intrinsics.fy / 24 == pytest.approx(CANONICAL_INTRINSICS.fy / 137)
@@ -111,7 +113,7 @@ def test_a_pose_between_two_is_interpolated_within_the_gap(tmp_path):
     messages = [*images(), *cameras(late=PERIOD // 2)]
     found = views(tmp_path / 'run', messages)
     assert found[-1].camera.azimuth == pytest.approx(AZIMUTHS[-1])
-    with pytest.raises(DataError, match='no image has an azimuth: .*within 0.01 s'):
+    with pytest.raises(DataError, match='no image has a known camera: .*within 0.01 s'):
         views(tmp_path / 'short', messages, max_pose_gap=0.01)
 
 

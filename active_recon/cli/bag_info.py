@@ -53,6 +53,14 @@ def _print_contents(path: Path, summary: 'BagSummary') -> None:
         typer.echo(f'  {topic.name:<{width}}  {topic.count:>6}  {topic.type_name}')
 
 
+def print_refusals(run: 'RecordedRun') -> None:
+    """Print which messages of a bag without a record of the loop were left out, and why."""
+    from active_recon.report.words import refusals
+
+    for refusal in refusals(run.counters.get('bag', {})):
+        typer.echo(refusal)
+
+
 def _print_run(run: 'RecordedRun', replays: bool) -> None:
     from active_recon.bags.runs.missing import describe_missing
 
@@ -65,6 +73,7 @@ def _print_run(run: 'RecordedRun', replays: bool) -> None:
         typer.echo(f'  episode {number}: {taken if azimuths else "no view"}{end}')
         if missing := describe_missing(episode):
             typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')
+    print_refusals(run)
     if run.assumed and (not replays or 'bag' in run.counters):
         typer.echo('assumed, since the bag does not say:')
         for assumption in run.assumed:

@@ -8,6 +8,7 @@ from pathlib import Path
 import time
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.bag_info import print_refusals
 from active_recon.cli.bag_options import with_bag_options
 from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
@@ -117,6 +118,7 @@ def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
     """Print the result for a bag that has no record of the loop to compare with."""
     for assumption in run.assumed:
         typer.echo(f'assumed: {assumption}')
+    print_refusals(run)
     for episode in verified.episodes:
         if not episode.steps:
             continue

@@ -12,7 +12,7 @@ from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERAN
 from active_recon.geometry.view_distance import view_distance
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import degrees, Subject
-from active_recon.report.words import counted, refused, times, view_numbers, warned
+from active_recon.report.words import counted, refusals, times, view_numbers, warned
 
 _STOPPED = {
     'max_views': ('view limit', 'It stopped because it had taken as many views as '
@@ -75,11 +75,10 @@ def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
     """Yield the findings from the nodes' counters, which count the whole run."""
     for node, counts in sorted(subject.run.counters.items()):
         name = node.strip('/')
+        for refusal in refusals(counts):
+            yield 'warning', f'{refusal} (counted by the {name}).'
         for key, count in sorted(counts.items()):
-            kind = key.removeprefix('refused/')
-            if count > 0 and kind != key:
-                yield 'warning', f'{refused(kind, count)} (counted by the {name}).'
-            elif count > 0 and key.startswith('warned/') and key != 'warned/elevation':
+            if count > 0 and key.startswith('warned/') and key != 'warned/elevation':
                 yield 'warning', (f'The {name} warned {times(count)} of '
                                   f'{warned(key.removeprefix("warned/"))}.')
         if {'images', 'views', 'images_unused'} <= counts.keys():

@@ -1,6 +1,6 @@
 """The page's texts for counters, warnings and record keys, and for their counts."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 _REFUSED = {
     'no_pose': 'no camera pose arrived close enough to {them} in time (late poses)',
@@ -79,6 +79,12 @@ def refused(kind: str, count: int) -> str:
     why = _REFUSED[kind].format(them='it' if one else 'them', their='its' if one else 'their',
                                 they='it was' if one else 'they were')
     return f'{counted(count, "image")} {"was" if one else "were"} dropped: {why}'
+
+
+def refusals(counts: Mapping[str, int]) -> list[str]:
+    """Return the texts for all rejected messages among the counters of a node."""
+    return [refused(key.removeprefix('refused/'), count) for key, count in sorted(counts.items())
+            if key.startswith('refused/') and count > 0]
 
 
 def warned(kind: str) -> str:

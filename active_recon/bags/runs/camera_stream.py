@@ -115,7 +115,9 @@ class CameraStream:
                 else:
                     self._lenses.append((stamp, intrinsics_from_msg(msg)))
             except MessageError as error:
-                yield error
+                # Of an image there may be another camera info: it is the message that is left out
+                yield error if role == POSE_ROLE else MessageError(
+                    str(error), 'unusable_camera_info')
         self._place()
         self._unstamped_images = not any(
             nanoseconds_from_stamp(read_message(message).header.stamp)

@@ -71,7 +71,8 @@ def gated_views(stream: CameraStream, gate: ViewGate,
         counters['images'] += 1
         gate.took(view.camera)
     if not counters['images']:
-        raise DataError(f'no image has an azimuth: {refusal or "there is no image"}', 'no_views')
+        raise DataError(f'no image has a known camera: {refusal or "there is no image"}',
+                        'no_views')
     if not views and refusal:
         raise DataError(f'no image became a view: {refusal}', 'no_views')
     if not views:
