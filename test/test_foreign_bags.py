@@ -48,10 +48,20 @@ def test_one_joint_of_several_is_chosen_by_its_name(tmp_path):
     folder = write_bag(tmp_path / 'run', images() + joints(names=('lift', 'turn')))
     (episode,) = read_run(folder, Topics(joint='turn')).episodes
     assert azimuths(episode.views) == AZIMUTHS
-    with pytest.raises(DataError, match='expected one of a single joint, got 2 of lift, turn'):
+    with pytest.raises(DataError, match='on /table, lift, turn: choose one with --joint'):
         read_run(folder)
     with pytest.raises(DataError, match='expected one of tilt'):
         read_run(folder, Topics(joint='tilt'))
+
+
+def test_joints_that_come_one_by_one_are_not_taken_for_one(tmp_path):
+    lift = [(time + 1, '/table', JointState(
+        header=header(time + 1, ''), name=['lift'], position=[1.0])) for time, _ in TIMES]
+    folder = write_bag(tmp_path / 'run', images() + joints() + lift)
+    (episode,) = read_run(folder, Topics(joint='turn')).episodes
+    assert azimuths(episode.views) == AZIMUTHS
+    with pytest.raises(DataError, match='several joints on /table, lift, turn'):
+        read_run(folder)
 
 
 def test_a_float_is_joined_on_receive_times(tmp_path):

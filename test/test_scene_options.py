@@ -86,6 +86,9 @@ def test_what_the_bag_tells_cannot_be_told_otherwise(tmp_path):
     for number, scene in enumerate((Scene(elevation=0.5), Scene(camera_position=(1, 0, 1)))):
         with pytest.raises(ConfigError, match='the bag has camera poses on /tracker'):
             views(tmp_path / str(number), posed, scene)
+    for topics in (Topics(joint='turn'), Topics(turned_object=True)):
+        with pytest.raises(ConfigError, match='not for geometry_msgs/msg/PoseStamped'):
+            read_run(tmp_path / '0', topics)
     with pytest.raises(ConfigError, match='both set the elevation'):
         Scene(elevation=0.5, camera_position=(1, 0, 1))
     with pytest.raises(ConfigError, match='needs --camera-position'):

@@ -16,7 +16,7 @@ from active_recon.bags.storage.message_types import (
     POSE,
     read_message,
 )
-from active_recon.errors import MessageError
+from active_recon.errors import DataError, MessageError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics
 from active_recon.reporting import Advance, Reporting, silent
 from msg_tools.camera_images import size_from_msg
@@ -36,8 +36,8 @@ class CameraStream:
     no camera position, or if it has no camera info of a calibrated camera, the camera is assumed
     at that azimuth on the scene's orbit, with a lens whose shorter side matches the canonical
     camera. Where images or azimuths have no stamps, they are joined on their receive times, and
-    an image without one has its receive time as its stamp. Raises ConfigError if the scene
-    repeats what the bag has.
+    an image without one has its receive time as its stamp. Raises ConfigError if the topics or the
+    scene tell what the bag has, DataError if the angle is of one of several joints.
 
     - assumed: in words, what neither the bag nor the scene states; complete once `views` ended
     - received: receive times by topic name in the loop and by stamp, nanoseconds
@@ -52,6 +52,7 @@ class CameraStream:
         self._scene = scene
         self._reporting = reporting
         self._unstamped = self._unstamped_images = False
+        self._joints: set[str] = set()
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64] | float]] = []
         self.images: list[tuple[int, int]] = []
@@ -118,6 +119,7 @@ class CameraStream:
                 # Of an image there may be another camera info: it is the message that is left out
                 yield error if role == POSE_ROLE else MessageError(
                     str(error), 'unusable_camera_info')
+        self._require_one_joint()
         self._place()
         self._unstamped_images = not any(
             nanoseconds_from_stamp(read_message(message).header.stamp)
@@ -133,11 +135,20 @@ class CameraStream:
         kind = self._camera.azimuth.type_name
         if kind == POSE:
             return pose_from_msg(msg, self._topics.object_frame)
-        angle = (joint_position_from_msg(msg, self._topics.joint) if kind == JOINT_STATE
-                 else float(msg.data))
+        if kind == JOINT_STATE:
+            self._joints.update(msg.name)
+            angle = joint_position_from_msg(msg, self._topics.joint)
+        else:
+            angle = float(msg.data)
         if not math.isfinite(angle):
             raise MessageError(f'azimuth not finite: got {angle}', 'azimuth')
         return angle
+
+    def _require_one_joint(self) -> None:
+        """Raise DataError where it is open which of several joints, of any message, is meant."""
+        if len(self._joints) > 1 and not self._topics.joint:
+            raise DataError(f'several joints on {self._camera.azimuth.name}, '
+                            f'{", ".join(sorted(self._joints))}: choose one with --joint', 'joint')
 
     def _place(self) -> None:
         """Decide how much of the camera is known; raise ConfigError on redundant options."""
@@ -145,6 +156,7 @@ class CameraStream:
         has_poses, recorded = azimuth.type_name == POSE, bool(self._lenses)
         if not has_poses and scene.camera_position is None:
             self._lenses.clear()  # at an unknown distance a lens is of no use
+        self._topics.reject_redundant(azimuth)
         scene.reject_redundant(azimuth.name, has_poses, has_poses and bool(self._lenses))
         self.assumed = scene.assumed(self._camera.image.name, has_poses, recorded)
 

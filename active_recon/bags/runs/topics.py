@@ -56,6 +56,16 @@ class Topics:
             raise ConfigError('max_pose_gap: invalid time: expected 0 or more seconds, got '
                               f'{self.max_pose_gap}')
 
+    def reject_redundant(self, azimuth: TopicSummary) -> None:
+        """Raise ConfigError on options for another type than the poses or azimuths have."""
+        unused = [option for option, given in (
+            ('--joint', self.joint and azimuth.type_name != JOINT_STATE),
+            ('--turned-object', self.turned_object and azimuth.type_name == POSE)) if given]
+        if unused:
+            raise ConfigError(f'{" and ".join(unused)}: not for {azimuth.type_name}, which the '
+                              f'bag has on {azimuth.name}: leave it out, or name another topic '
+                              'with --azimuth')
+
 
 @dataclass(frozen=True)
 class CameraTopics:
