@@ -1,7 +1,7 @@
 """Bags: what is written is what readers that we did not write read."""
 
 from active_recon.bags.storage import writer
-from active_recon.bags.storage.files import mcap_files
+from active_recon.bags.storage.files import numbered_files
 from active_recon.bags.storage.opening import open_bag
 from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import RecordingError
@@ -224,7 +224,7 @@ def test_each_file_of_a_split_bag_begins_with_what_is_latched_and_counts_once(tm
             if number == 10:
                 bag.write('/episode', cdr(header(10)), time_of(10), time_of(10))
             bag.flush()
-    files = mcap_files(bag.folder)
+    files = numbered_files(bag.folder)
     assert len(files) > 3
     for file in files:
         first = next(open_bag(file).messages({'/episode'}))
@@ -247,6 +247,6 @@ def test_a_disk_that_is_full_where_a_file_is_split_leaves_the_files_before(tmp_p
     bag.flush()
     with small_disk(3_000), pytest.raises(RecordingError, match='ends after 2 messages, 1 were'):
         bag.write('/camera/image_raw', cdr(image(2, 90)), time_of(2), 0)
-    assert [file.name for file in mcap_files(bag.folder)] == ['run_0.mcap']
+    assert [file.name for file in numbered_files(bag.folder)] == ['run_0.mcap']
     with Reader(bag.folder) as reader:
         assert reader.message_count == 2

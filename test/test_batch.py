@@ -49,15 +49,16 @@ def row_of(number, **values):
 
 def test_bags_of_a_tree_are_found_once_and_in_order(tmp_path):
     for name in ('z.mcap', 'b/metadata.yaml', 'b/b_0.mcap', 'split/split_0.mcap',
-                 'split/split_1.mcap', 'loose/x.db3', 'loose/y.mcap', 'loose/notes.txt',
-                 'loose/.y.mcap.part', 'empty/readme'):
+                 'split/split_1.mcap', 'day/day_0.db3', 'day/day_1.db3', 'loose/x.db3',
+                 'loose/y.mcap', 'loose/notes.txt', 'loose/.y.mcap.part', 'empty/readme'):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
     found = [str(path.relative_to(tmp_path)) for path in bags_below(tmp_path)]
-    assert found == ['b', 'loose/x.db3', 'loose/y.mcap', 'split', 'z.mcap']
+    assert found == ['b', 'day', 'loose/x.db3', 'loose/y.mcap', 'split', 'z.mcap']
     inside = [str(tmp_path / 'loose'), str(tmp_path / 'loose' / 'y.mcap'), tmp_path.as_uri()]
     assert find_roots(inside) == [tmp_path]
-    assert find_roots([str(tmp_path / '**' / '*.db3')]) == [tmp_path / 'loose' / 'x.db3']
+    assert find_roots([str(tmp_path / '**' / '*.db3')]) == [
+        tmp_path / 'day', tmp_path / 'loose' / 'x.db3']
     for pattern, roots in (('split/*.mcap', ['split']), ('b/*', ['b']), ('**/*_1.mcap', ['split']),
                            ('loose/*', ['loose/x.db3', 'loose/y.mcap'])):  # parts are one bag
         assert find_roots([str(tmp_path / pattern)]) == [tmp_path / each for each in roots]

@@ -2,12 +2,14 @@
 
 
 from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from shutil import copytree
 import sqlite3
 
 from active_recon.bags.replay.comparison import compare, NOTHING_RECORDED, SAME_BITS
 from active_recon.bags.replay.replay import ReplayedEpisode, ReplayStep
 from active_recon.bags.runs.reading import read_run
-from active_recon.bags.storage.files import mcap_files
+from active_recon.bags.storage.files import numbered_files
 from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import DataError
 from active_recon.reconstructor import Reconstruction
@@ -210,7 +212,7 @@ def test_a_file_of_a_split_bag_is_read_alone_from_its_first_own_view_on(loop, ba
     split = write_bag(tmp_path / 'split', loop.messages, max_bytes=20_000)
     whole = {view.stamp: view for view in only(read_run(bag)).views}
     found = []
-    for file in mcap_files(split):
+    for file in numbered_files(split):
         with suppress(DataError):  # one that has no view of its own
             episode = only(read_run(file))
             assert (episode.id, episode.begin) == ('first', BEGIN)
@@ -290,7 +292,29 @@ def test_the_parameters_and_the_provenance_are_read(loop, tmp_path):
 @pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
 @pytest.mark.parametrize('storage', list(StoragePlugin))
 def test_bags_that_rosbag2_packed_read_alike(bag, tmp_path, storage, mode):
-    assert same(read_run(copied(bag, tmp_path / 'copy', storage, mode)), read_run(bag))
+    copy = copied(bag, tmp_path / 'copy', storage, mode)
+    (bare,) = [path for path in copy.iterdir() if path.suffix != '.yaml']
+    for place in (copy, bare):
+        assert same(read_run(place), read_run(bag))
+
+
+def test_a_database_whose_recorder_was_killed_is_read_to_its_last_message(bag, tmp_path):
+    copy = copied(bag, tmp_path / 'copy', StoragePlugin.SQLITE3)
+    (file,) = copy.glob('*.db3')
+    with closing(sqlite3.connect(file)) as database:
+        messages = database.execute('SELECT * FROM messages').fetchall()
+        database.execute('DELETE FROM messages WHERE id > 3')
+        database.commit()
+        database.execute('PRAGMA journal_mode = WAL')
+        database.executemany('INSERT INTO messages VALUES (?, ?, ?, ?)', messages[3:])
+        database.commit()
+        (copy / 'metadata.yaml').unlink()  # written at the end
+        killed = Path(copytree(copy, tmp_path / 'killed'))
+    assert len(list(killed.glob('*.db3-wal'))) == 1
+    before = {path.name: path.read_bytes() for path in killed.iterdir()}
+    for place in (killed, killed / file.name):
+        assert same(read_run(place), read_run(bag))
+    assert before == {path.name: path.read_bytes() for path in killed.iterdir()}
 
 
 def test_a_database_of_an_older_ros_has_no_definitions_and_needs_none(bag, tmp_path):

@@ -7,12 +7,24 @@ import sys
 
 from active_recon.bags.storage.opening import open_bag
 from active_recon.bags.storage.repair import repair_bag
+from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import DataError
 from mcap.reader import make_reader
 import pytest
-from recorded_messages import announced, cdr, errors_in, header, image, small_disk, time_of
+from recorded_messages import (
+    announced,
+    cdr,
+    definition,
+    errors_in,
+    HEADER,
+    header,
+    image,
+    small_disk,
+    time_of,
+)
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
+from zstandard import ZstdCompressor
 
 CHUNKS, IN_CHUNK = 8, 5
 
@@ -214,6 +226,29 @@ def test_what_only_the_recorder_knew_of_the_bag_is_kept(cut_off):
     assert repair_bag(cut_off)[1]
     assert 'compression_mode: MESSAGE' in metadata.read_text()
     assert 'compression_format: zstd' in metadata.read_text()
+
+
+def test_a_bag_of_packed_messages_is_described_as_such(cut_off):
+    folder = cut_off.parent / 'packed'
+    with BagWriter(folder) as bag:
+        bag.add_topic('/episode', HEADER, definition(HEADER))
+        bag.write('/episode', ZstdCompressor().compress(cdr(header(0))), time_of(0), time_of(0))
+    (folder / 'metadata.yaml').unlink()
+    assert repair_bag(folder)[1]
+    assert 'compression_mode: MESSAGE' in (folder / 'metadata.yaml').read_text()
+    assert 'compression_format: zstd' in (folder / 'metadata.yaml').read_text()
+    (message,) = open_bag(folder).messages(['/episode'])
+    assert message.data == cdr(header(0))
+
+
+@pytest.mark.parametrize('suffix', ['.mcap', '.db3'])
+def test_bags_beside_each_other_are_not_taken_for_one(tmp_path, suffix):
+    for name in ('mug_0', 'mug_1', 'vase_0'):
+        (tmp_path / f'{name}{suffix}').touch()
+    for use in (open_bag, *([repair_bag] if suffix == '.mcap' else [])):
+        with pytest.raises(DataError, match=f'several bags .* got mug_0{suffix}, mug_1'):
+            use(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_a_packed_file_that_nothing_lists_is_asked_to_be_unpacked(cut_off):

@@ -114,6 +114,7 @@ def is_bag_folder(folder: Place, names: Sequence[str]) -> bool:
     """Return whether a folder that has these entries is one bag."""
     if 'metadata.yaml' in names:
         return True
-    numbered = re.compile(rf'{re.escape(folder.name)}_\d+\.mcap')
-    files = [name for name in names if name.endswith('.mcap')]
-    return bool(files) and all(map(numbered.fullmatch, files))
+    numbered = re.compile(rf'{re.escape(folder.name)}_\d+\.(mcap|db3)')
+    files = [name for name in names if name.endswith(('.mcap', '.db3'))]
+    storages = {name.rpartition('.')[2] for name in files}
+    return len(storages) == 1 and all(map(numbered.fullmatch, files))

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from active_recon.bags.storage.mcap_file import MAX_RECORD_BYTES
 from active_recon.errors import DataError
-from zstandard import frame_content_size, ZstdDecompressor, ZstdError
+from zstandard import frame_content_size, FRAME_HEADER, ZstdDecompressor, ZstdError
 
 MAX_COMPRESSION_RATIO = 200
 """The largest ratio of decompressed to compressed size that is accepted for a file larger than
@@ -19,7 +19,11 @@ _BLOCK_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class StoredFiles:
-    """The files of a bag in their order, and their compression: one of COMPRESSION_MODES."""
+    """
+    The files of a bag in their order, and their compression: one of COMPRESSION_MODES.
+
+    Messages that are compressed, each by itself, are known as such without being told.
+    """
 
     paths: Sequence[Path]
     compression_mode: str = ''
@@ -39,7 +43,7 @@ class StoredFiles:
 
     def decompressed_message(self, data: bytes) -> bytes:
         """Return the bytes of a stored message; raises DataError as `decompressed` does."""
-        if self.compression_mode != 'message':
+        if self.compression_mode != 'message' and not is_packed(data):
             return data
         try:
             declared = frame_content_size(data)  # -1: unknown
@@ -52,6 +56,11 @@ class StoredFiles:
             raise DataError(f'message too large: its {len(data)} bytes decompress to more than '
                             f'{limit}', 'too_large')
         return message
+
+
+def is_packed(message: bytes) -> bool:
+    """Return whether the bytes of a message are compressed: CDR never begins like that."""
+    return message.startswith(FRAME_HEADER)
 
 
 def _decompressed_file(path: Path, folder: Path) -> Path:

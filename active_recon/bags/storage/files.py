@@ -3,7 +3,6 @@
 from itertools import count
 import os
 from pathlib import Path
-import re
 
 from active_recon.errors import DataError
 from active_recon.whole_files import whole_file
@@ -18,22 +17,29 @@ def write_atomically(path: Path, text: str) -> None:
     sync_folder(path.parent)
 
 
-def mcap_files(folder: Path) -> list[Path]:
+def numbered_files(folder: Path, suffix: str = '.mcap') -> list[Path]:
     """
-    Return the MCAP files of a folder in rosbag2's order, by their numbers.
+    Return the files of the bag in a folder, by the numbers that rosbag2 ends their names with.
 
-    Raises DataError where others are packed: without them it would be a part of the bag.
+    Raises DataError where others are packed, as without them it would be a part of the bag, and
+    where the names are those of several bags.
     """
-    if packed := sorted(folder.glob('*.mcap.zstd')):
+    if packed := sorted(folder.glob(f'*{suffix}.zstd')):
         raise DataError(
             f'{folder}: packed files in a folder without metadata.yaml to list them: expected '
-            f'MCAP files, got {packed[0].name}; unpack it first, by `zstd -d --rm`', 'compression')
+            f'{suffix} files, got {packed[0].name}; unpack it first, by `zstd -d --rm`',
+            'compression')
+    files = sorted(folder.glob(f'*{suffix}'), key=_name_and_number)
+    if len({_name_and_number(path)[0] for path in files}) > 1:
+        raise DataError(f'{folder}: several bags in a folder without metadata.yaml: expected '
+                        f'files of one name, got {", ".join(path.name for path in files)}; name '
+                        'one of them', 'several_bags')
+    return files
 
-    def number(path: Path) -> tuple[int, str]:
-        found = re.search(r'_(\d+)$', path.stem)
-        return int(found[1]) if found else 0, path.name
 
-    return sorted(folder.glob('*.mcap'), key=number)
+def _name_and_number(path: Path) -> tuple[str, int]:
+    name, _, number = path.stem.rpartition('_')
+    return (name, int(number)) if name and number.isdecimal() else (path.stem, 0)
 
 
 def free_name(path: Path, ending: str) -> Path:

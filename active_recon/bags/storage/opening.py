@@ -4,7 +4,7 @@ from pathlib import Path
 
 from active_recon.bags.storage.bag import Bag
 from active_recon.bags.storage.compression import COMPRESSION_MODES, StoredFiles
-from active_recon.bags.storage.files import mcap_files
+from active_recon.bags.storage.files import numbered_files
 from active_recon.bags.storage.mcap_bag import McapBag
 from active_recon.bags.storage.metadata import yaml_mapping
 from active_recon.errors import DataError
@@ -18,16 +18,17 @@ def open_bag(path: Path) -> Bag:
     if not path.exists():
         raise DataError(f'{path}: no bag there: no such file or folder')
     if not path.is_dir():
-        alone = StoredFiles([path])
+        alone = StoredFiles([path], 'file' if path.suffix == '.zstd' else '')
         return McapBag(path, alone) if _is_mcap(path) else _sqlite3_bag(path, alone)
     if (path / 'metadata.yaml').exists():
         storage, named = _described(path)
         return McapBag(path, named) if storage == 'mcap' else _sqlite3_bag(path, named)
-    files = mcap_files(path)
-    if not files:
-        raise DataError(f'{path}: no bag in this folder: it has neither metadata.yaml nor an '
-                        'MCAP file')
-    return McapBag(path, StoredFiles(files))
+    if files := numbered_files(path):
+        return McapBag(path, StoredFiles(files))
+    if files := numbered_files(path, '.db3'):
+        return _sqlite3_bag(path, StoredFiles(files))
+    raise DataError(f'{path}: no bag in this folder: it has neither metadata.yaml nor an MCAP or '
+                    'sqlite3 file')
 
 
 def _sqlite3_bag(path: Path, files: StoredFiles) -> Bag:
@@ -38,6 +39,8 @@ def _sqlite3_bag(path: Path, files: StoredFiles) -> Bag:
 
 
 def _is_mcap(path: Path) -> bool:
+    if path.suffix == '.zstd':
+        return path.stem.endswith('.mcap')
     try:
         with path.open('rb') as file:
             return file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC

@@ -7,7 +7,13 @@ import os
 from pathlib import Path
 from typing import Any
 
-from active_recon.bags.storage.files import free_name, mcap_files, sync_folder, write_atomically
+from active_recon.bags.storage.compression import is_packed
+from active_recon.bags.storage.files import (
+    free_name,
+    numbered_files,
+    sync_folder,
+    write_atomically,
+)
 from active_recon.bags.storage.mcap_rewriter import McapRewriter
 from active_recon.bags.storage.metadata import (
     bag_information,
@@ -30,6 +36,7 @@ class Repair:
     """
     The outcome for one file of a bag.
 
+    - packed: whether its messages are compressed, each by itself
     - lost: what could not be read, in words
     - kept_as: the path of the original file; None if it was intact and was left unchanged
     """
@@ -37,6 +44,7 @@ class Repair:
     path: Path
     contents: Contents = field(default_factory=Contents)
     topics: dict[str, Topic] = field(default_factory=dict)
+    packed: bool = False
     lost: list[str] = field(default_factory=list)
     kept_as: Path | None = None
 
@@ -69,9 +77,10 @@ def bag_files(bag: Path) -> list[Path]:
     """Return a bag's files in the order of recording; raises DataError if there is no bag."""
     if bag.is_file():
         return [bag]
-    files = mcap_files(bag)
+    files = numbered_files(bag)
     if not files:
-        raise DataError(f'{bag}: no bag there: expected a folder of MCAP files, or one MCAP file',
+        raise DataError(f'{bag}: no bag there to repair: expected a folder of MCAP files, or one '
+                        'MCAP file; sqlite3 bags are read as they are',
                         'no_bag')
     return files
 
@@ -118,6 +127,7 @@ def _survey(found: Salvage) -> Repair:
                 record.topic, types.get(record.schema_id, ''),
                 qos_from_yaml(record.metadata.get('offered_qos_profiles', '')))
         elif isinstance(record, Message):
+            repair.packed |= is_packed(record.data)
             if record.channel_id in topics:
                 repair.contents.add(topics[record.channel_id], record.log_time)
             else:
@@ -144,6 +154,8 @@ def _repair_metadata(folder: Path, repairs: Sequence[Repair]) -> bool:
     topics = {name: topic for repair in repairs for name, topic in repair.topics.items()}
     information = bag_information(
         [(repair.path.name, repair.contents) for repair in repairs], topics.values())
+    if any(repair.packed for repair in repairs):
+        information |= {'compression_format': 'zstd', 'compression_mode': 'MESSAGE'}
     if path.exists():
         before = _read_information(path)
         if _essence(before) == _essence(information):

@@ -1,8 +1,11 @@
 """A bag in rosbag2's storage sqlite3."""
 
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager, ExitStack
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import closing, contextmanager, ExitStack
 from pathlib import Path
+from shutil import copyfile
+import sqlite3
+from tempfile import TemporaryDirectory
 
 from active_recon.bags.storage.bag import bag_summary, BagSummary, RawMessage
 from active_recon.bags.storage.compression import StoredFiles
@@ -55,7 +58,8 @@ class Sqlite3Bag:
     def _readers(self) -> Iterator[list[Reader]]:
         """Open a reader of each file; its errors are raised as DataError."""
         try:
-            with self._files.decompressed() as files, ExitStack() as stack:
+            with (self._files.decompressed() as stored, _complete(stored) as files,
+                  ExitStack() as stack):
                 readers = [stack.enter_context(Reader(file)) for file in files]
                 for connection in (each for reader in readers for each in reader.connections):
                     if connection.msgdef.format == MessageDefinitionFormat.MSG:
@@ -69,6 +73,31 @@ class Sqlite3Bag:
         except Exception as error:  # the library raises all kinds of errors on damaged bytes
             raise DataError(f'{self._path}: no readable rosbag2 bag (MCAP or sqlite3): '
                             f'{" ".join(str(error).split())}') from error
+
+
+@contextmanager
+def _complete(files: Sequence[Path]) -> Iterator[list[Path]]:
+    """
+    Yield databases with all that was recorded, in the files' order.
+
+    SQLite's log holds the last of it after a recorder was killed; it is taken in by a copy.
+    """
+    with TemporaryDirectory() as folder:
+        yield [_with_logs(file, logs, Path(folder)) if (logs := _logs(file)) else file
+               for file in files]
+
+
+def _logs(file: Path) -> list[Path]:
+    logs = (file.with_name(file.name + ending) for ending in ('-wal', '-journal'))
+    return [log for log in logs if log.is_file() and log.stat().st_size]
+
+
+def _with_logs(file: Path, logs: Sequence[Path], folder: Path) -> Path:
+    for each in (file, *logs):
+        copyfile(each, folder / each.name)
+    with closing(sqlite3.connect(folder / file.name)) as database:
+        database.execute('PRAGMA wal_checkpoint(TRUNCATE)')
+    return folder / file.name
 
 
 def _offered(connection: Connection) -> tuple[QosProfile, ...]:
