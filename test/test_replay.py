@@ -344,6 +344,10 @@ def test_weights_are_found_by_their_hash_wherever_they_lie(tmp_path):
     assert recorded_setup(bag, moved).weights == moved
     with pytest.raises(WeightsError, match='which have changed since'):
         recorded_setup(bag)
+    for wrong, reason in ((other, 'not the weights of the recording: '),
+                          (tmp_path / 'none', 'no such file')):
+        with pytest.raises(WeightsError, match=reason):
+            recorded_setup(bag, wrong)
     assert recorded_setup(bag, other, any_weights=True).weights == other
 
 

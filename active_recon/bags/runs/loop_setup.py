@@ -99,10 +99,11 @@ def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: b
     """
     Return what a run was recorded with, by its parameters and the hash of its weights.
 
-    `weights`: the file to check first or, with `any_weights`, to use whatever its hash.
+    `weights`: the file, which has to have the recorded hash unless `any_weights`; None: whichever
+    has it.
     `scene_parameters`: `object_size` in metres and `object_yaw` in radians, which replace the
-    recorded ones; None keeps those. Raises WeightsError if no file has the recorded hash,
-    DataError if a parameter is invalid.
+    recorded ones; None keeps those. Raises WeightsError if there are no weights of the recorded
+    hash, DataError if a parameter is invalid.
     """
     placed = {name: value for name, value in (scene_parameters or {}).items()
               if value is not None}
@@ -158,13 +159,26 @@ def _named(parameter: str) -> Path | None:
 
 def _recorded_weights(run: RecordedRun, weights: Path | None, parameter: str) -> Path:
     wanted = run.provenance.get('weights_sha256')
-    named = [path for path in (weights, _named(parameter)) if path]
+    named = _named(parameter)
     if wanted is None:
-        return [*named, SHIPPED][0]
-    for path in (*named, SHIPPED, *sorted(FOLDER.glob('*.safetensors'))):
+        return weights or named or SHIPPED
+    if weights is not None:
+        _require_hash(weights, wanted)
+        return weights
+    for path in (*([named] if named else []), SHIPPED, *sorted(FOLDER.glob('*.safetensors'))):
         if path.is_file() and weights_hash(path) == wanted:
             return path
     raise WeightsError(
         f'{run.path}: weights not found: expected those of the recording, SHA-256 '
-        f'{wanted[:12]}..., among the given and the shipped ones, which have changed since. Give '
-        'the file by --weights, or replay with another model by --model')
+        f'{wanted[:12]}..., among the shipped ones, which have changed since. Give the file by '
+        '--weights, or replay with another model by --model')
+
+
+def _require_hash(weights: Path, wanted: str) -> None:
+    if not weights.is_file():
+        raise WeightsError(f'{weights}: no such file: expected the weights of the recording, '
+                           f'SHA-256 {wanted[:12]}...')
+    if (found := weights_hash(weights)) != wanted:
+        raise WeightsError(
+            f'{weights}: not the weights of the recording: expected SHA-256 {wanted[:12]}..., got '
+            f'{found[:12]}...; --model replays with other weights')
