@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 
+from active_recon.report.page import report_page
 from active_recon.report.stages import median, STAGES, timings, two_clocks
+from active_recon.report.subject import Subject
 import pytest
 from report_runs import changed, DECISION, HAND_OVER, MS, NETWORK, recorded_run, TURN, WAY
 
@@ -35,6 +37,17 @@ def test_last_view_of_an_episode_that_is_done_has_no_decision_and_no_total(run):
     last = timings(run.episodes[0])[-1]
     assert last.stages[3] is None
     assert last.total is None
+
+
+def test_a_replay_has_messages_with_times_and_no_timing(run):
+    replayed = replace(run, provenance={**run.provenance, 'replay_of': 'run'})
+    assert Subject('A', run, run.episodes[0]).timed
+    subject = Subject('A', replayed, replayed.episodes[0])
+    for timing in timings(subject.episode, subject.timed):
+        assert not any(known is not None for known in (*timing.stages, timing.total, timing.turn))
+    page = report_page([subject])
+    assert 'image to goal' in report_page([Subject('A', run, run.episodes[0])])
+    assert 'image to goal' not in page
 
 
 def test_what_overtakes_takes_no_time_and_the_sum_stays(run):

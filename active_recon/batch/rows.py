@@ -66,7 +66,7 @@ def episode_row(bag: str, number: int, subject: Subject, verdict: str, report: s
         'stopped': episode.done, 'verdict': verdict,
         'recorded': run.begin // 1000 if run.begin > 0 else None,
         'duration_s': (run.end - run.begin) / 1e9,
-        'image_to_goal_ms': median([each.total for each in timings(episode)]) if views else None,
+        'image_to_goal_ms': median([each.total for each in timings(episode, subject.timed)]),
         'travel_deg': math.degrees(subject.travel),
         'warnings': [each.text for each in findings(subject) if each.level == 'warning'],
         'weights_sha256': run.provenance.get('weights_sha256', ''),

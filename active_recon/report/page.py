@@ -47,7 +47,7 @@ def report_page(subjects: Sequence[Subject]) -> str:
         panel['colored'] = surface is not None
     drawn = {'shared': shared, 'panels': [
         {'scene': scene(subject), 'surface': surface, 'map': turntable_map(subject),
-         'stages': stage_chart(timings(subject.episode))}
+         'stages': stage_chart(timings(subject.episode, subject.timed))}
         for subject, surface in zip(subjects, surfaces, strict=True)]}
     environment = Environment(
         loader=PackageLoader('active_recon.report', 'templates'), autoescape=True,
@@ -73,7 +73,7 @@ def write_page(page: str, path: Path) -> None:
 
 def _panel(subject: Subject) -> dict[str, Any]:
     """Return the template's variables of one subject."""
-    run, times = subject.run, timings(subject.episode)
+    run, times = subject.run, timings(subject.episode, subject.timed)
     recorded = datetime.fromtimestamp(run.begin / 1e9, UTC)
     return {
         'subject': subject,

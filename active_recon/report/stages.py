@@ -45,9 +45,13 @@ class Timing:
     total: float | None
     turn: float | None
 
+_UNKNOWN = Timing((None,) * len(STAGES), None, None)
 
-def timings(episode: RecordedEpisode) -> list[Timing]:
-    """Return the timing of each view."""
+
+def timings(episode: RecordedEpisode, measured: bool = True) -> list[Timing]:
+    """Return the timing of each view: nothing where it was not `measured`, as in a replay."""
+    if not measured:
+        return [_UNKNOWN] * len(episode.views)
     asked = [episode.first_goal, *(view.goal for view in episode.views)]
     return [_timing(view, goal and goal.final)
             for view, goal in zip(episode.views, asked, strict=False)]

@@ -46,6 +46,11 @@ class Subject:
         return self.episode.done == PHOTOS
 
     @property
+    def timed(self) -> bool:
+        """Whether the times of its messages are a loop's: a replay gives them stamps alone."""
+        return 'replay_of' not in self.run.provenance
+
+    @property
     def goals(self) -> list[RecordedGoal | None]:
         """The goal of each view."""
         decided = [self.episode.first_goal, *(view.goal for view in self.views[:-1])]
