@@ -6,6 +6,7 @@ from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.rebuilt import lacks_reconstruction, rebuilt
 from active_recon.bags.runs.scene import parse_background, Scene
 from active_recon.bags.runs.topics import Topics
+from active_recon.calibration.placement import cube_corners
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import CANONICAL_DISTANCE, CANONICAL_INTRINSICS
@@ -61,6 +62,19 @@ def test_a_camera_of_a_known_position_is_itself(tmp_path, turned):
     pixel, _ = found[0].camera.project(np.zeros((1, 3)))
     assert pixel[0] == pytest.approx([found[0].camera.intrinsics.cx,
                                       found[0].camera.intrinsics.cy])
+
+
+def test_a_camera_of_a_known_position_and_no_lens_sees_the_object_as_large_from_afar(tmp_path):
+    folder = write_bag(tmp_path / 'run', [*images(), *joints()])
+    corners = cube_corners(0.5)
+    for distance in (0.8, 8.0):
+        camera = read_run(folder, scene=Scene(
+            object_size=0.5, camera_position=(0.0, distance, 0.0))).episodes[0].views[0].camera
+        assert camera.distance == pytest.approx(distance)
+        middle = camera.project(np.zeros((1, 3)))[0]
+        across = np.abs(camera.project(corners * [1, 0, 1])[0] - middle).max()
+        assert across == pytest.approx(
+            CANONICAL_INTRINSICS.fx / CANONICAL_INTRINSICS.width * 24 / 2.1 / 2)
 
 
 def test_a_background_is_taken_away_as_it_is_told(tmp_path):

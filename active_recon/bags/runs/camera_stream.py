@@ -35,9 +35,10 @@ class CameraStream:
     Poses are interpolated and rejected as in the node. If the bag has azimuths only and the scene
     no camera position, or if it has no camera info of a calibrated camera, the camera is assumed
     at that azimuth on the scene's orbit, with a lens whose shorter side matches the canonical
-    camera. Where images or azimuths have no stamps, they are joined on their receive times, and
-    an image without one has its receive time as its stamp. Raises ConfigError if the topics or the
-    scene tell what the bag has, DataError if the angle is of one of several joints.
+    camera, or at the scene's position, with one as much longer as that is farther. Where images or
+    azimuths have no stamps, they are joined on their receive times, and an image without one has
+    its receive time as its stamp. Raises ConfigError if the topics or the scene tell what the bag
+    has, DataError if the angle is of one of several joints.
 
     - assumed: in words, what neither the bag nor the scene states; complete once `views` ended
     - received: receive times by topic name in the loop and by stamp, nanoseconds
@@ -173,7 +174,8 @@ class CameraStream:
         if self._lenses:
             return self._lenses[max(bisect_right(self._lenses, time, key=_stamp) - 1, 0)][1]
         side = min(height, width)
-        focal = CANONICAL_INTRINSICS.fx * side / CANONICAL_INTRINSICS.width
+        focal = (self._scene.canonical_distances * CANONICAL_INTRINSICS.fx * side
+                 / CANONICAL_INTRINSICS.width)
         return Intrinsics(focal, focal, width / 2, height / 2, width, height)
 
 

@@ -58,6 +58,13 @@ class Scene:
         return 1.0 if self.object_size is None else self.object_size
 
     @property
+    def canonical_distances(self) -> float:
+        """The camera's distance in those of the canonical one, whose image the object fills."""
+        if self.camera_position is None:
+            return 1.0
+        return float(np.linalg.norm(self.camera_position)) / (CANONICAL_DISTANCE * self.size)
+
+    @property
     def parameters(self) -> Mapping[str, float | None]:
         """The parameters of reconstructor and planner among the options."""
         return {'object_size': self.object_size, 'object_yaw': self.object_yaw}
