@@ -44,6 +44,16 @@ def test_truth_of_any_other_object_is_not_known(run, mesh, up):
     assert known_truth(shown(run, mesh, up)) is None
 
 
+def test_object_that_ships_is_as_large_as_the_camera_showed_it_in_a_larger_cube(run):
+    camera = run.parameters['turntable_camera'] | {'object_size': 0.5}
+    shown_small = replace(run, parameters={**run.parameters, 'turntable_camera': camera})
+    small, whole = known_truth(shown_small), known_truth(run)
+    assert "longest side was 0.5 m; the run's cube is 1 m" in small.placed
+    assert small.cells.sum() == pytest.approx(whole.cells.sum() / 8, rel=0.2)
+    sides = [np.ptp(np.argwhere(cells), axis=0).max() + 1 for cells in (small.cells, whole.cells)]
+    assert sides[0] == pytest.approx(sides[1] / 2, abs=2)
+
+
 def test_mesh_and_its_binvox_are_the_same_truth(run, tmp_path):
     cells = cells_of('chair', run)
     write_binvox(VoxelGrid(cells.astype(np.float32)), tmp_path / 'chair.binvox')

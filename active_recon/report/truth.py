@@ -101,7 +101,15 @@ def known_truth(run: RecordedRun) -> Truth | None:
         mesh.parts == (mesh.stem,) or mesh.parts[-3:-1] == ('active_recon', 'objects'))
     if not ships or camera.get('up') or camera.get('front'):
         return None
-    return TruthFile(Path(mesh.stem)).read(run)
+    size = _object_size(run)
+    shown = float(camera.get('object_size', size))
+    if abs(shown / size - 1) < _SAME_SIDE:
+        return TruthFile(Path(mesh.stem)).read(run)
+    scaled = load_mesh(find_object(mesh.stem))
+    scaled.apply_transform(np.diag([*[shown / size] * 3, 1.0]))
+    cells = _turned(VoxelGrid(_in_place(scaled, _resolution(run)).astype(np.float32)), run)
+    return Truth(cells, f'The true shape is {mesh.stem}, whose longest side was {shown:g} m; the '
+                        f"run's cube is {size:g} m.")
 
 
 def _fitted(mesh: trimesh.Trimesh, run: RecordedRun) -> NDArray[np.bool_]:
