@@ -7,7 +7,7 @@ from active_recon.calibration.board import detect_all, Detection
 from active_recon.calibration.fit import overall_error
 from active_recon.calibration.lens import estimate_lens, project, read_lens, write_lens
 from active_recon.calibration.placement import Placement
-from active_recon.calibration.remarks import of_angles
+from active_recon.calibration.remarks import of_angles, of_errors
 from active_recon.calibration.turntable import fit_turntable
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import azimuth_difference, Camera
@@ -177,6 +177,13 @@ def test_a_camera_that_slipped_is_refused(seen):
     with pytest.raises(DataError, match='neither the camera nor the board slipped') as refusal:
         fit_turntable([*seen[:4], *elsewhere], LENS, ANGLES)
     assert refusal.value.kind == 'reprojection'
+
+
+def test_the_lens_of_another_camera_is_among_the_causes_of_a_large_error(seen):
+    longer = replace(LENS, fx=1.4 * LENS.fx, fy=1.4 * LENS.fy)
+    (remark,) = of_errors(fit_turntable(seen, longer, ANGLES).images)
+    assert 'the camera info, if given, that of this camera' in remark
+    assert not of_errors(fit_turntable(seen, LENS, ANGLES).images)
 
 
 @pytest.mark.parametrize('size', [0.0, -1.0, math.nan, math.inf])

@@ -60,7 +60,8 @@ def of_errors(images: Sequence[ImageFit]) -> list[str]:
     error, good = overall_error(images), images[0].seen.size[0] * _GOOD_ERROR
     remarks = [] if error <= good else [
         f'The error of {error:.1f} pixels is large (usual: below {good:.1f}). Check that the '
-        'board is flat, the images are sharp, and the motion is exact.']
+        'board is flat, the images are sharp, the motion is exact, and the camera info, if given, '
+        'that of this camera.']
     worse = [one.seen.name for one in images if one.error > _MUCH_WORSE * error]
     return remarks + ([f'Images with a much larger error: {", ".join(worse)}.'] if worse else [])
 
