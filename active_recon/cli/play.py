@@ -11,7 +11,7 @@ import typer
 
 
 def play(
-    bag: Annotated[Path, typer.Argument(help="A bag's folder, or one of its MCAP files.")],
+    bag: Annotated[Path, typer.Argument(help='A rosbag2 folder, or an MCAP or sqlite3 file.')],
     rate: Annotated[float, typer.Option(
         help='Playback speed, above 0; 1 is the speed of the recording.')] = 1.0,
     topics: Annotated[str, typer.Option(
