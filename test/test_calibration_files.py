@@ -51,8 +51,9 @@ def test_an_image_is_read_as_the_camera_took_it_whatever_exif_says(tmp_path):
 
 @pytest.mark.parametrize('text', [
     'image,degrees\na10.png, 90\na2.png, 45\n', 'a2.png,45\na10.png,90\nother.png,1\n',
-    '45\n90\n', 'degrees\n45\n\n90\n', 'images/a2.png,45\nimages/a10.png,90'],
-    ids=['heading', 'more than asked', 'without names', 'heading alone', 'with folders'])
+    '45\n90\n', 'degrees\n45\n\n90\n', 'images/a2.png,45\nimages/a10.png,90', '\ufeff45\n90\n'],
+    ids=['heading', 'more than asked', 'without names', 'heading alone', 'with folders',
+         'by a spreadsheet'])
 def test_angles_belong_to_their_images(tmp_path, text):
     angles = read_angles(write(tmp_path / 'angles.csv', text), NAMES)
     assert angles == pytest.approx({'a2.png': math.pi / 4, 'a10.png': math.pi / 2})
@@ -65,6 +66,7 @@ def test_angles_belong_to_their_images(tmp_path, text):
     ('a2.png,45\na10.png,ninety\n', r'line 2: wrong row: expected 1 numbers, .* got a10.png, '
                                     r'ninety'),
     ('a2.png,45\na10.png,inf\n', 'line 2'),
+    ('a2.png,45\na10.png,90\nother/a2.png,40', 'line 3: a second row for a2.png'),
     ('a2.png,45,3\na10.png,90,3\n', 'line 1'),
     ('', 'none for a2.png, a10.png'),
 ])

@@ -84,7 +84,7 @@ def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
     the order of `names`. A heading is skipped. Raises DataError that names the line.
     """
     try:
-        with path.open(newline='') as lines:
+        with path.open(newline='', encoding='utf-8-sig') as lines:  # spreadsheets mark it
             rows = [(number, [cell.strip() for cell in row])
                     for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -98,7 +98,10 @@ def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
             raise DataError(f'{path}, line {number}: wrong row: expected {count} numbers, or an '
                             f'image and {count} numbers, got {", ".join(row)}')
         if len(row) > count:
-            named[Path(row[0]).name] = values
+            if (name := Path(row[0]).name) in named:
+                raise DataError(f'{path}, line {number}: a second row for {name}: expected one '
+                                'for each image')
+            named[name] = values
         else:
             unnamed.append(values)
     if unnamed and (named or len(unnamed) != len(names)):
