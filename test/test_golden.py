@@ -183,3 +183,9 @@ def test_a_policy_that_wants_a_view_that_was_never_taken_is_refused(
 def test_a_place_for_a_bag_that_is_not_written_is_refused(tmp_path, monkeypatch, capsys):
     code, said = told(monkeypatch, capsys, 'replay', PAPER, '--out', tmp_path / 'new')
     assert (code, '--out: no bag to write' in said) == (2, True)
+
+
+def test_the_weights_of_the_recording_are_not_named_beside_another_model(monkeypatch, capsys):
+    code, said = told(monkeypatch, capsys, 'replay', PAPER, '--weights', 'a.safetensors',
+                      '--model', '2d3d')
+    assert (code, '--weights beside --model: expected one' in said) == (2, True)

@@ -88,6 +88,9 @@ def replay(
     if out and overrides == Overrides():
         raise ConfigError('--out: no bag to write: expected it with --model, --policy or '
                           '--threshold, got none of them')
+    if model and weights:
+        raise ConfigError('--weights beside --model: expected one of them, the weights of the '
+                          'recording or another model, got both')
     files = ShapeFiles(mesh, voxels, density)
     began = time.monotonic()
     run = read_run(path, topics, scene, bag_progress(path))
