@@ -1,5 +1,7 @@
 """Photos are read upright, in 8 bits, and no larger than needed; what is no photo is left out."""
 
+import shutil
+
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.photos.camera_file import PosedPhoto
@@ -12,6 +14,7 @@ from active_recon.photos.files import (
 )
 from active_recon.photos.large_images import opened as opened_large
 from active_recon.photos.views import load_views, view_of
+from active_recon.watching.arrivals import Arrivals
 import cv2
 import numpy as np
 from PIL import ExifTags, Image, ImageOps
@@ -142,6 +145,21 @@ def test_a_folder_without_a_photo_is_refused(tmp_path):
     (tmp_path / 'broken.png').write_bytes(b'\x89PNG')
     with pytest.raises(DataError, match='no readable photo: expected at least one, got none; '
                                         'broken.png'):
+        open_photos(photo_paths(tmp_path))
+
+
+def test_hidden_files_and_depth_are_no_photos_and_heic_is_told_of(tmp_path):
+    Image.fromarray(drawn()).save(tmp_path / 'a.png')
+    for name in ('.trashed-1-a.png', '._a.png', '~a.png', 'a_depth.png', 'b.HEIC'):
+        shutil.copy(tmp_path / 'a.png', tmp_path / name)
+    photos, left_out = open_photos(photo_paths(tmp_path))
+    assert [photo.name for photo in photos] == ['a.png']
+    assert len(left_out) == 1 and left_out[0].startswith('b.HEIC: HEIC photos cannot be read: let')
+    arrivals = Arrivals(tmp_path)
+    arrivals.arrived(0.0)
+    assert {path.name for path in arrivals.arrived(1.0)} == {'a.png', 'b.HEIC'}
+    (tmp_path / 'a.png').unlink()
+    with pytest.raises(DataError, match=r'no readable photo: .*; b.HEIC: HEIC photos cannot be'):
         open_photos(photo_paths(tmp_path))
 
 

@@ -58,19 +58,29 @@ class PhotoFile:
         return self.size[::-1] if self.orientation >= 5 else self.size
 
 
+def is_photo(path: Path) -> bool:
+    """
+    Return whether a file of a folder is a photo, by its name.
+
+    Hidden files (what a phone has in its bin, what is not whole yet) and depth images are none.
+    HEIC, which cannot be read, is one: it has to be told of.
+    """
+    return (path.suffix.lower() in (*ENDINGS, *HEIC_ENDINGS)
+            and not path.name.startswith(('.', '~')) and not is_depth(path))
+
+
 def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
     """
     Return the photos of a folder in the order of their names, 2 before 10; a list stays as it is.
 
-    Depth images beside them are none. Raises DataError where the folder is missing or has none.
+    They are those of `is_photo`. Raises DataError where the folder is missing or has none.
     """
     if not isinstance(place, Path):
         return list(place)
     if not place.is_dir():
         raise DataError(f'{place}: no such folder: expected one with photos '
                         f'({", ".join(ENDINGS)})', 'no_photos')
-    paths = sorted((path for path in place.iterdir()
-                    if path.suffix.lower() in ENDINGS and not is_depth(path)), key=in_order)
+    paths = sorted(filter(is_photo, place.iterdir()), key=in_order)
     if not paths:
         raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none',
                         'no_photos')

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from active_recon.calibration.files import in_order
 from active_recon.errors import DataError
-from active_recon.photos.files import ENDINGS, HEIC_ENDINGS
+from active_recon.photos.files import is_photo
 
 SETTLED_S = 0.8
 """A file is whole once it has not changed for so long, seconds."""
@@ -24,8 +24,8 @@ class Arrivals:
     """
     Tells which photos of a folder have come, changed or gone.
 
-    Hidden files and those of other endings, as which programs that synchronise folders keep what
-    is not whole yet, are no photos. Raises DataError where there is no such folder.
+    Photos are those of `is_photo`: what programs that synchronise folders have not whole yet they
+    keep as hidden files, or under other endings. Raises DataError where there is no such folder.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -62,10 +62,7 @@ class Arrivals:
 
     def _files(self) -> Iterator[tuple[Path, tuple[int, int]]]:
         """Yield each photo with its size and the time of its last change."""
-        endings = (*ENDINGS, *HEIC_ENDINGS)  # the latter to be told of
-        for path in self._folder.iterdir():
-            if path.suffix.lower() not in endings or path.name.startswith(('.', '~')):
-                continue
+        for path in filter(is_photo, self._folder.iterdir()):
             try:
                 status = path.stat()
             except OSError:  # gone since
