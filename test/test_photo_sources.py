@@ -106,6 +106,17 @@ def test_a_turntable_s_steps_are_azimuths_the_other_way_round(tmp_path):
             posed_by(TurntableCameras(step, 0.3, 0.6, view), photos)
 
 
+def test_the_table_has_turned_to_photos_that_cannot_be_read_too(tmp_path):
+    blank_photos(tmp_path, rig(PINHOLE, count=5))
+    (tmp_path / 'photo2.png').write_bytes(b'damaged')
+    (tmp_path / 'photo1.heic').write_bytes(b'what photo1.png was made from')
+    photos, left_out = open_photos(photo_paths(tmp_path))
+    _, posed, _ = posed_by(TurntableCameras(0.3, 0.2, 0.6, 0.9), photos)
+    assert len(left_out) == 2
+    azimuths = [math.atan2(*each.pose[[1, 0], 3]) for each in posed]
+    np.testing.assert_allclose(azimuths, [0, -0.3, -0.9, -1.2])
+
+
 def test_a_turntable_s_photos_have_their_focal_length_by_exif(tmp_path):
     exif = Image.Exif()
     exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.FocalLengthIn35mmFilm] = 28

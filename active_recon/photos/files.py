@@ -1,7 +1,8 @@
 """Photos as files: which there are, how large and how turned they are, and their pixels."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import hashlib
 import math
 from pathlib import Path
@@ -23,6 +24,7 @@ ORDERS = ('name', 'time')
 """By their names, 2 before 10, or by when they were taken."""
 LARGEST_SIDE = 2048
 """Pixels a side to which larger photos are reduced: far more than any network's image has."""
+_UNREADABLE = 'unreadable'
 _FILM_DIAGONAL = math.hypot(36, 24)  # millimetres, of the film that EXIF's equivalent refers to
 _TURNED = {2: Image.Transpose.FLIP_LEFT_RIGHT, 3: Image.Transpose.ROTATE_180,
            4: Image.Transpose.FLIP_TOP_BOTTOM, 5: Image.Transpose.TRANSPOSE,
@@ -39,6 +41,7 @@ class PhotoFile:
     - size: width and height as stored, pixels; orientation: EXIF's, 1 (as stored) to 8
     - focal: focal length by EXIF, pixels of the photo as stored; None where it says nothing
     - taken: when, by EXIF, in a form that sorts; '' where it says nothing
+    - lost: how many photos that cannot be read come between it and the next one
     """
 
     path: Path
@@ -46,6 +49,7 @@ class PhotoFile:
     orientation: int = 1
     focal: float | None = None
     taken: str = ''
+    lost: int = 0
 
     @property
     def name(self) -> str:
@@ -91,9 +95,12 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
     """
     Return the photos among files, and why the others are left out.
 
-    A photo whose file has the same bytes as one before is left out. Raises DataError where none
-    is left.
+    A photo whose file has the same bytes as one before is left out. One that cannot be read is
+    `lost` after the one before it, unless another file has its name but for the ending. Raises
+    DataError where none is left.
     """
+    paths = list(paths)
+    named = Counter(path.with_suffix('') for path in paths)
     photos: list[PhotoFile] = []
     left_out: list[str] = []
     known: dict[bytes, str] = {}
@@ -102,6 +109,8 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
             photos.append(open_photo(path, known))
         except DataError as error:
             left_out.append(str(error))
+            if photos and error.kind == _UNREADABLE and named[path.with_suffix('')] == 1:
+                photos[-1] = replace(photos[-1], lost=photos[-1].lost + 1)
     if not photos:
         raise DataError('no readable photo: expected at least one, got none'
                         + ''.join(f'; {reason}' for reason in left_out[:3]), 'no_photos')
@@ -115,13 +124,13 @@ def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
     Raises DataError where it cannot be read, or another of `known` has the same bytes.
     """
     if path.suffix.lower() in HEIC_ENDINGS:
-        raise DataError(f'{path.name}: {HEIC_ADVICE}')
+        raise DataError(f'{path.name}: {HEIC_ADVICE}', _UNREADABLE)
     try:
         digest = hashlib.sha256(path.read_bytes()).digest()
         photo = _opened(path)
     except (DataError, OSError) as error:
         raise DataError(f'{path.name}: not readable: expected a whole image, got: '
-                        f'{error}') from error
+                        f'{error}', _UNREADABLE) from error
     if known.setdefault(digest, path.name) != path.name:
         raise DataError(f'{path.name}: the same photo as {known[digest]}')
     return photo
