@@ -109,6 +109,18 @@ def test_a_folder_comes_by_its_numbers_and_what_cannot_be_read_is_left_out(tmp_p
     assert '4.png: not readable' in broken
 
 
+def test_a_folder_whose_first_image_cannot_be_read_begins_with_the_others(tmp_path):
+    (tmp_path / '0.png').write_bytes(b'no image')
+    with pytest.raises(DataError, match='0.png: not readable'):
+        open_source(str(tmp_path))
+    Image.new('RGB', SIZE).save(tmp_path / '1.png')
+    source = open_source(str(tmp_path))
+    assert source.size == SIZE
+    with pytest.raises(DataError, match='0.png: not readable'):
+        source.read()
+    assert source.read() is not None and source.read() is None
+
+
 def test_a_device_that_was_unplugged_is_searched_for_and_goes_on(monkeypatch):
     monkeypatch.setattr(grabbing, 'RETRY_S', 0.01)
     first, second = Fake(2), Fake(3)

@@ -144,8 +144,7 @@ class _Folder:
         self.name = str(folder)
         self.rate: float | None = rate
         self._left = image_paths([folder])
-        first = read_image(self._left[0])
-        self.size = first.shape[1], first.shape[0]
+        self.size = _first_size(self._left)
 
     def read(self) -> NDArray[np.uint8] | None:
         """Return the next image; see ImageSource."""
@@ -161,3 +160,15 @@ class _Folder:
 
     def close(self) -> None:
         """Nothing is to be given back."""
+
+
+def _first_size(paths: list[Path]) -> tuple[int, int]:
+    """Return width and height of the first image that can be read; raises DataError if none."""
+    problems = []
+    for path in paths:
+        try:
+            height, width, _ = read_image(path).shape
+            return width, height
+        except DataError as error:
+            problems.append(error)
+    raise problems[0]
