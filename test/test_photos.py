@@ -260,7 +260,7 @@ def test_matrices_that_are_inverse_and_of_other_axes_fit_as_is_advised(looks, fi
 
 def test_the_axes_that_fit_can_be_given(plain, tmp_path, shape):
     path = changed(plain, tmp_path, lambda pose: pose @ np.diag([1.0, -1, -1, 1]))
-    other = from_files(plain, path, Options(axes='opencv'))
+    other = active_recon.reconstruct(plain, path, axes='opencv')
     np.testing.assert_allclose(other.occupancy, shape.occupancy, atol=1e-6)
 
 
@@ -323,7 +323,8 @@ def test_options_that_cannot_be_are_refused(how, expected, plain):
         active_recon.reconstruct(plain, **how)
 
 
-@pytest.mark.parametrize('how', [{'masks': 'masks'}, {'unit': 0.001}, {'order': 'time'}])
+@pytest.mark.parametrize('how', [{'masks': 'masks'}, {'unit': 0.001}, {'order': 'time'},
+                                 {'axes': 'opengl'}])
 def test_what_is_for_files_is_refused_beside_pixels(how, rgba, views):
     with pytest.raises(ConfigError, match='not for images with cameras of their own'):
         active_recon.reconstruct(rgba[:1], views[:1], 0.3, **how)
@@ -336,6 +337,9 @@ def test_pixels_without_cameras_are_refused(rgba, views):
         active_recon.reconstruct([rgba[0]], views[:1])
     with pytest.raises(ConfigError, match='expected one for each of 2 images, got 1'):
         active_recon.reconstruct(rgba[:2], views[:1], 0.3)
+    for given in (views[0], [views[0].pose], np.array([views[0].pose])):
+        with pytest.raises(ConfigError, match=r'a Camera\(pose, intrinsics\) for each image, got'):
+            active_recon.reconstruct(rgba[:1], given, 0.3)
 
 
 def test_the_bag_of_the_photos_replays_bit_by_bit(shape, tmp_path):

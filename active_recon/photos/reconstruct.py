@@ -82,7 +82,7 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
                 *, background: str = 'auto', masks: Path | str | None = None,
                 box: Sequence[float] | None = None, unit: float = 1.0, up: str | None = None,
                 views: int | None = None, model: str | Path | None = None,
-                threads: int | None = 1, order: str = 'name') -> Shape:
+                threads: int | None = 1, order: str = 'name', axes: str | None = None) -> Shape:
     """
     Reconstruct an object from photos of known cameras.
 
@@ -91,10 +91,10 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
     camera for each image in the object frame, whose origin is the centre of the object's cube.
     `size` is the side of that cube in metres. With a camera file it only sets the scale, and the
     cube is found unless `box` (x, y, z, side, in the file's units) or the file tells it. The rest
-    is as in `Options`; `masks`, `unit` and `order` are for files alone. Raises ActiveReconError
-    where no photo can be used.
+    is as in `Options`; `masks`, `unit` and `order` are for files alone, `axes` for those of
+    cameras. Raises ActiveReconError where no photo can be used.
     """
-    options = Options(box, unit, size, up, None, background, None if masks is None else
+    options = Options(box, unit, size, up, axes, background, None if masks is None else
                       Path(masks), views, model, threads, order)
     if isinstance(cameras, str):
         cameras = Path(cameras)
@@ -191,9 +191,13 @@ def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Op
     for name, given, instead in (
             ('masks', options.masks is not None, 'give pixels with an alpha channel'),
             ('unit', options.unit != 1, 'give cameras in metres'),
-            ('order', options.order != 'name', 'give the images in their order')):
+            ('order', options.order != 'name', 'give the images in their order'),
+            ('axes', options.axes is not None, 'give poses of the optical frame')):
         if given:
             raise ConfigError(f'{name}: not for images with cameras of their own: {instead}')
+    if isinstance(cameras, Camera) or not all(isinstance(each, Camera) for each in cameras):
+        raise ConfigError('cameras: expected a list with a Camera(pose, intrinsics) for each '
+                          f'image, got {type(cameras).__name__}')
     if len(images) != len(cameras) or len(images) == 0:
         raise ConfigError(f'cameras: expected one for each of {len(images)} images, got '
                           f'{len(cameras)}')

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from active_recon.calibration.board import Board
-from active_recon.errors import DataError
+from active_recon.errors import ConfigError, DataError
 from active_recon.photos.board_photos import board_photos
 from active_recon.photos.camera_file import CameraFile, posed_photos, PosedPhoto
 from active_recon.photos.files import PhotoFile
@@ -45,8 +45,11 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
     Return the cameras, the photos that have one, and why others have none.
 
     `source` None is the file of cameras beside the photos, or in the folder above; `axes` is for
-    files, see `read_cameras`. Raises DataError where no photo has a camera.
+    files alone, see `read_cameras`. Raises DataError where no photo has a camera, ConfigError on
+    `axes` without a file.
     """
+    if axes is not None and isinstance(source, BoardCameras | TurntableCameras):
+        raise ConfigError('axes: with a board or a turntable: they are for a file of cameras')
     if isinstance(source, BoardCameras):
         with reporting('searching the board', len(photos)) as advance:
             return board_photos(photos, source.board, source.lens_file, advance)
