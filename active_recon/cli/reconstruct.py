@@ -160,6 +160,8 @@ def reconstruct(
         if views is not None:
             raise ConfigError('--views with --watch: every photo that arrives is used; '
                               '--max-views tells when there are enough')
+        if order != 'name':
+            raise ConfigError('--order with --watch: photos are taken in as they arrive')
         shape = watch_photos(photos, source, options, StoppingRule(
             max_views, target_quality=target_quality, min_gain=min_gain), Pages(port, lan))
     else:
