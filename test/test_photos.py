@@ -5,6 +5,7 @@ import json
 import os
 from pathlib import Path
 import shutil
+import sys
 
 import active_recon
 from active_recon.bags.replay.verification import verify
@@ -16,6 +17,7 @@ from active_recon.bags.runs.run_writing import write_run
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Camera
+from active_recon.meshes.collision import NO_COACD
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
 from active_recon.photos.cube import first_cube
@@ -363,6 +365,14 @@ def test_a_folder_that_cannot_be_made_is_told(shape, tmp_path):
     (tmp_path / 'out').write_text('a file')
     with pytest.raises(DataError, match='out: not written: expected a folder with room'):
         save_shape(shape, tmp_path / 'out')
+
+
+def test_the_command_says_what_a_robot_description_lacks(shape, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'coacd', None)
+    monkeypatch.setattr('active_recon.photos.reconstruct.from_files', lambda *how: shape)
+    said = CliRunner().invoke(app, ['reconstruct', str(tmp_path), '--out', str(tmp_path / 'out'),
+                                    '--mesh-format', 'urdf'])
+    assert said.exit_code == 0 and NO_COACD in said.output
 
 
 def test_the_command_writes_all_files(plain, tmp_path):

@@ -167,7 +167,10 @@ def reconstruct(
     else:
         shape = from_files(photos, source, options, progress_bar)
     _print(shape)
-    for path in save_shape(shape, out, mesh_format):
+    paths, missing = save_shape(shape, out, mesh_format)
+    if missing:
+        typer.echo(missing)
+    for path in paths:
         typer.echo(f'wrote {path}')
     if bag:
         _write_bag(shape, folder, out / 'report.html')

@@ -18,10 +18,12 @@ FORMATS = (*MESH_FORMATS, 'urdf')
 """Of the mesh; `urdf` is a robot description, see `write_urdf`."""
 
 
-def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply') -> list[Path]:
+def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply'
+               ) -> tuple[list[Path], str]:
     """
-    Write mesh, voxels.npz, voxels.binvox, picture.png and shape.json; return their paths.
+    Write mesh, voxels.npz, voxels.binvox, picture.png and shape.json.
 
+    Returns their paths, and in words what is missing in a robot description, see `write_urdf`.
     Mesh and voxels are in the object frame in metres; shape.json has the similarity that carries
     them into the world of the camera file. Raises DataError where no cell is occupied or a file
     cannot be written, ConfigError on an unknown format.
@@ -29,10 +31,11 @@ def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply') -> list[Pat
     paths = [folder / name for name in (
         f'mesh.{mesh_format}', 'voxels.npz', 'voxels.binvox', 'picture.png', 'shape.json')]
     mesh, voxels, binvox, picture, description = paths
+    missing = ''
     try:
         if mesh_format == 'urdf':
             folder.mkdir(parents=True, exist_ok=True)
-            write_urdf(shape.mesh(), mesh)
+            missing = write_urdf(shape.mesh(), mesh)
         else:
             write_mesh(shape.mesh(), mesh)
         write_npz(shape.grid, voxels, shape.threshold)
@@ -43,7 +46,7 @@ def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply') -> list[Pat
     except OSError as error:
         raise DataError(f'{folder}: not written: expected a folder with room, got: '
                         f'{error}') from error
-    return paths
+    return paths, missing
 
 
 def described(shape: Shape) -> dict[str, object]:
