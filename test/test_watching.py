@@ -300,6 +300,23 @@ def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(photos, t
     assert '9.jpg: gone from the folder' in said
 
 
+def test_while_the_folder_cannot_be_read_photos_neither_come_nor_go(tmp_path):
+    folder, said = tmp_path / 'photos', []
+    folder.mkdir()
+    for name in ('a.jpg', 'b.jpg'):
+        (folder / name).write_bytes(b'no photo')
+    watcher = Watcher(folder, Collection(SOURCE, Options()), None, said.append)
+    assert [watcher.step(now) for now in (0.0, 1.0)] == [False, True]  # b.jpg waits for its turn
+    folder.rename(tmp_path / 'elsewhere')
+    assert [watcher.step(now) for now in (2.0, 3.0)] == [False, False]
+    assert said[-1] == (f'{folder}: cannot be read: No such file or directory; the photos so far '
+                        'stay, and it is looked for again')
+    assert len(said) == 3 and said[0].startswith('left out: a.jpg: not readable')
+    (tmp_path / 'elsewhere').rename(folder)
+    assert [watcher.step(now) for now in (4.0, 5.0)] == [True, False]
+    assert said[3].startswith('left out: b.jpg: not readable') and 'identify' in said[3]
+
+
 def test_ctrl_c_writes_the_products(photos, tmp_path, monkeypatch):
     folder = tmp_path / 'arriving'
     folder.mkdir()

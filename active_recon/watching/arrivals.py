@@ -1,6 +1,6 @@
 """Photos that arrive in a folder, once each of them is whole."""
 
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,7 +25,8 @@ class Arrivals:
     Tells which photos of a folder have come, changed or gone.
 
     Photos are those of `is_photo`: what programs that synchronise folders have not whole yet they
-    keep as hidden files, or under other endings. Raises DataError where there is no such folder.
+    keep as hidden files, or under other endings. While the folder cannot be read nothing comes or
+    goes, and `away` says why; else it is ''. Raises DataError where there is no such folder.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -33,12 +34,13 @@ class Arrivals:
             raise DataError(f'{folder}: no such folder: expected one where photos will arrive',
                             'no_photos')
         self._folder = folder
+        self.away = ''
         self._known: dict[Path, _Seen] = {}
 
     def gone(self) -> list[Path]:
         """Return photos that were told of and are no longer as they were."""
-        there = dict(self._files())
-        gone = [path for path, seen in self._known.items() if seen.told
+        there = self._files()
+        gone = [path for path, seen in self._known.items() if seen.told and not self.away
                 and there.get(path) != (seen.size, seen.changed)]
         for path in gone:
             del self._known[path]
@@ -51,7 +53,7 @@ class Arrivals:
         `now` is any clock in seconds, the same at each call.
         """
         whole = []
-        for path, (size, changed) in self._files():
+        for path, (size, changed) in self._files().items():
             seen = self._known.get(path)
             if seen is None or (seen.size, seen.changed) != (size, changed):
                 self._known[path] = _Seen(size, changed, now)
@@ -60,11 +62,17 @@ class Arrivals:
                 whole.append(path)
         return sorted(whole, key=lambda path: (self._known[path].changed, in_order(path)))
 
-    def _files(self) -> Iterator[tuple[Path, tuple[int, int]]]:
-        """Yield each photo with its size and the time of its last change."""
-        for path in filter(is_photo, self._folder.iterdir()):
-            try:
+    def _files(self) -> dict[Path, tuple[int, int]]:
+        """Return the size of each photo and the time of its last change; none while `away`."""
+        found = {}
+        try:
+            paths = list(filter(is_photo, self._folder.iterdir()))
+            self.away = ''
+        except OSError as error:
+            paths = []
+            self.away = f'{self._folder}: cannot be read: {error.strerror}'
+        for path in paths:
+            with suppress(OSError):  # gone since
                 status = path.stat()
-            except OSError:  # gone since
-                continue
-            yield path, (status.st_size, status.st_mtime_ns)
+                found[path] = status.st_size, status.st_mtime_ns
+        return found

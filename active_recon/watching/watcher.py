@@ -74,6 +74,7 @@ class Watcher:
         self._say = say
         self._queue: list[Path] = []
         self._left_out: dict[str, str] = {}
+        self._away = ''
         self.progress = Progress()
         self.verdicts = Verdicts()
 
@@ -90,7 +91,10 @@ class Watcher:
             self._say(f'{path.name}: gone from the folder')
         self._queue = [path for path in (*self._queue, *self._arrivals.arrived(now))
                        if path not in gone]
-        if not self._queue:
+        if self._arrivals.away not in ('', self._away):
+            self._say(f'{self._arrivals.away}; the photos so far stay, and it is looked for again')
+        self._away = self._arrivals.away
+        if not self._queue or self._away:
             if gone:
                 self._tell()
             return bool(gone)
