@@ -301,6 +301,15 @@ def test_what_is_wrong_with_photos_is_one_line_each_and_the_others_are_used(plai
     assert said[2] == 'photo9.png: the same photo as photo1.png'
 
 
+def test_an_error_names_the_photos_that_were_left_out_before_it(plain, tmp_path):
+    shutil.copytree(plain, tmp_path / 'some')
+    for path in sorted((tmp_path / 'some').glob('*.png'))[1:]:
+        path.rename(path.with_suffix('.heic'))
+    with pytest.raises(DataError, match=rf'got 1 that look the same way; .*\. Left out before, '
+                                        rf'{COUNT - 1}: photo1.heic: HEIC photos cannot be read'):
+        active_recon.reconstruct(tmp_path / 'some')
+
+
 def test_a_single_photo_needs_the_place_of_the_object(plain, views):
     with pytest.raises(DataError, match='object not found: .* give its place by --box'):
         active_recon.reconstruct(plain, views=1)

@@ -1,10 +1,11 @@
 """From photos with known cameras to the shape of the object in them: the whole way in one call."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from active_recon.errors import ConfigError, DataError, ViewError
+from active_recon.errors import ConfigError, DataError, ViewError, WeightsError
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.backgrounds import BACKGROUNDS, before_clutter, named, separated
 from active_recon.photos.board_masks import board_views
@@ -121,12 +122,27 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
     Raises ActiveReconError where no photo can be used.
     """
     photos, left_out = open_photos(photo_paths(place))
-    photos = in_order_of(options.order, photos)
-    file, posed, unposed = posed_by(source, photos, options.axes, reporting)
-    chosen = even_choice(posed, options.views or len(posed))
-    with reporting('reading the photos', len(chosen)) as advance:
-        views, unread = load_views(chosen, options.masks, advance)
-    return from_views(views, file, options, [*left_out, *unposed, *unread], reporting)
+    with _telling(left_out):
+        photos = in_order_of(options.order, photos)
+        file, posed, unposed = posed_by(source, photos, options.axes, reporting)
+        left_out += unposed
+        chosen = even_choice(posed, options.views or len(posed))
+        with reporting('reading the photos', len(chosen)) as advance:
+            views, unread = load_views(chosen, options.masks, advance)
+        left_out += unread
+        return from_views(views, file, options, left_out, reporting)
+
+
+@contextmanager
+def _telling(left_out: Sequence[str]) -> Iterator[None]:
+    """Let an error of the photos say which were left out before it."""
+    try:
+        yield
+    except DataError as error:
+        if not left_out or isinstance(error, WeightsError):
+            raise
+        raise DataError(f'{error}. Left out before, {len(left_out)}: {"; ".join(left_out[:3])}',
+                        error.kind) from error
 
 
 def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = _DEFAULTS,
