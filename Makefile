@@ -19,6 +19,7 @@ PIP := $(BIN)/python -m pip --quiet
 # Live tests mostly wait, hence more workers than two cores; one thread each, so that they share.
 TEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:cacheprovider -n 4 --dist loadfile \
 	--no-loadscope-reorder
+SPHINX := $(BIN)/python -m sphinx -q -W --keep-going -b html
 SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell find \
 	active_recon msg_tools resource scripts launch config rviz security \
 	-type f -not -path '*/__pycache__/*' 2>/dev/null)
@@ -72,12 +73,11 @@ doc: html  ## the documentation, built and opened; ARGS=--no-open only builds
 # The theme repeats the whole navigation on each page: half of the time, for nothing to check.
 read-doc: .venv/installed
 	@echo '== checking the documentation'
-	@$(BIN)/python -m sphinx -q -W --keep-going -b html -D html_theme=basic \
-		-d build/doc-check/.doctrees doc build/doc-check
+	@$(SPHINX) -D html_theme=basic -d build/doc-check/.doctrees doc build/doc-check
 
 html: .venv/installed
 	@echo '== building the documentation'
-	@$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doc/.doctrees doc build/doc
+	@$(SPHINX) -d build/doc/.doctrees doc build/doc
 
 bench: .venv/installed  ## the figures of doc/benchmarks.md, measured here
 	@echo '== measuring'

@@ -5,12 +5,12 @@ from pathlib import Path
 import tempfile
 
 from active_recon.datasets.layout import list_objects
-from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.models.attention import AttentionModel
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.network_2d3d import Network2d3d, Network2d3dConfig
 import pytest
+from small_datasets import lamps_and_tables
 import torch
 
 pytest_plugins = ['live_tests']
@@ -22,10 +22,7 @@ os.environ.setdefault(
 @pytest.fixture(scope='session')
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder of three lamps and three tables in R2N2's layout."""
-    out = tmp_path_factory.mktemp('dataset')
-    jobs = [job for category in ('lamp', 'table') for job in shape_jobs(category, range(3), out)]
-    assert not [outcome.refusal for outcome in make_dataset(jobs, samples=1) if outcome.refusal]
-    return out
+    return lamps_and_tables(tmp_path_factory.mktemp('dataset'), 3)
 
 
 @pytest.fixture(scope='session')

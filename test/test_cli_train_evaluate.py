@@ -4,12 +4,12 @@ import json
 import math
 import shutil
 
-from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import weights_hash
 from command_line import command, refusal
 import pytest
 from safetensors.torch import load_file
+from small_datasets import lamps_and_tables
 import torch
 from torch.testing import assert_close
 
@@ -17,10 +17,7 @@ from torch.testing import assert_close
 @pytest.fixture(scope='module')
 def dataset(tmp_path_factory):
     """Return a folder of a lamp and a table: what is measured takes as long as its objects."""
-    out = tmp_path_factory.mktemp('dataset')
-    jobs = [job for category in ('lamp', 'table') for job in shape_jobs(category, range(1), out)]
-    assert not [outcome.refusal for outcome in make_dataset(jobs, samples=1) if outcome.refusal]
-    return out
+    return lamps_and_tables(tmp_path_factory.mktemp('dataset'), 1)
 
 
 @pytest.fixture(autouse=True)

@@ -45,9 +45,10 @@ def hand_eye(mounts: NDArray[np.float64], boards: NDArray[np.float64], names: Se
     # (R_a - 1) t_x - scale R_x t_b = -t_a: the scale is 1 unless the squares have another size
     turned = (a[:, :3, :3] - np.eye(3)).reshape(-1, 3)
     moved = (b[:, :3, 3] @ pose[:3, :3].T).ravel()
-    wanted = moved - a[:, :3, 3].ravel()
-    pose[:3, 3] = np.linalg.lstsq(turned, wanted, rcond=None)[0]
-    apart, seen = wanted - turned @ pose[:3, 3], _beside(turned, moved)
+    both = np.stack([moved - a[:, :3, 3].ravel(), moved], axis=1)
+    solved = np.linalg.lstsq(turned, both, rcond=None)[0]
+    pose[:3, 3] = solved[:, 0]
+    apart, seen = (both - turned @ solved).T  # what no position of the camera explains
     known = _SCALE_TOLERANCE * _root_mean_square(seen) > _VISIBLE
     if known:
         _require_scale(apart, seen)
@@ -88,11 +89,6 @@ def _require_scale(apart: NDArray[np.float64], seen: NDArray[np.float64]) -> Non
                         f'but by the poses the squares are {1 - change:.3g} times as large as '
                         'given; measure a square, and check that the poses are in metres',
                         'scale')
-
-
-def _beside(columns: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what of the values, (N,), no combination of the columns, (N, K), gives."""
-    return values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
 
 
 def _root_mean_square(values: NDArray[np.float64]) -> float:

@@ -55,7 +55,7 @@ def measure(
                               f'{", ".join(filter(None, known))}, got {value!r}')
     torch.set_num_threads(threads)
     weights = find_weights(model)
-    bundle = load_weights(weights)
+    sha256, bundle = weights_hash(weights), load_weights(weights)
     network = bundle.reconstruction
     policy = load_policy(LEARNED, PolicyOptions(
         views=views, weights=weights, threads=threads)) if kind == LEARNED else None
@@ -73,7 +73,7 @@ def measure(
             else:
                 left_out += some.unreadable
                 parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
-                                      seed + at, policy, weights_hash(weights)))
+                                      seed + at, policy, sha256))
             advance(len(few), '')
     for reason in left_out:
         typer.echo(f'left out: {reason}', err=True)
@@ -108,10 +108,9 @@ def fit(
 
     weights = find_weights(model)
     sha256 = weights_hash(weights)
-    together = Measured.joined([Measured.read(path) for path in calibration]).checked(sha256)
+    together = Measured.read_all(calibration, sha256)
     first = together.rows(halves(together))
-    tables = fitted(Measured.joined([Measured.read(path) for path in known]).checked(sha256),
-                    first, sha256)
+    tables = fitted(Measured.read_all(known, sha256), first, sha256)
     path = out or tables_path(weights)
     tables.write(path, command=command_line(), calibrated_on=sorted(set(first.source.tolist())))
     typer.echo(f'wrote {path}')
@@ -148,10 +147,9 @@ def study(
     found = QualityTables.read(tables or tables_path(find_weights(model)))
     sha256, sets = found.weights_sha256, {}
     if files:
-        sets[files[0].stem] = Measured.joined(
-            [Measured.read(path) for path in files]).checked(sha256)
+        sets[files[0].stem] = Measured.read_all(files, sha256)
     if halved:
-        together = Measured.joined([Measured.read(path) for path in halved]).checked(sha256)
+        together = Measured.read_all(halved, sha256)
         sets[f'{halved[0].stem}, second half'] = together.rows(~halves(together))
     result = {'command': command_line(), 'weights_sha256': sha256,
               'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}

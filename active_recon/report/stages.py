@@ -45,6 +45,7 @@ class Timing:
     total: float | None
     turn: float | None
 
+
 _UNKNOWN = Timing((None,) * len(STAGES), None, None)
 
 

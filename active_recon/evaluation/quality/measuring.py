@@ -78,13 +78,6 @@ class Measured:
         return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts])
                       for each in fields(cls)})
 
-    def checked(self, weights_sha256: str) -> Self:
-        """Return it; raises DataError where it was measured with other weights."""
-        for other in {*self.weights.tolist()} - {weights_sha256}:
-            raise DataError(f'quality: measured with other weights: expected {weights_sha256[:12]}'
-                            f', got {other[:12]}; give the right --model, or measure anew')
-        return self
-
     def write(self, path: Path) -> None:
         """Write it as an npz file."""
         with whole_file(path) as unfinished, unfinished.open('wb') as file:
@@ -100,6 +93,15 @@ class Measured:
         except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
             raise DataError(f'{path}: no measured qualities: expected a file that `active-recon '
                             f'quality measure` wrote, got: {error!r}') from error
+
+    @classmethod
+    def read_all(cls, paths: Sequence[Path], weights_sha256: str) -> Self:
+        """Return all rows of files; raises DataError as `read`, and on those of other weights."""
+        together = cls.joined([cls.read(path) for path in paths])
+        for other in {*together.weights.tolist()} - {weights_sha256}:
+            raise DataError(f'quality: measured with other weights: expected {weights_sha256[:12]}'
+                            f', got {other[:12]}; give the right --model, or measure anew')
+        return together
 
 
 def orders_of(views: ViewSet, kind: str, count: int, seed: int) -> Order:
