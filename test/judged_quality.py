@@ -16,10 +16,11 @@ def some_tables(sha256='none', seed=0):
         return np.round(rng.normal(size=shape), 3).tolist()
     return QualityTables(
         sha256, table(size), np.abs(rng.normal(size=size) + 2).round(3).tolist(),
-        (0.1 * rng.normal(size=2 * size)).round(3).tolist(), table(COUNTS), [0.2] * COUNTS,
-        [0.5, 0.7], [0.6, 0.85], [0.3, 0.2, 0.1, 0.0], table(width),
-        np.eye(width).tolist(), ['pose', 'mask'], table(2, size + 1),
-        [sorted(table(50)) for _ in range(COUNTS)], [sorted(table(50)) for _ in range(COUNTS)])
+        (0.1 * rng.normal(size=2 * size)).round(3).tolist(), table(COUNTS), table(width),
+        np.eye(width).tolist(), ['pose', 'mask'], table(2, size + 1), margin=[0.2] * COUNTS,
+        targets=[0.5, 0.7], needed=[0.6, 0.85], growth=[0.3, 0.2, 0.1, 0.0],
+        usual_scores=[sorted(table(50)) for _ in range(COUNTS)],
+        usual_distances=[sorted(table(50)) for _ in range(COUNTS)])
 
 
 def quality_of(expected=0.6, promise=0.0, attainable=1.0, suspect='',

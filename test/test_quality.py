@@ -178,8 +178,40 @@ def test_pooled_latents_do_not_depend_on_where_in_the_map_something_is():
     np.testing.assert_allclose(pooled(latent), pooled(latent[:, ::-1, ::-1]))
 
 
-def judged(numbers, count=2, tables=None):
-    return Judge(tables or some_tables()).judge_numbers(np.asarray(numbers), count)
+def judged(numbers, count=2, tables=None, around=True):
+    return Judge(tables or some_tables()).judge_numbers(np.asarray(numbers), count, around)
+
+
+def of_any_cameras(tables):
+    """Return tables to which views of no turntable are usual, whatever they are like."""
+    return replace(tables, usual_scores_any=[[99.0] * 50] * COUNTS,
+                   usual_distances_any=[[999.0] * 50] * COUNTS)
+
+
+def test_what_is_unusual_on_a_turntable_may_be_usual_from_any_cameras():
+    far = np.append(np.zeros(len(FEATURES)), 99.0)
+    tables = of_any_cameras(some_tables())
+    assert judged(far, around=False).suspect and judged(far, tables=tables).suspect
+    assert judged(far, tables=tables, around=False).p_value == 1
+
+
+def test_a_first_view_is_judged_as_of_any_camera_since_it_tells_no_turntable():
+    far = np.append(np.zeros(len(FEATURES)), 99.0)
+    tables = of_any_cameras(some_tables())
+    assert [bool(judged(far, count, tables).suspect) for count in (1, 2)] == [False, True]
+
+
+@pytest.mark.parametrize(('elevation_deg', 'distance', 'suspected'), [
+    (20, 2, True), (21, 2.05, True), (24, 2, False), (20, 2.2, False)])
+def test_views_of_one_elevation_and_distance_are_judged_as_of_a_turntable(
+        elevation_deg, distance, suspected):
+    cameras = [orbit_camera(0.3, math.radians(20), 2, LENS),
+               orbit_camera(2, math.radians(elevation_deg), distance, LENS)]
+    views = [seen_as(ball(), camera) for camera in cameras]
+    tables = replace(of_any_cameras(some_tables()), usual_scores=[[-99.0] * 50] * COUNTS)
+    quality = Judge(tables).judge(
+        np.where(ball(), 0.8, 0.001), 0.4, np.zeros((CHANNELS, 2, 2)), views, 2)
+    assert bool(quality.suspect) == suspected
 
 
 def test_more_views_than_were_measured_are_judged_as_the_most():
@@ -198,7 +230,7 @@ def test_bounds_are_about_the_expected_iou_and_promises_below_it():
 
 
 def test_what_the_learned_policy_promises_has_numbers_of_its_own(tmp_path):
-    tables = replace(some_tables(), needed_learned=[0.1, 0.2])
+    tables = replace(of_any_cameras(some_tables()), needed_learned=[0.1, 0.2])
     numbers = np.random.default_rng(0).normal(size=len(FEATURES) + 1)
     quality = judged(numbers, 1, tables)
     assert quality.expected_iou > 0.2
@@ -241,7 +273,7 @@ def test_tables_come_back_from_their_file_and_judge_the_same(tmp_path):
 
 @pytest.mark.parametrize(('field', 'value'), [
     ('centre', [0.0]), ('head', [1.0]), ('suspects', ['pose', 'luck']), ('margin', []),
-    ('usual_scores', [[0.0]])])
+    ('usual_scores', [[0.0]]), ('usual_distances_any', [[0.0]])])
 def test_tables_that_do_not_fit_each_other_are_refused(field, value):
     with pytest.raises(WeightsError, match='quality tables'):
         replace(some_tables(), **{field: value})

@@ -1,6 +1,6 @@
 """Fitting and testing the tables of quality: on numbers whose truth is known."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 import json
 
 from active_recon.datasets.drawn_cameras import Viewing
@@ -16,7 +16,7 @@ from active_recon.evaluation.quality.faults import (
     wrong_poses,
     wrong_size,
 )
-from active_recon.evaluation.quality.fitting import fit
+from active_recon.evaluation.quality.fitting import calibrated, fit
 from active_recon.evaluation.quality.measuring import (
     halves,
     LEARNED,
@@ -40,7 +40,7 @@ from active_recon.models.weights_files import SHIPPED, weights_hash
 from active_recon.policies import Choice
 from active_recon.policies.geometric import HeuristicPolicy
 from active_recon.quality.features import FEATURES
-from active_recon.quality.tables import QualityTables
+from active_recon.quality.tables import Heads, QualityTables, tables_path
 from command_line import command, refusal
 import numpy as np
 import pytest
@@ -128,6 +128,57 @@ def test_views_of_the_learned_policy_have_promises_of_their_own():
     assert min(both.needed_learned) < min(both.needed)
 
 
+def of_any_cameras(measured):
+    """Return episodes of any cameras, whose latents are all far from the known ones."""
+    kind = np.array([f'{each}, any' for each in measured.kind])
+    return replace(measured, kind=kind, latents=measured.latents + 9,
+                   episode=np.char.add(measured.episode, ' any'))
+
+
+@pytest.fixture(scope='module')
+def tables_of_both():
+    usual = [made_up(400, 1), of_any_cameras(made_up(400, 1))]
+    return fit(made_up(400, 0), Measured.joined(
+        [*usual, *(made_up(60, 2, fault) for fault in FAULTS)]), 'abc')
+
+
+def test_false_alarms_are_rare_from_a_turntable_and_from_any_cameras_alike(tables_of_both):
+    fresh = made_up(400, 3)
+    for views in (fresh, of_any_cameras(fresh)):
+        found = study(views, tables_of_both)['views']
+        assert all(after['flagged'] < 0.08 for after in found.values())
+    moved = replace(fresh, latents=fresh.latents + 9)  # usual from any cameras alone
+    found = study(moved, tables_of_both)['views']
+    assert [after['flagged'] > 0.9 for after in found.values()] == [False, True, True]
+
+
+def test_tables_of_any_cameras_alone_judge_all_views_by_them(tables):
+    views = of_any_cameras(made_up(400, 1))
+    alone = calibrated(tables, views)
+    assert not alone.usual_scores_any
+    assert study(views, alone)['views']['1']['flagged'] < 0.08 < (
+        study(views, tables)['views']['1']['flagged'])
+
+
+def test_tables_calibrated_on_the_same_objects_are_the_same(tables):
+    assert calibrated(tables, made_up(400, 1)) == tables
+
+
+def test_tables_calibrated_on_other_objects_keep_what_was_fitted_and_bound_those(tables):
+    vague = made_up(400, 6, noise=1.2)
+    again = calibrated(tables, vague)
+    assert all(getattr(again, each.name) == getattr(tables, each.name) for each in fields(Heads))
+    after = [study(made_up(400, 7, noise=1.2), each)['views']['2']['solid']['covered']
+             for each in (tables, again)]
+    assert after[0] < 0.8 and 0.85 < after[1] < 0.95
+
+
+def test_tables_are_not_calibrated_on_fewer_views_than_they_have(tables):
+    few = made_up(40, 1)
+    with pytest.raises(DataError, match='after 1 to 3, got none after 3'):
+        calibrated(tables, few.rows(few.count < 3))
+
+
 def test_a_promise_that_is_broken_too_often_is_never_made():
     rng = np.random.default_rng(5)
     expected = rng.uniform(size=(200, 3)).cumsum(axis=1) / 3
@@ -181,6 +232,21 @@ def test_without_faults_to_learn_nothing_is_fitted():
     with pytest.raises(DataError, match='no faulty objects'):
         fit(made_up(20, 9), made_up(20, 10), 'abc')
 
+
+
+def test_known_objects_with_faults_are_refused():
+    faults = [made_up(20, 2, fault) for fault in FAULTS]
+    with pytest.raises(DataError, match='known objects with faults: .* got mask'):
+        fit(Measured.joined([made_up(40, 0), made_up(40, 0, 'mask')]),
+            Measured.joined([made_up(40, 1), *faults]), 'abc')
+
+
+def test_a_study_of_hollow_objects_alone_has_no_figures_of_solid_ones(tables):
+    hollow = replace(made_up(20, 3), hollow=np.ones(20 * COUNTS))
+    found = study(hollow, tables)
+    assert found['hollow'] == 20 and not found['promises']
+    text = markdown({'command': 'study', 'sets': [{'name': 'shells', **found}]})
+    assert '| 3 | 0 | – | – | – |' in text
 
 def test_the_text_has_every_set_and_fault(figures):
     text = markdown({'command': 'c', 'sets': [{'name': 'made up', **figures}]})
@@ -295,6 +361,24 @@ def test_the_commands_fit_tables_and_test_them_on_the_other_half(tmp_path, monke
     assert (whole['objects'], half['objects']) == (200, 100)
     used = json.loads((tmp_path / 'tables.json').read_text())['calibrated_on']
     assert not set(used) & set(half['sources'])
+
+
+def test_the_command_calibrates_the_tables_beside_weights_on_objects_of_one_s_own(
+        tmp_path, monkeypatch, capsys, tables):
+    weights = tmp_path / 'my.safetensors'
+    weights.write_bytes(b'of no network')
+    sha256 = weights_hash(weights)
+    made_up(200, 6, noise=1.2, weights=sha256).write(tmp_path / 'mine.npz')
+    asked = ('quality', 'fit', '--calibration', tmp_path / 'mine.npz', '--model', weights)
+    assert 'expected its tables in my-quality.json' in refusal(monkeypatch, capsys, *asked)
+    earlier = replace(tables, weights_sha256=sha256)
+    earlier.write(tables_path(weights), command='fit --known train.npz')
+    for _ in range(2):
+        assert command(monkeypatch, *asked) == 0
+    mine = QualityTables.read(tables_path(weights))
+    assert mine.head == list(tables.head) and min(mine.margin) > max(tables.margin)
+    card = json.loads(tables_path(weights).read_text())
+    assert card['heads_fitted_by'] == 'fit --known train.npz'
 
 
 def test_what_was_measured_with_another_network_is_refused(tmp_path, monkeypatch, capsys, tables):

@@ -85,12 +85,13 @@ def measure(
 
 @quality.command()
 def fit(
-    known: Annotated[list[Path], typer.Option(
-        help='Measured without faults: objects of training and validation (may be given several '
-             'times).')],
     calibration: Annotated[list[Path], typer.Option(
-        help='Measured on other objects, with and without faults (may be given several times). '
-             'The first of two halves, split by source, is used.')],
+        help='Measured on objects that nothing was fitted to, with and without faults (may be '
+             'given several times). The first of two halves, split by source, is used.')],
+    known: Annotated[list[Path] | None, typer.Option(
+        help='Measured without faults: objects of training and validation (may be given several '
+             'times). Default: what is fitted stays as it is in the tables beside the weights, '
+             'and only the bounds, the promises and what is usual are calibrated anew.')] = None,
     out: Annotated[Path | None, typer.Option(
         help='The JSON file to write; default: beside the weights, where it is used.')] = None,
     model: Model = None,
@@ -100,19 +101,29 @@ def fit(
 
     Example: active-recon quality fit --known train.npz --calibration real.npz --calibration
     real-pose.npz
+
+    To calibrate tables for objects and cameras of your own: active-recon quality fit
+    --calibration mine.npz
     """
+    from active_recon.evaluation.quality.fitting import calibrated
     from active_recon.evaluation.quality.fitting import fit as fitted
     from active_recon.evaluation.quality.measuring import halves, Measured
-    from active_recon.models.weights_files import find_weights, weights_hash
-    from active_recon.quality.tables import tables_path
+    from active_recon.models.weights_files import find_weights, read_card, weights_hash
+    from active_recon.quality.tables import needed_tables, tables_path
 
     weights = find_weights(model)
     sha256 = weights_hash(weights)
     together = Measured.read_all(calibration, sha256)
     first = together.rows(halves(together))
-    tables = fitted(Measured.read_all(known, sha256), first, sha256)
+    card = {'command': command_line(), 'calibrated_on': sorted(set(first.source.tolist()))}
+    if known:
+        tables = fitted(Measured.read_all(known, sha256), first, sha256)
+    else:
+        tables = calibrated(needed_tables(weights, sha256), first)
+        earlier = read_card(tables_path(weights))
+        card['heads_fitted_by'] = earlier.get('heads_fitted_by', earlier.get('command', ''))
     path = out or tables_path(weights)
-    tables.write(path, command=command_line(), calibrated_on=sorted(set(first.source.tolist())))
+    tables.write(path, **card)
     typer.echo(f'wrote {path}')
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _ONE_ELEVATION = math.radians(10)
+_RING_ELEVATION, _RING_DISTANCE = math.radians(2), 1.05
 
 
 def view_distance(a: Camera, b: Camera) -> float:
@@ -60,3 +61,15 @@ def at_one_elevation(directions: NDArray[np.float64]) -> NDArray[np.bool_]:
     heights = directions[..., 2].clip(-1, 1)
     return np.asarray(np.arcsin(heights.max(axis=-1)) - np.arcsin(heights.min(axis=-1))
                       <= _ONE_ELEVATION)
+
+
+def on_one_ring(positions: NDArray[np.floating]) -> bool:
+    """
+    Return whether positions (N, 3) lie on one ring about the z axis, as those of a turntable do.
+
+    Their elevations may differ by 2 degrees, their distances by 5 %. Two drawn at random hardly
+    ever agree in both.
+    """
+    height, distance = directions_of(positions)[:, 2], np.linalg.norm(positions, axis=-1)
+    return bool(np.ptp(np.arcsin(height.clip(-1, 1))) <= _RING_ELEVATION
+                and distance.max() <= _RING_DISTANCE * distance.min())

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from active_recon.geometry.view_distance import on_one_ring
 from active_recon.quality.conformal import p_value
 from active_recon.quality.features import FEATURES, features
 from active_recon.quality.latents import pooled
@@ -32,20 +33,26 @@ class Judge:
         views so far.
         """
         distance = self._known.distances(pooled(latent))
+        around = on_one_ring(np.stack([view.camera.position for view in views]))
         return self.judge_numbers(
-            np.append(features(occupancy, threshold, views), distance), count)
+            np.append(features(occupancy, threshold, views), distance), count, around)
 
-    def judge_numbers(self, numbers: NDArray[np.float64], count: int) -> Quality:
-        """Return the quality by the features and the latent's distance, (F,)."""
+    def judge_numbers(self, numbers: NDArray[np.float64], count: int, around: bool) -> Quality:
+        """
+        Return the quality by the features and the latent's distance, (F,), after `count` views.
+
+        `around`: they are of a turntable, which a first view does not tell.
+        """
         row = min(count, len(self._tables.margin)) - 1
+        scores, distances = self._tables.usual(around and count > 1)
         given = standardised(numbers, self._tables.centre, self._tables.scale)
         expected = float(expected_iou(
             given, self._tables.head, np.asarray(self._tables.intercepts[row])))
         by_fault = self._fault_head @ np.append(given, 1.0)
         # Either of two tests may flag, so each gets half of the false alarms
         p = min(1.0, 2 * min(
-            p_value(float(np.logaddexp.reduce(by_fault)), self._tables.usual_scores[row]),
-            p_value(float(numbers[-1]), self._tables.usual_distances[row])))
+            p_value(float(np.logaddexp.reduce(by_fault)), scores[row]),
+            p_value(float(numbers[-1]), distances[row])))
         suspect = self._tables.suspects[int(by_fault.argmax())] if p <= FALSE_ALARMS else ''
         promise, promise_learned = (
             promised(expected, self._tables.targets, self._tables.needed_where(learned))

@@ -14,26 +14,19 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class QualityTables:
+class Heads:
     """
-    What `active-recon quality fit` found for a network, as plain numbers.
+    What `active-recon quality fit` fits to a network's reconstructions.
 
     F features, first those of `FEATURES`, then the latent's distance; K numbers of views, the last
-    of which stands for all more; D pooled channels; P targets.
+    of which stands for all more; D pooled channels.
 
     - weights_sha256: of the network's weights
     - centre, scale: (F,), by which features are standardised
     - head: (2 F,), the weights of the standardised features and of their squares in the log odds
       of the IoU; intercepts: (K,)
-    - margin: (K,), between expected IoU and lower bound
-    - targets: (P,), increasing, that can be promised; needed: (P,), the expected IoU for that in
-      any order of the views; needed_learned: (P,), the same where the learned policy of the
-      weights chooses them, empty where that was not measured
-    - growth: (K,), between expected and attainable IoU
     - latent_mean: (D,); latent_whitening: (D, D)
     - suspects: names of faults; fault_head: (faults, F + 1), their log odds against no fault
-    - usual_scores: (K, ...), increasing: the scores of usual views, which are the log odds of any
-      fault; usual_distances: (K, ...), those of the latent's distance
     """
 
     weights_sha256: str
@@ -41,17 +34,44 @@ class QualityTables:
     scale: Sequence[float]
     head: Sequence[float]
     intercepts: Sequence[float]
-    margin: Sequence[float]
-    targets: Sequence[float]
-    needed: Sequence[float]
-    growth: Sequence[float]
     latent_mean: Sequence[float]
     latent_whitening: Sequence[Sequence[float]]
     suspects: Sequence[str]
     fault_head: Sequence[Sequence[float]]
+
+    @property
+    def known_latents(self) -> KnownLatents:
+        """The latents of the training objects."""
+        return KnownLatents(np.array(self.latent_mean), np.array(self.latent_whitening))
+
+
+@dataclass(frozen=True)
+class QualityTables(Heads):
+    """
+    What is fitted, and what is calibrated on objects that nothing was fitted to; plain numbers.
+
+    K numbers of views as those of `Heads`; P targets.
+
+    - margin: (K,), between expected IoU and lower bound
+    - targets: (P,), increasing, that can be promised; needed: (P,), the expected IoU for that in
+      any order of the views; needed_learned: (P,), the same where the learned policy of the
+      weights chooses them, empty where that was not measured
+    - growth: (K,), between expected and attainable IoU
+    - usual_scores: (K, ...), increasing: the scores of usual views of a turntable, which are the
+      log odds of any fault; usual_distances: (K, ...), those of the latent's distance
+    - usual_scores_any, usual_distances_any: the same of views of no turntable; empty where none
+      were measured
+    """
+
+    margin: Sequence[float]
+    targets: Sequence[float]
+    needed: Sequence[float]
+    growth: Sequence[float]
     usual_scores: Sequence[Sequence[float]]
     usual_distances: Sequence[Sequence[float]]
     needed_learned: Sequence[float] = field(default_factory=list)
+    usual_scores_any: Sequence[Sequence[float]] = field(default_factory=list)
+    usual_distances_any: Sequence[Sequence[float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Raise WeightsError where shapes do not fit each other, or names are unknown."""
@@ -66,9 +86,11 @@ class QualityTables:
             if found != shape:
                 raise WeightsError(f'quality tables: {name} of a wrong shape: expected {shape}, '
                                    f'got {found}')
-        if not counts or {len(self.usual_scores), len(self.usual_distances)} != {counts}:
+        rows = {len(self.usual_scores), len(self.usual_distances)}
+        of_any = {len(self.usual_scores_any), len(self.usual_distances_any)}
+        if not counts or rows != {counts} or of_any not in ({0}, {counts}):
             raise WeightsError('quality tables: no usual scores for some numbers of views: '
-                               f'expected those of {counts}, got {len(self.usual_scores)}')
+                               f'expected those of {counts}, got {min(rows | of_any)}')
         if unknown := set(self.suspects) - SUSPECTS.keys():
             raise WeightsError('quality tables: unknown suspects: expected some of '
                                f'{", ".join(SUSPECTS)}, got {", ".join(sorted(unknown))}')
@@ -82,10 +104,11 @@ class QualityTables:
         return max((target for target, needed in zip(
             self.targets, self.needed_where(learned), strict=True) if needed <= 1), default=0.0)
 
-    @property
-    def known_latents(self) -> KnownLatents:
-        """The latents of the training objects."""
-        return KnownLatents(np.array(self.latent_mean), np.array(self.latent_whitening))
+    def usual(self, around: bool) -> tuple[Sequence[Sequence[float]], Sequence[Sequence[float]]]:
+        """Return usual scores and distances, (K, ...), of views of a turntable or of others."""
+        if around or not len(self.usual_scores_any):
+            return self.usual_scores, self.usual_distances
+        return self.usual_scores_any, self.usual_distances_any
 
     def write(self, path: Path, **notes: Any) -> None:
         """Write the tables, and notes on how they were made, as JSON."""
@@ -118,3 +141,11 @@ def find_tables(weights: Path, sha256: str) -> tuple[QualityTables | None, str]:
         return None, (f'no quality: {path.name} is of other weights: expected SHA-256 '
                       f'{sha256[:12]}, got {tables.weights_sha256[:12]}')
     return tables, ''
+
+
+def needed_tables(weights: Path, sha256: str) -> QualityTables:
+    """Return the tables as `find_tables`; raises WeightsError where there are none."""
+    tables, why = find_tables(weights, sha256)
+    if tables is None:
+        raise WeightsError(f'{weights}: {why}')
+    return tables

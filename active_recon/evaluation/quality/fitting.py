@@ -1,6 +1,7 @@
 """Fitting the tables that quality is judged by."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 
 from active_recon.errors import DataError
 from active_recon.evaluation.quality.faults import FAULTS
@@ -10,7 +11,7 @@ from active_recon.evaluation.quality.shells import HOLLOW
 from active_recon.quality.conformal import upper_quantile
 from active_recon.quality.judge import expected_iou, standardised
 from active_recon.quality.latents import KnownLatents
-from active_recon.quality.tables import QualityTables
+from active_recon.quality.tables import Heads, QualityTables
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
@@ -30,45 +31,71 @@ def fit(known: Measured, calibration: Measured, sha256: str) -> QualityTables:
 
     `known` objects, without faults, and of which the network may have seen some, give the
     latents, the head, and what usual views are like beside those with a fault. The faults of
-    `calibration` are learned; its other rows, of objects that nothing was fitted to, give all
-    quantiles and promises. What is said of the IoU is fitted to objects that are not hollow: of
-    others no view tells what is inside. Raises DataError where one of the parts is empty.
+    `calibration` are learned; its other rows calibrate, see `calibrated`. Raises DataError where
+    one of the parts is empty, or `known` has faults.
     """
-    usual = calibration.rows(calibration.fault == '')
     faulty = calibration.rows(calibration.fault != '')
-    for name, part in (('known', known), ('calibration', usual), ('faulty', faulty)):
+    for name, part in (('known', known), ('faulty', faulty)):
         if not len(part):
             raise DataError(f'quality: no {name} objects: expected some to fit with, got none')
+    if (known.fault != '').any():
+        raise DataError('quality: known objects with faults: expected those without, got '
+                        f'{", ".join(sorted(set(known.fault.tolist()) - {""}))}')
+    counts = int(calibration.count[calibration.fault == ''].max(initial=1))
     latents = KnownLatents.of(known.latents)
     given = numbers_of(known, latents)
-    solid = known.hollow <= HOLLOW
-    centre, scale = given.mean(axis=0), given.std(axis=0) + 1e-6
-    counts = int(usual.count.max())
-    known_z = standardised(given, list(centre), list(scale))
-    head, intercepts = _head(known_z[solid], known.solid, counts)
+    centre, scale = _plain(given.mean(axis=0)), _plain(given.std(axis=0) + 1e-6)
+    known_z = standardised(given, centre, scale)
+    head, intercepts = _head(known_z[known.hollow <= HOLLOW], known.solid, counts)
     suspects = tuple(FAULTS)
     fault_head = _softmax_head(
         [known_z, *(standardised(numbers_of(faulty.rows(faulty.fault == name), latents),
-                                 list(centre), list(scale)) for name in suspects)])
-    own = numbers_of(usual, latents)
-    z = standardised(own, list(centre), list(scale))
-    expected = expected_iou(z, list(head), intercepts[usual.count - 1])
-    scores = logsumexp(_with_one(z) @ fault_head.T, axis=1)
-    judged = usual.hollow <= HOLLOW
-    right, ahead = usual.solid, expected[judged]
-    of = [usual.count == number for number in range(1, counts + 1)]
+                                 centre, scale) for name in suspects)])
+    return calibrated(Heads(
+        sha256, centre, scale, _plain(head), _plain(intercepts), _plain(latents.mean),
+        [_plain(row) for row in latents.whitening], suspects,
+        [_plain(row) for row in fault_head]), calibration)
+
+
+def calibrated(heads: Heads, calibration: Measured) -> QualityTables:
+    """
+    Return tables of heads whose quantiles and promises are those of new objects.
+
+    Nothing may have been fitted to the objects; rows with a fault are left out. What is said of
+    the IoU is calibrated on objects that are not hollow: of others no view tells what is inside.
+    What is usual is told apart for turntables and for any cameras. Raises DataError where there
+    is no object, or there are fewer views than the heads have numbers of views for.
+    """
+    counts = range(1, len(heads.intercepts) + 1)
+    usual = calibration.rows((calibration.fault == '') & (calibration.count <= counts[-1]))
+    if missing := set(counts) - set(usual.solid.count.tolist()):
+        raise DataError('quality: no objects to calibrate with after some numbers of views: '
+                        f'expected solid ones without a fault after 1 to {counts[-1]}, got none '
+                        f'after {", ".join(map(str, sorted(missing)))}')
+    own = numbers_of(usual, heads.known_latents)
+    z = standardised(own, heads.centre, heads.scale)
+    expected = expected_iou(z, heads.head, np.asarray(heads.intercepts)[usual.count - 1])
+    scores = logsumexp(_with_one(z) @ np.asarray(heads.fault_head).T, axis=1)
+    right, ahead = usual.solid, expected[usual.hollow <= HOLLOW]
     needed = {kind: _needed(right.rows(right.kind == kind), ahead[right.kind == kind])
               for kind in np.unique(right.kind).tolist()}
+    of_turntable = usual.around if usual.around.any() else np.ones(len(usual), np.bool_)
+
+    def ordered(values: Matrix, chosen: NDArray[np.bool_]) -> list[list[float]]:
+        return [_plain(np.sort(values[chosen & (usual.count == number)]))
+                for number in counts] if chosen.any() else []
+
     return QualityTables(
-        sha256, _plain(centre), _plain(scale), _plain(head), _plain(intercepts),
-        _plain([min(upper_quantile((ahead - right.iou)[right.count == number], MISS), 1.0)
-                for number in range(1, counts + 1)]),
-        TARGETS, _plain(np.max(list(needed.values()), axis=0)), _growth(right, ahead),
-        _plain(latents.mean),
-        [_plain(row) for row in latents.whitening], suspects,
-        [_plain(row) for row in fault_head],
-        [_plain(np.sort(scores[rows])) for rows in of],
-        [_plain(np.sort(own[rows, -1])) for rows in of], _plain(needed.get(LEARNED, [])))
+        **{each.name: getattr(heads, each.name) for each in fields(Heads)},
+        margin=_plain([min(upper_quantile((ahead - right.iou)[right.count == number], MISS), 1.0)
+                       for number in counts]),
+        targets=TARGETS, needed=_plain(np.max(list(needed.values()), axis=0)),
+        growth=_growth(right, ahead),
+        usual_scores=ordered(scores, of_turntable),
+        usual_distances=ordered(own[:, -1], of_turntable),
+        needed_learned=_plain(needed.get(LEARNED, [])),
+        usual_scores_any=ordered(scores, ~of_turntable),
+        usual_distances_any=ordered(own[:, -1], ~of_turntable))
 
 
 def numbers_of(measured: Measured, latents: KnownLatents) -> Matrix:

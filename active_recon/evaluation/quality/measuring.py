@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 import torch
 
 LEARNED = 'attention'
+_ANY = ', any'
 KINDS = ('random', 'even', LEARNED)
 
 
@@ -67,6 +68,11 @@ class Measured:
     def solid(self) -> Self:
         """The rows of objects that are not hollow."""
         return self.rows(self.hollow <= HOLLOW)
+
+    @property
+    def around(self) -> NDArray[np.bool_]:
+        """Which views are of a turntable, (N,)."""
+        return ~np.char.endswith(self.kind, _ANY)
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -131,7 +137,7 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
     """
     shown = FAULTS[fault](views, seed) if fault else views
     around = at_one_elevation(pose_directions(views.poses.numpy())).all()
-    called = kind if around else f'{kind}, any'
+    called = kind if around else f'{kind}{_ANY}'
     count = min(count, shown.poses.shape[1])
     order = torch.from_numpy(orders_of(shown, kind, count, seed))
     observer, objects = Observer(network, shown), torch.arange(len(shown))

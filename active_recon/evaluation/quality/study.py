@@ -25,14 +25,14 @@ def study(measured: Measured, tables: QualityTables) -> dict[str, Any]:
     - objects, hollow: numbers; sources
     - views: by number of views, `error` of the expected IoU (mean absolute, with its interval
       over objects) and `covered`, the share above the lower bound, of objects that are not hollow
-      and of `all`; `flagged`: false alarms among all
+      and of `all`, each missing where there are none; `flagged`: false alarms among all
     - faults: by name and number of views, the shares `flagged` and `named` rightly
     - promises: by order of views and target, see `_promise`
     """
     judge = Judge(tables)
     numbers = numbers_of(measured, tables.known_latents)
-    judged = [judge.judge_numbers(row, int(count))
-              for row, count in zip(numbers, measured.count, strict=True)]
+    judged = [judge.judge_numbers(row, int(count), bool(around)) for row, count, around in zip(
+        numbers, measured.count, measured.around, strict=True)]
     usual = measured.fault == ''
     solid = usual & (measured.hollow <= HOLLOW)
     expected = np.array([quality.expected_iou for quality in judged])

@@ -20,10 +20,11 @@ def _lines(result: Mapping[str, Any]) -> Iterator[str]:
                     '| error, with hollow | above it, with hollow | false alarms |',
                     '|---|---|---|---|---|---|---|---|')
         for count, after in figures['views'].items():
-            solid, whole = after['solid'], after['all']
-            yield (f'| {count} | {solid["episodes"]} | {solid["iou"]:.3f} | '
-                   f'{_spread(solid["error"])} | {solid["covered"]:.3f} | '
-                   f'{whole["error"][0]:.3f} | {whole["covered"]:.3f} | {after["flagged"]:.3f} |')
+            solid, whole = after.get('solid'), after['all']
+            of_solid = (f'{solid["episodes"]} | {solid["iou"]:.3f} | {_spread(solid["error"])} | '
+                        f'{solid["covered"]:.3f}' if solid else '0 | – | – | –')
+            yield (f'| {count} | {of_solid} | {whole["error"][0]:.3f} | {whole["covered"]:.3f} | '
+                   f'{after["flagged"]:.3f} |')
         if figures['faults']:
             yield from ('', '| fault | views | episodes | flagged | named |',
                         '|---|---|---|---|---|')
