@@ -71,9 +71,14 @@ def test_a_training_that_is_done_is_resumed_to_the_same_weights(run, dataset, mo
     assert_close(load_file(run / 'weights.safetensors'), before, rtol=0, atol=0)
 
 
-def test_a_training_of_other_settings_is_not_resumed(run, dataset, monkeypatch, capsys):
-    line = refusal(monkeypatch, capsys, *training(dataset, run, '--resume', '--seed', 3))
-    assert 'made under other settings' in line
+@pytest.mark.parametrize(('option', 'value', 'told'), [
+    ('--seed', 3, 'settings: seed: expected 0 as before, got 3; ask'),
+    ('--init-from', '2d3d-attention', "settings: begun_with: expected '' as before, got '"),
+    ('--view-separation-deg', 90, 'view_separation: expected 1.04719755')])
+def test_a_training_of_other_settings_is_not_resumed(
+        run, dataset, monkeypatch, capsys, option, value, told):
+    line = refusal(monkeypatch, capsys, *training(dataset, run, '--resume', option, value))
+    assert 'made under other settings' in line and told in line
 
 
 def test_a_new_training_never_overwrites_the_checkpoints_of_another(

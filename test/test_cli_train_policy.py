@@ -62,6 +62,10 @@ def test_a_policy_is_learned_in_two_rounds_and_chooses(
     assert before == {file: file.stat().st_mtime_ns
                       for file in (tmp_path / 'run').rglob('*.npz')}
     np.testing.assert_equal(load_file(made), written)
+    assert command(monkeypatch, 'train-policy', *arguments, '--candidates', 5) == 2
+    assert 'candidates: expected 4 as before, got 5; name another' in capsys.readouterr().err
+    assert command(monkeypatch, 'train-policy', *arguments, '--model', 'lifting') == 2
+    assert 'network_sha256: expected' in capsys.readouterr().err
     assert command(monkeypatch, 'policies', dataset, '--model', weights, '--policies',
                    'random,attention', '--objects', 2, '--starts', 1, '--seeds', 1, '--views', 3,
                    '--threads', 1, '--out', tmp_path) == 0

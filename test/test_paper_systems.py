@@ -1,8 +1,10 @@
 """The compared systems: the same objects, as many views, trained once."""
 
+from contextlib import contextmanager
+from dataclasses import replace
 import json
 
-from active_recon.errors import WeightsError
+from active_recon.errors import ConfigError, WeightsError
 from active_recon.models import weights_files as weights_module
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import FOLDER
@@ -67,11 +69,14 @@ def test_a_missing_system_is_trained_and_then_found(study, small_batches):
     before = path.read_bytes()
     assert have_systems(study, [TWO_STAGE]) == {TWO_STAGE: path}
     assert path.read_bytes() == before
+    for other, told in (({'seed': 3}, 'seed: expected 0 as before, got 3'),
+                        ({'samples': 36}, 'views_seen: expected 9 as before, got 36'),
+                        ({'training': ('train', 'val')}, 'objects: expected')):
+        with pytest.raises(ConfigError, match=f'another training: {told}'):
+            have_systems(replace(study, **other), [TWO_STAGE])
 
 
 def test_a_training_is_told_as_it_goes(study, small_batches):
-    from contextlib import contextmanager
-    from dataclasses import replace
     told = []
 
     @contextmanager

@@ -173,6 +173,9 @@ def test_it_is_trained_and_resumed_from_the_command_line(lamps, tmp_path, monkey
     assert is_segmenter(tmp_path / 'run/segmenter.safetensors')
     assert command(monkeypatch, *arguments) == 2  # holds another training
     assert command(monkeypatch, *arguments, '--resume') == 0
+    capsys.readouterr()
+    assert command(monkeypatch, *arguments, '--resume', '--init-from', 'lifting') == 2
+    assert "begun_with: expected '' as before, got" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('library', ['openvino', 'onnxruntime'])

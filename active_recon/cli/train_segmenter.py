@@ -50,7 +50,7 @@ def train_segmenter(
     from active_recon.models.lifting_encoder import IMAGE_SIZE
     from active_recon.models.segmenter import Segmenter, SegmenterConfig
     from active_recon.models.segmenter_weights import begin_with, save_segmenter
-    from active_recon.models.weights_files import find_weights
+    from active_recon.models.weights_files import find_weights, weights_hash
     from active_recon.training.loop import make_fabric, Run, TrainingConfig
     from active_recon.training.segmenter import train_segmenter
     from active_recon.training.silhouettes import silhouette_figures
@@ -71,10 +71,13 @@ def train_segmenter(
         warn_of_shared_objects(views.folders, held_out.folders, 'their IoU is too high')
     config = SegmenterConfig()
     segmenter = Segmenter.from_config(config)
+    begun_with = ''
     if init_from:
+        begun_with = weights_hash(find_weights(init_from))
         begin_with(segmenter, find_weights(init_from))
     with shown_steps('segmenter', steps) as report:
-        train_segmenter(segmenter, views, training, Run(fabric, checkpoint, report, resume))
+        train_segmenter(segmenter, views, training, Run(
+            fabric, checkpoint, report, resume, begun_with=begun_with))
     if not fabric.is_global_zero:
         return
     figures = silhouette_figures(segmenter.eval(), held_out)

@@ -1,5 +1,6 @@
 """Training checkpoints: safetensors for the numbers, JSON for the rest; never pickle."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 import json
 from pathlib import Path
@@ -71,7 +72,23 @@ def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
     What an older checkpoint does not tell, such as the data, is taken to be the same.
     """
     stored = load_checkpoint(path, module, optimizer)
-    if stored.settings != {name: settings.get(name) for name in stored.settings}:
-        raise ConfigError(f'{path}: made under other settings, {stored.settings}, where these '
-                          f'are asked for: {settings}')
+    asked = {name: settings.get(name) for name in stored.settings}
+    if differing := '; '.join(differences(stored.settings, asked)):
+        raise ConfigError(f'{path}: made under other settings: {differing}; ask for the same, or '
+                          'name another folder with --out')
     return stored
+
+
+def differences(made: dict[str, Any], asked: dict[str, Any]) -> Iterator[str]:
+    """Yield in words how settings differ, those within settings each by itself."""
+    for name in sorted(made.keys() | asked.keys()):
+        one, other = made.get(name), asked.get(name)
+        if isinstance(one, dict) and isinstance(other, dict):
+            yield from differences(one, other)
+        elif one != other:
+            yield f'{name}: expected {_short(one)} as before, got {_short(other)}'
+
+
+def _short(value: Any) -> str:
+    """Return a setting as text; of a SHA-256 its begin tells enough."""
+    return repr(value[:12]) if isinstance(value, str) else repr(value)

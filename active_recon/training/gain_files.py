@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 import hashlib
+import json
 from pathlib import Path
+from typing import Any
 
 from active_recon.cluster import Crew
 from active_recon.cluster.local import LocalCrew
@@ -18,6 +20,7 @@ from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import read_scene
 from active_recon.policies import load_policy, Policy, PolicyOptions
 from active_recon.reporting import Advance
+from active_recon.training.checkpoints import differences
 from active_recon.training.view_gains import (
     by_gain,
     by_policy,
@@ -27,11 +30,13 @@ from active_recon.training.view_gains import (
     spread_views,
     ViewGains,
 )
+from active_recon.whole_files import whole_file
 import numpy as np
 import torch
 
 _MIXED = ('random', 'farthest', 'uniform')
 _FEWEST = 3  # candidates that leave a choice after the first view
+_NOTE = 'collected.json'
 _LEFT_OUT = {'data', 'mesh'}  # kinds of errors of objects that cannot be read
 _BY_GAIN = 0.4  # share of the episodes in which the best view is taken, where no policy is given
 
@@ -82,8 +87,10 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
     Files that are there already are kept. Views are chosen by the policy, or by a mixture of
     random, farthest, an even sweep and the greatest gain. Each object is shown under a light,
     noise and pose errors of its own. Objects that cannot be read are left out; raises DataError
-    where none is left. `crew` does the work; None: this process.
+    where none is left, and ConfigError where gains of another network, or collected otherwise, are
+    there. `crew` does the work; None: this process.
     """
+    _keep_apart(out, {'network_sha256': entrant.weights, **collecting.to_dict()})
     keep = partial(_keep, entrant, collecting, out, policy, torch.get_num_threads())
     workers = crew or LocalCrew(1)
     results = workers.map(keep, folders, out, sorted({folder.root for folder in folders}))
@@ -95,6 +102,24 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
         raise DataError(f'{out}: no object whose gains can be measured: expected one or more '
                         f'with voxels and {_FEWEST} images, got none')
     return files
+
+
+def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
+    """
+    Note beside gains how they are collected; raise ConfigError where they were otherwise.
+
+    How many objects there may be is no difference: the gains of each are its own.
+    """
+    noted = out / _NOTE
+    if not noted.is_file():
+        out.mkdir(parents=True, exist_ok=True)
+        with whole_file(noted) as unfinished:
+            unfinished.write_text(json.dumps(collected) + '\n')
+    before = json.loads(noted.read_text())
+    if differing := '; '.join(differences(*({**each, 'objects': None}
+                                            for each in (before, collected)))):
+        raise ConfigError(f'{out}: gains that were measured otherwise are there: {differing}; '
+                          'name another folder with --out')
 
 
 def _file(out: Path, folder: ObjectFolder) -> Path:

@@ -83,7 +83,8 @@ def train_jointly(
 ) -> None:
     """Train both in place, from fresh weights or any others; see `train_steps`."""
     size = share_of_batch(config, run.fabric)
-    settings = {'training': config.to_dict(), 'loss': loss.to_dict(), 'reward': rewards.to_dict()}
+    settings = {'training': config.to_dict(), 'loss': loss.to_dict(), 'reward': rewards.to_dict(),
+                'view_separation': attention.view_separation}
 
     def draw(step: int) -> Draw:
         return draw_episodes(views, size, [config.seed, 2, step, run.fabric.global_rank],

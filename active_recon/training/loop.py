@@ -81,6 +81,7 @@ class Run:
     With `resume` it continues from the checkpoint, if there is one. `report` is called after every
     step with the step and what was measured, `show` after every validation with the step.
     `draw_threads` draw batches ahead, see `drawn_ahead`; None: as many as `threads_to_draw` tells.
+    `begun_with` is the SHA-256 of the weights that the training begins with, '' for fresh ones.
     """
 
     fabric: Fabric
@@ -90,6 +91,7 @@ class Run:
     until: int | None = None  # stops early, as an interrupted training does
     show: Callable[[int], None] = lambda step: None
     draw_threads: int | None = None
+    begun_with: str = ''
 
 
 def make_fabric(bfloat16: bool, devices: int = 1, nodes: int = 1) -> Fabric:
@@ -146,7 +148,7 @@ def train_steps(
     raw = torch.optim.AdamW(parameters, config.learning_rate, betas=(0.9, 0.99),
                             weight_decay=weight_decay)
     wrapped, optimizer = fabric.setup(learner, raw)
-    settings = {**settings, 'data': _hash(views)}
+    settings = {**settings, 'data': _hash(views), 'begun_with': run.begun_with}
     begun = Checkpoint(0, settings, [])
     if run.resume and run.checkpoint_path.is_file():
         begun = resume_checkpoint(run.checkpoint_path, trained, raw, settings)

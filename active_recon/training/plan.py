@@ -14,7 +14,7 @@ from active_recon.evaluation.validation import best_threshold, policy_auc, recon
 from active_recon.models.lifting import Lifting
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_config, network_entry
-from active_recon.models.weights import Bundle
+from active_recon.models.weights import Bundle, state_hash
 from active_recon.policies import learned_policy
 from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.training.calibration import calibrate, MOST_OBJECTS
@@ -98,12 +98,13 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
     config = plan.config
     network = plan.begun.reconstruction if plan.begun else entry.build(config)
     frozen = plan.begun is not None and plan.frozen
+    begun_with = state_hash(network) if plan.begun else ''
     network.requires_grad_(not frozen)
     attention: Any = entry.policy(config) if entry.policy and (plan.joint or plan.policy) else None
 
     def run(stage: str, report: Report) -> Run:
         return Run(fabric, out / f'{stage}.safetensors', report, resume,
-                   show=lambda step: show(stage, step, network))
+                   show=lambda step: show(stage, step, network), begun_with=begun_with)
 
     if plan.joint and attention is not None:
         with reporting('joint', plan.reconstruction.steps) as report:

@@ -156,7 +156,7 @@ def train_policy(
     """Train the attention model in place on a frozen network; see `train_steps`."""
     size = share_of_batch(config, run.fabric)
     settings = {'training': config.to_dict(), 'reward': rewards.to_dict(), 'threshold': threshold,
-                'network': state_hash(network)}
+                'network': state_hash(network), 'view_separation': attention.view_separation}
     train_steps(
         run, PolicyLearner(network, attention, views, threshold, config.max_views, rewards),
         attention, config, settings, views,
