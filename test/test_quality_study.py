@@ -207,6 +207,14 @@ def test_the_two_halves_share_no_source_and_are_of_like_size():
     assert 0.35 < first.mean() < 0.65
 
 
+def test_the_first_half_stays_that_of_before_whatever_else_is_measured():
+    measured = made_up(40, 8, sources=7)
+    before = ['source 0', 'source 1', 'of others']
+    first = halves(measured, before)
+    assert set(measured.source[first]) == {'source 0', 'source 1'}
+    np.testing.assert_array_equal(halves(measured, ['of others']), halves(measured))
+
+
 def test_what_was_measured_comes_back_from_its_file(tmp_path):
     measured = made_up(5, 8)
     measured.write(tmp_path / 'm.npz')
@@ -343,7 +351,8 @@ def test_a_policy_chooses_the_views_after_the_first(seen):
                                atol=1e-6)  # the same views, in another order
 
 
-def test_the_commands_fit_tables_and_test_them_on_the_other_half(tmp_path, monkeypatch):
+def test_the_commands_fit_tables_and_test_them_on_the_other_half(
+        tmp_path, monkeypatch, capsys):
     shipped = weights_hash(SHIPPED)
     made_up(200, 0, weights=shipped).write(tmp_path / 'known.npz')
     made_up(200, 1, weights=shipped).write(tmp_path / 'real.npz')
@@ -361,6 +370,16 @@ def test_the_commands_fit_tables_and_test_them_on_the_other_half(tmp_path, monke
     assert (whole['objects'], half['objects']) == (200, 100)
     used = json.loads((tmp_path / 'tables.json').read_text())['calibrated_on']
     assert not set(used) & set(half['sources'])
+    few = Measured.read(tmp_path / 'real.npz')
+    few.rows(few.source != half['sources'][0]).write(tmp_path / 'few.npz')
+    few.rows(np.isin(few.source, used)).write(tmp_path / 'first.npz')
+    asked = ('quality', 'study', '--tables', tmp_path / 'tables.json', '--out', tmp_path,
+             '--halved')
+    assert command(monkeypatch, *asked, tmp_path / 'few.npz') == 0
+    (other,) = json.loads((tmp_path / 'quality.json').read_text())['sets']
+    assert other['sources'] == half['sources'][1:]
+    assert 'no object of the second half' in refusal(
+        monkeypatch, capsys, *asked, tmp_path / 'first.npz')
 
 
 def test_the_command_calibrates_the_tables_beside_weights_on_objects_of_one_s_own(

@@ -14,6 +14,8 @@ quality = typer.Typer(help='How good a shape is, judged without the truth.', no_
 Model = Annotated[str | None, typer.Option(
     help='The network: a model that ships, or a weights file.')]
 _BATCH = 4
+_SOURCES, _FITTED_BY = 'calibrated_on', 'heads_fitted_by'
+"""What tables tell of the first half's sources, and of the command that fitted what was kept."""
 
 
 @quality.command()
@@ -87,7 +89,8 @@ def measure(
 def fit(
     calibration: Annotated[list[Path], typer.Option(
         help='Measured on objects that nothing was fitted to, with and without faults (may be '
-             'given several times). The first of two halves, split by source, is used.')],
+             'given several times). The first of two halves, split by source, is used; without '
+             '--known that of the tables that there are, if some of its sources were measured.')],
     known: Annotated[list[Path] | None, typer.Option(
         help='Measured without faults: objects of training and validation (may be given several '
              'times). Default: what is fitted stays as it is in the tables beside the weights, '
@@ -114,16 +117,17 @@ def fit(
     weights = find_weights(model)
     sha256 = weights_hash(weights)
     together = Measured.read_all(calibration, sha256)
-    first = together.rows(halves(together))
-    card = {'command': command_line(), 'calibrated_on': sorted(set(first.source.tolist()))}
     if known:
+        first, notes = together.rows(halves(together)), {}
         tables = fitted(Measured.read_all(known, sha256), first, sha256)
     else:
-        tables = calibrated(needed_tables(weights, sha256), first)
-        earlier = read_card(tables_path(weights))
-        card['heads_fitted_by'] = earlier.get('heads_fitted_by', earlier.get('command', ''))
+        heads, earlier = needed_tables(weights, sha256), read_card(tables_path(weights))
+        first = together.rows(halves(together, earlier.get(_SOURCES, ())))
+        tables = calibrated(heads, first)
+        notes = {_FITTED_BY: earlier.get(_FITTED_BY, earlier.get('command', ''))}
     path = out or tables_path(weights)
-    tables.write(path, **card)
+    tables.write(path, **{'command': command_line(), **notes,
+                          _SOURCES: sorted(set(first.source.tolist()))})
     typer.echo(f'wrote {path}')
 
 
@@ -133,7 +137,8 @@ def study(
         help='Measured objects that nothing was fitted to: one set, with and without faults.')
     ] = None,
     halved: Annotated[list[Path] | None, typer.Option(
-        help='The files that `fit` was calibrated on: the other half of them is one set.')] = None,
+        help='The files that `fit` was calibrated on: the other half of them, of sources that it '
+             'did not use, is one set.')] = None,
     out: Annotated[Path, typer.Option(
         help='Folder for quality.json and quality.md.')] = Path('quality'),
     model: Model = None,
@@ -149,19 +154,24 @@ def study(
     from active_recon.evaluation.quality.measuring import halves, Measured
     from active_recon.evaluation.quality.study import study as studied
     from active_recon.evaluation.quality.summary import markdown
-    from active_recon.models.weights_files import find_weights
+    from active_recon.models.weights_files import find_weights, read_card
     from active_recon.quality.tables import QualityTables, tables_path
 
     if not files and not halved:
         raise ConfigError('study: nothing to measure: expected files of `quality measure`, or '
                           '--halved with some, got neither')
-    found = QualityTables.read(tables or tables_path(find_weights(model)))
+    path = tables or tables_path(find_weights(model))
+    found = QualityTables.read(path)
     sha256, sets = found.weights_sha256, {}
     if files:
         sets[files[0].stem] = Measured.read_all(files, sha256)
     if halved:
         together = Measured.read_all(halved, sha256)
-        sets[f'{halved[0].stem}, second half'] = together.rows(~halves(together))
+        second = together.rows(~halves(together, read_card(path).get(_SOURCES, ())))
+        if not len(second):
+            raise DataError('--halved: no object of the second half: expected some of sources '
+                            f'that {path} was not calibrated on, got none')
+        sets[f'{halved[0].stem}, second half'] = second
     result = {'command': command_line(), 'weights_sha256': sha256,
               'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}
     figures, page = write_study(result, markdown(result), out, 'quality')

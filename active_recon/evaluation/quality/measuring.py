@@ -1,6 +1,6 @@
 """Roll-outs of a frozen network: what its quality is judged by after each view, and the truth."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self
@@ -196,13 +196,17 @@ def _cameras(cameras: Cameras, size: int) -> Iterator[Camera]:
                                       size, size))
 
 
-def halves(measured: Measured) -> NDArray[np.bool_]:
+def halves(measured: Measured, before: Collection[str] = ()) -> NDArray[np.bool_]:
     """
     Return which rows belong to the first of two halves, split by source, (N,).
 
     The sources, from that with most objects that are not hollow, each join the half with fewer of
-    them so far.
+    them so far. Where there are some of those that were the first half `before`, they are it
+    again, whatever else was measured.
     """
+    again = np.isin(measured.source, sorted(before))
+    if again.any():
+        return again
     solid = measured.solid
     pairs = set(zip(solid.source.tolist(), solid.object.tolist(), strict=True))
     sizes = [(-sum(source == each for source, _ in pairs), each)
