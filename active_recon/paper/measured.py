@@ -69,7 +69,7 @@ def measure_loss(study: Study, weights: Path, policy: str, objects: Objects,
             parts = []
             for part in batches(len(trial.objects), _BATCH):
                 parts.append(_losses(trial.network, trial.views, trial.objects[part],
-                                     trial.starts[part], run.azimuths[part], loss))
+                                     trial.starts[part], run.azimuths[part.numpy()], loss))
                 advance(len(part), '')
         losses = np.concatenate(parts)
         write_arrays(path, loss=losses)

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 from active_recon.config import LossConfig
-from active_recon.errors import ConfigError, WeightsError
+from active_recon.errors import WeightsError
 from active_recon.models.registry import network_entry, NETWORKS
 from active_recon.models.weights_files import find_weights, read_card
 from active_recon.paper.study import Objects, Study
 from active_recon.paper.trainings import train_all, Training, views_seen
-from active_recon.training.checkpoints import differences
 from active_recon.training.loop import TrainingConfig
 from active_recon.training.plan import Plan
 from active_recon.training.supervised import steps_for
@@ -72,12 +70,10 @@ def find_system(study: Study, system: System) -> Path | None:
     Return a system's weights: those in the study's folder, else those that ship, else None.
 
     Weights that ship are used only if they were trained on about as many views as the study's, or
-    if the system is not trained by steps. Raises ConfigError where those in the folder are of a
-    study of other objects, samples or another seed.
+    if the system is not trained by steps.
     """
     own = study.models / system.name / 'weights.safetensors'
     if own.is_file():
-        _require_same_training(study, system, own)
         return own
     try:
         shipped = find_weights(system.name)
@@ -89,37 +85,16 @@ def find_system(study: Study, system: System) -> Path | None:
     return shipped if seen and abs(seen / study.samples - 1) < 0.1 else None
 
 
-def _require_same_training(study: Study, system: System, own: Path) -> None:
-    """Raise ConfigError where a study's training was another one; others' weights may be used."""
-    card, plan = read_card(own), training_plan(system, study.samples)
-    if not {'objects', 'seed'} <= card.keys():
-        return
-    made = {'seed': card['seed'], 'views_seen': card.get('views_seen'),
-            'objects': tuple(each['sha256'][:12] for each in card['objects'])}
-    asked = {'seed': study.seed, 'views_seen': views_seen({
-        'model': plan.model, 'scheme': 'joint' if plan.joint else 'two-stage',
-        'reconstruction': plan.reconstruction.to_dict()}),
-        'objects': _hashes(tuple(study.training_sets(resolution=system.resolution)))}
-    if differing := '; '.join(differences(made, asked)):
-        raise ConfigError(f'{own}: of another training: {differing}; name another folder with '
-                          '--models')
-
-
-@cache
-def _hashes(sets: tuple[Objects, ...]) -> tuple[str, ...]:
-    """Return the begin of each set's hash."""
-    return tuple(each.identity()['sha256'][:12] for each in sets)
-
-
 def have_systems(study: Study, wanted: Sequence[System]) -> dict[System, Path]:
-    """Return the weights of systems; train those that are missing."""
+    """Return the weights of systems, as `train_all`; those that ship need no training."""
     found = {system: find_system(study, system) for system in wanted}
-    missing = [system for system, path in found.items() if path is None]
-    trained = dict(zip(missing, train_all(study, [training_of(
+    own = [system for system, path in found.items()
+           if path is None or path.is_relative_to(study.models)]
+    trained = dict(zip(own, train_all(study, [training_of(
         system, study.training_sets(resolution=system.resolution),
         study.objects('val', resolution=system.resolution), study.models / system.name,
-        study.samples, study.seed) for system in missing]), strict=True))
-    return {system: path or trained[system] for system, path in found.items()}
+        study.samples, study.seed) for system in own]), strict=True))
+    return {system: path for system in wanted if (path := trained.get(system) or found[system])}
 
 
 def training_of(system: System, training: Sequence[Objects], validation: Objects, out: Path,

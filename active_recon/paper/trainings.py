@@ -3,16 +3,18 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from active_recon.cluster.telling import told
-from active_recon.errors import WorkError
+from active_recon.errors import ConfigError, WorkError
 from active_recon.models.registry import network_entry
 from active_recon.models.weights import save_weights
+from active_recon.models.weights_files import read_card
 from active_recon.paper.study import Objects, Study
 from active_recon.reporting import by_step
+from active_recon.training.checkpoints import differences
 from active_recon.training.loop import make_fabric, Measured
 from active_recon.training.plan import Plan, Report, seeded, train_plan
 from active_recon.training.supervised import mean_length
@@ -45,9 +47,13 @@ def train_all(study: Study, trainings: Sequence[Training]) -> list[Path]:
     Train what has no weights yet; return the paths of all weights.
 
     Each goes to a worker of the study's crew, if it has one. An interrupted training continues
-    from its checkpoints. Raises WorkError where a worker's training fails.
+    from its checkpoints. Raises ConfigError where weights are there of other objects, samples or
+    another seed, and WorkError where a worker's training fails.
     """
     missing = [each for each in trainings if not each.weights.is_file()]
+    for each in trainings:
+        if each.weights.is_file():
+            _require_same(each)
     if study.crew is None:
         for each in missing:
             _train(study, each)
@@ -60,6 +66,34 @@ def train_all(study: Study, trainings: Sequence[Training]) -> list[Path]:
                 if result.refusal:
                     raise WorkError(f'{missing[result.index].out}: {result.refusal}', result.kind)
     return [each.weights for each in trainings]
+
+
+def _require_same(training: Training) -> None:
+    """Raise ConfigError where a study's weights are of another training; others may be used."""
+    card = read_card(training.weights)
+    if not {'objects', 'seed', 'views_seen'} <= card.keys():
+        return
+    made = {'seed': card['seed'], 'objects': _short(card['objects'])}
+    asked = {'seed': training.seed, 'objects': _short(_identities(training.training))}
+    plan = training.plan
+    if plan.begun is None:  # a frozen network has seen what its own card tells
+        made['views_seen'] = card['views_seen']
+        asked['views_seen'] = views_seen({
+            'model': plan.model, 'scheme': 'joint' if plan.joint else 'two-stage',
+            'reconstruction': plan.reconstruction.to_dict()})
+    if differing := '; '.join(differences(made, asked)):
+        raise ConfigError(f'{training.weights}: of another training: {differing}; name another '
+                          'folder with --models')
+
+
+@cache
+def _identities(sets: tuple[Objects, ...]) -> list[dict[str, Any]]:
+    return [objects.identity() for objects in sets]
+
+
+def _short(identities: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the begin of each hash: the folder may be another."""
+    return [each['sha256'][:12] for each in identities]
 
 
 def _train_in_worker(study: Study, training: Training) -> None:
