@@ -3,6 +3,9 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+import tempfile
+
+from active_recon.errors import ConfigError
 
 
 @contextmanager
@@ -20,3 +23,21 @@ def whole_file(path: Path) -> Iterator[Path]:
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
         raise
+
+
+def writable(path: Path) -> Path:
+    """
+    Return the path of a file; make its folder, and raise ConfigError where it cannot be written.
+
+    To be asked before the work whose results go there.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise ConfigError(f'{path}: cannot be written: expected a folder that files can be made '
+                          f'in, got: {error.strerror}') from error
+    if path.is_dir():
+        raise ConfigError(f'{path}: cannot be written: expected a file, got a folder')
+    return path

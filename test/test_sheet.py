@@ -1,6 +1,8 @@
 """Contact sheets: what is drawn stands where it should, and the command writes it."""
 
 from active_recon.cli.main import app
+from active_recon.datasets.drawn_cameras import Viewing
+from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.errors import DataError
 from active_recon.volumes.sheet import contact_sheet, sequence_sheet
 from command_line import refusal as refused
@@ -37,11 +39,31 @@ def test_objects_stand_row_by_row_and_what_is_left_over_is_background():
     assert dark.tolist() == [[True, True], [True, False]]
 
 
-def test_the_command_draws_a_category_or_the_training_images_of_a_dataset(dataset, tmp_path):
+def test_the_command_draws_a_category(tmp_path):
     run(tmp_path / 'lamps.png', '--category', 'lamp', '--count', 2)
     assert cv2.imread(str(tmp_path / 'lamps.png')).shape == (160, 8 * 160, 3)
-    run(tmp_path / 'new' / 'batch.png', '--training', dataset, '--count', 3)
-    assert cv2.imread(str(tmp_path / 'new' / 'batch.png')).shape == (3 * 64, 8 * 64, 3)
+
+
+@pytest.mark.parametrize(('model', 'side'), [('lifting', 128), ('2d3d-attention', 64)])
+def test_training_images_are_those_of_the_network(dataset, tmp_path, model, side):
+    path = tmp_path / 'new' / 'batch.png'
+    run(path, '--training', dataset, '--count', 3, '--model', model)
+    assert cv2.imread(str(path)).shape == (3 * side, 8 * side, 3)
+
+
+def test_training_images_of_any_cameras_are_shown(tmp_path):
+    list(make_dataset(shape_jobs('lamp', range(2), tmp_path / 'any'), 1,
+                      viewing=Viewing('any', 3)))
+    run(tmp_path / 'batch.png', '--training', tmp_path / 'any', '--count', 2)
+    assert cv2.imread(str(tmp_path / 'batch.png')).shape == (2 * 128, 3 * 128, 3)
+    with pytest.raises(DataError, match='expected 24, got 3'):
+        run(tmp_path / 'batch.png', '--training', tmp_path / 'any', '--model', '2d3d')
+
+
+def test_one_thing_is_shown(tmp_path, monkeypatch, capsys):
+    line = refused(monkeypatch, capsys, 'sheet', tmp_path / 'x.png', '--category', 'chair',
+                   '--training', tmp_path)
+    assert 'expected one of --category, --meshes, --training, got --category and --t' in line
 
 
 def test_a_folder_without_meshes_or_objects_is_refused(tmp_path):

@@ -1,6 +1,8 @@
 """A file is written whole, or what stood in its place stays."""
 
-from active_recon.whole_files import whole_file
+from active_recon.errors import ConfigError
+from active_recon.whole_files import whole_file, writable
+from command_line import refusal
 import pytest
 
 
@@ -27,3 +29,28 @@ def test_what_fails_leaves_what_stood_there_and_nothing_beside_it(tmp_path, erro
         raise error
     assert path.read_text() == 'before'
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_folder_of_a_file_is_made_and_nothing_in_it(tmp_path):
+    path = tmp_path / 'new' / 'it.json'
+    assert writable(path) == path
+    assert list(tmp_path.rglob('*')) == [path.parent]
+
+
+def test_a_folder_at_the_place_of_a_file_or_a_file_at_that_of_its_folder_is_refused(tmp_path):
+    (tmp_path / 'file').touch()
+    for path in (tmp_path, tmp_path / 'file' / 'it.json'):
+        with pytest.raises(ConfigError, match='cannot be written: expected a f'):
+            writable(path)
+
+
+@pytest.mark.parametrize('asked', [
+    ('evaluate', 'data', '--json', 'file/it.json'), ('evaluate', 'data', '--rows', 'file/it.csv'),
+    ('study', 'data', '--out', 'file'), ('policies', 'data', '--out', 'file'),
+    ('paper', 'table1', '--out', 'file'), ('quality', 'measure', 'data', 'file/it.npz')],
+    ids=' '.join)
+def test_what_cannot_be_written_is_told_before_anything_is_measured(
+        asked, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'file').touch()
+    assert 'cannot be written' in refusal(monkeypatch, capsys, *asked)

@@ -27,6 +27,7 @@ from active_recon.cli.reading import Split
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 from active_recon.policies import POLICIES
+from active_recon.whole_files import writable
 import typer
 
 if TYPE_CHECKING:
@@ -118,6 +119,8 @@ def evaluate(
             raise ConfigError(f'--against: another resolution: expected weights of {one} cells a '
                               f'side, as those of --model, got {two}; `active-recon study` '
                               'measures networks of several at the same cells')
+    for path in filter(None, (json_file, rows)):
+        writable(path)  # tells before hours of measuring
     torch.set_num_threads(threads)
     plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
                           split_file, bf16, threads, runtime)
@@ -167,7 +170,6 @@ def evaluate(
     if training and validation is not None:
         result['baselines'] = print_baselines(training, validation, trial)
     if json_file:
-        json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(json.dumps(result, indent=1) + '\n')
         typer.echo(f'wrote {json_file}')
 

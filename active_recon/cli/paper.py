@@ -14,6 +14,7 @@ from active_recon.cli.cluster_option import (
 )
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
+from active_recon.whole_files import writable
 import typer
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ def paper(
     data, models, out = (require_path(folder) for folder in (data, models, out))
     if cluster and device != 'cpu':
         raise ConfigError(f'--cluster: expected --device cpu, got {device}')
+    writable(out / 'README.md')  # tells before hours of training
     torch.set_num_threads(threads)
     study = Study(data, models, out, model, pascal3d, tuple(training or ('train',)), samples,
                   starts, seed, threads, policy_seeds, policy_starts, subset_objects, device,

@@ -7,6 +7,7 @@ from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.study_files import write_study
 from active_recon.errors import ConfigError, DataError
+from active_recon.whole_files import writable
 import typer
 
 quality = typer.Typer(help='How good a shape is, judged without the truth.', no_args_is_help=True)
@@ -61,7 +62,7 @@ def measure(
     network = bundle.reconstruction
     policy = load_policy(LEARNED, PolicyOptions(
         views=views, weights=weights, threads=threads)) if kind == LEARNED else None
-    out.parent.mkdir(parents=True, exist_ok=True)
+    writable(out)  # tells before minutes of measuring
     folders = chosen_folders(list_objects(data), None, objects, seed)
     parts, left_out = [], []
     with progress_bar(f'measuring {data.name}', len(folders)) as advance:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.errors import ConfigError, DataError
+from active_recon.whole_files import writable
 import typer
 
 if TYPE_CHECKING:
@@ -22,19 +23,32 @@ def sheet(
     training: Annotated[Path | None, typer.Option(
         help='Dataset whose augmented training images are shown instead: one sequence of views '
              'in each row.')] = None,
+    model: Annotated[str, typer.Option(
+        help='With --training: the network whose images are shown. lifting takes any cameras, '
+             "2d3d-attention the turntable's.")] = 'lifting',
     count: Annotated[int, typer.Option(
         min=1, help='Number of objects of each category; with --training, of rows.')] = 8,
     azimuth_deg: Annotated[float, typer.Option(
         help='Azimuth of the camera; 0 is the front.')] = 35.0,
 ) -> None:
-    """Draw many objects in one image, to inspect them and compare them with real ones."""
+    """
+    Draw many objects in one image, to inspect them and compare them with real ones.
+
+    Example: active-recon sheet chairs.png --category chair
+
+    Example: active-recon sheet images.png --training data/train
+    """
     import cv2
 
+    asked = {'--category': category, '--meshes': meshes, '--training': training}
+    if len(given := [name for name, value in asked.items() if value]) > 1:
+        raise ConfigError(f'sheet: several things to show: expected one of {", ".join(asked)}, '
+                          f'got {" and ".join(given)}')
     if out.suffix.lower() != '.png':
         raise ConfigError(f'{out}: no PNG file: expected a path that ends with .png')
+    writable(out)
     picture = _objects(category, meshes, count, azimuth_deg) if training is None else (
-        _training(training, count))
-    out.parent.mkdir(parents=True, exist_ok=True)
+        _training(training, count, model))
     if not cv2.imwrite(str(out), picture[..., ::-1]):
         raise DataError(f'{out}: cannot be written: expected the path of a PNG file')
     typer.echo(f'wrote {out}')
@@ -61,14 +75,21 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
     return contact_sheet(objects, azimuth=math.radians(azimuth_deg))
 
 
-def _training(root: Path, rows: int) -> 'NDArray[np.uint8]':
+def _training(root: Path, rows: int, model: str) -> 'NDArray[np.uint8]':
     from active_recon.datasets.layout import list_objects
     from active_recon.datasets.views import read_views
+    from active_recon.models.registry import named_network, network_config, network_entry
     from active_recon.training.batches import draw_batch
+    from active_recon.training.posed_batches import draw_posed_batch
     from active_recon.volumes.sheet import sequence_sheet
     import numpy as np
 
+    name = named_network(model)
+    spec = network_entry(name).build(network_config(name, 'small')).spec
     rng = np.random.default_rng(0)
     folders = list_objects(root)
     some = [folders[index] for index in rng.permutation(len(folders))[:4 * rows]]
-    return sequence_sheet(draw_batch(read_views(some), rows, _TRAINING_VIEWS, rng).images)
+    views = read_views(some, image_size=spec.image_size, framed=not spec.needs_front)
+    if spec.needs_front:
+        return sequence_sheet(draw_batch(views, rows, _TRAINING_VIEWS, rng).images)
+    return sequence_sheet(draw_posed_batch(views, rows, _TRAINING_VIEWS, rng).images[:, :, :3])

@@ -5,7 +5,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from active_recon.whole_files import whole_file
+from active_recon.whole_files import whole_file, writable
+
+
+def study_files(out: Path, name: str) -> list[Path]:
+    """Return where figures and their page go; raises ConfigError where they cannot be written."""
+    return [writable(out / f'{name}.json'), writable(out / f'{name}.md')]
 
 
 def write_study(result: Mapping[str, Any], page: str, out: Path, name: str) -> list[Path]:
@@ -14,8 +19,7 @@ def write_study(result: Mapping[str, Any], page: str, out: Path, name: str) -> l
 
     Each is written whole or not at all: what an earlier run wrote stays where the disk is full.
     """
-    out.mkdir(parents=True, exist_ok=True)
-    written = [out / f'{name}.json', out / f'{name}.md']
+    written = study_files(out, name)
     for path, text in zip(written, (json.dumps(result, indent=1) + '\n', page), strict=True):
         with whole_file(path) as unfinished:
             unfinished.write_text(text)
