@@ -12,6 +12,7 @@ from active_recon.errors import MessageError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.geometry.rotations import rotation_between
 from msg_tools.camera_images import pixels_from_msg, reduced_from_msg, size_from_msg
+from msg_tools.missing_parts import no_camera_info, no_pose, seconds
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CompressedImage, Image
@@ -104,6 +105,8 @@ class ViewJoiner:
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
         self._first_intrinsics: float = math.inf
         self._first_pose: float = math.inf
+        self._ignored_intrinsics: int | None = None
+        self._ignored_poses: list[int] = []
 
     def add_image(self, stamp: int, msg: Image | CompressedImage, now: float) -> None:
         """
@@ -113,19 +116,21 @@ class ViewJoiner:
         """
         size = size_from_msg(msg)
         if stamp == self._last_image:
-            raise MessageError(f'duplicate image: got that of {_seconds(stamp)} again',
+            raise MessageError(f'duplicate image: got that of {seconds(stamp)} again',
                                'duplicate')
         if stamp < self._last_image:
             raise MessageError(
-                f'image out of order: expected increasing stamps, got {_seconds(stamp)} after '
-                f'{_seconds(self._last_image)}; a new episode resets the order', 'out_of_order')
+                f'image out of order: expected increasing stamps, got {seconds(stamp)} after '
+                f'{seconds(self._last_image)}; a new episode resets the order', 'out_of_order')
         self._last_image = stamp
         self._images.append(_WaitingImage(stamp, msg, size, now))
 
     def add_intrinsics(self, stamp: int, intrinsics: Intrinsics) -> None:
-        if stamp >= self._earliest:
-            self._intrinsics.append((stamp, intrinsics))
-            self._first_intrinsics = min(self._first_intrinsics, stamp)
+        if stamp < self._earliest:
+            self._ignored_intrinsics = stamp
+            return
+        self._intrinsics.append((stamp, intrinsics))
+        self._first_intrinsics = min(self._first_intrinsics, stamp)
 
     def add_mask(self, stamp: int, mask: Image) -> None:
         """Add the mask message of the image of that stamp."""
@@ -140,6 +145,7 @@ class ViewJoiner:
     def add_pose(self, stamp: int, pose: NDArray[np.float64]) -> None:
         """Add a pose, (4, 4), object from optical frame."""
         if stamp < self._earliest:
+            self._ignored_poses = [stamp]
             return
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
         del self._poses[:-_MAX_POSES]
@@ -198,9 +204,8 @@ class ViewJoiner:
         """Return the camera info of that stamp, None while it may still arrive."""
         intrinsics = _of_stamp(self._intrinsics, stamp)
         if intrinsics is None and _is_past(self._intrinsics, stamp, late):
-            found = (f'the last is of {_seconds(self._intrinsics[-1][0])}' if self._intrinsics
-                     else 'none received')
-            raise MessageError(f"no camera info of the image's stamp, {_seconds(stamp)}: {found}",
+            last = self._intrinsics[-1][0] if self._intrinsics else self._ignored_intrinsics
+            raise MessageError(no_camera_info(stamp, last),
                                self._kind('no_camera_info', stamp, self._first_intrinsics))
         return intrinsics
 
@@ -218,13 +223,9 @@ class ViewJoiner:
             late = True
         if not late:
             return None
-        distances = [abs(known - stamp) for known, _ in self._poses[max(after - 1, 0):after + 1]]
-        found = (f'the nearest is {min(distances) / 1e9:.3f} s away' if distances
-                 else 'none received')
-        raise MessageError(
-            f'no pose for the image of {_seconds(stamp)}: expected one of its stamp, or one '
-            f'before and one after it within {self.max_pose_gap:g} s, {found}',
-            self._kind('no_pose', stamp, self._first_pose))
+        nearby = [known for known, _ in self._poses[max(after - 1, 0):after + 1]]
+        raise MessageError(no_pose(stamp, nearby or self._ignored_poses, self.max_pose_gap),
+                           self._kind('no_pose', stamp, self._first_pose))
 
     def _kind(self, kind: str, stamp: int, first: float) -> str:
         """Return the kind of error of an image that lacks a part of which `first` is the first."""
@@ -256,7 +257,3 @@ def _of_stamp(parts: Sequence[tuple[int, Part]], stamp: int) -> Part | None:
 def _is_past(parts: Sequence[tuple[int, object]], stamp: int, late: bool) -> bool:
     """Return whether a part of that stamp can no longer arrive."""
     return late or bool(parts and parts[-1][0] > stamp)
-
-
-def _seconds(stamp: int) -> str:
-    return f'{stamp / 1e9:.3f} s'

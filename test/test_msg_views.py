@@ -2,6 +2,7 @@
 
 from array import array
 from itertools import permutations
+import re
 
 from active_recon.errors import MessageError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
@@ -90,6 +91,47 @@ def test_an_image_without_any_pose_is_refused_after_a_while():
     joiner.add_image(0, IMAGE, now=10.0)
     joiner.add_intrinsics(0, CANONICAL_INTRINSICS)
     assert 'none received' in str(only_error(joiner, now=11.0))
+
+
+@pytest.mark.parametrize(('came', 'said'), [
+    ([], 'none received'),
+    ([0, 0], 'without a stamp: let .* fill in header.stamp'),
+    ([5_000 * MS], r'the last is of 5.000 s; it must have the stamp of its image'),
+    ([130_000 * MS], r'the last is of 130.000 s; it must have the stamp of its image')])
+def test_camera_info_that_is_of_no_image_is_told_by_the_stamp_it_came_with(came, said):
+    joiner = ViewJoiner(max_pose_gap=0.1, patience=0.5)
+    joiner.clear(earliest=100_000 * MS)
+    joiner.add_image(120_000 * MS, IMAGE, now=0.0)
+    for stamp in came:
+        joiner.add_intrinsics(stamp, CANONICAL_INTRINSICS)
+    error = only_error(joiner, now=1.0)
+    assert error.kind == 'no_camera_info'
+    assert re.search(f"no camera info of the image's stamp, 120.000 s: .*{said}", str(error))
+
+
+@pytest.mark.parametrize(('came', 'said'), [
+    ([], 'none received'),
+    ([0, 0], 'without a stamp: let .* fill in header.stamp'),
+    ([5_000 * MS], 'the nearest is 115.000 s away; are .* stamped by the same clock'),
+    ([130_000 * MS], 'the nearest is 10.000 s away; are .* stamped by the same clock'),
+    ([119_800 * MS], 'the nearest is 0.200 s away$')])
+def test_poses_that_are_of_no_image_are_told_by_the_stamps_they_came_with(came, said):
+    joiner = ViewJoiner(max_pose_gap=0.1, patience=0.5)
+    joiner.clear(earliest=100_000 * MS)
+    joiner.add_image(120_000 * MS, IMAGE, now=0.0)
+    joiner.add_intrinsics(120_000 * MS, CANONICAL_INTRINSICS)
+    for stamp in came:
+        joiner.add_pose(stamp, pose(1.0))
+    error = only_error(joiner, now=1.0)
+    assert error.kind == 'no_pose'
+    assert re.search(f'expected one of its stamp, or .* within 0.1 s, .*{said}', str(error))
+
+
+def test_a_first_stamp_of_0_where_the_time_begins_is_a_stamp():
+    joiner = ViewJoiner(max_pose_gap=0.05, patience=0.5)
+    joiner.add_image(30 * MS, IMAGE, now=0.0)
+    joiner.add_intrinsics(0, CANONICAL_INTRINSICS)
+    assert 'the last is of 0.000 s' in str(only_error(joiner, now=1.0))
 
 
 def test_an_image_without_camera_info_is_refused_once_later_info_came():

@@ -104,6 +104,10 @@ def image_of_the_last_episode(camera):
     camera.send(*camera.messages(10**9))
 
 
+def image_without_a_stamp(camera):
+    camera.send(*camera.messages(0))
+
+
 @pytest.mark.parametrize(('spoil', 'kind', 'said'), [
     (image_of_no_size, 'image_size', 'height and a width above 0, got 0 x 0'),
     (image_of_unknown_encoding, 'encoding', "expected one of rgb8.*, got 'yuv9'"),
@@ -119,6 +123,7 @@ def image_of_the_last_episode(camera):
     (image_older_than_the_last, 'out_of_order', 'expected increasing stamps, got .* after'),
     (image_of_the_last_episode, 'last_episode', 'image of another episode: expected one of this '
                                                 'episode.*got one of'),
+    (image_without_a_stamp, 'no_stamp', 'image without a stamp: .*got 0; let its publisher fill'),
 ], ids=lambda value: value.__name__ if callable(value) else '')
 def test_bad_input_is_said_once_counted_and_survived(
         reconstructor, shared_bench, camera, spoil, kind, said):

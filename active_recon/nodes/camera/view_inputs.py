@@ -94,6 +94,10 @@ class ViewInputs:
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             self._monitor.add_message('images', stamp)
             self._capture.on_image(stamp, partial(pixels_from_msg, msg))
+            if stamp == 0 < self._begin:
+                raise MessageError(
+                    'image without a stamp: expected that of when it was taken, got 0; let its '
+                    'publisher fill in header.stamp', 'no_stamp')
             if stamp < self._begin or self._node.clock_monitor.is_ahead(stamp):
                 raise MessageError(
                     'image of another episode: expected one of this episode, which began at '
