@@ -8,6 +8,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
 from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy
+from active_recon.nodes.loop.refused_views import NO_GOAL, refusing_views
 from active_recon.nodes.loop.target_warning import tell_min_gain, tell_target
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
 from active_recon.nodes.loop.view_synchronizer import ViewSynchronizer
@@ -137,7 +138,8 @@ class ViewPlannerNode(ManagedNode):
             self._diagnostics.set_value('Episode', episode.id)
             self._publish_done(episode.begin, '')
             if self._views.last is not None:
-                self._decide(*self._views.last)
+                with refusing_views(self._diagnostics):
+                    self._decide(*self._views.last)
             self._first_goal_timer.wake()
 
     def clock_went_back(self, how: str) -> None:
@@ -188,6 +190,7 @@ class ViewPlannerNode(ManagedNode):
             return
         decision = self._planner.add_view(view.latent, view.camera, view.entropy, view.volume,
                                           view.quality)
+        self._diagnostics.clear_warning(NO_GOAL)
         self._started = True
         self._diagnostics.count('views')
         name = self._loaded.in_use.name

@@ -6,6 +6,7 @@ import signal
 from active_recon.geometry.cameras import azimuth_difference, orbit_camera
 from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.runtimes import load_policy_runtime
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from judged_quality import quality_of
 from msg_tools.cameras import pose_to_msg
@@ -57,6 +58,34 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
     fake.begin('second')
     fake.wait_goal(before)
     bench.until(lambda: not fake.done[-1].frame_id, 'an end that is taken back')
+
+
+def test_a_planner_warns_for_as_long_as_it_can_use_no_view_of_the_reconstructor(
+        start_node, bench, latent):
+    planner = start_node('view_planner', policy='attention', weights=PAPER_MODEL,
+                         start_azimuth=2.0)
+    fake = FakeReconstructor(bench)
+    begin = bench.now()
+    fake.begin('first')
+    fake.wait_goal(begin)
+    told = bench.subscribe(DiagnosticArray, '/diagnostics')
+
+    def levels():
+        return [status.level for msg in told for status in msg.status
+                if status.name == '/view_planner']
+
+    fake.show(latent[:3], 2.0)
+    bench.until(lambda: DiagnosticStatus.WARN in levels(), 'the warning')
+    told.clear()
+    bench.until(lambda: len(levels()) > 2, 'what is told once a second')
+    assert set(levels()) == {DiagnosticStatus.WARN}
+    said = bench.state('view_planner').problem
+    assert 'no goal after the last view: wrong shape of the latent' in said
+    assert 'must be those of the reconstructor' in said
+    assert bench.counts('view_planner')['warned/no_goal'] == 1
+    fake.wait_goal(fake.show(latent, 2.0))
+    bench.until(lambda: not bench.state('view_planner').problem, 'the end of the warning')
+    assert planner.log('over: no goal after the last view')
 
 
 def test_the_goals_of_an_episode_that_a_clock_ahead_began_are_of_that_episode(

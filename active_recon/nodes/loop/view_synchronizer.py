@@ -5,6 +5,7 @@ import time
 from typing import Any
 
 from active_recon.geometry.cameras import Camera
+from active_recon.nodes.loop.refused_views import NO_GOAL, refusing_views
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.life_cycle import ManagedNode
 from active_recon.nodes.runtime.qos import LATCHED_QOS
@@ -34,7 +35,9 @@ class ViewSynchronizer:
     camera, which arrives before.
     `on_view` is called with the stamp (nanoseconds) and the view when all parts have arrived,
     unless it is older than the episode. `last` keeps the last one: it may arrive before the
-    message of the episode that it belongs to.
+    message of the episode that it belongs to. A part that cannot be read, and a view on which
+    `on_view` raises ActiveReconError, is rejected in the diagnostics with the warning `NO_GOAL`,
+    which `on_view` is to clear.
     """
 
     def __init__(self, node: ManagedNode, frame: str, diagnostics: Diagnostics,
@@ -43,6 +46,7 @@ class ViewSynchronizer:
                  on_camera: Callable[[Camera], None]) -> None:
         self._node = node
         self._diagnostics = diagnostics
+        node.add_cleanup(lambda: diagnostics.clear_warning(NO_GOAL, log=False))
         self._on_view, self._on_waiting, self._on_camera = on_view, on_waiting, on_camera
         self._joiner = StampJoiner(['latent', 'camera', 'entropy'])
         self._has_volume = False
@@ -103,7 +107,7 @@ class ViewSynchronizer:
 
     def _on(self, name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
         def on_msg(msg: Any) -> None:
-            with self._diagnostics.rejecting():
+            with refusing_views(self._diagnostics):
                 self._join(name, nanoseconds_from_stamp(msg.header.stamp), read(msg))
         return on_msg
 
@@ -123,7 +127,7 @@ class ViewSynchronizer:
                 self._on_waiting(PlannerView(**parts))
 
     def _on_quality(self, msg: DiagnosticArray) -> None:
-        with self._diagnostics.rejecting():
+        with refusing_views(self._diagnostics):
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             if stamp >= self._begin and not self._node.clock_monitor.is_ahead(stamp):
                 self._qualities[stamp] = quality_from_msg(msg)
