@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 
 from active_recon.geometry.cameras import Camera
 from geometry_msgs.msg import PoseStamped
@@ -73,6 +74,16 @@ def test_a_reconstructor_begins_an_episode_where_its_clock_goes_back(start_node,
     said, = node.log('the clock went back by 110.000 s: ')
     assert episodes[1].frame_id in said
     assert bench.counts('reconstructor')['clock_jumps'] == 1
+
+
+def test_a_reconstructor_that_hears_no_clock_of_its_simulation_says_so(start_node, bench):
+    node = start_node('reconstructor', take_views='all', use_sim_time=True)
+    FakeCamera(bench).show()
+    bench.until(lambda: bench.counts('reconstructor').get('warned/no_clock'), 'the warning')
+    assert 'warned/clock_ahead' not in bench.counts('reconstructor')
+    line, = node.log('use_sim_time')
+    assert re.search('WARN.* use_sim_time is set and no /clock has been received: expected .*got '
+                     r'an image of \d+\.\d{3} s; start what publishes /clock', line)
 
 
 def test_a_node_that_changes_to_the_clock_of_a_simulation_begins_an_episode(start_node, bench):

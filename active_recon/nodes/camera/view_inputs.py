@@ -110,8 +110,16 @@ class ViewInputs:
 
     def _check_clock(self, stamp: int) -> None:
         """Warn of a stamp far ahead of the node's clock: images in time are refused after it."""
-        ahead_s = (stamp - self._node.get_clock().now().nanoseconds) / 1e9
-        if ahead_s > CLOCK_AHEAD_S:
+        now = self._node.get_clock().now().nanoseconds
+        ahead_s = (stamp - now) / 1e9
+        if ahead_s <= CLOCK_AHEAD_S:
+            return
+        if now == 0:  # before the first message of a simulation's clock
+            self._diagnostics.warn('no_clock', (
+                'use_sim_time is set and no /clock has been received: expected the time of a '
+                f'simulation or of a bag, got an image of {stamp / 1e9:.3f} s; start what '
+                'publishes /clock, or set use_sim_time to false'))
+        else:
             self._diagnostics.warn('clock_ahead', (
                 f'an image is stamped {ahead_s:.0f} s from now: expected stamps of this '
                 "machine's clock; are the clocks of the machines the same? Images of earlier "
