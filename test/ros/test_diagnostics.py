@@ -10,7 +10,8 @@ from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
 
-from .conftest import FakeCamera
+from .conftest import FakeCamera, FakeReconstructor
+from .test_life_cycle import Supervisor
 
 pytestmark = pytest.mark.ros
 
@@ -79,6 +80,22 @@ def test_a_node_tells_the_state_of_its_life_cycle_as_it_changes(start_node, benc
         bench.until(lambda state=state: facts().get('State') == state, state)
     assert 'Weights SHA-256' not in facts()
     assert bench.counts('reconstructor')['episodes'] == 1
+
+
+def test_a_node_that_is_configured_anew_tells_nothing_of_before(start_node, bench):
+    node = start_node('view_planner', policy='farthest', target_quality=0.95, start_azimuth=1.0)
+    supervisor, state = Supervisor(bench, 'view_planner'), partial(bench.state, 'view_planner')
+    FakeReconstructor(bench, ('episode',)).begin('only')
+    bench.until(lambda: state().counts.get('goals'), 'a goal')
+    assert 'target_quality 0.95 is never reached' in state().problem
+    assert supervisor.set('deactivate') and supervisor.set('cleanup')
+    bench.until(lambda: state().facts['State'] == 'unconfigured', 'the end')
+    assert not state().problem
+    assert state().counts['goals'] == 1
+    assert supervisor.set('configure')
+    bench.until(lambda: state().facts['State'] == 'inactive', 'the new beginning')
+    assert state().counts == {'warned/target_quality': 1}
+    assert len(node.log('WARN.*target_quality')) == 2
 
 
 def test_the_planner_tells_the_episode_and_why_it_is_done(start_node, bench, facts, box):

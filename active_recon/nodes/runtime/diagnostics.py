@@ -35,13 +35,8 @@ class Diagnostics:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._counts: Counter[str] = Counter()
+        self.forget_counts()
         self.reset()
-        self._unlogged: Counter[str] = Counter()
-        self._logged_at: dict[str, float] = {}
-        self._last_problem = '', ''  # its key and its message
-        self._warnings: dict[str, str] = {}
-        self._logged_warnings: set[str] = set()
         self._failure = ''
         self._host = socket.gethostname()
         self._alone_at = time.monotonic()
@@ -62,11 +57,20 @@ class Diagnostics:
         """Publish the rates per second of these counters, too."""
         self._rates |= {name: Rate(time.monotonic()) for name in counters}
 
+    def forget_counts(self) -> None:
+        """Let all counters begin at 0."""
+        self._counts: Counter[str] = Counter()
+
     def reset(self) -> None:
-        """Forget values, rates and latencies; the counters stay."""
+        """Forget values, rates, latencies and warnings; the counters and an error stay."""
         self._values: dict[str, str] = {}
         self._rates: dict[str, Rate] = {}
         self._latency = Durations()
+        self._warnings: dict[str, str] = {}
+        self._logged_warnings: set[str] = set()
+        self._last_problem = '', ''  # its key and its message
+        self._unlogged: Counter[str] = Counter()
+        self._logged_at: dict[str, float] = {}
 
     def record_latency(self, stamp: int) -> None:
         """Record the latency of a message just published, from its stamp in nanoseconds to now."""

@@ -71,7 +71,8 @@ class ManagedNode(QosWarnings, LifecycleNode, ABC):
         self._is_starting = False
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Configure; where that fails, free everything again."""
+        """Configure, with counters at 0; where that fails, free everything again."""
+        self._diagnostics.forget_counts()
         result = self._transit('configure', self.configure, self._configured)
         self.is_configured = result == TransitionCallbackReturn.SUCCESS
         if not self.is_configured:
@@ -96,12 +97,10 @@ class ManagedNode(QosWarnings, LifecycleNode, ABC):
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Destroy what `configure` created."""
-        self.on_deactivate(state)
-        self.is_configured = False
-        self._free()
-        self._publish_state()
-        return TransitionCallbackReturn.SUCCESS
+        """Destroy what `configure` created; in the diagnostics only the counters stay."""
+        result = self.on_error(state)
+        self._diagnostics.clear_error()
+        return result
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Destroy everything; the node can no longer be configured."""
@@ -110,8 +109,12 @@ class ManagedNode(QosWarnings, LifecycleNode, ABC):
         return result
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Destroy everything; the node can be configured again."""
-        return self.on_cleanup(state)
+        """Destroy everything; the node can be configured again, and its error is still told."""
+        self.on_deactivate(state)
+        self.is_configured = False
+        self._free()
+        self._publish_state()
+        return TransitionCallbackReturn.SUCCESS
 
     def _activate(self) -> None:
         self.clock_monitor = ClockMonitor(self, self.clock_went_back)
