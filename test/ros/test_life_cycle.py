@@ -1,6 +1,7 @@
 """The life cycle of reconstructor and planner, by the services that `ros2 lifecycle` calls."""
 
 import gc
+import re
 import signal
 import weakref
 
@@ -106,17 +107,25 @@ def test_weights_that_are_missing_leave_a_node_unconfigured_and_say_why(
     assert not supervisor.set('activate')
 
 
-def test_what_is_not_possible_in_a_state_is_refused_and_survived(start_node, bench):
+def test_what_is_not_possible_in_a_state_is_refused_in_one_line_and_survived(start_node, bench):
     node = start_node('view_planner', policy='farthest')
     supervisor = Supervisor(bench, 'view_planner')
-    for impossible in ('configure', 'nonsense', Transition.TRANSITION_ACTIVATE, 77):
-        assert not supervisor.set(impossible)
+    impossible = {'configure': 'configure', 'nonsense': 'nonsense',
+                  Transition.TRANSITION_ACTIVATE: r'activate \(3\)', 77: r'an unknown one \(77\)'}
+    for asked in impossible:
+        assert not supervisor.set(asked)
     assert supervisor.state() == 'active'
+    lines = node.log('refused|ERROR|Traceback')
+    for line, got in zip(lines, impossible.values(), strict=True):
+        assert re.search('WARN.* refused: no such transition of a node that is active: expected '
+                         rf'deactivate \(4\) or shutdown \(7\), got {got}$', line)
     assert supervisor.set(Transition.TRANSITION_DEACTIVATE)
     assert supervisor.state() == 'inactive'
     refused = bench.ask(Trigger, 'plan')
     assert not refused.success and 'inactive' in refused.message
-    assert node.log('refused: .*Transition is not registered')
+    assert supervisor.set('shutdown')
+    assert not supervisor.set('configure')
+    assert node.log('a node that is finalized: expected none, got configure$')
 
 
 def test_a_reconstructor_hears_nothing_while_inactive_and_then_begins_an_episode(

@@ -87,8 +87,14 @@ class Diagnostics:
         """Drop a value of the node's state that holds no longer, if there is one."""
         self._values.pop(key, None)
 
-    def reject(self, error: ActiveReconError) -> None:
-        """Count a rejected input by the error's kind and log the reason in one line."""
+    def reject(self, error: ActiveReconError, log_each: bool = False) -> None:
+        """
+        Count a rejected input by the error's kind and log the reason in one line.
+
+        `log_each` is for what a person asks for, and never comes in a flood.
+        """
+        if log_each:
+            self._logged_at.pop(f'refused/{error.kind}', None)
         self._record(f'refused/{error.kind}', f'refused: {one_line(error)}')
 
     def warn(self, kind: str, message: str) -> None:

@@ -14,10 +14,7 @@ from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.qos_warnings import QosWarnings
 from active_recon.nodes.runtime.run import one_line, run_node
 from lifecycle_msgs.srv import ChangeState
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-
-RCLError = rclpy_implementation.RCLError
 
 
 class ManagedNode(QosWarnings, LifecycleNode, ABC):
@@ -156,12 +153,19 @@ class ManagedNode(QosWarnings, LifecycleNode, ABC):
     def _reject_impossible(self, change: Callable[..., ChangeState.Response],
                            request: ChangeState.Request,
                            response: ChangeState.Response) -> ChangeState.Response:
-        """Answer failure to a transition that does not exist, on which rclpy would raise."""
-        try:
+        """Answer failure to a transition that the state lacks, on which rclpy would raise."""
+        asked, machine = request.transition, self._state_machine
+        possible = {number: label for number, label, *_ in machine.available_transitions}
+        # As in rclpy, a label counts where both are given
+        if asked.label in possible.values() if asked.label else asked.id in possible:
             return change(request, response)
-        except RCLError as error:
-            self._diagnostics.reject(ConfigError(one_line(error), 'transition'))
-            return response
+        known = {number: label for number, label, *_ in machine.transition_graph}
+        choices = ' or '.join(f'{label} ({number})' for number, label in possible.items())
+        got = asked.label or f'{known.get(asked.id, "an unknown one")} ({asked.id})'
+        self._diagnostics.reject(ConfigError(
+            f'no such transition of a node that is {machine.current_state[1]}: expected '
+            f'{choices or "none"}, got {got}', 'transition'), log_each=True)
+        return response
 
     def _destroyed_later(self, entity: Any, destroy: Callable[[Any], Any]) -> Any:
         if self._cleanups is not None:
