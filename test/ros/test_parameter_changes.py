@@ -73,6 +73,18 @@ def test_a_threshold_counts_from_the_next_view_and_what_is_refused_changes_nothi
     assert camera.occupancy[-1].width < cells / 4
 
 
+def test_parameters_that_exclude_each_other_change_together_or_in_their_order(start_node, bench):
+    start_node('view_planner', policy='farthest', motion_weight=0.3)
+    new = {'motion_cost': 0.01, 'motion_weight': 0.0}
+    assert change_together(bench, 'view_planner', **new).successful
+    assert change_together(bench, 'view_planner', motion_weight=0.3, motion_cost=0.0).successful
+    one_by_one = change(bench, 'view_planner', **new)
+    assert not one_by_one['motion_cost'].successful
+    assert 'both given' in one_by_one['motion_cost'].reason
+    assert one_by_one['motion_weight'].successful
+    assert change(bench, 'view_planner', motion_cost=0.01)['motion_cost'].successful
+
+
 def test_views_are_taken_by_the_rule_that_was_set_last(start_node, bench):
     start_node('reconstructor', take_views='at_goal')
     camera = FakeCamera(bench)
