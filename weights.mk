@@ -121,13 +121,16 @@ $(RUN)/quality/judged-%.npz: $(RUN)/quality/judged.npz
 	$(MEASURE) $(JUDGED) $@ --views 6 --fault $*
 $(RUN)/quality/judged-any.npz: $(RUN)/quality/judged.npz
 	$(MEASURE) $(JUDGED_ANY) $@ --views 6
+$(RUN)/quality/judged-any-by-%.npz: $(RUN)/quality/judged.npz $(RUN)/policy/weights-scorer.safetensors
+	$(MEASURE) $(JUDGED_ANY) $@ --views 6 --kind $*
 $(RUN)/quality/judged-any-%.npz: $(RUN)/quality/judged.npz
 	$(MEASURE) $(JUDGED_ANY) $@ --views 6 --fault $*
 KNOWN := turn turn_things data things $(if $(REAL),turn_real any_real)
 $(NETWORK)-quality.json: $(KNOWN:%=$(RUN)/quality/known-%.npz) \
 		$(RUN)/quality/judged.npz $(FAULTS:%=$(RUN)/quality/judged-%.npz) \
 		$(KINDS:%=$(RUN)/quality/judged-by-%.npz) \
-		$(RUN)/quality/judged-any.npz $(FAULTS:%=$(RUN)/quality/judged-any-%.npz)
+		$(RUN)/quality/judged-any.npz $(FAULTS:%=$(RUN)/quality/judged-any-%.npz) \
+		$(KINDS:%=$(RUN)/quality/judged-any-by-%.npz)
 	$(AR) quality fit --model $(NETWORK).safetensors --out $@ \
 		$(patsubst %,--known %,$(filter $(RUN)/quality/known%,$^)) \
 		$(patsubst %,--calibration %,$(filter $(RUN)/quality/judged%,$^))

@@ -12,7 +12,7 @@ from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, OrbitCamera
-from active_recon.geometry.view_distance import view_distance
+from active_recon.geometry.view_distance import on_one_ring, view_distance
 from active_recon.policies import (
     AUTO_POLICY,
     Choice,
@@ -222,7 +222,7 @@ class Planner:
             return self.stop()
         worth = None if self._goal is None else self._goal.worth
         reason = self._stopping.reason([view.entropy for view in views], quality, worth,
-                                       learned=bool(self.provenance))
+                                       self._goes_around and bool(self.provenance))
         return Decision(None, reason) if reason else self.next_goal()
 
     def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:
@@ -259,6 +259,11 @@ class Planner:
     def lacks_gains(self) -> bool:
         """Whether the policy's last scores are no expected gains, which `min_gain` needs."""
         return not self.sweeps and self._choice is not None and not self._choice.is_gain
+
+    @property
+    def _goes_around(self) -> bool:
+        """Whether all candidates are of a turntable, where the learned policy has own promises."""
+        return on_one_ring(np.stack([camera.position for camera in self._candidates]))
 
     @property
     def sweeps(self) -> bool:

@@ -282,14 +282,16 @@ def test_it_stops_once_the_target_is_promised():
         assert ends_after(planner, rising) == (count, 'target_reached')
 
 
-@pytest.mark.parametrize(('provenance', 'count'), [({}, 3), ({'runtime': 'torch'}, 2)])
-def test_a_learned_policy_stops_by_what_is_promised_for_its_own_views(provenance, count):
+@pytest.mark.parametrize(('provenance', 'elevations', 'count'), [
+    ({}, (), 3), ({'runtime': 'torch'}, (), 2), ({'runtime': 'torch'}, (0.0, 1.2), 3)])
+def test_a_learned_policy_stops_by_what_is_promised_for_its_own_views_of_a_turntable(
+        provenance, elevations, count):
     policy = FarthestPolicy()
     policy.provenance = provenance
     rising = [quality_of(promise=any_order, promise_learned=own)
               for any_order, own in ((0.0, 0.0), (0.4, 0.5), (0.5, 0.6))]
-    assert ends_after(Planner(policy, 24, 0, target_quality=0.5), rising) == (
-        count, 'target_reached')
+    planner = Planner(policy, 24, 0, target_quality=0.5, elevation_range=elevations)
+    assert ends_after(planner, rising) == (count, 'target_reached')
 
 
 def test_it_says_early_that_the_target_is_out_of_reach():

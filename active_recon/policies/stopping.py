@@ -40,18 +40,19 @@ class StoppingRule:
                                   f'{getattr(self, name)}')
 
     def reason(self, entropies: Sequence[float], quality: Quality | None,
-               worth: float | None, learned: bool = False) -> str:
+               worth: float | None, learned_around: bool = False) -> str:
         """
         Return why no further view is needed, '' where one is.
 
         It is one of target_reached, max_views, target_out_of_reach, entropy_settled and
         gain_too_small. `entropies` are those after each view, nats; `quality` is that after the
         last, which ends nothing while its views are flagged as unusual; `worth` is what the best
-        further view is expected to gain, None where that is not known; `learned` is whether the
-        policy of the weights chooses the views, for which promises are its own.
+        further view is expected to gain, None where that is not known; `learned_around` is
+        whether the policy of the weights chooses views of a turntable, for which promises are its
+        own.
         """
         known = quality if self.target_quality and quality and not quality.suspect else None
-        if known is not None and known.promise_for(learned) >= self.target_quality:
+        if known is not None and known.promise_for(learned_around) >= self.target_quality:
             return 'target_reached'
         if len(entropies) >= self.max_views:
             return 'max_views'

@@ -31,8 +31,8 @@ class Quality:
     - p_value: how often views of known objects, without a fault, are as unusual, in (0, 1]
     - silhouette_iou: mean over views of the IoU of the predicted and the seen silhouette
     - suspect: the most likely of SUSPECTS where the p-value is at most FALSE_ALARMS, else ''
-    - promise_learned: the promise where the learned policy of the weights chooses the views; None
-      where it is not told, in bags of earlier versions
+    - promise_learned: the promise where the learned policy of the weights chooses the views on a
+      turntable; None where it is not told, in bags of earlier versions
     """
 
     expected_iou: float
@@ -45,7 +45,7 @@ class Quality:
     promise_learned: float | None = None
 
     def promise_for(self, learned: bool) -> float:
-        """Return the promise where the learned policy of the weights chooses the views or not."""
+        """Return the promise where the learned policy goes around a turntable or not."""
         return self.promise if self.promise_learned is None or not learned else (
             self.promise_learned)
 

@@ -55,7 +55,7 @@ class QualityTables(Heads):
     - margin: (K,), between expected IoU and lower bound
     - targets: (P,), increasing, that can be promised; needed: (P,), the expected IoU for that in
       any order of the views; needed_learned: (P,), the same where the learned policy of the
-      weights chooses them, empty where that was not measured
+      weights chooses them on a turntable, empty where that was not measured
     - growth: (K,), between expected and attainable IoU
     - usual_scores: (K, ...), increasing: the scores of usual views of a turntable, which are the
       log odds of any fault; usual_distances: (K, ...), those of the latent's distance
@@ -96,7 +96,7 @@ class QualityTables(Heads):
                                f'{", ".join(SUSPECTS)}, got {", ".join(sorted(unknown))}')
 
     def needed_where(self, learned: bool) -> Sequence[float]:
-        """Return what targets need, (P,), where the learned policy chooses the views or not."""
+        """Return what targets need, (P,), where the learned policy goes around or not."""
         return self.needed_learned if learned and len(self.needed_learned) else self.needed
 
     def most_promised(self, learned: bool) -> float:

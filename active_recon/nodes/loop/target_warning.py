@@ -42,8 +42,10 @@ def _problem(params: ViewPlannerParameters, in_use: PolicyInUse) -> str:
     path = tables_path(find_weights(params.weights or None))
     if not path.is_file():
         return f'expected quality tables beside the weights, {path.name}, found none'
+    around = not (params.elevation_range or params.reachable_views)
     try:
-        most = QualityTables.read(path).most_promised(POLICIES[in_use.name].is_learned)
+        most = QualityTables.read(path).most_promised(
+            around and POLICIES[in_use.name].is_learned)
     except WeightsError as error:
         return one_line(error)
     if params.target_quality <= most:
