@@ -168,7 +168,7 @@ def test_goals_stand_at_the_camera_s_elevation_unless_another_is_given(
     assert goals[1].azimuth == pytest.approx(first + math.pi, abs=0.14)
     for goal in goals:
         assert (goal.elevation, goal.distance) == pytest.approx((elevation, 0.7))
-    positions, _, _ = scores_from_msg(scores[-1])
+    positions, _, _ = scores_from_msg(bench.until(lambda: scores, 'the scores')[-1])
     np.testing.assert_allclose(positions[:, 2], 0.7 * math.sin(elevation), atol=1e-6)
 
 

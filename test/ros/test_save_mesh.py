@@ -92,6 +92,7 @@ def test_a_mesh_is_answered_though_the_node_changes_its_state(
     client = bench.node.create_client(Trigger, 'save_mesh')
     bench.until(client.service_is_ready, 'the service')
     answer = client.call_async(Trigger.Request())
+    bench.within(0.2, answer.done)  # services are not answered in the order of the requests
     for transition in transitions:
         assert bench.ask(ChangeState, 'reconstructor/change_state', ChangeState.Request(
             transition=Transition(label=transition))).success
