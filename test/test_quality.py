@@ -10,7 +10,7 @@ from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.weights_files import SHIPPED, weights_hash
 from active_recon.quality.conformal import p_value, upper_quantile
 from active_recon.quality.features import FEATURES, features
-from active_recon.quality.judge import Judge
+from active_recon.quality.judge import FEWEST_USUAL, Judge
 from active_recon.quality.latents import KnownLatents, pooled
 from active_recon.quality.quality import FALSE_ALARMS, SUSPECTS
 from active_recon.quality.silhouettes import agreement, cube_outline, eroded, SeenView, silhouette
@@ -193,6 +193,15 @@ def test_what_is_unusual_on_a_turntable_may_be_usual_from_any_cameras():
     tables = of_any_cameras(some_tables())
     assert judged(far, around=False).suspect and judged(far, tables=tables).suspect
     assert judged(far, tables=tables, around=False).p_value == 1
+
+
+def test_it_takes_so_many_usual_views_for_one_to_be_flagged():
+    far = np.append(np.zeros(len(FEATURES)), 99.0)
+    for count, flagged in ((FEWEST_USUAL - 1, False), (FEWEST_USUAL, True)):
+        few = [[-99.0] * count] * COUNTS
+        tables = replace(some_tables(), usual_scores=few, usual_distances=few)
+        assert tables.fewest_usual == count
+        assert bool(judged(far, tables=tables).suspect) == flagged
 
 
 def test_a_first_view_is_judged_as_of_any_camera_since_it_tells_no_turntable():

@@ -394,10 +394,14 @@ def test_the_command_calibrates_the_tables_beside_weights_on_objects_of_one_s_ow
     earlier.write(tables_path(weights), command='fit --known train.npz')
     for _ in range(2):
         assert command(monkeypatch, *asked) == 0
+    assert not capsys.readouterr().err
     mine = QualityTables.read(tables_path(weights))
     assert mine.head == list(tables.head) and min(mine.margin) > max(tables.margin)
     card = json.loads(tables_path(weights).read_text())
     assert card['heads_fitted_by'] == 'fit --known train.npz'
+    made_up(60, 6, weights=sha256).write(tmp_path / 'mine.npz')
+    assert command(monkeypatch, *asked) == 0
+    assert 'warning: calibrated on 30 episodes: expected 39 or more' in capsys.readouterr().err
 
 
 def test_what_was_measured_with_another_network_is_refused(tmp_path, monkeypatch, capsys, tables):

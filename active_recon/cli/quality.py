@@ -113,6 +113,7 @@ def fit(
     from active_recon.evaluation.quality.fitting import fit as fitted
     from active_recon.evaluation.quality.measuring import halves, Measured
     from active_recon.models.weights_files import find_weights, read_card, weights_hash
+    from active_recon.quality.judge import FEWEST_USUAL
     from active_recon.quality.tables import needed_tables, tables_path
 
     weights = find_weights(model)
@@ -126,6 +127,10 @@ def fit(
         first = together.rows(halves(together, earlier.get(_SOURCES, ())))
         tables = calibrated(heads, first)
         notes = {_FITTED_BY: earlier.get(_FITTED_BY, earlier.get('command', ''))}
+    if tables.fewest_usual < FEWEST_USUAL:
+        typer.echo(f'warning: calibrated on {tables.fewest_usual} episodes: expected '
+                   f'{FEWEST_USUAL} or more in this half, else no view is flagged as unusual and '
+                   'no target promised; measure more', err=True)
     path = out or tables_path(weights)
     tables.write(path, **{'command': command_line(), **notes,
                           _SOURCES: sorted(set(first.source.tolist()))})

@@ -1,6 +1,7 @@
 """Judges the quality of reconstructions by a network's tables."""
 
 from collections.abc import Sequence
+import math
 
 from active_recon.geometry.view_distance import on_one_ring
 from active_recon.quality.conformal import p_value
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 
 _IOU = FEATURES.index('iou')
 _FAR = 4.0
+_TESTS = 2
+FEWEST_USUAL = math.ceil(_TESTS / FALSE_ALARMS) - 1
+"""Usual views that it takes for any to be flagged as unusual."""
 
 
 class Judge:
@@ -50,7 +54,7 @@ class Judge:
             given, self._tables.head, np.asarray(self._tables.intercepts[row])))
         by_fault = self._fault_head @ np.append(given, 1.0)
         # Either of two tests may flag, so each gets half of the false alarms
-        p = min(1.0, 2 * min(
+        p = min(1.0, _TESTS * min(
             p_value(float(np.logaddexp.reduce(by_fault)), scores[row]),
             p_value(float(numbers[-1]), distances[row])))
         suspect = self._tables.suspects[int(by_fault.argmax())] if p <= FALSE_ALARMS else ''

@@ -110,6 +110,11 @@ class QualityTables(Heads):
             return self.usual_scores, self.usual_distances
         return self.usual_scores_any, self.usual_distances_any
 
+    @property
+    def fewest_usual(self) -> int:
+        """The least number of usual views that others are compared with."""
+        return min(map(len, (*self.usual_scores, *self.usual_scores_any)))
+
     def write(self, path: Path, **notes: Any) -> None:
         """Write the tables, and notes on how they were made, as JSON."""
         path.write_text(json.dumps({**asdict(self), **notes}) + '\n')
