@@ -94,6 +94,8 @@ class Planner:
              threads: int | None = None, target_quality: float = 0.0, min_gain: float = 0.0,
              runtime: str = AUTO, precision: str = 'auto') -> 'Planner':
         """Build the planner of a policy's name; raises ConfigError and WeightsError."""
+        if seed < 0:
+            raise ConfigError(f'seed: negative: expected 0 or more, got {seed}')
         options = PolicyOptions(np.random.default_rng(seed), max_views, weights, runtime, device,
                                 threads, precision)
         return cls(load_policy(policy, options), max_views, entropy_tolerance, object_yaw, limits,

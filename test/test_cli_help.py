@@ -8,9 +8,15 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-COMMANDS = [('',), *((name,) for name in typer.main.get_command(app).commands),
-            ('bag', 'info'), ('bag', 'repair'), ('dataset', 'build'), ('batch', 'measure'),
-            ('batch', 'replay'), ('batch', 'report')]
+
+def commands_of(command, name=('',)):
+    """Yield a command by its name, and all within it."""
+    yield name, command
+    for part, inner in getattr(command, 'commands', {}).items():
+        yield from commands_of(inner, (*filter(None, name), part))
+
+
+COMMANDS = dict(commands_of(typer.main.get_command(app)))
 
 
 def shown(*arguments):
@@ -32,6 +38,14 @@ def test_no_line_of_a_paragraph_breaks_before_the_terminal_does(command):
         lines = [line.strip() for line in paragraph.strip().splitlines() if line.strip()]
         for line, following in zip(lines, lines[1:], strict=False):
             assert len(line) + 1 + len(following.split()[0]) > 78, line
+
+
+@pytest.mark.parametrize('command', [name for name, command in COMMANDS.items()
+                                     if any(each.name == 'seed' for each in command.params)],
+                         ids=' '.join)
+def test_a_negative_seed_is_refused(command):
+    result = CliRunner().invoke(app, [*command, '--seed', '-1'])
+    assert result.exit_code == 2 and "Invalid value for '--seed'" in result.output
 
 
 def test_a_paragraph_is_one_line_and_stays_apart_from_the_next():

@@ -376,6 +376,11 @@ def test_a_target_that_no_iou_can_be_is_refused(name, share):
         Planner(FarthestPolicy(), **{name: share})
 
 
+def test_a_negative_seed_is_refused():
+    with pytest.raises(ConfigError, match='seed: negative'):
+        Planner.load('random', seed=-1)
+
+
 def test_a_goal_has_a_reason_where_the_policy_looks_at_the_volume():
     cells = np.zeros((32,) * 3, np.float32)
     cells[10:22, 10:22, 10:22] = 0.5

@@ -59,7 +59,8 @@ def evaluate(
         min=1, max=24, help='Number of first views measured for each object, out of 24.')] = 4,
     seeds: Annotated[int, typer.Option(
         min=1, help='Number of runs of the policy random.')] = 5,
-    seed: Annotated[int, typer.Option(help='Seed of the starts and of the policy random.')] = 0,
+    seed: Annotated[int, typer.Option(
+        min=0, help='Seed of the starts and of the policy random.')] = 0,
     split_file: Split = None,
     training: Annotated[list[Path] | None, typer.Option(
         help='Training folder: also measure two baselines, the mean shape of the category and '

@@ -59,7 +59,7 @@ def paper(
         min=0, help='Number of objects on which every sequence of three views is measured, '
                     '12,720 passes each; 0 skips this.')] = 60,
     seed: Annotated[int, typer.Option(
-        help='Seed of the trainings, the starts and the random views.')] = 0,
+        min=0, help='Seed of the trainings, the starts and the random views.')] = 0,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     device: Annotated[str, typer.Option(
         help='Device on which IoU is measured, cpu or cuda. Trainings use a GPU if there is one; '

@@ -48,7 +48,7 @@ def policies(
     starts: Annotated[int, typer.Option(min=1, help='First views of each object, drawn.')] = 2,
     seeds: Annotated[int, typer.Option(min=1, help='How often random is drawn.')] = 3,
     seed: Annotated[int, typer.Option(
-        help='Draws objects, first views, renderings and random views.')] = 0,
+        min=0, help='Draws objects, first views, renderings and random views.')] = 0,
     out: Annotated[Path, typer.Option(
         help='Folder where policies.json and policies.md go.')] = Path('study'),
     bf16: Annotated[bool, typer.Option(

@@ -32,7 +32,7 @@ def measure(
         help='Spoil the views: unknown (noise), pose, object_size, mask.')] = None,
     objects: Annotated[int | None, typer.Option(
         min=1, help='Largest number of objects, drawn at random; default: all.')] = None,
-    seed: Annotated[int, typer.Option(help='Seed of objects, orders and faults.')] = 0,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of objects, orders and faults.')] = 0,
     model: Model = None,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
 ) -> None:

@@ -59,7 +59,7 @@ def study(
         min=1, help='Largest number of objects in the robustness tests.')] = 48,
     out: Annotated[Path, typer.Option(
         help='Folder for study.json, study.md and a PNG file for each set.')] = Path('study'),
-    seed: Annotated[int, typer.Option(help='Seed of objects, views and disturbances.')] = 0,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of objects, views and disturbances.')] = 0,
     bf16: Annotated[bool, typer.Option(
         help='Mixed precision, bfloat16: takes less time.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,

@@ -78,7 +78,7 @@ def train(
     augment: Annotated[bool, typer.Option(
         help='Augment backgrounds, light, shift and scale; --no-augment: plain white, as in the '
              'paper.')] = True,
-    seed: Annotated[int, typer.Option(help='Seed of the weights and of the batches.')] = 0,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and of the batches.')] = 0,
     bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     devices: Annotated[int, typer.Option(

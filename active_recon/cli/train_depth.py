@@ -32,7 +32,7 @@ def train_depth(
         min=1, help='Steps between two checkpoints.')] = 100,
     augment: Annotated[bool, typer.Option(
         help='Augment backgrounds, light and poses; --no-augment: plain white.')] = True,
-    seed: Annotated[int, typer.Option(help='Seed of the weights and of the batches.')] = 0,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and of the batches.')] = 0,
     bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     resume: Annotated[bool, typer.Option(

@@ -46,7 +46,7 @@ def train_policy(
     epochs: Annotated[int, typer.Option(min=1, help='Passes over all states.')] = 40,
     batch_size: Annotated[int, typer.Option(min=1, help='States of a batch.')] = 32,
     learning_rate: Annotated[float, typer.Option(help='Peak learning rate.')] = 1.5e-3,
-    seed: Annotated[int, typer.Option(help='Seed of the weights and batches.')] = 0,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and batches.')] = 0,
     bf16: Annotated[bool, typer.Option(
         help='Half precision of the network where it is safe.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,

@@ -28,7 +28,7 @@ def train_segmenter(
         min=1, help='Steps over which the learning rate rises to its peak.')] = 100,
     checkpoint_every: Annotated[int, typer.Option(
         min=1, help='Steps between two checkpoints.')] = 100,
-    seed: Annotated[int, typer.Option(help='Seed of the weights and of the batches.')] = 0,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and of the batches.')] = 0,
     bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
     devices: Annotated[int, typer.Option(
         min=1, help='Processes that share the batches.')] = 1,
