@@ -192,6 +192,14 @@ def test_images_without_an_azimuth_are_refused(tmp_path):
     refusal(write_bag(tmp_path / 'run', images()), 'no camera poses or azimuths on any topic')
 
 
+def test_images_beside_transforms_alone_are_refused_with_the_way_that_there_is(tmp_path):
+    with Writer(tmp_path / 'run', version=9, storage_plugin=StoragePlugin.MCAP) as rosbag2:
+        for topic, name in (('/camera/image_raw', IMAGE), ('/tf', 'tf2_msgs/msg/TFMessage')):
+            connection = rosbag2.add_connection(topic, name, typestore=STORE)
+            rosbag2.write(connection, BEGIN, bytes(64))
+    refusal(tmp_path / 'run', 'no camera poses .* play the bag to .* with pose_source: tf')
+
+
 def test_images_whose_poses_are_of_another_time_are_refused(tmp_path):
     later = LoopRun(begin=BEGIN + 10**12)
     entries = [*images(topic='/camera/image_raw'), *(

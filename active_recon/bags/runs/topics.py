@@ -20,6 +20,9 @@ from active_recon.parameters.reconstructor import ReconstructorParameters
 
 IMAGE_TYPES = (IMAGE, COMPRESSED_IMAGE)
 AZIMUTH_TYPES = (POSE, JOINT_STATE, FLOAT)
+TRANSFORMS = 'tf2_msgs/msg/TFMessage'
+_BY_TRANSFORMS = ('. Transforms in bags are not read: play the bag to a reconstructor with '
+                  'pose_source: tf, which publishes the camera/pose to record')
 IMAGE_ROLE, INFO_ROLE, POSE_ROLE = 'camera/image_raw', 'camera/camera_info', 'camera/pose'
 _ROLES = (IMAGE_ROLE, INFO_ROLE, POSE_ROLE)
 _OF_THE_LOOP = ('/view', '/view_image', '/latent', '/camera/mask', '/next_view', '/next_azimuth',
@@ -154,9 +157,10 @@ class _Search:
         found = (views if loops_own and not name else None) or self._known_by_name(
             name, fitting, POSE_ROLE) or fitting or views
         if not found or name and not fitting:
+            transforms = any(topic.type_name == TRANSFORMS for topic in self._present)
             raise DataError(f"no camera poses or azimuths on {name or 'any topic'}: expected "
-                            f'{" or ".join(AZIMUTH_TYPES)}; name the topic with --azimuth',
-                            'topics')
+                            f'{" or ".join(AZIMUTH_TYPES)}; name the topic with --azimuth'
+                            f'{_BY_TRANSFORMS if transforms else ""}', 'topics')
         return _only(found, AZIMUTH_TYPES, "the camera's poses or azimuths", '--azimuth')
 
     def camera_info(self, name: str, image: TopicSummary) -> TopicSummary | None:
