@@ -224,7 +224,7 @@ class Planner:
             return self.stop()
         worth = None if self._goal is None else self._goal.worth
         reason = self._stopping.reason([view.entropy for view in views], quality, worth,
-                                       self._goes_around and bool(self.provenance))
+                                       bool(self.provenance) and self._goes_around)
         return Decision(None, reason) if reason else self.next_goal()
 
     def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:

@@ -241,7 +241,6 @@ def test_without_faults_to_learn_nothing_is_fitted():
         fit(made_up(20, 9), made_up(20, 10), 'abc')
 
 
-
 def test_known_objects_with_faults_are_refused():
     faults = [made_up(20, 2, fault) for fault in FAULTS]
     with pytest.raises(DataError, match='known objects with faults: .* got mask'):
@@ -255,6 +254,7 @@ def test_a_study_of_hollow_objects_alone_has_no_figures_of_solid_ones(tables):
     assert found['hollow'] == 20 and not found['promises']
     text = markdown({'command': 'study', 'sets': [{'name': 'shells', **found}]})
     assert '| 3 | 0 | – | – | – |' in text
+
 
 def test_the_text_has_every_set_and_fault(figures):
     text = markdown({'command': 'c', 'sets': [{'name': 'made up', **figures}]})

@@ -73,8 +73,9 @@ def train_segmenter(
     segmenter = Segmenter.from_config(config)
     begun_with = ''
     if init_from:
-        begun_with = weights_hash(find_weights(init_from))
-        begin_with(segmenter, find_weights(init_from))
+        path = find_weights(init_from)
+        begun_with = weights_hash(path)
+        begin_with(segmenter, path)
     with shown_steps('segmenter', steps) as report:
         train_segmenter(segmenter, views, training, Run(
             fabric, checkpoint, report, resume, begun_with=begun_with))

@@ -52,15 +52,15 @@ def directions_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(exact / np.linalg.norm(exact, axis=-1, keepdims=True))
 
 
-def at_one_elevation(directions: NDArray[np.float64]) -> NDArray[np.bool_]:
+def at_one_elevation(directions: NDArray[np.float64],
+                     within: float = _ONE_ELEVATION) -> NDArray[np.bool_]:
     """
-    Return whether the elevations of directions (..., N, 3) differ by 10 degrees at most, (...).
+    Return whether the elevations of directions (..., N, 3) differ by at most `within` rad, (...).
 
-    Then a camera goes around the object as on a turntable, give or take how it is held.
+    By 10 degrees, a camera goes around the object as on a turntable, give or take how it is held.
     """
     heights = directions[..., 2].clip(-1, 1)
-    return np.asarray(np.arcsin(heights.max(axis=-1)) - np.arcsin(heights.min(axis=-1))
-                      <= _ONE_ELEVATION)
+    return np.asarray(np.arcsin(heights.max(axis=-1)) - np.arcsin(heights.min(axis=-1)) <= within)
 
 
 def on_one_ring(positions: NDArray[np.floating]) -> bool:
@@ -70,6 +70,6 @@ def on_one_ring(positions: NDArray[np.floating]) -> bool:
     Their elevations may differ by 2 degrees, their distances by 5 %. Two drawn at random hardly
     ever agree in both.
     """
-    height, distance = directions_of(positions)[:, 2], np.linalg.norm(positions, axis=-1)
-    return bool(np.ptp(np.arcsin(height.clip(-1, 1))) <= _RING_ELEVATION
+    distance = np.linalg.norm(positions, axis=-1)
+    return bool(at_one_elevation(directions_of(positions), _RING_ELEVATION)
                 and distance.max() <= _RING_DISTANCE * distance.min())

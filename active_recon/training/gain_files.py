@@ -115,6 +115,7 @@ def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with whole_file(noted) as unfinished:
             unfinished.write_text(json.dumps(collected) + '\n')
+        return
     before = json.loads(noted.read_text())
     if differing := '; '.join(differences(*({**each, 'objects': None}
                                             for each in (before, collected)))):

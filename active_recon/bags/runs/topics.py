@@ -14,13 +14,13 @@ from active_recon.bags.storage.message_types import (
     IMAGE,
     JOINT_STATE,
     POSE,
+    TRANSFORMS,
 )
 from active_recon.errors import ConfigError, DataError
 from active_recon.parameters.reconstructor import ReconstructorParameters
 
 IMAGE_TYPES = (IMAGE, COMPRESSED_IMAGE)
 AZIMUTH_TYPES = (POSE, JOINT_STATE, FLOAT)
-TRANSFORMS = 'tf2_msgs/msg/TFMessage'
 _BY_TRANSFORMS = ('. Transforms in bags are not read: play the bag to a reconstructor with '
                   'pose_source: tf, which publishes the camera/pose to record')
 IMAGE_ROLE, INFO_ROLE, POSE_ROLE = 'camera/image_raw', 'camera/camera_info', 'camera/pose'

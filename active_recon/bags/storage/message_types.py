@@ -18,6 +18,7 @@ JOINT_STATE = 'sensor_msgs/msg/JointState'
 CLOUD = 'sensor_msgs/msg/PointCloud2'
 POSE = 'geometry_msgs/msg/PoseStamped'
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+TRANSFORMS = 'tf2_msgs/msg/TFMessage'
 READ_TYPES = frozenset((HEADER, FLOAT, IMAGE, COMPRESSED_IMAGE, CAMERA_INFO, JOINT_STATE, CLOUD,
                         POSE, DIAGNOSTICS))
 _MAX_PADDING = 12
