@@ -42,7 +42,8 @@ class LiftingConfig(Config):
     """
     Sizes of the lifting network.
 
-    - encoder_channels: at 64, 32, 16 and 8 pixels a side; pyramid_channels: of its upward path
+    - encoder_channels: at 64, 32, 16 and 8 pixels a side; pyramid_channels: of its upward path;
+      encoder_depth: residual blocks at 16 and at 8 pixels
     - coarse_hidden, coarse_channels: of the features lifted to 16 cells a side; fine_channels: of
       those lifted to 32
     - volume_channels: at 16, 8 and 4 cells; head_channels: at 32
@@ -58,6 +59,7 @@ class LiftingConfig(Config):
     volume_channels: tuple[int, int, int] = (40, 80, 128)
     head_channels: int = 16
     visibility: bool = False
+    encoder_depth: int = 1
 
     def __post_init__(self) -> None:
         """Reject sizes that make no network."""
@@ -68,16 +70,22 @@ class LiftingConfig(Config):
                               f'{min(sizes)}')
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the plain mapping; without `visibility` where off, as weights before it have."""
+        """Return the plain mapping; without what is as in weights that do not name it."""
         values = super().to_dict()
         if not self.visibility:
             del values['visibility']
+        if self.encoder_depth == 1:
+            del values['encoder_depth']
         return values
 
 
 SIZES = {
     'small': LiftingConfig(),
     'small-visibility': LiftingConfig(visibility=True),
+    'large': LiftingConfig(
+        encoder_channels=(32, 64, 128, 256), encoder_depth=2, pyramid_channels=64,
+        coarse_hidden=64, coarse_channels=64, fine_channels=16, volume_channels=(64, 128, 192),
+        head_channels=32),
     'published': LiftingConfig(
         encoder_channels=(24, 64, 128, 192), pyramid_channels=48, coarse_hidden=64,
         coarse_channels=48, fine_channels=12, volume_channels=(48, 96, 160), head_channels=24)}
@@ -116,7 +124,8 @@ class Lifting(ReconstructionNetwork):
     def from_config(cls, config: LiftingConfig) -> 'Lifting':
         """Build the network of a configuration, with fresh weights."""
         encoder = PyramidEncoder(config.encoder_channels, config.pyramid_channels,
-                                 config.coarse_hidden, config.fine_channels)
+                                 config.coarse_hidden, config.fine_channels,
+                                 config.encoder_depth)
         summaries = 5 if config.visibility else 4
         decoder = HullUnet(summaries * config.coarse_channels + 1, 4 * config.fine_channels + 1,
                            config.volume_channels, config.head_channels)

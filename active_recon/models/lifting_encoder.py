@@ -103,17 +103,23 @@ def _halved(before: int, after: int, kernel: int = 3) -> nn.Sequential:
 
 
 class DownwardPath(nn.Module):
-    """An encoder's way from what it is shown down to 8 pixels a side, and over all of it."""
+    """
+    An encoder's way from what it is shown down to 8 pixels a side, and over all of it.
 
-    def __init__(self, channels: tuple[int, int, int, int]) -> None:
+    `depth` is the number of residual blocks at 16 and at 8 pixels a side.
+    """
+
+    def __init__(self, channels: tuple[int, int, int, int], depth: int = 1) -> None:
         super().__init__()
         at_64, at_32, at_16, at_8 = channels
         # No norm where the maps are wide: it would take longer than what it follows
         self.down_64 = nn.Sequential(nn.Conv2d(SHOWN, at_64, 5, stride=2, padding=2), nn.ReLU(),
                                      nn.Conv2d(at_64, at_64, 3, padding=1), nn.ReLU())
         self.down_32 = nn.Sequential(_halved(at_64, at_32), Residual(at_32))
-        self.down_16 = nn.Sequential(_halved(at_32, at_16), Residual(at_16))
-        self.down_8 = nn.Sequential(_halved(at_16, at_8), Residual(at_8))
+        self.down_16 = nn.Sequential(_halved(at_32, at_16),
+                                     *(Residual(at_16) for _ in range(depth)))
+        self.down_8 = nn.Sequential(_halved(at_16, at_8),
+                                    *(Residual(at_8) for _ in range(depth)))
         self.whole = nn.Linear(at_8, at_8)
 
     def downward(self, shown: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -130,12 +136,13 @@ class PyramidEncoder(DownwardPath):
     A pyramid down to 8 x 8 and up again, with lateral connections at 16, 32 and 64.
 
     `channels` are those at 64, 32, 16 and 8 pixels a side; `width` those of the way up at 16 and
-    32, half of them at 64. `coarse` and `fine` are the channels of the maps.
+    32, half of them at 64. `coarse` and `fine` are the channels of the maps. For `depth` see
+    DownwardPath.
     """
 
     def __init__(self, channels: tuple[int, int, int, int], width: int, coarse: int,
-                 fine: int) -> None:
-        super().__init__(channels)
+                 fine: int, depth: int = 1) -> None:
+        super().__init__(channels, depth)
         at_64, at_32, at_16, at_8 = channels
         self.up_8 = nn.Conv2d(at_8, width, 1)
         self.lateral_16, self.lateral_32 = nn.Conv2d(at_16, width, 1), nn.Conv2d(at_32, width, 1)
