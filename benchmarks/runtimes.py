@@ -1,7 +1,8 @@
 """The default network in each runtime, with no ROS: a view, a plan, and the start of a process."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from copy import copy
+from itertools import product
 from pathlib import Path
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import time
 
 from active_recon.geometry.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera
 from active_recon.geometry.canonical import network_image
+from active_recon.models.weights_files import find_weights
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_runtime
@@ -37,6 +39,11 @@ def runtime_figures() -> list[Figure]:
     return [*_views(1), *_views(2), *_plans(24, 1), *_plans(200, 20), *_starts()]
 
 
+def large_figures() -> list[Figure]:
+    """Return the figures of a view of the large network, beside the default's in the same run."""
+    return [figure for threads in (1, 2) for figure in _views(threads, (None, 'lifting-large'))]
+
+
 def segmenter_figures() -> list[Figure]:
     """Put the object on white by the segmenter, in an image of 640 x 480, on one thread."""
     camera = orbit_camera(0.3, intrinsics=Intrinsics(600, 600, 320, 240, 640, 480))
@@ -51,23 +58,25 @@ def segmenter_figures() -> list[Figure]:
     return [Figure(name, 'ms', samples, None) for name, samples in interleaved(tasks).items()]
 
 
-def _views(threads: int) -> Iterator[Figure]:
+def _views(threads: int, models: Sequence[str | None] = (None,)) -> Iterator[Figure]:
     """Encode, update and decode, from the network's image to the occupancy of 64 cells."""
     ways = [('torch', 'f32'), ('openvino', 'f32')]
     ways += [('openvino', 'bf16')] if has_bf16() else []
-    ways += [('openvino', 'int8')] if has_int8() else []
+    ways += [('openvino', 'int8')] if has_int8() and models == (None,) else []
     taken = _taken()
     tasks = {}
-    for name, precision in ways:
-        runtime = load_runtime(None, name, threads=threads, precision=precision)
+    for model, (name, precision) in product(models, ways):
+        runtime = load_runtime(None if model is None else find_weights(model), name,
+                               threads=threads, precision=precision)
         views = [network_image(*view, runtime.spec) for view in taken]
         state = runtime.initial_state()
         for view in views[:4]:
             _, _, state = runtime.step(*view, state)
-        tasks[f'a view, {name} {precision}, threads: {threads}'] = (
+        of = '' if model is None else f' of {model}'
+        tasks[f'a view{of}, {name} {precision}, threads: {threads}'] = (
             lambda runtime=runtime, view=views[4], state=state: runtime.step(*view, state))
     for name, samples in interleaved(tasks).items():
-        yield Figure(name, 'ms', samples, 4)
+        yield Figure(name, 'ms', samples, None if ' of ' in name else 4)
 
 
 def _plans(count: int, goal: float) -> Iterator[Figure]:

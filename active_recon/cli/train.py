@@ -30,7 +30,7 @@ def train(
     size: Annotated[str, typer.Option(
         help="Size of the network: 'small' (trains within an hour on two CPU cores) or "
              "'published' (as in its paper); for ogn also 'small-64' and 'published-64', for "
-             "lifting 'small-visibility'.")] = 'small',
+             "lifting 'large' and 'small-visibility'.")] = 'small',
     scheme: Annotated[str, typer.Option(
         help="'two-stage': reconstruction on random views, then the policy with it frozen; "
              "'joint': both together on the policy's views, as in the paper.")] = 'two-stage',
@@ -40,6 +40,9 @@ def train(
     init_from: Annotated[str | None, typer.Option(
         help='Weights (or the name of a model that ships) to initialise the reconstruction '
              'network from; it is trained further.')] = None,
+    widen_to: Annotated[str | None, typer.Option(
+        help='With --init-from, of lifting: train a network of this larger size, such as large, '
+             'which at first gives nearly what the given weights give.')] = None,
     steps: Annotated[int, typer.Option(
         min=1, help='Training steps of the reconstruction.')] = 12000,
     policy_steps: Annotated[int, typer.Option(
@@ -120,6 +123,8 @@ def train(
                           'with --resume, or name another folder with --out')
     if freeze_from and init_from:
         raise ConfigError('both --freeze-from and --init-from: give one of them')
+    if widen_to and not init_from:
+        raise ConfigError('--widen-to without --init-from: expected weights to begin with')
     begun = freeze_from or init_from
     own_file, model = model, named_network(model)
     entry = network_entry(model)
@@ -140,7 +145,7 @@ def train(
     with_policy = entry.policy is not None and not joint and policy_steps > 0
     plan = Plan(model, size, loss, first, second if with_policy else None,
                 RewardConfig(group_size=group_size), joint,
-                begun=_begun(find_weights(begun)) if begun else None,
+                begun=_begun(find_weights(begun), model, widen_to) if begun else None,
                 frozen=init_from is None, view_separation=math.radians(view_separation_deg))
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
@@ -174,8 +179,17 @@ def train(
             typer.echo(f'they load where {OWN_NETWORKS}={own_file} is set')
 
 
-def _begun(path: Path) -> 'Bundle':
+def _begun(path: Path, model: str, widen_to: str | None) -> 'Bundle':
+    from active_recon.models.lifting import LiftingConfig
+    from active_recon.models.registry import network_config
     from active_recon.models.weights import load_weights
     from active_recon.models.weights_files import read_card
+    from active_recon.models.widening import widened
 
-    return replace(load_weights(path), card=read_card(path))
+    bundle = replace(load_weights(path), card=read_card(path))
+    if widen_to is None:
+        return bundle
+    sizes = network_config(model, widen_to)
+    if not isinstance(sizes, LiftingConfig):
+        raise ConfigError(f'--widen-to: {model} cannot be widened: expected --model lifting')
+    return widened(bundle, sizes)
