@@ -14,12 +14,16 @@ _LATER = 'promise_learned'  # messages of earlier versions lack it
 _NUMBERS = tuple(field.name for field in fields(Quality) if field.name not in (_SUSPECT, _LATER))
 
 
-def quality_to_msg(quality: Quality, header: Header) -> DiagnosticArray:
-    """Return one status: the numbers as values; WARN, with the question to ask, if flagged."""
+def quality_to_msg(quality: Quality, header: Header, weights_sha256: str = '') -> DiagnosticArray:
+    """
+    Return one status: the numbers as values; WARN, with the question to ask, if flagged.
+
+    `hardware_id` is the SHA-256 of the network's weights, which are what judges.
+    """
     values = asdict(quality)
     return DiagnosticArray(header=header, status=[DiagnosticStatus(
         level=DiagnosticStatus.WARN if quality.suspect else DiagnosticStatus.OK, name=NAME,
-        message=quality.warning or 'ok', hardware_id='',
+        message=quality.warning or 'ok', hardware_id=weights_sha256,
         values=[KeyValue(key=name, value=str(value)) for name, value in values.items()
                 if value is not None])])
 
@@ -42,6 +46,11 @@ def quality_from_msg(msg: DiagnosticArray) -> Quality:
                            f'{", ".join(SUSPECTS)}, got {suspect!r}', NAME)
     return Quality(**{name: _share(name, values[name]) for name in _NUMBERS}, suspect=suspect,
                    promise_learned=_share(_LATER, values[_LATER]) if _LATER in values else None)
+
+
+def judging_weights(msg: DiagnosticArray) -> str:
+    """Return the SHA-256 of the weights that judged; '' where the message does not tell."""
+    return next((status.hardware_id for status in msg.status if status.name == NAME), '')
 
 
 def _share(name: str, text: str) -> float:

@@ -21,7 +21,12 @@ from active_recon.models.registry import network_entry
 from active_recon.models.scorer_weights import save_scorer
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.models.weights import Bundle, save_weights
-from active_recon.models.weights_files import scorer_path, SHIPPED, weights_hash
+from active_recon.models.weights_files import (
+    find_weights,
+    scorer_path,
+    SHIPPED,
+    weights_hash,
+)
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_policy_runtime, load_runtime, REMARK
 from active_recon.runtimes.compiled_cache import VARIABLE
@@ -74,7 +79,8 @@ def exported(tmp_path_factory, tiny):
     seeing = replace(test_lifting.TINY, visibility=True)
     return {**found, 'visibility': saved(folder / 'seeing', 'lifting', seeing),
             '2d3d-attention': saved(folder, '2d3d-attention', tiny,
-                                    AttentionModel.from_config(tiny)), 'shipped': SHIPPED}
+                                    AttentionModel.from_config(tiny)), 'shipped': SHIPPED,
+            'large': find_weights('lifting-large')}
 
 
 def some_views(spec, count=3):
@@ -106,7 +112,7 @@ def answers(runtime):
 
 
 @pytest.mark.parametrize('library', LIBRARIES)
-@pytest.mark.parametrize('model', [*CASES, 'visibility', '2d3d-attention', 'shipped'])
+@pytest.mark.parametrize('model', [*CASES, 'visibility', '2d3d-attention', 'shipped', 'large'])
 def test_a_runtime_answers_as_torch_does_after_every_view(exported, model, library):
     theirs, ours = (load_runtime(exported[model], name, threads=1, precision='f32')
                     for name in ('torch', library))
@@ -248,19 +254,21 @@ def test_a_runtime_proposes_as_torch_does_after_every_view(exported, library):
     np.testing.assert_allclose(states[1]['memory'], states[0]['memory'], atol=1e-4)
 
 
-def test_what_ships_is_what_the_command_makes(tmp_path):
-    for path in (SHIPPED, scorer_path()):
+@pytest.mark.parametrize(('model', 'most'), [('lifting', 5e6), ('lifting-large', 12e6)])
+def test_what_ships_is_what_the_command_makes(model, most, tmp_path):
+    weights = find_weights(model)
+    for path in (weights, scorer_path(weights)):
         shutil.copy(path, tmp_path)
-    made = export(tmp_path / SHIPPED.name)
+    made = export(tmp_path / weights.name)
     assert [path.name for path in made] == [
-        graph_path(None, part).name for part in (*NETWORK_PARTS, POLICY_PART)]
+        graph_path(weights, part).name for part in (*NETWORK_PARTS, POLICY_PART)]
     for path in made:
-        ours, theirs = (onnx.load(each) for each in (path, SHIPPED.with_name(path.name)))
+        ours, theirs = (onnx.load(each) for each in (path, weights.with_name(path.name)))
         assert metadata(ours) == metadata(theirs)
-        assert metadata(ours)['weights_sha256'] == weights_hash()
-        assert sum(each.ByteSize() for each in (ours, theirs)) < 10_000_000
-    again, shipped = (load_runtime(weights, 'openvino', threads=1)
-                      for weights in (tmp_path / SHIPPED.name, None))
+        assert metadata(ours)['weights_sha256'] == weights_hash(weights)
+        assert max(each.ByteSize() for each in (ours, theirs)) < most
+    again, shipped = (load_runtime(each, 'openvino', threads=1)
+                      for each in (tmp_path / weights.name, weights))
     np.testing.assert_allclose(answers(again)[0], answers(shipped)[0], rtol=0, atol=1e-5)
 
 

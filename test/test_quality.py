@@ -7,7 +7,7 @@ import math
 from active_recon.errors import WeightsError
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.models.lifting import Lifting, LiftingConfig
-from active_recon.models.weights_files import SHIPPED, weights_hash
+from active_recon.models.weights_files import find_weights, weights_hash
 from active_recon.quality.conformal import p_value, upper_quantile
 from active_recon.quality.features import FEATURES, features
 from active_recon.quality.judge import FEWEST_USUAL, Judge
@@ -301,8 +301,10 @@ def test_tables_are_used_with_the_weights_that_they_were_fitted_to_alone(tmp_pat
         find_tables(weights, 'abc')
 
 
-def test_the_tables_that_ship_are_of_the_weights_that_ship():
-    tables, why = find_tables(SHIPPED, weights_hash(SHIPPED))
+@pytest.mark.parametrize('model', ['lifting', 'lifting-large'])
+def test_the_tables_that_ship_are_of_the_weights_that_ship(model):
+    weights = find_weights(model)
+    tables, why = find_tables(weights, weights_hash(weights))
     assert tables is not None, why
     assert list(tables.needed) == sorted(tables.needed)
 

@@ -86,13 +86,14 @@ class ReconstructorNode(ManagedNode):
         self._products = Products(self, self._reconstructor, self._object_frame,
                                   params.publish_mesh)
         self.add_cleanup(self._free_network)
+        provenance = self._reconstructor.provenance
         self._publisher = ReconstructionPublisher(
-            self, self._object_frame, self._reconstructor.judges_quality)
+            self, self._object_frame, self._reconstructor.judges_quality,
+            provenance.get('weights_sha256', ''))
         if self._reconstructor.no_quality:
             self.get_logger().info(self._reconstructor.no_quality)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED_QOS)
         self._diagnostics.measure_rates('images', 'poses', 'views')
-        provenance = self._reconstructor.provenance
         self._diagnostics.set_value('Weights SHA-256', provenance.get('weights_sha256', ''))
         tell_of_runtime(self._diagnostics, provenance)
         tell_of_runtime(self._diagnostics, self._segmentation.provenance if self._segmentation

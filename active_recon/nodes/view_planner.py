@@ -7,7 +7,7 @@ from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import Camera
 from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
-from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy
+from active_recon.nodes.loop.policy_loader import loaded_policy, tell_network, tell_policy
 from active_recon.nodes.loop.refused_views import NO_GOAL, refusing_views
 from active_recon.nodes.loop.target_warning import tell_min_gain, tell_target
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
@@ -71,7 +71,9 @@ class ViewPlannerNode(ManagedNode):
                                      lambda: self._params.values, self._on_camera)
         self._reset_episode()
         self._views = ViewSynchronizer(
-            self, self._frame, self._diagnostics, self._decide, self._expect, self._prepare)
+            self, self._frame, self._diagnostics, self._decide, self._expect, self._prepare,
+            lambda sha256: tell_network(self._diagnostics, self._loaded, sha256))
+        self.add_cleanup(lambda: tell_network(self._diagnostics, self._loaded, ''))
         if self._planner.wants_volume:
             self._views.subscribe_volume(self._params.values.object_size)
         inputs.subscribe(Header, 'episode', self._on_episode, LATCHED_QOS)

@@ -18,6 +18,7 @@ _REFUSED = {
 _WARNED = {
     'unusual_views': 'views unlike those it knows',
     'learned_policy': 'a view policy that was learned for other weights',
+    'weights': 'a reconstructor with other weights than the planner',
     'stalled': 'a camera that stood still away from its goal',
     'noisy_poses': 'poses that jump',
     'goal_timeout': 'a goal that was not reached in time',

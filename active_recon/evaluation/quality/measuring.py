@@ -14,7 +14,7 @@ from active_recon.evaluation.quality.faults import FAULTS, sources_of
 from active_recon.evaluation.quality.shells import HOLLOW, hollow_share
 from active_recon.evaluation.rollouts import Observer, RenderedObjects, Seen
 from active_recon.geometry.cameras import Camera, Intrinsics
-from active_recon.geometry.view_distance import at_one_elevation, pose_directions
+from active_recon.geometry.view_distance import on_one_ring, pose_directions
 from active_recon.models.network import Cameras, ReconstructionNetwork
 from active_recon.policies import Policy
 from active_recon.quality.features import features
@@ -136,7 +136,7 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
     keeps no foreground, from which silhouettes are had.
     """
     shown = FAULTS[fault](views, seed) if fault else views
-    around = at_one_elevation(pose_directions(views.poses.numpy())).all()
+    around = all(map(on_one_ring, views.poses[:, :, :3, 3].numpy()))
     called = kind if around else f'{kind}{_ANY}'
     count = min(count, shown.poses.shape[1])
     order = torch.from_numpy(orders_of(shown, kind, count, seed))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from active_recon.models.weights_files import find_weights
+from active_recon.models.weights_files import find_weights, weights_hash
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.life_cycle import ManagedNode
 from active_recon.nodes.runtime.parameters import set_read_only_parameter
@@ -15,18 +15,24 @@ from active_recon.policies import (
     PolicyInUse,
     PolicyOptions,
 )
+from active_recon.policies.automatic import LEARNED_POLICY
 import numpy as np
 
-_WARNING = 'learned_policy'
+_WARNING, _OTHER_NETWORK = 'learned_policy', 'weights'
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedPolicy:
-    """A policy, what it is called, and the parameters by which it was loaded."""
+    """
+    A policy, what it is called, and the parameters by which it was loaded.
+
+    `network` is the SHA-256 of the weights that it was trained for; '' of one that is not learned.
+    """
 
     policy: Policy
     in_use: PolicyInUse
     params: ViewPlannerParameters
+    network: str
 
 
 def loaded_policy(params: ViewPlannerParameters, before: LoadedPolicy | None = None
@@ -40,10 +46,12 @@ def loaded_policy(params: ViewPlannerParameters, before: LoadedPolicy | None = N
     if before is not None and before.in_use.name == in_use.name and all(
             getattr(before.params, name) == getattr(params, name)
             for name in POLICIES[in_use.name].parameters):
-        return LoadedPolicy(before.policy, in_use, params)
-    return LoadedPolicy(load_policy(in_use.name, PolicyOptions(
+        return LoadedPolicy(before.policy, in_use, params, before.network)
+    policy = load_policy(in_use.name, PolicyOptions(
         np.random.default_rng(params.seed), params.max_views, weights, params.runtime,
-        threads=params.threads, precision=params.precision)), in_use, params)
+        threads=params.threads, precision=params.precision))
+    return LoadedPolicy(policy, in_use, params,
+                        weights_hash(weights) if in_use.name == LEARNED_POLICY else '')
 
 
 def tell_policy(node: ManagedNode, diagnostics: Diagnostics, in_use: PolicyInUse) -> None:
@@ -56,3 +64,14 @@ def tell_policy(node: ManagedNode, diagnostics: Diagnostics, in_use: PolicyInUse
         diagnostics.raise_warning(_WARNING, in_use.warning)
     else:
         diagnostics.clear_warning(_WARNING)
+
+
+def tell_network(diagnostics: Diagnostics, loaded: LoadedPolicy, weights_sha256: str) -> None:
+    """Warn where the reconstructor has other weights than the policy was trained for."""
+    if loaded.network and weights_sha256 and loaded.network != weights_sha256:
+        diagnostics.raise_warning(_OTHER_NETWORK, (
+            f'the policy {loaded.in_use.name} was trained for the weights {loaded.network[:12]}: '
+            f'expected the reconstructor to have them, got {weights_sha256[:12]}; set `weights` '
+            'of both nodes to the same'))
+    else:
+        diagnostics.clear_warning(_OTHER_NETWORK)

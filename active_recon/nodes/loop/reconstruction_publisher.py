@@ -22,11 +22,13 @@ class ReconstructionPublisher:
     """
     Publishes `occupancy`, `probabilities`, `latent`, `entropy`, `view` and its images.
 
-    And `quality`, where the network `judges_quality`: elsewhere nobody is to wait for it.
+    And `quality`, where the network `judges_quality`: elsewhere nobody is to wait for it. It tells
+    the SHA-256 of the network's weights.
     """
 
-    def __init__(self, node: Node, frame: str, judges_quality: bool) -> None:
-        self._frame = frame
+    def __init__(self, node: Node, frame: str, judges_quality: bool,
+                 weights_sha256: str) -> None:
+        self._frame, self._weights = frame, weights_sha256
         self._view_pub = node.create_publisher(PoseStamped, 'view', LATCHED_QOS)
         self._view_image_pub = node.create_publisher(Image, 'view_image', LATCHED_QOS)
         self._network_image_pub = node.create_publisher(Image, 'network_image', LATCHED_QOS)
@@ -59,7 +61,8 @@ class ReconstructionPublisher:
         self._entropy_pub.publish(entropy_to_msg(grid.entropy(), header))
         # While this judges, the planner reads what came before; then come images, for people
         if self._quality_pub is not None and reconstruction.quality is not None:
-            self._quality_pub.publish(quality_to_msg(reconstruction.quality, header))
+            self._quality_pub.publish(
+                quality_to_msg(reconstruction.quality, header, self._weights))
         if cleared_image is not None:
             self._view_image_pub.publish(image_to_msg(cleared_image, header))
         if reconstruction.image is not None:

@@ -17,7 +17,7 @@ from msg_tools.cameras import pose_from_msg
 from msg_tools.entropy import entropy_from_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
-from msg_tools.quality import quality_from_msg
+from msg_tools.quality import judging_weights, quality_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 from sensor_msgs.msg import Image, JointState, PointCloud2
@@ -32,7 +32,8 @@ class ViewSynchronizer:
 
     With them goes the `quality` of their stamp, for which they wait while it has a publisher;
     `on_waiting` is called with the last view when it begins to wait, and `on_camera` with its
-    camera, which arrives before.
+    camera, which arrives before. `on_weights` is called with the SHA-256 of the network's weights,
+    or '', where a quality tells of them.
     `on_view` is called with the stamp (nanoseconds) and the view when all parts have arrived,
     unless it is older than the episode. `last` keeps the last one: it may arrive before the
     message of the episode that it belongs to. A part that cannot be read, and a view on which
@@ -43,11 +44,13 @@ class ViewSynchronizer:
     def __init__(self, node: ManagedNode, frame: str, diagnostics: Diagnostics,
                  on_view: Callable[[int, PlannerView], None],
                  on_waiting: Callable[[PlannerView], None],
-                 on_camera: Callable[[Camera], None]) -> None:
+                 on_camera: Callable[[Camera], None],
+                 on_weights: Callable[[str], None]) -> None:
         self._node = node
         self._diagnostics = diagnostics
         node.add_cleanup(lambda: diagnostics.clear_warning(NO_GOAL, log=False))
         self._on_view, self._on_waiting, self._on_camera = on_view, on_waiting, on_camera
+        self._on_weights = on_weights
         self._joiner = StampJoiner(['latent', 'camera', 'entropy'])
         self._has_volume = False
         self._begin = 0
@@ -131,6 +134,7 @@ class ViewSynchronizer:
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             if stamp >= self._begin and not self._node.clock_monitor.is_ahead(stamp):
                 self._qualities[stamp] = quality_from_msg(msg)
+                self._on_weights(judging_weights(msg))
                 self._hand_over()
 
     def _hand_over(self) -> None:
