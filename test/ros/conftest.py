@@ -280,7 +280,7 @@ class FakeReconstructor:
 
     def show(self, latent: np.ndarray, azimuth: float, stamp: int | None = None,
              parts: Sequence[str] = PARTS, elevation: float = CANONICAL_ELEVATION,
-             quality: Quality | None = None) -> int:
+             quality: Quality | None = None, weights: str = '') -> int:
         """Publish a view's parts; return their stamp."""
         stamp = self.bench.now() if stamp is None else stamp
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
@@ -288,7 +288,7 @@ class FakeReconstructor:
                     'latent': latent_to_msg(latent, header),
                     'view': pose_to_msg(orbit_camera(azimuth, elevation).pose, header)}
         if quality is not None:
-            messages['quality'] = quality_to_msg(quality, header)
+            messages['quality'] = quality_to_msg(quality, header, weights)
         for part in parts:
             self._publishers[part].publish(messages[part])
         return stamp

@@ -4,7 +4,7 @@ import math
 import signal
 
 from active_recon.geometry.cameras import azimuth_difference, orbit_camera
-from active_recon.models.weights_files import find_weights, PAPER_MODEL
+from active_recon.models.weights_files import find_weights, PAPER_MODEL, weights_hash
 from active_recon.runtimes import load_policy_runtime
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
@@ -185,6 +185,22 @@ def test_a_planner_waits_for_the_quality_of_a_view_and_stops_by_it(start_node, b
                        quality=quality_of(promise=0.5))
     done = bench.until(lambda: fake.done and fake.done[-1].frame_id and fake.done[-1], 'the end')
     assert (done.frame_id, nanoseconds_from_stamp(done.stamp)) == ('target_reached', second)
+
+
+def test_other_weights_than_the_policy_s_are_told_until_they_are_the_same(
+        start_node, bench, latent):
+    start_node('view_planner', policy='attention', weights=PAPER_MODEL, entropy_tolerance=0.0,
+               start_azimuth=1.0)
+    fake = FakeReconstructor(bench, ('episode', *FakeReconstructor.PARTS, 'quality'))
+    fake.begin('only')
+    stamp = 0
+    for weights in (64 * 'a', weights_hash(find_weights(PAPER_MODEL))):
+        goal = view_goal_from_msg(fake.wait_goal(stamp))
+        stamp = fake.show(latent, goal.azimuth, parts=('quality', *FakeReconstructor.PARTS),
+                          quality=quality_of(), weights=weights)
+        told = 'expected the reconstructor to have them, got aaaaaaaaaaaa'
+        bench.until(lambda: (told in bench.state('view_planner').problem)  # noqa: B023
+                    == weights.startswith('aaaa'), 'a warning, and its end')  # noqa: B023
 
 
 def test_a_sweep_in_the_policy_s_place_is_told_while_views_are_unusual(start_node, bench, latent):
