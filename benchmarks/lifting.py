@@ -19,6 +19,7 @@ DOCUMENTS = (ROOT / 'README.md', ROOT / 'doc' / 'results.md',
              ROOT / 'active_recon' / 'weights' / 'MODEL_CARD.md')
 _BESIDE = '--models lifting,carving,2d3d-attention --threads 1'
 _KNOWN = '--surfaces 1,5 --disturbed-views 0'
+_LARGE = "--models lifting-large,lifting --threads 1 --surfaces '' --disturbed-views 0"
 STUDIES: Mapping[str, str] = {
     'parametric-test': f'data/test {_BESIDE} --surfaces 1,5 --disturbed-views 5 '
                        '--disturbed-objects 12',
@@ -29,6 +30,14 @@ STUDIES: Mapping[str, str] = {
                           '--disturbed-objects 24',
     'photographs': f'--photos photos/dino_sparse_ring {_BESIDE}',
     'r2n2-chairs': f"data/r2n2_sample {_BESIDE} --surfaces '' --disturbed-views 0",
+    'large-parametric-test': 'data/test --models lifting-large,lifting,carving --threads 1 '
+                             f'{_KNOWN}',
+    'large-parametric-unseen': f'data/unseen {_LARGE}',
+    'large-real-val': f"data/real_val {_LARGE} --category '!thing_*' --objects 60",
+    'large-things-val': f"data/real_val {_LARGE} --category 'thing_*' --objects 60",
+    'large-photographs': '--photos photos/dino_sparse_ring --models lifting-large,lifting '
+                         '--threads 1',
+    'large-r2n2-chairs': f'data/r2n2_sample {_LARGE}',
 }
 SETS: Mapping[str, str] = {
     'parametric-test': 'parametric test',
@@ -40,6 +49,7 @@ _COUNTS = (1, 2, 3, 5, 8, 24)
 _BOUNDED = (1, 24)
 """Numbers of views whose intervals the long table has room for."""
 _SHORT_COUNTS = (1, 5, 24)
+_MODELS = ('lifting', 'carving', '2d3d-attention')
 
 
 def run(folder: Path, name: str) -> None:
@@ -50,13 +60,21 @@ def run(folder: Path, name: str) -> None:
             shutil.copy(picture, kept)
 
 
-def figures_by_set() -> Iterator[tuple[str, Mapping[str, Mapping[int, Any]]]]:
-    """Yield each set's title, and every model's IoU at 32 cells by number of random views."""
+def figures_by_set(prefix: str = '') -> Iterator[tuple[str, Mapping[str, Mapping[int, Any]]]]:
+    """
+    Yield each set's title, and every model's IoU at 32 cells by number of random views.
+
+    With them comes how far the first model is ahead of each other one, as `ahead of MODEL`.
+    `prefix` is that of the studies' names.
+    """
     for name, title in SETS.items():
-        figures = json.loads((RESULTS / f'{name}.json').read_text())['sets'][0]
+        figures = json.loads((RESULTS / f'{prefix}{name}.json').read_text())['sets'][0]
+        measured = {**{model: own['random'] for model, own in figures['models'].items()},
+                    **{f'ahead of {model}': own['random']
+                       for model, own in figures['ahead'].items()}}
         yield f'{title} ({figures["objects"]})', {
-            model: dict(zip(figures['counts'], own['random']['iou_32'], strict=True))
-            for model, own in figures['models'].items()}
+            name: dict(zip(figures['counts'], own['iou_32'], strict=True))
+            for name, own in measured.items()}
 
 
 def long_table() -> Iterator[str]:
@@ -65,11 +83,21 @@ def long_table() -> Iterator[str]:
     yield '|---' * (len(_COUNTS) + 2) + '|'
     for title, models in figures_by_set():
         label = title
-        for model, values in models.items():
+        for model in _MODELS:
             yield _row(label, f'**{model}**' if model == 'lifting' else model, *(
-                f'{_mean(values[count])} [{values[count]["low"]:.3f}, {values[count]["high"]:.3f}]'
-                if count in _BOUNDED else _mean(values[count]) for count in _COUNTS))
+                _bounded(models[model][count]) if count in _BOUNDED
+                else _mean(models[model][count]) for count in _COUNTS))
             label = ''
+
+
+def large_table() -> Iterator[str]:
+    """Yield a Markdown table of the large network beside the default, and of their difference."""
+    yield _row('objects', 'model', '1 view', *(f'{count} views' for count in _COUNTS[1:]))
+    yield '|---' * (len(_COUNTS) + 2) + '|'
+    for title, models in figures_by_set('large-'):
+        for label, model, shown in ((title, 'lifting-large', _mean), ('', 'lifting', _mean),
+                                    ('', 'ahead of lifting', _bounded)):
+            yield _row(label, model, *(shown(models[model][count]) for count in _COUNTS))
 
 
 def short_table() -> Iterator[str]:
@@ -78,7 +106,7 @@ def short_table() -> Iterator[str]:
     yield '|---|---|---|---|'
     for title, models in figures_by_set():
         yield _row(title, *(', '.join(_mean(models[model][count]) for count in _SHORT_COUNTS)
-                            for model in ('lifting', 'carving', '2d3d-attention')))
+                            for model in _MODELS))
 
 
 def _row(*cells: str) -> str:
@@ -89,9 +117,14 @@ def _mean(value: Mapping[str, Any]) -> str:
     return f'{value["mean"]:.3f}'
 
 
+def _bounded(value: Mapping[str, Any]) -> str:
+    return f'{_mean(value)} [{value["low"]:.3f}, {value["high"]:.3f}]'
+
+
 def with_tables(text: str) -> str:
     """Return a document with the tables between its marks made anew from the results."""
-    return with_tables_between_marks(text, {'iou': long_table, 'iou-short': short_table})
+    return with_tables_between_marks(text, {
+        'iou': long_table, 'iou-short': short_table, 'iou-large': large_table})
 
 
 def main() -> None:

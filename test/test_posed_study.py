@@ -7,7 +7,7 @@ import math
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
-from active_recon.errors import ConfigError, WeightsError
+from active_recon.errors import ConfigError, DataError, WeightsError
 from active_recon.evaluation.posed.choosing import choose
 from active_recon.evaluation.posed.entrants import Entrant, load_entrants
 from active_recon.evaluation.posed.measuring import logits_of, measure, orders_of, Plan
@@ -185,6 +185,12 @@ def test_gains_are_measured_of_a_network_of_smaller_images(made, small, tmp_path
     folder = list_objects(made)[0]
     (path,) = collect_gains([folder], small, Collecting(1, 3, 1, 2), tmp_path)
     assert np.isfinite(ViewGains.load(path).gains).any()
+
+
+def test_a_damaged_note_of_how_gains_were_collected_is_told(made, small, tmp_path):
+    (tmp_path / 'collected.json').write_text('{"obj')
+    with pytest.raises(DataError, match='collected.json: no readable note of how gains were'):
+        collect_gains(list_objects(made)[:1], small, Collecting(1, 3, 1, 2), tmp_path)
 
 
 def test_thresholds_are_chosen_where_iou_is_best(scene):

@@ -87,8 +87,9 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
     Files that are there already are kept. Views are chosen by the policy, or by a mixture of
     random, farthest, an even sweep and the greatest gain. Each object is shown under a light,
     noise and pose errors of its own. Objects that cannot be read are left out; raises DataError
-    where none is left, and ConfigError where gains of another network, or collected otherwise, are
-    there. `crew` does the work; None: this process.
+    where none is left or the note of how gains were collected is damaged, and ConfigError where
+    gains of another network, or collected otherwise, are there. `crew` does the work; None: this
+    process.
     """
     _keep_apart(out, {'network_sha256': entrant.weights, **collecting.to_dict()})
     keep = partial(_keep, entrant, collecting, out, policy, torch.get_num_threads())
@@ -116,7 +117,11 @@ def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
         with whole_file(noted) as unfinished:
             unfinished.write_text(json.dumps(collected) + '\n')
         return
-    before = json.loads(noted.read_text())
+    try:
+        before = dict(json.loads(noted.read_text()))
+    except (ValueError, TypeError) as error:
+        raise DataError(f'{noted}: no readable note of how gains were collected: expected that of '
+                        f'`train-policy`, got: {error}; name another folder with --out') from error
     if differing := '; '.join(differences(*({**each, 'objects': None}
                                             for each in (before, collected)))):
         raise ConfigError(f'{out}: gains that were measured otherwise are there: {differing}; '
