@@ -102,11 +102,15 @@ def large_table() -> Iterator[str]:
 
 def short_table() -> Iterator[str]:
     """Yield a Markdown table with a row for each set, and a column for each model."""
-    yield _row('objects', 'default network', 'visual hull (carving)', "the paper's network")
-    yield '|---|---|---|---|'
-    for title, models in figures_by_set():
-        yield _row(title, *(', '.join(_mean(models[model][count]) for count in _SHORT_COUNTS)
-                            for model in _MODELS))
+    yield _row('objects', 'default network', '`lifting-large`', 'visual hull (carving)',
+               "the paper's network")
+    yield '|---' * 5 + '|'
+    for (title, models), (_, larger) in zip(figures_by_set(), figures_by_set('large-'),
+                                            strict=True):
+        every = {**models, 'lifting-large': larger['lifting-large']}
+        yield _row(title, *(', '.join(_mean(every[model][count]) for count in _SHORT_COUNTS)
+                            for model in ('lifting', 'lifting-large', 'carving',
+                                          '2d3d-attention')))
 
 
 def _row(*cells: str) -> str:
