@@ -73,8 +73,8 @@ def figures_by_set(prefix: str = '') -> Iterator[tuple[str, Mapping[str, Mapping
                     **{f'ahead of {model}': own['random']
                        for model, own in figures['ahead'].items()}}
         yield f'{title} ({figures["objects"]})', {
-            name: dict(zip(figures['counts'], own['iou_32'], strict=True))
-            for name, own in measured.items()}
+            model: dict(zip(figures['counts'], own['iou_32'], strict=True))
+            for model, own in measured.items()}
 
 
 def long_table() -> Iterator[str]:

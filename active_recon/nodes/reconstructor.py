@@ -87,14 +87,14 @@ class ReconstructorNode(ManagedNode):
                                   params.publish_mesh)
         self.add_cleanup(self._free_network)
         provenance = self._reconstructor.provenance
+        weights_sha256 = provenance.get('weights_sha256', '')
         self._publisher = ReconstructionPublisher(
-            self, self._object_frame, self._reconstructor.judges_quality,
-            provenance.get('weights_sha256', ''))
+            self, self._object_frame, self._reconstructor.judges_quality, weights_sha256)
         if self._reconstructor.no_quality:
             self.get_logger().info(self._reconstructor.no_quality)
         self._episode_pub = self.create_publisher(Header, 'episode', LATCHED_QOS)
         self._diagnostics.measure_rates('images', 'poses', 'views')
-        self._diagnostics.set_value('Weights SHA-256', provenance.get('weights_sha256', ''))
+        self._diagnostics.set_value('Weights SHA-256', weights_sha256)
         tell_of_runtime(self._diagnostics, provenance)
         tell_of_runtime(self._diagnostics, self._segmentation.provenance if self._segmentation
                         else {}, 'Segmenter')
