@@ -91,21 +91,33 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
     if msg.header.frame_id != frame:
         raise MessageError(f'wrong frame of a camera pose: expected {frame!r}, '
                            f'got {msg.header.frame_id!r}', 'frame')
-    point, turn = msg.pose.position, msg.pose.orientation
-    position = np.array([point.x, point.y, point.z])
-    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
-    if not _sensible(*position, *quaternion):
-        raise MessageError(f'camera pose not finite: got position {position.tolist()} and '
-                           f'quaternion {quaternion.tolist()}', 'pose')
-    if np.linalg.norm(quaternion) < 1e-6:
-        raise MessageError('invalid camera pose: expected a unit quaternion, '
-                           f'got {quaternion.tolist()}', 'quaternion')
+    position, quaternion = numbers_from_msgs(msg.pose.position, msg.pose.orientation,
+                                             'camera pose')
     if np.linalg.norm(position) < 1e-6:
         raise MessageError("invalid camera pose: it is at the object's centre", 'pose')
     pose = np.eye(4)
     pose[:3, :3] = matrix_from_quaternion(quaternion)
     pose[:3, 3] = position
     return pose
+
+
+def numbers_from_msgs(point: Point, turn: Quaternion,
+                      what: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """
+    Return a position (3,) and a quaternion (4,), x, y, z, w, of any length.
+
+    Raises MessageError, in which `what` names them, if they are not finite, a million kilometres
+    away, or the quaternion is zero.
+    """
+    position = np.array([point.x, point.y, point.z])
+    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
+    if not _sensible(*position, *quaternion):
+        raise MessageError(f'{what} not finite: got position {position.tolist()} and '
+                           f'quaternion {quaternion.tolist()}', 'pose')
+    if np.linalg.norm(quaternion) < 1e-6:
+        raise MessageError(f'invalid {what}: expected a unit quaternion, '
+                           f'got {quaternion.tolist()}', 'quaternion')
+    return position, quaternion
 
 
 def pose_to_msg(pose: NDArray[np.float64], header: Header) -> PoseStamped:

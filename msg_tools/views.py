@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from active_recon.errors import MessageError
 from active_recon.geometry.cameras import Camera, Intrinsics
-from active_recon.geometry.rotations import rotation_between
+from active_recon.geometry.rotations import pose_between
 from msg_tools.camera_images import pixels_from_msg, reduced_from_msg, size_from_msg
 from msg_tools.missing_parts import no_camera_info, no_pose, seconds
 import numpy as np
@@ -23,6 +23,8 @@ _MAX_WAITING = 32  # images
 _MAX_WAITING_BYTES = 1 << 28  # of all waiting images
 NOT_BEGUN = 'not_begun'
 """Kind of the error of an image from just before the first pose or camera info."""
+PATIENCE_S = 0.5
+"""How long images wait for the other messages of their stamps."""
 Part = TypeVar('Part')
 
 
@@ -82,7 +84,7 @@ class ViewJoiner:
     pose or camera info is no fault of the camera's, and its error is of the kind `NOT_BEGUN`.
     """
 
-    def __init__(self, max_pose_gap: float, patience: float = 0.5, masks: bool = False,
+    def __init__(self, max_pose_gap: float, patience: float = PATIENCE_S, masks: bool = False,
                  max_depth_gap: float | None = None) -> None:
         self.max_pose_gap = max_pose_gap
         self._max_depth_gap = max_depth_gap
@@ -219,7 +221,7 @@ class ViewJoiner:
             if after > 0:
                 earlier, pose_before = self._poses[after - 1]
                 if max(later - stamp, stamp - earlier) <= round(self.max_pose_gap * 1e9):
-                    return interpolated(pose_before, pose, (stamp - earlier) / (later - earlier))
+                    return pose_between(pose_before, pose, (stamp - earlier) / (later - earlier))
             late = True
         if not late:
             return None
@@ -230,15 +232,6 @@ class ViewJoiner:
     def _kind(self, kind: str, stamp: int, first: float) -> str:
         """Return the kind of error of an image that lacks a part of which `first` is the first."""
         return NOT_BEGUN if 0 < first - stamp <= self._patience * 1e9 else kind
-
-
-def interpolated(start: NDArray[np.float64], end: NDArray[np.float64],
-                 fraction: float) -> NDArray[np.float64]:
-    """Return the pose, (4, 4), between two: positions on the line, rotations by slerp."""
-    pose = np.eye(4)
-    pose[:3, :3] = rotation_between(start[:3, :3], end[:3, :3], fraction)
-    pose[:3, 3] = (1 - fraction) * start[:3, 3] + fraction * end[:3, 3]
-    return pose
 
 
 def nearest_part(parts: Sequence[tuple[int, Part]], stamp: int, gap: float) -> Part | None:

@@ -15,7 +15,7 @@ from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
 from rclpy.serialization import serialize_message
-from recorded_messages import definition, LATCHED, SENSOR
+from recorded_messages import cdr, definition, LATCHED, SENSOR
 from std_msgs.msg import Header
 
 BEGIN = 1_700_000_000_000_000_000
@@ -96,7 +96,13 @@ def header(stamp, frame):
 
 
 def type_name(msg):
+    if hasattr(msg, '__msgtype__'):  # of rosbags: one that the ROS of wheels does not have
+        return msg.__msgtype__
     return f'{type(msg).__module__.split(".")[0]}/msg/{type(msg).__name__}'
+
+
+def message_data(msg):
+    return cdr(msg) if hasattr(msg, '__msgtype__') else serialize_message(msg)
 
 
 def write_bag(folder, messages, max_bytes=None, parameters=None, one_by_one=False):
@@ -111,7 +117,7 @@ def write_bag(folder, messages, max_bytes=None, parameters=None, one_by_one=Fals
         for time, topic, msg in messages:
             bag.add_topic(topic, type_name(msg), definition(type_name(msg)),
                           (SENSOR if topic.startswith('/camera/') else LATCHED,))
-            bag.write(topic, serialize_message(msg), time + DELAY, time)
+            bag.write(topic, message_data(msg), time + DELAY, time)
             if max_bytes or one_by_one:
                 bag.flush()  # a file may end wherever a chunk does
     return folder

@@ -7,7 +7,7 @@ from active_recon.bags.runs.reading import read_run
 from active_recon.bags.storage import compression
 from active_recon.errors import DataError
 from command_line import command
-from foreign_recordings import images, joints
+from foreign_recordings import images, joints, transforms
 from loop_bags import BEGIN, LoopRun, type_name, write_bag
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType
@@ -192,12 +192,16 @@ def test_images_without_an_azimuth_are_refused(tmp_path):
     refusal(write_bag(tmp_path / 'run', images()), 'no camera poses or azimuths on any topic')
 
 
-def test_images_beside_transforms_alone_are_refused_with_the_way_that_there_is(tmp_path):
-    with Writer(tmp_path / 'run', version=9, storage_plugin=StoragePlugin.MCAP) as rosbag2:
-        for topic, name in (('/camera/image_raw', IMAGE), ('/tf', 'tf2_msgs/msg/TFMessage')):
-            connection = rosbag2.add_connection(topic, name, typestore=STORE)
-            rosbag2.write(connection, BEGIN, bytes(64))
-    refusal(tmp_path / 'run', 'no camera poses .* play the bag to .* with pose_source: tf')
+def test_transforms_without_the_objects_frame_are_refused_with_those_that_there_are(tmp_path):
+    refusal(write_bag(tmp_path / 'run', [*images(), *transforms('world')]),
+            "no frame 'object', but camera, tool0, world: name one with --object-frame, and with "
+            '--object-position where')
+
+
+def test_transforms_that_do_not_connect_the_camera_are_refused(tmp_path):
+    apart = [*images(), *transforms(camera='wrist_camera'), *transforms(camera='other', tool='x')]
+    refusal(write_bag(tmp_path / 'run', sorted(apart, key=lambda entry: entry[0])),
+            "between the frames 'object' and 'camera': .* got none with 'camera'; the frames are")
 
 
 def test_images_whose_poses_are_of_another_time_are_refused(tmp_path):

@@ -1,5 +1,6 @@
 """Depth beside a dataset's images: written, read, framed, turned with them, and learned from."""
 
+from dataclasses import replace
 import math
 
 from active_recon.datasets.drawn_cameras import Viewing
@@ -17,6 +18,7 @@ from active_recon.volumes.depth_evidence import depth_evidence
 from command_line import command
 import numpy as np
 import pytest
+from safetensors.torch import load_file
 from test_lifting import TINY
 import torch
 
@@ -136,3 +138,25 @@ def test_a_refiner_is_trained_and_loaded_from_the_command_line(
     assert refiner.to_64.weight.abs().sum() > 0 and not fresh.to_64.weight.any()
     assert math.isfinite(float(refiner.calibration.sum()))
     assert command(monkeypatch, *arguments) == 2  # holds another training
+
+
+def test_a_training_may_begin_with_the_refiner_of_another_network(
+        deep, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    torch.manual_seed(0)
+    sizes = replace(TINY, coarse_channels=TINY.coarse_channels + 4)
+    save_weights(tmp_path / 'lifting.safetensors',
+                 Bundle(Lifting.from_config(sizes).eval(), None, sizes, 0.4, model='lifting'))
+    arguments = ('train-depth', deep, '--validation', deep, '--model', 'lifting.safetensors',
+                 '--steps', 1, '--learning-rate', 1e-9, '--batch-size', 1, '--max-views', 1,
+                 '--threads', 1)
+    assert command(monkeypatch, *arguments, '--init-from', 'lifting', '--out', 'run') == 0
+    trained = load_file(tmp_path / 'run' / 'lifting-depth.safetensors')
+    shipped = load_refiner().state_dict()
+    different = {name for name, tensor in trained.items() if name != 'calibration' and (
+        tensor.shape != shipped[name].shape
+        or not torch.allclose(tensor.float(), shipped[name], atol=1e-3))}
+    assert different == {'enter_16.weight'}
+    assert command(monkeypatch, *arguments, '--init-from', 'lifting.safetensors',
+                   '--out', 'other') == 2
+    assert 'takes no depth: expected lifting-depth.safetensors' in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """Depth in the reconstruction: without it nothing changes, with it the order does not count."""
 
+from dataclasses import replace
 import json
 import math
 
@@ -236,3 +237,19 @@ def test_a_saved_episode_with_spoilt_depth_is_refused(weights, tmp_path):
     save_file({**load_file(path), 'depth_evidence': np.zeros((2, 2), np.float32)}, path, facts)
     with pytest.raises(DataError, match='depth evidence of'):
         read_state(path, reconstructor)
+
+
+def test_begun_with_another_networks_it_corrects_as_that_where_there_are_no_features():
+    given = fresh()
+    logits, evidence, *_ = some_input()
+
+    def corrected(refiner):
+        nothing = torch.zeros(1, refiner.features + 1, 16, 16, 16)
+        return refiner(logits, evidence, nothing[:, :1], nothing[:, 1:])
+
+    with torch.inference_mode():
+        for features in (given.features, given.features + 3):
+            begun = DepthRefiner.begun_with(given, replace(CONFIG, features=features)).eval()
+            assert torch.equal(corrected(begun), corrected(given))
+    with pytest.raises(ConfigError, match='of other sizes'):
+        DepthRefiner.begun_with(given, replace(CONFIG, head_channels=16))

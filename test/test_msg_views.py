@@ -6,9 +6,10 @@ import re
 
 from active_recon.errors import MessageError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.geometry.rotations import pose_between
 from msg_tools.images import image_to_msg
 from msg_tools.joins import StampJoiner
-from msg_tools.views import interpolated, NOT_BEGUN, ViewJoiner
+from msg_tools.views import NOT_BEGUN, ViewJoiner
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image
@@ -60,9 +61,9 @@ def test_a_pose_is_interpolated_along_the_way(fraction):
 
 def test_interpolation_is_exact_at_its_ends_and_rigid_between():
     start, end = pose(0.3), pose(2.0)
-    np.testing.assert_allclose(interpolated(start, end, 0.0), start, atol=1e-12)
-    np.testing.assert_allclose(interpolated(start, end, 1.0), end, atol=1e-12)
-    rotation = interpolated(start, end, 0.4)[:3, :3]
+    np.testing.assert_allclose(pose_between(start, end, 0.0), start, atol=1e-12)
+    np.testing.assert_allclose(pose_between(start, end, 1.0), end, atol=1e-12)
+    rotation = pose_between(start, end, 0.4)[:3, :3]
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
 
 

@@ -28,15 +28,16 @@ _TOPICS: dict[str, tuple[Any, Any]] = {
         metavar='TOPIC', help='Topic of the camera info (CameraInfo).')], ''),
     'azimuth': (Annotated[str, _option(
         metavar='TOPIC',
-        help='Topic of the camera pose (PoseStamped), or of its azimuth in radians (JointState '
-             'of a turntable, or Float64).')], ''),
+        help='Topic of the camera pose (PoseStamped), of transforms (TFMessage), or of the '
+             "camera's azimuth in radians (JointState of a turntable, or Float64).")], ''),
     'joint': (Annotated[str, _option(
         metavar='NAME', help='Joint of the JointState, if it has several.')], ''),
     'turned_object': (Annotated[bool, _option(
         '--turned-object',
         help='The azimuth is the angle of a turntable in front of a fixed camera.')], False),
     'object_frame': (Annotated[str, _option(
-        metavar='FRAME', help='Frame of the camera pose; default: object.')], 'object'),
+        metavar='FRAME', help='Frame of the camera pose, or the one of the transforms that the '
+                              'object is in; default: object.')], 'object'),
     'max_pose_gap': (Annotated[float, _option(
         min=0, metavar='SECONDS',
         help='Longest time from an image to the poses it is interpolated from; default: '
@@ -58,6 +59,9 @@ _SCENE: dict[str, tuple[Any, Any]] = {
         metavar='X,Y,Z,W', help='Camera orientation in the object frame at angle 0; default: it '
                                 'looks at the object.')],
         None),
+    'object_position': (Annotated[str | None, _option(
+        metavar='X,Y,Z', help="Centre of the object's cube in --object-frame, metres; default: "
+                              'its origin.')], None),
     'background': (Annotated[str, _option(
         metavar='segment|COLOR|IMAGE',
         help='Background to replace by white: all but the object that a learned segmenter finds '
@@ -100,13 +104,14 @@ def bag_options_given(topics: 'Topics', scene: 'Scene') -> set[str]:
 
 def _scene(object_size: float | None, object_yaw_deg: float | None, elevation_deg: float | None,
            camera_position: str | None, camera_orientation: str | None,
-           background: str) -> 'Scene':
+           object_position: str | None, background: str) -> 'Scene':
     from active_recon.bags.runs.scene import parse_background, Scene
 
     how, empty_scene = parse_background(background)
     return Scene(object_size, _radians(object_yaw_deg), _radians(elevation_deg),
                  _numbers('--camera-position', camera_position, 3),
-                 _numbers('--camera-orientation', camera_orientation, 4), how, empty_scene)
+                 _numbers('--camera-orientation', camera_orientation, 4),
+                 _numbers('--object-position', object_position, 3), how, empty_scene)
 
 
 def _radians(degrees: float | None) -> float | None:

@@ -19,6 +19,9 @@ def train_depth(
     model: Annotated[str, typer.Option(
         help='The network, which stays as it is: a model that ships, or a weights file.'
         )] = 'lifting',
+    init_from: Annotated[str | None, typer.Option(
+        help='A model that ships, or a weights file: begin with its depth refiner. Default: fresh '
+             'weights.')] = None,
     out: Annotated[Path, typer.Option(
         help='Folder of the checkpoint, and of the weights at the end.')] = Path('runs/depth'),
     steps: Annotated[int, typer.Option(min=1, help='Steps.')] = 1500,
@@ -51,9 +54,9 @@ def train_depth(
       active-recon train-depth data/train things/train --validation data/val --out runs/depth
     """
     from active_recon.models.depth_refiner import DepthRefiner, DepthRefinerConfig
-    from active_recon.models.depth_weights import save_refiner
+    from active_recon.models.depth_weights import load_refiner, save_refiner
     from active_recon.models.lifting import Lifting
-    from active_recon.models.weights import load_weights
+    from active_recon.models.weights import load_weights, state_hash
     from active_recon.models.weights_files import depth_path, find_weights, weights_hash
     from active_recon.training.depth import calibrate_depth, train_depth
     from active_recon.training.loop import make_fabric, Run, TrainingConfig
@@ -61,6 +64,7 @@ def train_depth(
 
     path = find_weights(model)
     network = load_weights(path).reconstruction
+    begun = load_refiner(find_weights(init_from)) if init_from else None
     if not isinstance(network, Lifting):
         raise ConfigError(f'--model: no such network: expected lifting, got {model!r}')
     checkpoint = checkpoint_in(out, resume)
@@ -74,10 +78,12 @@ def train_depth(
     held_out = read_objects([validation], 'validation data', network.spec, depth=True)
     warn_of_shared_objects(views.folders, held_out.folders, 'the calibration is biased')
     config = DepthRefinerConfig(features=network.initial_state(1)['coarse_sum'].shape[1])
-    refiner, digest = DepthRefiner.from_config(config), weights_hash(path)
+    refiner = DepthRefiner.begun_with(begun, config) if begun else DepthRefiner.from_config(config)
+    begun_with, digest = state_hash(begun) if begun else '', weights_hash(path)
     with shown_steps('depth', steps) as report:
         train_depth(refiner, network, views, training,
-                    Run(fabric, checkpoint, report, resume), {'network_sha256': digest})
+                    Run(fabric, checkpoint, report, resume, begun_with=begun_with),
+                    {'network_sha256': digest})
     scale, bias = calibrate_depth(refiner, network, held_out)
     typer.echo(f'calibrated on validation: {scale:.3f} logit {bias:+.3f}')
     written = out / depth_path(path).name

@@ -1,5 +1,5 @@
 """
-Rotations as matrices (3, 3) and as unit quaternions x, y, z, w.
+Rotations as matrices (3, 3) and as unit quaternions x, y, z, w; poses between two.
 
 What scipy.spatial does for many rotations at once; its import is a third of a node's start.
 """
@@ -58,6 +58,15 @@ def rotation_between(start: NDArray[np.float64], end: NDArray[np.float64],
         return matrix_from_quaternion((1 - fraction) * first + fraction * last)
     return matrix_from_quaternion(
         math.sin((1 - fraction) * half) * first + math.sin(fraction * half) * last)
+
+
+def pose_between(start: NDArray[np.float64], end: NDArray[np.float64],
+                 fraction: float) -> NDArray[np.float64]:
+    """Return the pose, (4, 4), between two: positions on the line, rotations by slerp."""
+    pose = np.eye(4)
+    pose[:3, :3] = rotation_between(start[:3, :3], end[:3, :3], fraction)
+    pose[:3, 3] = (1 - fraction) * start[:3, 3] + fraction * end[:3, 3]
+    return pose
 
 
 def _normalised(quaternion: Iterable[float]) -> tuple[float, float, float, float]:

@@ -68,6 +68,24 @@ class DepthRefiner(VolumeUnet):
         """Build the refiner of a configuration, with fresh weights."""
         return cls(config.features, config.head_channels, config.volume_channels)
 
+    @classmethod
+    def begun_with(cls, refiner: 'DepthRefiner', config: DepthRefinerConfig) -> 'DepthRefiner':
+        """
+        Return a refiner that begins with the weights of another, which may be another network's.
+
+        If the networks have different numbers of features, what reads them begins at zero. Raises
+        ConfigError if other sizes differ.
+        """
+        begun, given = cls.from_config(config), refiner.state_dict()
+        if begun.features != refiner.features:
+            given['enter_16.weight'] = torch.zeros_like(begun.enter_16.weight)
+        try:
+            begun.load_state_dict(given)
+        except RuntimeError as error:
+            raise ConfigError('depth refiner of other sizes: expected those of '
+                              f'{config.to_dict()}: {error}') from error
+        return begun
+
     def forward(self, logits: Tensor, evidence: Tensor, count: Tensor, total: Tensor) -> Tensor:
         """
         Return corrected logits of occupancy, (B, 64, 64, 64).

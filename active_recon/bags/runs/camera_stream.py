@@ -7,14 +7,23 @@ from itertools import islice
 import math
 from typing import Any
 
+from active_recon.bags.runs.recorded_transforms import RecordedTransforms
 from active_recon.bags.runs.scene import Scene
-from active_recon.bags.runs.topics import CameraTopics, IMAGE_ROLE, INFO_ROLE, POSE_ROLE, Topics
+from active_recon.bags.runs.topics import (
+    CameraTopics,
+    IMAGE_ROLE,
+    INFO_ROLE,
+    POSE_ROLE,
+    POSE_TYPES,
+    Topics,
+)
 from active_recon.bags.storage.bag import Bag
 from active_recon.bags.storage.message_types import (
     FLOAT,
     JOINT_STATE,
     POSE,
     read_message,
+    TRANSFORMS,
 )
 from active_recon.errors import DataError, MessageError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics
@@ -32,7 +41,8 @@ class CameraStream:
     """
     Reads the camera topics of a bag.
 
-    Poses are interpolated and rejected as in the node. If the bag has azimuths only and the scene
+    Poses are interpolated and rejected as in the node; of transforms, that of an image's frame in
+    the object's is looked up at its stamp. If the bag has azimuths only and the scene
     no camera position, or if it has no camera info of a calibrated camera, the camera is assumed
     at that azimuth on the scene's orbit, with a lens whose shorter side matches the canonical
     camera, or at the scene's position, with one as much longer as that is farther. Where images or
@@ -56,6 +66,9 @@ class CameraStream:
         self._joints: set[str] = set()
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64] | float]] = []
+        self._transforms = (
+            RecordedTransforms(topics.object_frame, topics.max_pose_gap)
+            if camera.azimuth.type_name == TRANSFORMS else None)
         self.images: list[tuple[int, int]] = []
         self.assumed: list[str] = []
         self.received: dict[str, dict[int, int]] = {
@@ -93,6 +106,9 @@ class CameraStream:
                 joiner.add_pose(self._poses[fed][0], self._placed(self._poses[fed][1]))
                 fed += 1
             try:
+                if self._transforms:
+                    joiner.add_pose(time, self._placed(self._transforms.pose(
+                        msg.header.frame_id, time)))
                 joiner.add_intrinsics(time, self._lens(time, *size_from_msg(msg)))
                 joiner.add_image(time, msg, now=0)
             except MessageError as error:
@@ -103,31 +119,42 @@ class CameraStream:
 
     def _read_cameras(self) -> Iterator[MessageError]:
         """Read the poses and lenses and sort them by their stamps; yield the errors."""
-        info, azimuth = self._camera.camera_info, self._camera.azimuth
-        poses = []
-        for message in self._bag.messages({azimuth.name, *([info.name] if info else ())}):
-            msg = read_message(message)
-            stamp = (0 if message.type_name == FLOAT
-                     else nanoseconds_from_stamp(msg.header.stamp))
-            role = POSE_ROLE if message.topic == azimuth.name else INFO_ROLE
-            self.received[role].setdefault(stamp, message.received)
-            try:
-                if role == POSE_ROLE:
-                    poses.append((stamp, message.received, self._pose(msg)))
-                else:
-                    self._lenses.append((stamp, intrinsics_from_msg(msg)))
-            except MessageError as error:
-                # Of an image there may be another camera info: it is the message that is left out
-                yield error if role == POSE_ROLE else MessageError(
-                    str(error), 'unusable_camera_info')
+        info, azimuth, static = (self._camera.camera_info, self._camera.azimuth,
+                                 self._camera.static)
+        read = [topic for topic in (azimuth, static, info) if topic]
+        poses: list[tuple[int, int, NDArray[np.float64] | float]] = []
+        with self._reporting('reading the cameras', sum(each.count for each in read)) as advance:
+            for message in self._bag.messages({topic.name for topic in read}):
+                advance(1, '')
+                msg = read_message(message)
+                if self._transforms and message.type_name == TRANSFORMS:
+                    yield from self._transforms.read(msg, message)
+                    continue
+                stamp = (0 if message.type_name == FLOAT
+                         else nanoseconds_from_stamp(msg.header.stamp))
+                role = POSE_ROLE if message.topic == azimuth.name else INFO_ROLE
+                self.received[role].setdefault(stamp, message.received)
+                try:
+                    if role == POSE_ROLE:
+                        poses.append((stamp, message.received, self._pose(msg)))
+                    else:
+                        self._lenses.append((stamp, intrinsics_from_msg(msg)))
+                except MessageError as error:
+                    # Of an image there may be another camera info: the message is left out
+                    yield error if role == POSE_ROLE else MessageError(
+                        str(error), 'unusable_camera_info')
         self._require_one_joint()
         self._place()
         self._unstamped_images = not any(
             nanoseconds_from_stamp(read_message(message).header.stamp)
             for message in islice(self._bag.messages({self._camera.image.name}), 2))
-        self._unstamped = self._unstamped_images or not any(stamp for stamp, _, _ in poses)
+        stamps = (self._transforms.stamps if self._transforms
+                  else [stamp for stamp, *_ in poses])
+        self._unstamped = self._unstamped_images or bool(stamps) and not any(stamps)
         self._poses = [(received if self._unstamped else stamp, pose)
                        for stamp, received, pose in poses]
+        if self._transforms:
+            self._transforms.finish(by_receive_time=self._unstamped)
         self._poses.sort(key=_stamp)
         self._lenses.sort(key=_stamp)
 
@@ -154,7 +181,7 @@ class CameraStream:
     def _place(self) -> None:
         """Decide how much of the camera is known; raise ConfigError on redundant options."""
         scene, azimuth = self._scene, self._camera.azimuth
-        has_poses, recorded = azimuth.type_name == POSE, bool(self._lenses)
+        has_poses, recorded = azimuth.type_name in POSE_TYPES, bool(self._lenses)
         if not has_poses and scene.camera_position is None:
             self._lenses.clear()  # at an unknown distance a lens is of no use
         self._topics.reject_redundant(azimuth)
@@ -164,7 +191,7 @@ class CameraStream:
     def _placed(self, known: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Return the pose, or one on the orbit at its azimuth if no lens is known."""
         pose = (self._scene.pose_at(known, self._topics.turned_object)
-                if isinstance(known, float) else known)
+                if isinstance(known, float) else self._scene.about_object(known))
         if self._lenses or self._scene.camera_position is not None:
             return pose
         return self._scene.orbit_pose(Camera(pose).azimuth)

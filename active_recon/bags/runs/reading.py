@@ -77,6 +77,9 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
         episode, counters = gated_views(stream, ViewGate(), scene)
         gaps = gaps_between([stamp for stamp, _ in stream.images])
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
+    if scene.object_position is not None:
+        raise ConfigError('--object-position: not needed: the loop recorded its poses about the '
+                          'object')
     record = LoopRecord(bag, namespace, node.get('object_size', scene.size), topics.object_frame)
     episodes = with_depth(recorded_episodes(stream, record, scene), bag, namespace,
                           summary.provenance, node)

@@ -31,6 +31,7 @@ class Scene:
     - camera_position: (3,), m, in the object's frame at the recorded angle 0;
       camera_orientation: its optical frame's unit quaternion x, y, z, w, None: it looks at the
       object's centre, upright
+    - object_position: centre of the object's cube in the frame of the camera's poses, (3,), m
     - background: how the background is removed; empty_scene: (H, W, 3) uint8 RGB
     """
 
@@ -39,6 +40,7 @@ class Scene:
     elevation: float | None = None
     camera_position: Sequence[float] | None = None
     camera_orientation: Sequence[float] | None = None
+    object_position: Sequence[float] | None = None
     background: Background = Background()
     empty_scene: NDArray[np.uint8] | None = None
 
@@ -79,6 +81,14 @@ class Scene:
             return self.orbit_pose(-angle if turned_object else angle)
         return self._fixed_camera(turned_object).pose_at(angle)
 
+    def about_object(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a recorded pose of the camera (4, 4) with the object's centre as the origin."""
+        if self.object_position is None:
+            return pose
+        moved = pose.copy()
+        moved[:3, 3] -= self.object_position
+        return moved
+
     def orbit_pose(self, azimuth: float) -> NDArray[np.float64]:
         """Return the pose of a camera at that azimuth, which looks at the object's centre."""
         elevation = CANONICAL_ELEVATION if self.elevation is None else self.elevation
@@ -89,6 +99,9 @@ class Scene:
         if has_poses and self.camera_position is not None:
             raise ConfigError('--camera-position: not needed: the bag has camera poses on '
                               f'{topic}')
+        if not has_poses and self.object_position is not None:
+            raise ConfigError('--object-position: not for azimuths, which the bag has on '
+                              f'{topic}: they are those around the object')
         if has_camera and self.elevation is not None:
             raise ConfigError(f'--elevation-deg: not needed: the bag has camera poses on {topic}, '
                               'and camera info')

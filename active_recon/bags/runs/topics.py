@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import math
 
 from active_recon.bags.runs.image_kinds import non_camera_topics
+from active_recon.bags.runs.recorded_transforms import frames_until, STATIC, without_statics
 from active_recon.bags.runs.run import TopicSummary
 from active_recon.bags.storage.bag import Bag, BagSummary
 from active_recon.bags.storage.message_types import (
@@ -14,15 +15,16 @@ from active_recon.bags.storage.message_types import (
     IMAGE,
     JOINT_STATE,
     POSE,
+    read_message,
     TRANSFORMS,
 )
 from active_recon.errors import ConfigError, DataError
 from active_recon.parameters.reconstructor import ReconstructorParameters
 
 IMAGE_TYPES = (IMAGE, COMPRESSED_IMAGE)
-AZIMUTH_TYPES = (POSE, JOINT_STATE, FLOAT)
-_BY_TRANSFORMS = ('. Transforms in bags are not read: play the bag to a reconstructor with '
-                  'pose_source: tf, which publishes the camera/pose to record')
+AZIMUTH_TYPES = (POSE, TRANSFORMS, JOINT_STATE, FLOAT)
+POSE_TYPES = (POSE, TRANSFORMS)
+"""Types of topics that have the camera's whole pose."""
 IMAGE_ROLE, INFO_ROLE, POSE_ROLE = 'camera/image_raw', 'camera/camera_info', 'camera/pose'
 _ROLES = (IMAGE_ROLE, INFO_ROLE, POSE_ROLE)
 _OF_THE_LOOP = ('/view', '/view_image', '/latent', '/camera/mask', '/next_view', '/next_azimuth',
@@ -37,11 +39,12 @@ class Topics:
     Names may lack the first '/'.
 
     - image: sensor_msgs Image or CompressedImage; camera_info: sensor_msgs CameraInfo
-    - azimuth: geometry_msgs PoseStamped of the camera; or radians, as a sensor_msgs JointState or
-      a std_msgs Float64
+    - azimuth: geometry_msgs PoseStamped of the camera; or tf2_msgs TFMessage that connect the
+      images' frame with the object's, beside those of the topic with _static after its name; or
+      radians, as a sensor_msgs JointState or a std_msgs Float64
     - joint: the joint's name, if the JointState has several
     - turned_object: the angle is a turntable's under a fixed camera, whose azimuth is its negative
-    - object_frame: the frame of the PoseStamped
+    - object_frame: the frame of the PoseStamped, or that of the transforms that the object is in
     - max_pose_gap: the longest time from an image to its neighbouring poses, s, as in the node
     """
 
@@ -63,7 +66,7 @@ class Topics:
         """Raise ConfigError on options for another type than the poses or azimuths have."""
         unused = [option for option, given in (
             ('--joint', self.joint and azimuth.type_name != JOINT_STATE),
-            ('--turned-object', self.turned_object and azimuth.type_name == POSE)) if given]
+            ('--turned-object', self.turned_object and azimuth.type_name in POSE_TYPES)) if given]
         if unused:
             raise ConfigError(f'{" and ".join(unused)}: not for {azimuth.type_name}, which the '
                               f'bag has on {azimuth.name}: leave it out, or name another topic '
@@ -75,13 +78,14 @@ class CameraTopics:
     """
     The topics of the camera; `azimuth` has its poses, or only its azimuths.
 
-    `of_views`: the camera's images were not recorded; `image` has what the network saw instead,
-    one image for each view.
+    `static` has the static transforms beside those of `azimuth`. `of_views`: the camera's images
+    were not recorded; `image` has what the network saw instead, one image for each view.
     """
 
     image: TopicSummary
     camera_info: TopicSummary | None
     azimuth: TopicSummary
+    static: TopicSummary | None = None
     of_views: bool = False
 
 
@@ -112,12 +116,14 @@ def camera_topics(bag: Bag, summary: BagSummary, topics: Topics) -> CameraTopics
     except DataError as error:
         missing.append(error)
     try:
-        azimuth = search.azimuth(topics.azimuth, loops_own=not missing and of_views)
+        azimuth = search.azimuth(topics.azimuth, topics.object_frame,
+                                 loops_own=not missing and of_views)
     except DataError as error:
         missing.append(error)
     if missing:
         raise DataError('; '.join(map(str, missing)), 'topics')
-    return CameraTopics(image, search.camera_info(topics.camera_info, image), azimuth, of_views)
+    return CameraTopics(image, search.camera_info(topics.camera_info, image), azimuth,
+                        search.static_beside(azimuth), of_views)
 
 
 class _Search:
@@ -149,19 +155,49 @@ class _Search:
             f'no camera images on {name or "any topic"}{instead if others else ""}: expected '
             f'{" or ".join(IMAGE_TYPES)}; name the topic with --image', 'topics')
 
-    def azimuth(self, name: str, loops_own: bool) -> TopicSummary:
+    def azimuth(self, name: str, object_frame: str, loops_own: bool) -> TopicSummary:
         """Return the topic of the poses or azimuths; `loops_own`: that of the views only."""
         views = [topic for topic in self._present
                  if topic.name.endswith('/view') and topic.type_name == POSE]
         fitting = self._fitting(name, AZIMUTH_TYPES)
         found = (views if loops_own and not name else None) or self._known_by_name(
-            name, fitting, POSE_ROLE) or fitting or views
+            name, fitting, POSE_ROLE)
+        frames: set[str] = set()
+        if not found and any(topic.type_name == TRANSFORMS for topic in fitting):
+            fitting, frames = self._connected(fitting, object_frame)
+        found = found or fitting or views
         if not found or name and not fitting:
-            transforms = any(topic.type_name == TRANSFORMS for topic in self._present)
+            advice = (f'. The transforms have no frame {object_frame!r}, but '
+                      f'{", ".join(sorted(frames))}: name one with --object-frame, and with '
+                      '--object-position where the object is in it' if frames else '')
             raise DataError(f"no camera poses or azimuths on {name or 'any topic'}: expected "
                             f'{" or ".join(AZIMUTH_TYPES)}; name the topic with --azimuth'
-                            f'{_BY_TRANSFORMS if transforms else ""}', 'topics')
+                            f'{advice}', 'topics')
         return _only(found, AZIMUTH_TYPES, "the camera's poses or azimuths", '--azimuth')
+
+    def static_beside(self, azimuth: TopicSummary) -> TopicSummary | None:
+        """Return the topic of the static transforms beside others, None if there is none."""
+        return next((topic for topic in self._present
+                     if topic.type_name == azimuth.type_name == TRANSFORMS
+                     and topic.name == azimuth.name + STATIC), None)
+
+    def _connected(self, fitting: Sequence[TopicSummary],
+                   object_frame: str) -> tuple[list[TopicSummary], set[str]]:
+        """
+        Return the topics of which those with the object's frame, if any, are to be taken.
+
+        The second value are the frames of the transforms, where they lack it.
+        """
+        transforms = [topic for topic in fitting if topic.type_name == TRANSFORMS]
+        others = [topic for topic in fitting if topic.type_name != TRANSFORMS]
+        poses = {topic.name for topic in others if topic.type_name == POSE}
+        for message in self._bag.messages(poses) if poses else ():
+            if read_message(message).header.frame_id == object_frame:
+                return others, set()
+        frames = frames_until(self._bag, transforms, object_frame)
+        if object_frame in frames:
+            return without_statics(transforms), set()
+        return others, frames
 
     def camera_info(self, name: str, image: TopicSummary) -> TopicSummary | None:
         """Return the topic of the camera info, None if there is none."""

@@ -20,7 +20,7 @@ POSE = 'geometry_msgs/msg/PoseStamped'
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 TRANSFORMS = 'tf2_msgs/msg/TFMessage'
 READ_TYPES = frozenset((HEADER, FLOAT, IMAGE, COMPRESSED_IMAGE, CAMERA_INFO, JOINT_STATE, CLOUD,
-                        POSE, DIAGNOSTICS))
+                        POSE, DIAGNOSTICS, TRANSFORMS))
 _MAX_PADDING = 12
 """Trailing bytes that are accepted: ROS aligns the empty sequences of a JointState."""
 
