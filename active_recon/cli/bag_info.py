@@ -1,5 +1,6 @@
 """`active-recon bag info`: the content of a bag, and whether it can be replayed."""
 
+from collections.abc import Sequence
 import math
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
@@ -9,7 +10,7 @@ from active_recon.cli.progress import bag_progress
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.bags.runs.run import RecordedRun
+    from active_recon.bags.runs.run import RecordedRun, RecordedView
     from active_recon.bags.runs.scene import Scene
     from active_recon.bags.runs.topics import Topics
     from active_recon.bags.storage.bag import BagSummary
@@ -61,6 +62,12 @@ def print_refusals(run: 'RecordedRun') -> None:
         typer.echo(refusal)
 
 
+def told_depth(views: 'Sequence[RecordedView]') -> str:
+    """Return how many of the views have depth, after a comma; '' if none has."""
+    deep = sum(view.depth is not None for view in views)
+    return f', {deep} with depth' if deep else ''
+
+
 def _print_run(run: 'RecordedRun', replays: bool) -> None:
     from active_recon.bags.runs.missing import describe_missing
 
@@ -69,7 +76,8 @@ def _print_run(run: 'RecordedRun', replays: bool) -> None:
     for number, episode in enumerate(run.episodes, 1):
         azimuths = ', '.join(f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
         end = f', done: {episode.done}' if episode.done else ''
-        taken = f'{len(episode.views)} views at azimuths {azimuths} degrees'
+        taken = (f'{len(episode.views)} views at azimuths {azimuths} degrees'
+                 f'{told_depth(episode.views)}')
         typer.echo(f'  episode {number}: {taken if azimuths else "no view"}{end}')
         if missing := describe_missing(episode):
             typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')

@@ -30,6 +30,11 @@ _TOPICS: dict[str, tuple[Any, Any]] = {
         metavar='TOPIC',
         help='Topic of the camera pose (PoseStamped), of transforms (TFMessage), or of the '
              "camera's azimuth in radians (JointState of a turntable, or Float64).")], ''),
+    'depth': (Annotated[str, _option(
+        metavar='TOPIC',
+        help='Topic of a depth camera (Image of 16UC1 or 32FC1, or compressedDepth), which is '
+             'registered to the images or connected with them by transforms; default: none.')],
+        ''),
     'joint': (Annotated[str, _option(
         metavar='NAME', help='Joint of the JointState, if it has several.')], ''),
     'turned_object': (Annotated[bool, _option(

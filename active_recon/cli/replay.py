@@ -8,7 +8,7 @@ from pathlib import Path
 import time
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.bag_info import print_refusals
+from active_recon.cli.bag_info import print_refusals, told_depth
 from active_recon.cli.bag_options import with_bag_options
 from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
@@ -128,10 +128,16 @@ def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
         first, last = (step.reconstruction.grid for step in (episode.steps[0], episode.steps[-1]))
         count = int(last.occupied(reconstructor.threshold).sum())
         typer.echo(
-            f'reconstructed from {len(episode.steps)} views: {count} of {last.occupancy.size} '
+            f'reconstructed from {len(episode.steps)} views'
+            f'{told_depth([step.recorded for step in episode.steps])}: '
+            f'{count} of {last.occupancy.size} '
             f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():.0f} to '
             f'{last.entropy():.0f} nats; the bag has no record to compare with')
         _print_quality(episode)
+        refused = [step.reconstruction.depth_refusal for step in episode.steps
+                   if step.reconstruction.depth_refusal]
+        if refused:
+            typer.echo(f'depth of {len(refused)} of them was left out: {refused[0]}')
     typer.echo(f'hash {verified.hash}')
 
 

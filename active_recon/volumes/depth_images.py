@@ -29,6 +29,28 @@ class DepthImage:
     camera: Camera | None = None
 
 
+def registered(image: DepthImage, pose: NDArray[np.float64]) -> DepthImage:
+    """
+    Return the depth as a camera with the same lens at another pose, (4, 4), sees it.
+
+    Where several values fall on a pixel, the nearest counts; pixels on which none falls have no
+    value. `image` has a camera of its own.
+    """
+    assert image.camera is not None, 'depth without a camera is aligned with an image'
+    lens = image.camera.intrinsics
+    target = Camera(pose, lens)
+    with np.errstate(invalid='ignore'):
+        valid = np.isfinite(image.metres) & (image.metres > 0)
+    rays = image.camera.ray_directions()[valid]  # (N, 3), of depth 1
+    pixels, depths = target.project(image.camera.position + rays * image.metres[valid][:, None])
+    with np.errstate(invalid='ignore'):
+        inside = (depths > 0) & ((pixels >= 0) & (pixels < (lens.width, lens.height))).all(axis=1)
+    columns, rows = pixels[inside].astype(int).T
+    found = np.full((lens.height, lens.width), np.inf, np.float32)
+    np.minimum.at(found, (rows, columns), depths[inside].astype(np.float32))
+    return DepthImage(np.where(np.isinf(found), np.float32(0), found), target)
+
+
 def usable_depth(image: DepthImage, view: Camera,
                  object_size: float) -> tuple[NDArray[np.float32], Camera]:
     """

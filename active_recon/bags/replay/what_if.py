@@ -59,9 +59,9 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
     provenance = {**kept, **made_by, 'version': __version__,
                   'replay_of': run.path.resolve().name}
     parameters: dict[str, Mapping[str, Any]] = {'/reconstructor': {
-        **node_parameters(run, 'reconstructor'), **made_by, 'threshold': math.nan,
-        'weights': str(setup.weights), 'runtime': setup.runtime, 'precision': setup.precision,
-        **setup.reconstructor}}
+        **node_parameters(run, 'reconstructor'), **_with_depth(episodes), **made_by,
+        'threshold': math.nan, 'weights': str(setup.weights), 'runtime': setup.runtime,
+        'precision': setup.precision, **setup.reconstructor}}
     if setup.planner is not None and (overrides.policy or not overrides.weights):
         planning = {**node_parameters(run, 'view_planner'), **setup.planner,
                     'policy_in_use': setup.planner['policy'],
@@ -74,6 +74,12 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
              for time in (view.stamp, *view.received.values())]
     return replace(run, episodes=episodes, provenance=provenance, parameters=parameters,
                    begin=min(times, default=run.begin), end=max(times, default=run.end))
+
+
+def _with_depth(episodes: Sequence[RecordedEpisode]) -> dict[str, bool]:
+    """Return the parameter without which the depth of the views would not be read again."""
+    deep = any(view.depth is not None for episode in episodes for view in episode.views)
+    return {'use_depth': True} if deep else {}
 
 
 def _replanned(before: Sequence[RecordedEpisode], reconstructor: Reconstructor, planner: Planner,

@@ -52,6 +52,7 @@ class CameraStream:
 
     - assumed: in words, what neither the bag nor the scene states; complete once `views` ended
     - received: receive times by topic name in the loop and by stamp, nanoseconds
+    - transforms: None where the bag has poses or azimuths instead; `are_images_unstamped`
     - images: stamp and receive time of each image read, wanted or not, nanoseconds
     """
 
@@ -62,11 +63,11 @@ class CameraStream:
         self._topics = topics
         self._scene = scene
         self._reporting = reporting
-        self._unstamped = self._unstamped_images = False
+        self._unstamped = self.are_images_unstamped = False
         self._joints: set[str] = set()
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64] | float]] = []
-        self._transforms = (
+        self.transforms = (
             RecordedTransforms(topics.object_frame, topics.max_pose_gap)
             if camera.azimuth.type_name == TRANSFORMS else None)
         self.images: list[tuple[int, int]] = []
@@ -93,7 +94,7 @@ class CameraStream:
         for message in self._bag.messages({self._camera.image.name}):
             advance(1, '')
             msg = read_message(message)
-            stamp = (message.received if self._unstamped_images
+            stamp = (message.received if self.are_images_unstamped
                      else nanoseconds_from_stamp(msg.header.stamp))
             self.images.append((stamp, message.received))
             if not wanted(stamp):
@@ -106,8 +107,8 @@ class CameraStream:
                 joiner.add_pose(self._poses[fed][0], self._placed(self._poses[fed][1]))
                 fed += 1
             try:
-                if self._transforms:
-                    joiner.add_pose(time, self._placed(self._transforms.pose(
+                if self.transforms:
+                    joiner.add_pose(time, self._placed(self.transforms.pose(
                         msg.header.frame_id, time)))
                 joiner.add_intrinsics(time, self._lens(time, *size_from_msg(msg)))
                 joiner.add_image(time, msg, now=0)
@@ -127,8 +128,8 @@ class CameraStream:
             for message in self._bag.messages({topic.name for topic in read}):
                 advance(1, '')
                 msg = read_message(message)
-                if self._transforms and message.type_name == TRANSFORMS:
-                    yield from self._transforms.read(msg, message)
+                if self.transforms and message.type_name == TRANSFORMS:
+                    yield from self.transforms.read(msg, message)
                     continue
                 stamp = (0 if message.type_name == FLOAT
                          else nanoseconds_from_stamp(msg.header.stamp))
@@ -145,16 +146,16 @@ class CameraStream:
                         str(error), 'unusable_camera_info')
         self._require_one_joint()
         self._place()
-        self._unstamped_images = not any(
+        self.are_images_unstamped = not any(
             nanoseconds_from_stamp(read_message(message).header.stamp)
             for message in islice(self._bag.messages({self._camera.image.name}), 2))
-        stamps = (self._transforms.stamps if self._transforms
+        stamps = (self.transforms.stamps if self.transforms
                   else [stamp for stamp, *_ in poses])
-        self._unstamped = self._unstamped_images or bool(stamps) and not any(stamps)
+        self._unstamped = self.are_images_unstamped or bool(stamps) and not any(stamps)
         self._poses = [(received if self._unstamped else stamp, pose)
                        for stamp, received, pose in poses]
-        if self._transforms:
-            self._transforms.finish(by_receive_time=self._unstamped)
+        if self.transforms:
+            self.transforms.finish(by_receive_time=self._unstamped)
         self._poses.sort(key=_stamp)
         self._lenses.sort(key=_stamp)
 

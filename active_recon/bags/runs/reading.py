@@ -10,11 +10,12 @@ from active_recon.bags.runs.camera_stream import CameraStream
 from active_recon.bags.runs.image_gaps import gaps_between, ImageGaps, uncounted_images
 from active_recon.bags.runs.loop_record import LoopRecord
 from active_recon.bags.runs.parameters import checked_parameters
-from active_recon.bags.runs.recorded_depth import with_depth
+from active_recon.bags.runs.recorded_depth import with_depth, with_depth_of
 from active_recon.bags.runs.recorded_views import gated_views, recorded_episodes
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun
 from active_recon.bags.runs.scene import Scene
-from active_recon.bags.runs.topics import camera_topics, loop_namespace, Topics
+from active_recon.bags.runs.topic_search import camera_topics
+from active_recon.bags.runs.topics import loop_namespace, Topics
 from active_recon.bags.storage.bag import Bag, BagSummary
 from active_recon.bags.storage.opening import open_bag
 from active_recon.errors import ActiveReconError, ConfigError, DataError
@@ -65,6 +66,11 @@ def run_in(bag: Bag, summary: BagSummary, path: Path, topics: Topics, scene: Sce
 def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
           reporting: Reporting) -> _Read:
     namespace = None if topics.azimuth else loop_namespace(summary.topics)
+    for option, given in (('--object-position', scene.object_position is not None),
+                          ('--depth', topics.depth)):
+        if given and namespace is not None:
+            raise ConfigError(f'{option}: not needed: the bag has the views of a loop, which knew '
+                              'that')
     node = checked_parameters('reconstructor', summary.parameters.get(
         f'{namespace or "/"}reconstructor'.strip('/'), {}))
     topics = replace(topics, max_pose_gap=node.get('max_pose_gap', topics.max_pose_gap),
@@ -75,11 +81,11 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
     stream = CameraStream(bag, camera, topics, scene, reporting)
     if namespace is None:
         episode, counters = gated_views(stream, ViewGate(), scene)
+        if camera.depth:
+            episode = with_depth_of(camera.depth, episode, bag, stream.transforms, scene,
+                                    stream.are_images_unstamped)
         gaps = gaps_between([stamp for stamp, _ in stream.images])
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
-    if scene.object_position is not None:
-        raise ConfigError('--object-position: not needed: the loop recorded its poses about the '
-                          'object')
     record = LoopRecord(bag, namespace, node.get('object_size', scene.size), topics.object_frame)
     episodes = with_depth(recorded_episodes(stream, record, scene), bag, namespace,
                           summary.provenance, node)

@@ -1,11 +1,14 @@
-"""The depth images in a bag that the loop took in with its views."""
+"""The depth images in a bag beside its views: those that the loop took in, or those of a topic."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
+from active_recon.bags.runs.recorded_transforms import RecordedTransforms
 from active_recon.bags.runs.run import RecordedEpisode
+from active_recon.bags.runs.scene import Scene
+from active_recon.bags.runs.topics import DepthTopics
 from active_recon.bags.storage.bag import Bag
 from active_recon.bags.storage.message_types import (
     CAMERA_INFO,
@@ -16,13 +19,20 @@ from active_recon.bags.storage.message_types import (
 from active_recon.errors import DataError, MessageError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.parameters.reconstructor import ReconstructorParameters
-from active_recon.volumes.depth_images import DepthImage
+from active_recon.volumes.depth_images import DepthImage, registered
 from msg_tools.cameras import intrinsics_from_msg
 from msg_tools.compressed_depth import metres_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
+import numpy as np
 
 DEPTH_ROLE, DEPTH_INFO_ROLE = 'camera/depth/image_raw', 'camera/depth/camera_info'
 _COMPRESSED = '/compressedDepth'
+_SAME_POSE = 1e-6  # metres, and parts of unit vectors
+
+
+class _Stamped(NamedTuple):
+    stamp: int
+    msg: Any
 
 
 def with_depth(episodes: Sequence[RecordedEpisode], bag: Bag, namespace: str,
@@ -35,21 +45,58 @@ def with_depth(episodes: Sequence[RecordedEpisode], bag: Bag, namespace: str,
     """
     if not parameters.get('use_depth', ReconstructorParameters.use_depth):
         return list(episodes)
-    gap = round(1e9 * parameters.get('max_depth_gap', ReconstructorParameters.max_depth_gap))
+    gap = parameters.get('max_depth_gap', ReconstructorParameters.max_depth_gap)
     cameras = {view.stamp: view.camera for episode in episodes for view in episode.views}
-    found = _nearest(bag, [names.get(role, f'{namespace}{role}')
-                           for role in (DEPTH_ROLE, DEPTH_INFO_ROLE)], cameras, gap)
+    depth, info = (names.get(role, f'{namespace}{role}') for role in (DEPTH_ROLE, DEPTH_INFO_ROLE))
+    kinds = {depth: IMAGE, f'{depth}{_COMPRESSED}': COMPRESSED_IMAGE, info: CAMERA_INFO}
+    nearest, lens = _nearest(bag, kinds, cameras, gap)
+    found = {stamp: _image(each.msg, cameras[stamp], lens) for stamp, each in nearest.items()}
     return [replace(episode, views=[replace(view, depth=found.get(view.stamp))
                                     for view in episode.views]) for episode in episodes]
 
 
-def _nearest(bag: Bag, topics: Sequence[str], cameras: Mapping[int, Camera],
-             gap: int) -> dict[int, DepthImage]:
-    """Return the depth image nearest to each stamp of `cameras`, nanoseconds, if within `gap`."""
-    nearest: dict[int, tuple[int, Any]] = {}
+def with_depth_of(depth: DepthTopics, episode: RecordedEpisode, bag: Bag,
+                  transforms: RecordedTransforms | None, scene: Scene,
+                  by_receive_time: bool) -> RecordedEpisode:
+    """
+    Return an episode whose views have the nearest depth image of a topic, of another recorder.
+
+    By transforms the depth is registered to the image's camera; without, it has to be. Images and
+    depth without stamps are joined on their receive times, if asked. Raises DataError where the
+    transforms do not connect the depth camera.
+    """
+    cameras = {view.stamp: view.camera for view in episode.views}
+    kinds = {topic.name: topic.type_name for topic in (depth.images, depth.camera_info) if topic}
+    nearest, lens = _nearest(bag, kinds, cameras, ReconstructorParameters.max_depth_gap,
+                             by_receive_time)
+    found = {}
+    for stamp, each in nearest.items():
+        image = _image(each.msg, cameras[stamp], lens)
+        if image is not None and image.camera is not None and transforms:
+            try:
+                pose = scene.about_object(transforms.pose(each.msg.header.frame_id, each.stamp))
+            except MessageError as error:
+                if error.kind == 'tf':
+                    raise DataError(f'{depth.images.name}: {error}', 'tf') from error
+                continue
+            if not np.allclose(pose, image.camera.pose, rtol=0, atol=_SAME_POSE):
+                image = registered(replace(image, camera=Camera(pose, image.camera.intrinsics)),
+                                   image.camera.pose)
+        found[stamp] = image
+    return replace(episode, views=[replace(view, depth=found.get(view.stamp))
+                                   for view in episode.views])
+
+
+def _nearest(bag: Bag, kinds: Mapping[str, str], views: Collection[int], gap: float,
+             by_receive_time: bool = False) -> tuple[dict[int, _Stamped], Intrinsics | None]:
+    """
+    Return the depth message nearest to each view's stamp, nanoseconds, if within `gap` seconds.
+
+    The second value is the depth camera's lens, None where it has none. `kinds` are the types of
+    the topics. Raises DataError on other types.
+    """
+    nearest: dict[int, _Stamped] = {}
     lens: Intrinsics | None = None
-    depth, info = topics
-    kinds = {depth: IMAGE, f'{depth}{_COMPRESSED}': COMPRESSED_IMAGE, info: CAMERA_INFO}
     for message in bag.messages(set(kinds)):
         wanted = kinds[message.topic]
         if message.type_name != wanted:
@@ -60,17 +107,19 @@ def _nearest(bag: Bag, topics: Sequence[str], cameras: Mapping[int, Camera],
             with suppress(MessageError):
                 lens = lens or intrinsics_from_msg(msg)
             continue
-        stamp = nanoseconds_from_stamp(msg.header.stamp)
-        for view in cameras:
+        stamp = message.received if by_receive_time else nanoseconds_from_stamp(msg.header.stamp)
+        for view in views:
             away = abs(stamp - view)
-            if away <= gap and (view not in nearest or away < nearest[view][0]):
-                nearest[view] = away, msg
-    found = {}
-    for stamp, (_, msg) in nearest.items():
-        camera = cameras[stamp]
-        try:
-            found[stamp] = DepthImage(metres_from_msg(msg),
-                                      camera if lens is None else Camera(camera.pose, lens))
-        except MessageError:
-            continue
-    return found
+            if away <= round(gap * 1e9) and (view not in nearest
+                                             or away < abs(nearest[view].stamp - view)):
+                nearest[view] = _Stamped(stamp, msg)
+    return nearest, lens
+
+
+def _image(msg: Any, camera: Camera, lens: Intrinsics | None) -> DepthImage | None:
+    """Return a message's depth beside an image of a camera, None where it cannot be read."""
+    try:
+        return DepthImage(metres_from_msg(msg),
+                          camera if lens is None else Camera(camera.pose, lens))
+    except MessageError:
+        return None

@@ -1,0 +1,188 @@
+"""Finding the topics of the camera and its poses in a bag."""
+
+from collections.abc import Sequence
+
+from active_recon.bags.runs.image_kinds import non_camera_topics
+from active_recon.bags.runs.recorded_transforms import frames_until, STATIC, without_statics
+from active_recon.bags.runs.run import TopicSummary
+from active_recon.bags.runs.topics import (
+    CameraTopics,
+    DepthTopics,
+    IMAGE_ROLE,
+    INFO_ROLE,
+    POSE_ROLE,
+    Topics,
+)
+from active_recon.bags.storage.bag import Bag, BagSummary
+from active_recon.bags.storage.message_types import (
+    CAMERA_INFO,
+    COMPRESSED_IMAGE,
+    FLOAT,
+    IMAGE,
+    JOINT_STATE,
+    POSE,
+    read_message,
+    TRANSFORMS,
+)
+from active_recon.errors import DataError
+
+IMAGE_TYPES = (IMAGE, COMPRESSED_IMAGE)
+AZIMUTH_TYPES = (POSE, TRANSFORMS, JOINT_STATE, FLOAT)
+_ROLES = (IMAGE_ROLE, INFO_ROLE, POSE_ROLE)
+_OF_THE_LOOP = ('/view', '/view_image', '/latent', '/camera/mask', '/next_view', '/next_azimuth',
+                '/entropy')
+
+
+def camera_topics(bag: Bag, summary: BagSummary, topics: Topics) -> CameraTopics:
+    """
+    Return the camera's topics; raises DataError that names all missing or ambiguous ones.
+
+    A topic is found by its option, else by its remapped name, which the recorder stores, else by
+    its name in the loop, else by its type and its first message. Topics that the nodes subscribed
+    to under another role are left out.
+    """
+    if not any(topic.count for topic in summary.topics):
+        raise DataError('no messages: the bag is empty', 'empty')
+    search = _Search(bag, summary)
+    missing = []
+    try:
+        image, of_views = search.image(topics.image)
+    except DataError as error:
+        missing.append(error)
+    try:
+        azimuth = search.azimuth(topics.azimuth, topics.object_frame,
+                                 loops_own=not missing and of_views)
+    except DataError as error:
+        missing.append(error)
+    if missing:
+        raise DataError('; '.join(map(str, missing)), 'topics')
+    return CameraTopics(image, search.camera_info(topics.camera_info, image), azimuth,
+                        search.static_beside(azimuth), of_views,
+                        search.depth(topics.depth) if topics.depth else None)
+
+
+class _Search:
+    """Finds the topics in one bag."""
+
+    def __init__(self, bag: Bag, summary: BagSummary) -> None:
+        self._bag = bag
+        self._recorded_as = summary.provenance
+        others = {full for name, full in summary.provenance.items()
+                  if name.partition('/compressed')[0] not in _ROLES}
+        self._present = [topic for topic in summary.topics
+                         if topic.count and topic.name not in others]
+
+    def image(self, name: str) -> tuple[TopicSummary, bool]:
+        """Return the topic of the images, and whether they are what the network saw."""
+        fitting = self._fitting(name, IMAGE_TYPES)
+        usual = self._known_by_name(name, fitting, IMAGE_ROLE)
+        # Messages are read only if the names are not enough
+        others = {} if usual else non_camera_topics(self._bag, fitting)
+        cameras = usual or [topic for topic in fitting if topic.name not in others]
+        if cameras:
+            return _only(cameras, IMAGE_TYPES, "a camera's images", '--image'), False
+        seen = [topic for topic in self._present
+                if topic.name.endswith('/view_image') and topic.type_name == IMAGE]
+        if len(seen) == 1 and not name:
+            return seen[0], True
+        instead = f' ({", ".join(f"{topic} has {what}" for topic, what in others.items())})'
+        raise DataError(
+            f'no camera images on {name or "any topic"}{instead if others else ""}: expected '
+            f'{" or ".join(IMAGE_TYPES)}; name the topic with --image', 'topics')
+
+    def azimuth(self, name: str, object_frame: str, loops_own: bool) -> TopicSummary:
+        """Return the topic of the poses or azimuths; `loops_own`: that of the views only."""
+        views = [topic for topic in self._present
+                 if topic.name.endswith('/view') and topic.type_name == POSE]
+        fitting = self._fitting(name, AZIMUTH_TYPES)
+        found = (views if loops_own and not name else None) or self._known_by_name(
+            name, fitting, POSE_ROLE)
+        frames: set[str] = set()
+        if not found and any(topic.type_name == TRANSFORMS for topic in fitting):
+            fitting, frames = self._connected(fitting, object_frame)
+        found = found or fitting or views
+        if not found or name and not fitting:
+            advice = (f'. The transforms have no frame {object_frame!r}, but '
+                      f'{", ".join(sorted(frames))}: name one with --object-frame, and with '
+                      '--object-position where the object is in it' if frames else '')
+            raise DataError(f"no camera poses or azimuths on {name or 'any topic'}: expected "
+                            f'{" or ".join(AZIMUTH_TYPES)}; name the topic with --azimuth'
+                            f'{advice}', 'topics')
+        return _only(found, AZIMUTH_TYPES, "the camera's poses or azimuths", '--azimuth')
+
+    def static_beside(self, azimuth: TopicSummary) -> TopicSummary | None:
+        """Return the topic of the static transforms beside others, None if there is none."""
+        return next((topic for topic in self._present
+                     if topic.type_name == azimuth.type_name == TRANSFORMS
+                     and topic.name == azimuth.name + STATIC), None)
+
+    def _connected(self, fitting: Sequence[TopicSummary],
+                   object_frame: str) -> tuple[list[TopicSummary], set[str]]:
+        """
+        Return the topics of which those with the object's frame, if any, are to be taken.
+
+        The second value are the frames of the transforms, where they lack it.
+        """
+        transforms = [topic for topic in fitting if topic.type_name == TRANSFORMS]
+        others = [topic for topic in fitting if topic.type_name != TRANSFORMS]
+        poses = {topic.name for topic in others if topic.type_name == POSE}
+        for message in self._bag.messages(poses) if poses else ():
+            if read_message(message).header.frame_id == object_frame:
+                return others, set()
+        frames = frames_until(self._bag, transforms, object_frame)
+        if object_frame in frames:
+            return without_statics(transforms), set()
+        return others, frames
+
+    def camera_info(self, name: str, image: TopicSummary) -> TopicSummary | None:
+        """Return the topic of the camera info, None if there is none."""
+        fitting = self._fitting(name, (CAMERA_INFO,))
+        found = (self._known_by_name(name, fitting, INFO_ROLE)
+                 or self._info_beside(image) or fitting)
+        if not found and name:
+            raise DataError(f'no camera info on {name}: expected {CAMERA_INFO}; name the topic '
+                            'with --camera-info', 'topics')
+        return _only(found, (CAMERA_INFO,), 'camera info', '--camera-info') if found else None
+
+    def depth(self, name: str) -> DepthTopics:
+        """Return the topics of a depth camera; raises DataError where there are no images."""
+        for images in self._fitting(name, IMAGE_TYPES):
+            info = self._info_beside(images)
+            return DepthTopics(images, info[0] if info else None)
+        raise DataError(f'no depth images on {name}: expected {" or ".join(IMAGE_TYPES)}; name '
+                        'the topic with --depth', 'topics')
+
+    def _info_beside(self, image: TopicSummary) -> list[TopicSummary]:
+        """Return the camera info in the namespace of images, raw or compressed."""
+        raw = image.name.removesuffix('/compressed').removesuffix('/compressedDepth')
+        return [topic for topic in self._fitting('', (CAMERA_INFO,))
+                if topic.name == f'{raw.rpartition("/")[0]}/camera_info']
+
+    def _fitting(self, name: str, types: Sequence[str]) -> list[TopicSummary]:
+        """Return the topics of the types with that name, or all but the loop's own."""
+        return [topic for topic in self._present if topic.type_name in types and (
+            topic.name.lstrip('/') == name.lstrip('/') if name
+            else not topic.name.endswith(_OF_THE_LOOP))]
+
+    def _known_by_name(self, name: str, fitting: Sequence[TopicSummary],
+                       usual: str) -> list[TopicSummary]:
+        """Return the topics found by an option, by the recorded name, or by the usual name."""
+        if name:
+            return list(fitting)
+        remapped = self._recorded_as.get(usual, '')
+        return ([topic for topic in fitting if remapped in (topic.name, topic.name.removesuffix(
+            '/compressed'))] or [topic for topic in fitting if topic.name.endswith(f'/{usual}')])
+
+
+def _only(topics: Sequence[TopicSummary], types: Sequence[str], what: str,
+          option: str) -> TopicSummary:
+    """Return the topic of the first type present: types are in order of preference."""
+    for kind in types:
+        candidates = [topic for topic in topics if topic.type_name == kind]
+        if len(candidates) == 1:
+            return candidates[0]
+        if candidates:
+            raise DataError(f'{what} on several topics, '
+                            f'{", ".join(topic.name for topic in candidates)}: choose one with '
+                            f'{option}', 'topics')
+    raise AssertionError('topics were chosen by their types')
