@@ -135,12 +135,14 @@ class ViewJoiner:
         self._first_intrinsics = min(self._first_intrinsics, stamp)
 
     def add_mask(self, stamp: int, mask: Image) -> None:
-        """Add the mask message of the image of that stamp."""
+        """Add the mask message of the image of that stamp; raises MessageError without one."""
+        self._require_stamp(stamp, 'mask')
         if stamp >= self._earliest:
             self._masks.append((stamp, mask))
 
     def add_depth(self, stamp: int, depth: Image | CompressedImage) -> None:
-        """Add a depth image message."""
+        """Add a depth image message; raises MessageError where it has no stamp."""
+        self._require_stamp(stamp, 'depth image')
         if stamp >= self._earliest:
             self._depths.append((stamp, depth))
 
@@ -188,6 +190,11 @@ class ViewJoiner:
                 continue
             self._drop_first()
             yield View(stamp, image.msg, Camera(pose, intrinsics), mask, depth)
+
+    def _require_stamp(self, stamp: int, what: str) -> None:
+        if stamp == 0 < self._earliest:
+            raise MessageError(f'{what} without a stamp: expected that of its image, got 0; let '
+                               'its publisher fill in header.stamp', 'no_stamp')
 
     def _are_too_many(self) -> bool:
         return len(self._images) > _MAX_WAITING or (

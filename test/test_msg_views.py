@@ -206,6 +206,18 @@ def test_without_masks_none_is_waited_for():
     assert drain(joiner)[0].mask is None
 
 
+def test_masks_and_depth_without_a_stamp_are_refused_but_at_the_beginning_of_time():
+    joiner = ViewJoiner(max_pose_gap=0.1, masks=True, max_depth_gap=0.1)
+    joiner.add_mask(0, Image())
+    joiner.add_depth(0, Image())
+    joiner.clear(earliest=5)
+    with pytest.raises(MessageError, match='mask without a stamp: .* got 0; let') as raised:
+        joiner.add_mask(0, Image())
+    assert raised.value.kind == 'no_stamp'
+    with pytest.raises(MessageError, match='depth image without a stamp'):
+        joiner.add_depth(0, Image())
+
+
 def test_camera_info_of_another_size_is_refused_and_the_next_view_is_joined():
     joiner = ViewJoiner(max_pose_gap=0.1)
     for stamp, lens in ((0, CANONICAL_INTRINSICS.resized(64, 48)), (1, CANONICAL_INTRINSICS)):

@@ -59,3 +59,5 @@ def test_depth_in_either_form_goes_into_its_view_and_bad_depth_leaves_the_view(b
     until(lambda: bench.counts('reconstructor').get('warned/depth'), depth_to_msg,
           METRES[:50])
     bench.until(lambda: bench.counts('reconstructor').get('views', 0) > views, 'the view')
+    until(lambda: bench.counts('reconstructor').get('refused/no_stamp'),
+          lambda metres, _: depth_to_msg(metres, Header(frame_id='camera')), METRES)

@@ -60,7 +60,8 @@ class DepthImages:
         self._inputs.received(DEPTH_TOPIC)
         if not self._selector.accepts(topic, time.monotonic()):
             return
-        self._joiner.add_depth(nanoseconds_from_stamp(msg.header.stamp), msg)
+        with self._diagnostics.rejecting():
+            self._joiner.add_depth(nanoseconds_from_stamp(msg.header.stamp), msg)
         self._on_message()
 
     def _on_info(self, msg: CameraInfo) -> None:

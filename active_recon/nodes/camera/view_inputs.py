@@ -133,7 +133,8 @@ class ViewInputs:
         self._on_message()
 
     def _on_mask(self, msg: Image) -> None:
-        self._joiner.add_mask(nanoseconds_from_stamp(msg.header.stamp), msg)
+        with self._diagnostics.rejecting():
+            self._joiner.add_mask(nanoseconds_from_stamp(msg.header.stamp), msg)
         self._on_message()
 
     def _on_pose(self, msg: PoseStamped) -> None:
