@@ -1,38 +1,53 @@
 """
 What bf16 and int8 do to the IoU of the default network, and to the time of a view.
 
-`python -m benchmarks.precision data/val` reconstructs 104 objects of a dataset from five random
-views each, on one thread, in every precision in turns. It prints the IoU after each view, how much
-it differs from that in f32, and the time of a view as a ratio to that in f32.
+`python -m benchmarks.precision data/val [MODEL]` reconstructs 104 objects of a dataset from five
+random views each, on one thread, in every precision in turns. It prints the IoU after each view,
+how much it differs from that in f32, and the time of a view as a ratio to that in f32.
 """
 
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 import sys
 import time
 
 from active_recon.datasets.layout import list_objects, ObjectFolder
+from active_recon.errors import ConfigError
 from active_recon.geometry.canonical import network_image
+from active_recon.models.weights_files import find_weights
 from active_recon.runtimes import load_runtime, Runtime
+from active_recon.runtimes.precision import chosen_precision
 from active_recon.volumes.rendering import composite
 from active_recon.volumes.voxels import iou
 import numpy as np
 
 _OBJECTS, _VIEWS = 104, 5
-_PRECISIONS = ('f32', 'bf16', 'int8')
+
+
+def _precisions() -> Iterator[str]:
+    """Yield f32, and the others that this processor has."""
+    yield 'f32'
+    for precision in ('bf16', 'int8'):
+        with suppress(ConfigError):
+            chosen_precision(precision)
+            yield precision
 
 
 def main() -> None:
-    """Measure the dataset that is named on the command line."""
+    """Measure the dataset that is named on the command line, by a model's exports."""
     rng = np.random.default_rng(0)
     folders = list_objects(Path(sys.argv[1]))
     chosen = [folders[index] for index in rng.permutation(len(folders))[:_OBJECTS]]
-    runtimes = [load_runtime(None, 'openvino', threads=1, precision=precision)
-                for precision in _PRECISIONS]
+    precisions = list(_precisions())
+    weights = find_weights(sys.argv[2] if len(sys.argv) > 2 else None)
+    runtimes = [load_runtime(weights, 'openvino', threads=1, precision=precision)
+                for precision in precisions]
     for runtime in runtimes:
         runtime.warm_up()
     found = np.array([_measured(folder, runtimes, rng) for folder in chosen])
     ious, spent = found[..., 0], found[..., 1]  # (objects, precisions, views)
-    for index, precision in enumerate(_PRECISIONS):
+    for index, precision in enumerate(precisions):
         apart = ious[:, index] - ious[:, 0]
         bound = 1.96 * apart.mean(1).std() / len(apart) ** 0.5
         _print(f'{precision}: IoU', ious[:, index].mean(0))
