@@ -5,6 +5,8 @@ A pose is that of the camera's optical frame in the object frame. Pixel coordina
 begin at the image's corner (the first pixel's centre is 0.5), those of ROS at that centre (0).
 """
 
+import math
+
 from active_recon.errors import MessageError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics, OBJECT_FRAME
 from active_recon.geometry.lenses import Distortion, MODELS
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
+Triple = tuple[float, float, float]
 _LARGEST = 1e9  # metres or pixels: larger values may overflow
 
 
@@ -93,7 +96,7 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
                            f'got {msg.header.frame_id!r}', 'frame')
     position, quaternion = numbers_from_msgs(msg.pose.position, msg.pose.orientation,
                                              'camera pose')
-    if np.linalg.norm(position) < 1e-6:
+    if math.hypot(*position) < 1e-6:
         raise MessageError("invalid camera pose: it is at the object's centre", 'pose')
     pose = np.eye(4)
     pose[:3, :3] = matrix_from_quaternion(quaternion)
@@ -102,21 +105,21 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
 
 
 def numbers_from_msgs(point: Point, turn: Quaternion,
-                      what: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                      what: str) -> tuple[Triple, tuple[float, float, float, float]]:
     """
-    Return a position (3,) and a quaternion (4,), x, y, z, w, of any length.
+    Return a position, and a quaternion x, y, z, w of any length.
 
     Raises MessageError, in which `what` names them, if they are not finite, a million kilometres
     away, or the quaternion is zero.
     """
-    position = np.array([point.x, point.y, point.z])
-    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
+    position = float(point.x), float(point.y), float(point.z)
+    quaternion = float(turn.x), float(turn.y), float(turn.z), float(turn.w)
     if not _sensible(*position, *quaternion):
-        raise MessageError(f'{what} not finite: got position {position.tolist()} and '
-                           f'quaternion {quaternion.tolist()}', 'pose')
-    if np.linalg.norm(quaternion) < 1e-6:
+        raise MessageError(f'{what} not finite: got position {list(position)} and '
+                           f'quaternion {list(quaternion)}', 'pose')
+    if math.hypot(*quaternion) < 1e-6:
         raise MessageError(f'invalid {what}: expected a unit quaternion, '
-                           f'got {quaternion.tolist()}', 'quaternion')
+                           f'got {list(quaternion)}', 'quaternion')
     return position, quaternion
 
 

@@ -1,5 +1,7 @@
 """Transforms between frames from TransformStamped, as tf2 publishes them in TFMessage."""
 
+from sys import intern
+
 from active_recon.geometry.transform_tree import Transform
 from geometry_msgs.msg import TransformStamped
 from msg_tools.cameras import numbers_from_msgs
@@ -16,5 +18,5 @@ def transform_from_msg(msg: TransformStamped) -> Transform:
     position, quaternion = numbers_from_msgs(
         msg.transform.translation, msg.transform.rotation,
         f'transform of the frame {child!r} in {parent!r}')
-    return Transform(nanoseconds_from_stamp(msg.header.stamp), parent, child, position.tolist(),
-                     quaternion.tolist())
+    return Transform(nanoseconds_from_stamp(msg.header.stamp), intern(parent), intern(child),
+                     position, quaternion)

@@ -143,11 +143,37 @@ def test_depth_topics_that_are_none_or_not_connected_are_refused(chair, tmp_path
         read_run(folder, Topics(depth='/deep'))
     lost = [(time, topic, msg) for time, topic, msg in recording(chair[0], beside, by_tf=True)
             if topic != '/tf_static']
-    with pytest.raises(DataError, match="rect_raw: no transforms between .*'depth_optical_frame'"):
+    with pytest.raises(DataError, match="for any view: no transforms .* 'depth_optical_frame'"):
         read_run(write_bag(tmp_path / 'lost', lost), Topics(depth='/wrist/depth/image_rect_raw'))
     loop = LoopRun()
     with pytest.raises(ConfigError, match='--depth: not needed: the bag has the views of a loop'):
         read_run(write_bag(tmp_path / 'loop', loop.messages), Topics(depth='/deep'))
+
+
+def test_depth_of_another_size_than_its_lens_is_left_out_with_its_reason(
+        chair, tmp_path, monkeypatch, capsys):
+    messages = [(time, topic, msg) for time, topic, msg in recording(chair[0], beside, by_tf=True)
+                if topic != '/wrist/depth/camera_info']
+    folder = write_bag(tmp_path / 'run', messages)
+    assert command(monkeypatch, 'replay', folder, '--depth', '/wrist/depth/image_rect_raw') == 0
+    assert 'of 2 of them was left out: wrong depth image: expected 137' in capsys.readouterr().out
+
+
+def test_depth_that_no_view_has_is_refused_with_the_reason(chair, tmp_path):
+    metres = np.ones((137, 137), np.float32)
+    late = [(time, topic, depth_to_msg(metres, header(time + 10**10, FRAME))
+             if 'depth' in topic else msg) for time, topic, msg in recording(chair[0])]
+    with pytest.raises(DataError, match='for any view: expected some within 0.02 s of an image'):
+        read_run(write_bag(tmp_path / 'late', late), Topics(depth='/wrist/depth/image_rect_raw'))
+    with pytest.raises(DataError, match='for any view: .*rgb8'):
+        read_run(write_bag(tmp_path / 'color', recording(chair[0])),
+                 Topics(image='/wrist/color/image_raw', depth='/wrist/color/image_raw'))
+
+
+def test_depth_beside_a_camera_that_is_assumed_is_refused(chair, tmp_path):
+    without = [entry for entry in recording(chair[0]) if 'camera_info' not in entry[1]]
+    with pytest.raises(ConfigError, match="--depth needs the camera's pose and lens: .*the lens"):
+        read_run(write_bag(tmp_path / 'run', without), Topics(depth='/wrist/depth/image_rect_raw'))
 
 
 def test_depth_registered_to_its_own_pose_stays_as_it_is(chair):

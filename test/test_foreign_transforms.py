@@ -5,7 +5,7 @@ from dataclasses import replace
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import Topics
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
 from command_line import command
 from foreign_recordings import AZIMUTHS, cameras, IMAGES, images, joints, tf_message, transforms
@@ -57,7 +57,7 @@ def test_transforms_between_images_are_interpolated_within_the_gap(tmp_path):
     np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
     run = read_run(folder, Topics(max_pose_gap=0.9 * PERIOD / 1e9))
     np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
-    with pytest.raises(Exception, match="of the frame 'tool0' .* within 0.05 s, the nearest is "):
+    with pytest.raises(DataError, match="'tool0' .* within 0.05 s .* got one 0.020 s after"):
         read_run(folder, Topics(max_pose_gap=0.05))
 
 
@@ -114,6 +114,63 @@ def test_a_transform_that_is_not_finite_is_left_out_and_counted(tmp_path):
     run = read_run(bag(tmp_path / 'run', images(), LENSES, transforms(), bad))
     np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
     assert run.counters['bag']['refused/unusable_transform'] == 1
+
+
+def test_only_transforms_that_reach_the_camera_take_the_place_of_other_topics(tmp_path):
+    unrelated = [(BEGIN, '/tf_static', tf_message(POSES[0], 'world', 'object', 0))]
+    run = read_run(bag(tmp_path / 'turntable', images(), joints(), unrelated))
+    (episode,) = run.episodes
+    assert [view.camera.azimuth for view in episode.views] == pytest.approx(AZIMUTHS)
+    goal = [(time, '/move_goal', msg) for time, topic, msg in cameras() if topic == '/tracker']
+    for _, _, msg in goal:
+        msg.header.frame_id = 'base_link'
+    run = read_run(bag(tmp_path / 'arm', images(), LENSES, goal, transforms()))
+    np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
+
+
+def test_transforms_of_a_robots_namespace_go_with_the_static_ones_of_all(tmp_path):
+    named = [(time, topic.replace('/tf', '/robot/tf') if topic == '/tf' else topic, msg)
+             for time, topic, msg in transforms()]
+    rear = [(time, f'/rear{topic}', msg) for time, topic, msg in transforms('odom', 'x', 'y')
+            if topic == '/tf']
+    run = read_run(bag(tmp_path / 'run', images(), LENSES, named, rear))
+    np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
+
+
+def test_a_first_slash_of_a_frame_does_not_count(tmp_path):
+    run = read_run(bag(tmp_path / 'run', images(), LENSES, transforms('/object', '/tool0')),
+                   Topics(object_frame='/object'))
+    np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
+
+
+def test_transforms_of_a_clock_that_began_again_are_refused_up_to_where_it_was(tmp_path):
+    second = [(time + 20 * PERIOD, topic, tf_message(np.eye(4), 'object', 'tool0', stamp))
+              for (time, topic, _), stamp in zip(transforms(mounted=False),
+                                                 range(BEGIN, BEGIN + 9 * PERIOD, PERIOD),
+                                                 strict=True)]
+    run = read_run(bag(tmp_path / 'run', images(), LENSES, transforms(), second))
+    np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
+    assert run.counters['bag']['refused/unusable_transform'] == 9
+
+
+def test_a_camera_at_the_objects_centre_is_refused(tmp_path):
+    folder = bag(tmp_path / 'run', images(), LENSES, transforms())
+    with pytest.raises(DataError, match="at the object's centre, which --object-frame and"):
+        read_run(folder, Topics(object_frame='camera'))
+    with pytest.raises(DataError, match="at the object's centre"):
+        read_run(bag(tmp_path / 'poses', images(), list(cameras())[:2]),
+                 scene=Scene(object_position=POSES[0][:3, 3]))
+
+
+def test_joints_that_cannot_be_used_are_refused_with_what_the_transforms_lack(tmp_path):
+    arm = joints(topic='/joint_states', names=('shoulder', 'elbow'))
+    folder = bag(tmp_path / 'run', images(), LENSES, arm, transforms('base_link'))
+    with pytest.raises(DataError, match="with --joint. The transforms have no frame 'object'; "
+                                        'there are base_link, camera, tool0: name the'):
+        read_run(folder)
+    one = bag(tmp_path / 'one', images(), joints(), transforms('base_link'))
+    with pytest.raises(ConfigError, match="--object-frame: not for .*no frame 'bse_link'"):
+        read_run(one, Topics(object_frame='bse_link'))
 
 
 def test_static_transforms_alone_are_one_view(tmp_path):

@@ -76,6 +76,7 @@ class Task:
             'version': __version__, 'kind': self.kind, 'topics': repr(self.topics),
             'scene': repr([self.scene.parameters, self.scene.elevation,
                            self.scene.camera_position, self.scene.camera_orientation,
+                           self.scene.object_position,
                            self.scene.background]),
             'empty_scene': None if empty is None else hashlib.sha256(
                 empty.tobytes()).hexdigest(),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Transform:
     """
     Where a child frame is in its parent frame, at a stamp in nanoseconds.
@@ -38,8 +38,9 @@ class TransformTree:
     """
     Frames by the transforms that were added, in any order.
 
-    A static transform holds at any time. Others are interpolated between the one before and the
-    one after, none of them more than `max_gap` seconds away, and only if both have one parent.
+    A static transform holds at any time, whatever others there are of its child. Others are
+    interpolated between the one before and the one after, none of them more than `max_gap` seconds
+    away, and only if both have one parent.
     """
 
     max_gap: float
@@ -91,7 +92,7 @@ class TransformTree:
         while frame not in seen:
             yield frame
             seen.add(frame)
-            moving = self._moving.get(frame)
+            moving = None if frame in self._static else self._moving.get(frame)
             if moving:
                 frame = moving[max(bisect_right(moving, stamp, key=_stamp) - 1, 0)].parent
             elif frame in self._static:
@@ -100,7 +101,7 @@ class TransformTree:
     def _at(self, child: str, stamp: int) -> NDArray[np.float64]:
         """Return where a frame is in its parent, (4, 4)."""
         moving = self._moving.get(child)
-        if not moving:
+        if child in self._static or not moving:
             return self._static[child].pose
         after = bisect_right(moving, stamp, key=_stamp)
         before = moving[max(after - 1, 0)]
@@ -109,13 +110,22 @@ class TransformTree:
         beside = [each for each in moving[max(after - 1, 0):after + 1]
                   if abs(each.stamp - stamp) <= self.max_gap * 1e9]
         if after == 0 or len(beside) < 2 or beside[0].parent != beside[1].parent:
-            nearest = min(abs(each.stamp - stamp) for each in moving[max(after - 1, 0):after + 1])
             raise ViewError(
                 f'no transform of the frame {child!r} for the image of {stamp / 1e9:.3f} s: '
                 'expected one of its stamp, or one before and one after it within '
-                f'{self.max_gap:g} s, the nearest is {nearest / 1e9:.3f} s away', 'no_pose')
+                f'{self.max_gap:g} s (--max-pose-gap), got {self._beside(moving, after, stamp)}',
+                'no_pose')
         return pose_between(beside[0].pose, beside[1].pose,
                             (stamp - beside[0].stamp) / (beside[1].stamp - beside[0].stamp))
+
+    @staticmethod
+    def _beside(moving: Sequence[Transform], after: int, stamp: int) -> str:
+        around = [(moving[after - 1], 'before')] if after else []
+        around += [(moving[after], 'after')] if after < len(moving) else []
+        told = ' and '.join(f'one {abs(each.stamp - stamp) / 1e9:.3f} s {side}'
+                            for each, side in around)
+        parents = {each.parent for each, _ in around}
+        return told if len(parents) == 1 else f'{told}, in the frames {sorted(parents)}'
 
     def _not_connected(self, target: str, source: str) -> str:
         known = self.frames

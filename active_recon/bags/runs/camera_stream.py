@@ -36,6 +36,8 @@ from msg_tools.views import View, ViewJoiner
 import numpy as np
 from numpy.typing import NDArray
 
+_AT_CENTRE = 1e-6  # metres
+
 
 class CameraStream:
     """
@@ -52,7 +54,8 @@ class CameraStream:
 
     - assumed: in words, what neither the bag nor the scene states; complete once `views` ended
     - received: receive times by topic name in the loop and by stamp, nanoseconds
-    - transforms: None where the bag has poses or azimuths instead; `are_images_unstamped`
+    - transforms: None where the bag has poses or azimuths instead
+    - is_unstamped: receive times count instead of stamps; are_images_unstamped: also as stamps
     - images: stamp and receive time of each image read, wanted or not, nanoseconds
     """
 
@@ -63,7 +66,7 @@ class CameraStream:
         self._topics = topics
         self._scene = scene
         self._reporting = reporting
-        self._unstamped = self.are_images_unstamped = False
+        self.is_unstamped = self.are_images_unstamped = False
         self._joints: set[str] = set()
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._poses: list[tuple[int, NDArray[np.float64] | float]] = []
@@ -84,7 +87,7 @@ class CameraStream:
     def begins_after(self, stamp: int) -> bool:
         """Return whether an image of that stamp, or its camera, is from before the recording."""
         firsts = [entries[0][0] for entries in (self._poses, self._lenses)
-                  if entries and not self._unstamped]
+                  if entries and not self.is_unstamped]
         return stamp < max(min(self.images)[0] if self.images else math.inf, *firsts)
 
     def _joined(self, wanted: Callable[[int], bool], advance: Advance
@@ -100,13 +103,13 @@ class CameraStream:
             if not wanted(stamp):
                 continue
             self.received[IMAGE_ROLE].setdefault(stamp, message.received)
-            time = message.received if self._unstamped else stamp
+            time = message.received if self.is_unstamped else stamp
             # Of a fast tracker's poses only those around an image are of use
             fed = max(fed, bisect_left(self._poses, time, key=_stamp) - 1)
-            while fed < len(self._poses) and (fed == 0 or self._poses[fed - 1][0] < time):
-                joiner.add_pose(self._poses[fed][0], self._placed(self._poses[fed][1]))
-                fed += 1
             try:
+                while fed < len(self._poses) and (fed == 0 or self._poses[fed - 1][0] < time):
+                    fed += 1
+                    joiner.add_pose(self._poses[fed - 1][0], self._placed(self._poses[fed - 1][1]))
                 if self.transforms:
                     joiner.add_pose(time, self._placed(self.transforms.pose(
                         msg.header.frame_id, time)))
@@ -151,11 +154,11 @@ class CameraStream:
             for message in islice(self._bag.messages({self._camera.image.name}), 2))
         stamps = (self.transforms.stamps if self.transforms
                   else [stamp for stamp, *_ in poses])
-        self._unstamped = self.are_images_unstamped or bool(stamps) and not any(stamps)
-        self._poses = [(received if self._unstamped else stamp, pose)
+        self.is_unstamped = self.are_images_unstamped or bool(stamps) and not any(stamps)
+        self._poses = [(received if self.is_unstamped else stamp, pose)
                        for stamp, received, pose in poses]
         if self.transforms:
-            self.transforms.finish(by_receive_time=self._unstamped)
+            self.transforms.finish(by_receive_time=self.is_unstamped)
         self._poses.sort(key=_stamp)
         self._lenses.sort(key=_stamp)
 
@@ -177,7 +180,8 @@ class CameraStream:
         """Raise DataError where it is open which of several joints, of any message, is meant."""
         if len(self._joints) > 1 and not self._topics.joint:
             raise DataError(f'several joints on {self._camera.azimuth.name}, '
-                            f'{", ".join(sorted(self._joints))}: choose one with --joint', 'joint')
+                            f'{", ".join(sorted(self._joints))}: choose one with --joint'
+                            f'{self._camera.advice}', 'joint')
 
     def _place(self) -> None:
         """Decide how much of the camera is known; raise ConfigError on redundant options."""
@@ -190,9 +194,12 @@ class CameraStream:
         self.assumed = scene.assumed(self._camera.image.name, has_poses, recorded)
 
     def _placed(self, known: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        """Return the pose, or one on the orbit at its azimuth if no lens is known."""
+        """Return the pose, or one on the orbit if no lens is known; raises MessageError."""
         pose = (self._scene.pose_at(known, self._topics.turned_object)
                 if isinstance(known, float) else self._scene.about_object(known))
+        if np.linalg.norm(pose[:3, 3]) < _AT_CENTRE:
+            raise MessageError("invalid camera pose: it is at the object's centre, which "
+                               '--object-frame and --object-position set', 'pose')
         if self._lenses or self._scene.camera_position is not None:
             return pose
         return self._scene.orbit_pose(Camera(pose).azimuth)

@@ -15,7 +15,7 @@ from active_recon.bags.runs.recorded_views import gated_views, recorded_episodes
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun
 from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topic_search import camera_topics
-from active_recon.bags.runs.topics import loop_namespace, Topics
+from active_recon.bags.runs.topics import loop_namespace, POSE_TYPES, Topics
 from active_recon.bags.storage.bag import Bag, BagSummary
 from active_recon.bags.storage.opening import open_bag
 from active_recon.errors import ActiveReconError, ConfigError, DataError
@@ -73,17 +73,23 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
                               'that')
     node = checked_parameters('reconstructor', summary.parameters.get(
         f'{namespace or "/"}reconstructor'.strip('/'), {}))
+    frame_given = topics.object_frame != _ANY_TOPICS.object_frame
     topics = replace(topics, max_pose_gap=node.get('max_pose_gap', topics.max_pose_gap),
                      object_frame=node.get('object_frame', topics.object_frame))
     scene = replace(scene, object_size=scene.object_size or {
         **_simulated_camera(summary), **node}.get('object_size'))
     camera = camera_topics(bag, summary, topics)
+    if frame_given and camera.azimuth.type_name not in POSE_TYPES:
+        raise ConfigError(f'--object-frame: not for {camera.azimuth.type_name}, which the bag has '
+                          f'on {camera.azimuth.name}{camera.advice}')
     stream = CameraStream(bag, camera, topics, scene, reporting)
     if namespace is None:
         episode, counters = gated_views(stream, ViewGate(), scene)
         if camera.depth:
-            episode = with_depth_of(camera.depth, episode, bag, stream.transforms, scene,
-                                    stream.are_images_unstamped)
+            if stream.assumed:
+                raise ConfigError("--depth needs the camera's pose and lens: expected them in the "
+                                  f'bag, which lacks {"; ".join(stream.assumed)}')
+            episode = with_depth_of(camera.depth, episode, bag, stream, scene)
         gaps = gaps_between([stamp for stamp, _ in stream.images])
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
     record = LoopRecord(bag, namespace, node.get('object_size', scene.size), topics.object_frame)

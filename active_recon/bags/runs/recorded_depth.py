@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from active_recon.bags.runs.recorded_transforms import RecordedTransforms
+from active_recon.bags.runs.camera_stream import CameraStream
 from active_recon.bags.runs.run import RecordedEpisode
 from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import DepthTopics
@@ -24,6 +24,7 @@ from msg_tools.cameras import intrinsics_from_msg
 from msg_tools.compressed_depth import metres_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
+from numpy.typing import NDArray
 
 DEPTH_ROLE, DEPTH_INFO_ROLE = 'camera/depth/image_raw', 'camera/depth/camera_info'
 _COMPRESSED = '/compressedDepth'
@@ -32,6 +33,7 @@ _SAME_POSE = 1e-6  # metres, and parts of unit vectors
 
 class _Stamped(NamedTuple):
     stamp: int
+    received: int
     msg: Any
 
 
@@ -50,41 +52,56 @@ def with_depth(episodes: Sequence[RecordedEpisode], bag: Bag, namespace: str,
     depth, info = (names.get(role, f'{namespace}{role}') for role in (DEPTH_ROLE, DEPTH_INFO_ROLE))
     kinds = {depth: IMAGE, f'{depth}{_COMPRESSED}': COMPRESSED_IMAGE, info: CAMERA_INFO}
     nearest, lens = _nearest(bag, kinds, cameras, gap)
-    found = {stamp: _image(each.msg, cameras[stamp], lens) for stamp, each in nearest.items()}
+    found: dict[int, DepthImage] = {}
+    for stamp, each in nearest.items():
+        with suppress(MessageError):
+            found[stamp] = _image(each.msg, cameras[stamp], lens)
     return [replace(episode, views=[replace(view, depth=found.get(view.stamp))
                                     for view in episode.views]) for episode in episodes]
 
 
-def with_depth_of(depth: DepthTopics, episode: RecordedEpisode, bag: Bag,
-                  transforms: RecordedTransforms | None, scene: Scene,
-                  by_receive_time: bool) -> RecordedEpisode:
+def with_depth_of(depth: DepthTopics, episode: RecordedEpisode, bag: Bag, stream: CameraStream,
+                  scene: Scene) -> RecordedEpisode:
     """
     Return an episode whose views have the nearest depth image of a topic, of another recorder.
 
-    By transforms the depth is registered to the image's camera; without, it has to be. Images and
-    depth without stamps are joined on their receive times, if asked. Raises DataError where the
-    transforms do not connect the depth camera.
+    By transforms the depth is registered to the image's camera; without, it has to be. It is
+    joined on receive times where images are. Raises DataError where the transforms do not connect
+    the depth camera, and where no view has depth.
     """
     cameras = {view.stamp: view.camera for view in episode.views}
     kinds = {topic.name: topic.type_name for topic in (depth.images, depth.camera_info) if topic}
-    nearest, lens = _nearest(bag, kinds, cameras, ReconstructorParameters.max_depth_gap,
-                             by_receive_time)
-    found = {}
+    gap = ReconstructorParameters.max_depth_gap
+    nearest, lens = _nearest(bag, kinds, cameras, gap, stream.are_images_unstamped)
+    found: dict[int, DepthImage] = {}
+    reason = f'expected some within {gap:g} s of an image, got none'
     for stamp, each in nearest.items():
-        image = _image(each.msg, cameras[stamp], lens)
-        if image is not None and image.camera is not None and transforms:
-            try:
-                pose = scene.about_object(transforms.pose(each.msg.header.frame_id, each.stamp))
-            except MessageError as error:
-                if error.kind == 'tf':
-                    raise DataError(f'{depth.images.name}: {error}', 'tf') from error
-                continue
-            if not np.allclose(pose, image.camera.pose, rtol=0, atol=_SAME_POSE):
-                image = registered(replace(image, camera=Camera(pose, image.camera.intrinsics)),
-                                   image.camera.pose)
-        found[stamp] = image
+        try:
+            image = _image(each.msg, cameras[stamp], lens)
+            if stream.transforms:
+                image = _registered(image, scene.about_object(stream.transforms.pose(
+                    each.msg.header.frame_id,
+                    each.received if stream.is_unstamped else each.stamp)))
+            found[stamp] = image
+        except MessageError as error:
+            reason = str(error)
+            if error.kind == 'tf':
+                break
+    if not found:
+        raise DataError(f'{depth.images.name}: no depth for any view: {reason}', 'depth')
     return replace(episode, views=[replace(view, depth=found.get(view.stamp))
                                    for view in episode.views])
+
+
+def _registered(image: DepthImage, pose: NDArray[np.float64]) -> DepthImage:
+    """Return depth of a camera at a pose, (4, 4), as the image's camera would measure it."""
+    assert image.camera is not None
+    lens = image.camera.intrinsics
+    if image.metres.shape != (lens.height, lens.width):
+        return image  # refused with its view
+    if np.allclose(pose, image.camera.pose, rtol=0, atol=_SAME_POSE):
+        return image
+    return registered(replace(image, camera=Camera(pose, lens)), image.camera.pose)
 
 
 def _nearest(bag: Bag, kinds: Mapping[str, str], views: Collection[int], gap: float,
@@ -112,14 +129,11 @@ def _nearest(bag: Bag, kinds: Mapping[str, str], views: Collection[int], gap: fl
             away = abs(stamp - view)
             if away <= round(gap * 1e9) and (view not in nearest
                                              or away < abs(nearest[view].stamp - view)):
-                nearest[view] = _Stamped(stamp, msg)
+                nearest[view] = _Stamped(stamp, message.received, msg)
     return nearest, lens
 
 
-def _image(msg: Any, camera: Camera, lens: Intrinsics | None) -> DepthImage | None:
-    """Return a message's depth beside an image of a camera, None where it cannot be read."""
-    try:
-        return DepthImage(metres_from_msg(msg),
-                          camera if lens is None else Camera(camera.pose, lens))
-    except MessageError:
-        return None
+def _image(msg: Any, camera: Camera, lens: Intrinsics | None) -> DepthImage:
+    """Return a message's depth beside an image of a camera; raises MessageError."""
+    return DepthImage(metres_from_msg(msg),
+                      camera if lens is None else Camera(camera.pose, lens))

@@ -1,6 +1,6 @@
 """Transforms in a bag: whether they have the object's frame, and the cameras by them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,22 +18,30 @@ STATIC = '_static'
 """What the name of a topic ends with whose transforms hold at any time."""
 
 
-def frames_until(bag: Bag, topics: Sequence[TopicSummary], wanted: str) -> set[str]:
-    """Return the frames of transforms, read until one of them is the wanted one."""
-    frames: set[str] = set()
+def connecting(bag: Bag, topics: Sequence[TopicSummary],
+               wanted: Collection[str]) -> tuple[list[TopicSummary], set[str]]:
+    """
+    Return the topics whose transforms, with the static ones, connect the wanted frames.
+
+    The second value are all frames, read until one topic connects them.
+    """
+    statics = [topic.name for topic in topics if topic.name.endswith(STATIC)]
+    moving = [topic for topic in topics if topic.name not in statics] or list(topics)
+    trees: dict[str, dict[str, set[str]]] = {topic.name: {} for topic in moving}
     for message in bag.messages({topic.name for topic in topics}):
+        of_all = message.topic in statics and message.topic not in trees
         for each in read_message(message).transforms:
-            frames |= {each.header.frame_id.lstrip('/'), each.child_frame_id.lstrip('/')}
-        if wanted in frames:
+            pair = each.header.frame_id.lstrip('/'), each.child_frame_id.lstrip('/')
+            for tree in trees.values() if of_all else [trees[message.topic]]:
+                one, other = (tree.setdefault(name, {name}) for name in pair)
+                if one is not other:
+                    one |= other
+                    tree.update(dict.fromkeys(other, one))
+        if any(set(wanted) <= tree.get(next(iter(wanted)), set()) for tree in trees.values()):
             break
-    return frames
-
-
-def without_statics(topics: Sequence[TopicSummary]) -> list[TopicSummary]:
-    """Return the topics but those with the static transforms beside another's."""
-    names = {topic.name for topic in topics}
-    return [topic for topic in topics if not topic.name.endswith(STATIC)
-            or topic.name.removesuffix(STATIC) not in names]
+    found = [topic for topic in moving
+             if set(wanted) <= trees[topic.name].get(next(iter(wanted)), set())]
+    return found, {name for tree in trees.values() for name in tree}
 
 
 class RecordedTransforms:
@@ -48,6 +56,8 @@ class RecordedTransforms:
         self._tree = TransformTree(max_gap)
         self._moving: list[tuple[int, Transform]] = []
         self._firsts: dict[str, int] = {}
+        self._latest: dict[str, int] = {}
+        self._restarted: set[str] = set()
 
     def read(self, msg: Any, message: RawMessage) -> Iterator[MessageError]:
         """Read a TFMessage; yield the errors of its transforms that cannot be used."""
@@ -59,8 +69,17 @@ class RecordedTransforms:
                 continue
             if message.topic.endswith(STATIC):
                 self._tree.add(transform, static=True)
-            else:
-                self._moving.append((message.received, transform))
+                continue
+            latest = self._latest.setdefault(transform.child, transform.stamp)
+            if transform.stamp < latest - PATIENCE_S * 1e9:  # tf2 would forget all of before
+                self._restarted.add(transform.child)
+            if transform.child in self._restarted and transform.stamp <= latest:
+                yield MessageError(f'transform out of order: that of {transform.child!r} went '
+                                   f'back by {(latest - transform.stamp) / 1e9:.3f} s',
+                                   'unusable_transform')
+                continue
+            self._latest[transform.child] = max(latest, transform.stamp)
+            self._moving.append((message.received, transform))
 
     @property
     def stamps(self) -> list[int]:

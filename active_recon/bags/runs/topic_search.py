@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from active_recon.bags.runs.image_kinds import non_camera_topics
-from active_recon.bags.runs.recorded_transforms import frames_until, STATIC, without_statics
+from active_recon.bags.runs.recorded_transforms import connecting, STATIC
 from active_recon.bags.runs.run import TopicSummary
 from active_recon.bags.runs.topics import (
     CameraTopics,
@@ -50,7 +50,7 @@ def camera_topics(bag: Bag, summary: BagSummary, topics: Topics) -> CameraTopics
     except DataError as error:
         missing.append(error)
     try:
-        azimuth = search.azimuth(topics.azimuth, topics.object_frame,
+        azimuth = search.azimuth(topics.azimuth, topics.object_frame, None if missing else image,
                                  loops_own=not missing and of_views)
     except DataError as error:
         missing.append(error)
@@ -58,7 +58,7 @@ def camera_topics(bag: Bag, summary: BagSummary, topics: Topics) -> CameraTopics
         raise DataError('; '.join(map(str, missing)), 'topics')
     return CameraTopics(image, search.camera_info(topics.camera_info, image), azimuth,
                         search.static_beside(azimuth), of_views,
-                        search.depth(topics.depth) if topics.depth else None)
+                        search.depth(topics.depth) if topics.depth else None, search.advice)
 
 
 class _Search:
@@ -66,6 +66,7 @@ class _Search:
 
     def __init__(self, bag: Bag, summary: BagSummary) -> None:
         self._bag = bag
+        self.advice = ''
         self._recorded_as = summary.provenance
         others = {full for name, full in summary.provenance.items()
                   if name.partition('/compressed')[0] not in _ROLES}
@@ -90,49 +91,54 @@ class _Search:
             f'no camera images on {name or "any topic"}{instead if others else ""}: expected '
             f'{" or ".join(IMAGE_TYPES)}; name the topic with --image', 'topics')
 
-    def azimuth(self, name: str, object_frame: str, loops_own: bool) -> TopicSummary:
+    def azimuth(self, name: str, object_frame: str, image: TopicSummary | None,
+                loops_own: bool) -> TopicSummary:
         """Return the topic of the poses or azimuths; `loops_own`: that of the views only."""
         views = [topic for topic in self._present
                  if topic.name.endswith('/view') and topic.type_name == POSE]
         fitting = self._fitting(name, AZIMUTH_TYPES)
         found = (views if loops_own and not name else None) or self._known_by_name(
             name, fitting, POSE_ROLE)
-        frames: set[str] = set()
         if not found and any(topic.type_name == TRANSFORMS for topic in fitting):
-            fitting, frames = self._connected(fitting, object_frame)
+            fitting = self._connected(fitting, object_frame, image)
         found = found or fitting or views
         if not found or name and not fitting:
-            advice = (f'. The transforms have no frame {object_frame!r}, but '
-                      f'{", ".join(sorted(frames))}: name one with --object-frame, and with '
-                      '--object-position where the object is in it' if frames else '')
             raise DataError(f"no camera poses or azimuths on {name or 'any topic'}: expected "
                             f'{" or ".join(AZIMUTH_TYPES)}; name the topic with --azimuth'
-                            f'{advice}', 'topics')
-        return _only(found, AZIMUTH_TYPES, "the camera's poses or azimuths", '--azimuth')
+                            f'{self.advice}', 'topics')
+        return _only(found, AZIMUTH_TYPES, "the camera's poses or azimuths", '--azimuth',
+                     self.advice)
 
     def static_beside(self, azimuth: TopicSummary) -> TopicSummary | None:
         """Return the topic of the static transforms beside others, None if there is none."""
-        return next((topic for topic in self._present
-                     if topic.type_name == azimuth.type_name == TRANSFORMS
-                     and topic.name == azimuth.name + STATIC), None)
+        statics = [topic for topic in self._present
+                   if topic.type_name == azimuth.type_name == TRANSFORMS
+                   and topic.name.endswith(STATIC) and topic.name != azimuth.name]
+        return next((topic for topic in statics if topic.name == azimuth.name + STATIC),
+                    statics[0] if len(statics) == 1 else None)
 
-    def _connected(self, fitting: Sequence[TopicSummary],
-                   object_frame: str) -> tuple[list[TopicSummary], set[str]]:
+    def _connected(self, fitting: Sequence[TopicSummary], object_frame: str,
+                   image: TopicSummary | None) -> list[TopicSummary]:
         """
-        Return the topics of which those with the object's frame, if any, are to be taken.
+        Return the topics whose transforms connect the images' frame with the object's.
 
-        The second value are the frames of the transforms, where they lack it.
+        Where there are none, those that are no transforms, and `advice` tells what the transforms
+        lack.
         """
         transforms = [topic for topic in fitting if topic.type_name == TRANSFORMS]
-        others = [topic for topic in fitting if topic.type_name != TRANSFORMS]
-        poses = {topic.name for topic in others if topic.type_name == POSE}
-        for message in self._bag.messages(poses) if poses else ():
-            if read_message(message).header.frame_id == object_frame:
-                return others, set()
-        frames = frames_until(self._bag, transforms, object_frame)
-        if object_frame in frames:
-            return without_statics(transforms), set()
-        return others, frames
+        first = next(iter(self._bag.messages({image.name})), None) if image else None
+        wanted = [object_frame.lstrip('/')]
+        if first is not None:
+            wanted.append(read_message(first).header.frame_id.lstrip('/'))
+        found, frames = connecting(self._bag, transforms, wanted)
+        lacking = [repr(frame) for frame in wanted if frame not in frames]
+        if not found and frames:
+            what = (f'have no frame {" and no ".join(lacking)}' if lacking
+                    else f'do not connect {" and ".join(map(repr, wanted))}')
+            self.advice = (f'. The transforms {what}; there are {", ".join(sorted(frames))}: name '
+                           "the object's with --object-frame, and with --object-position where "
+                           'the object is in it')
+        return found or [topic for topic in fitting if topic.type_name != TRANSFORMS]
 
     def camera_info(self, name: str, image: TopicSummary) -> TopicSummary | None:
         """Return the topic of the camera info, None if there is none."""
@@ -174,8 +180,8 @@ class _Search:
             '/compressed'))] or [topic for topic in fitting if topic.name.endswith(f'/{usual}')])
 
 
-def _only(topics: Sequence[TopicSummary], types: Sequence[str], what: str,
-          option: str) -> TopicSummary:
+def _only(topics: Sequence[TopicSummary], types: Sequence[str], what: str, option: str,
+          advice: str = '') -> TopicSummary:
     """Return the topic of the first type present: types are in order of preference."""
     for kind in types:
         candidates = [topic for topic in topics if topic.type_name == kind]
@@ -184,5 +190,5 @@ def _only(topics: Sequence[TopicSummary], types: Sequence[str], what: str,
         if candidates:
             raise DataError(f'{what} on several topics, '
                             f'{", ".join(topic.name for topic in candidates)}: choose one with '
-                            f'{option}', 'topics')
+                            f'{option}{advice}', 'topics')
     raise AssertionError('topics were chosen by their types')

@@ -77,7 +77,7 @@ class CameraTopics:
 
     `static` has the static transforms beside those of `azimuth`. `of_views`: the camera's images
     were not recorded; `image` has what the network saw instead, one image for each view. `depth`
-    is None unless it was asked for.
+    is None unless it was asked for. `advice` is for where `azimuth` cannot be used.
     """
 
     image: TopicSummary
@@ -86,6 +86,7 @@ class CameraTopics:
     static: TopicSummary | None = None
     of_views: bool = False
     depth: DepthTopics | None = None
+    advice: str = ''
 
 
 def loop_namespace(present: Sequence[TopicSummary]) -> str | None:
