@@ -11,7 +11,7 @@ from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.run_writing import write_run
 from active_recon.geometry.cameras import Camera
 from active_recon.models.depth_weights import load_refiner
-from active_recon.models.weights_files import depth_path, read_card, weights_hash
+from active_recon.models.weights_files import depth_path, find_weights, read_card, weights_hash
 from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.depth_evidence import depth_evidence
 from active_recon.volumes.depth_images import DepthImage
@@ -40,18 +40,25 @@ def placed():
     return mesh, views
 
 
-def test_the_refiner_belongs_to_the_weights_that_ship():
-    load_refiner()
-    assert read_card(depth_path())['network_sha256'] == weights_hash()
-    assert read_card(depth_path())['sha256'] == weights_hash(depth_path())
+WITH_DEPTH = {'lifting': 'depth.json', 'lifting-large': 'depth-large.json'}
+
+
+@pytest.mark.parametrize('model', WITH_DEPTH)
+def test_the_refiner_belongs_to_the_weights_that_ship(model):
+    weights = find_weights(model)
+    load_refiner(weights)
+    card = read_card(depth_path(weights))
+    assert card['network_sha256'] == weights_hash(weights)
+    assert card['sha256'] == weights_hash(depth_path(weights))
 
 
 @pytest.mark.parametrize('page', ['doc/results.md', 'active_recon/weights/MODEL_CARD.md'])
-def test_the_figures_are_those_that_were_measured_with_the_weights_that_ship(page):
-    result, text = json.loads((ROOT / 'docs/results/depth.json').read_text()), (
-        ROOT / page).read_text()
-    assert result['weights_sha256'] == weights_hash()
-    assert result['depth_sha256'] == weights_hash(depth_path())
+@pytest.mark.parametrize('model', WITH_DEPTH)
+def test_the_figures_are_those_that_were_measured_with_the_weights_that_ship(model, page):
+    weights, result, text = find_weights(model), json.loads(
+        (ROOT / 'docs/results' / WITH_DEPTH[model]).read_text()), (ROOT / page).read_text()
+    assert result['weights_sha256'] == weights_hash(weights)
+    assert result['depth_sha256'] == weights_hash(depth_path(weights))
     for way in ('color', 'depth'):
         assert all(f'{value:.3f}' in text for value in result['iou_64'][way])
 
