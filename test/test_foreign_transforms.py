@@ -143,6 +143,17 @@ def test_a_first_slash_of_a_frame_does_not_count(tmp_path):
     np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
 
 
+def test_the_cameras_frame_is_named_where_that_of_the_images_is_not_the_optical_one(tmp_path):
+    moved = transforms(camera='real_optical_frame')
+    wrong = [(BEGIN, '/tf_static', tf_message(np.eye(4)[[1, 2, 0, 3]], 'tool0', 'camera', 0))]
+    folder = bag(tmp_path / 'run', images(), LENSES, moved, wrong)
+    run = read_run(folder, Topics(camera_frame='/real_optical_frame'))
+    np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
+    assert not np.allclose(poses(read_run(folder))[0], POSES[0], atol=0.1)
+    with pytest.raises(ConfigError, match='--camera-frame: not for sensor_msgs/msg/JointState'):
+        read_run(bag(tmp_path / 'joints', images(), joints()), Topics(camera_frame='camera'))
+
+
 def test_transforms_of_a_clock_that_began_again_are_refused_up_to_where_it_was(tmp_path):
     second = [(time + 20 * PERIOD, topic, tf_message(np.eye(4), 'object', 'tool0', stamp))
               for (time, topic, _), stamp in zip(transforms(mounted=False),

@@ -367,7 +367,9 @@ def test_reading_tells_how_far_it_is(loop, bag):
 
     read_run(bag, reporting=reporting)
     size = sum(path.stat().st_size for path in bag.glob('*.mcap'))
-    assert told == {'checking the bag': [size, size], 'reading the images': [3 * STILL, 3 * STILL]}
+    assert told == {'checking the bag': [size, size],
+                    'reading the cameras': [6 * STILL, 6 * STILL],
+                    'reading the images': [3 * STILL, 3 * STILL]}
 
 
 def test_images_that_are_missing_in_the_stream_are_told(tmp_path):

@@ -43,6 +43,9 @@ _TOPICS: dict[str, tuple[Any, Any]] = {
     'object_frame': (Annotated[str, _option(
         metavar='FRAME', help='Frame of the camera pose, or the one of the transforms that the '
                               'object is in; default: object.')], 'object'),
+    'camera_frame': (Annotated[str, _option(
+        metavar='FRAME', help="The camera's optical frame among the transforms; default: that of "
+                              'the images.')], ''),
     'max_pose_gap': (Annotated[float, _option(
         min=0, metavar='SECONDS',
         help='Longest time from an image to the poses it is interpolated from; default: '

@@ -112,7 +112,7 @@ class CameraStream:
                     joiner.add_pose(self._poses[fed - 1][0], self._placed(self._poses[fed - 1][1]))
                 if self.transforms:
                     joiner.add_pose(time, self._placed(self.transforms.pose(
-                        msg.header.frame_id, time)))
+                        self._topics.camera_frame or msg.header.frame_id, time)))
                 joiner.add_intrinsics(time, self._lens(time, *size_from_msg(msg)))
                 joiner.add_image(time, msg, now=0)
             except MessageError as error:

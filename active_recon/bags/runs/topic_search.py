@@ -50,7 +50,7 @@ def camera_topics(bag: Bag, summary: BagSummary, topics: Topics) -> CameraTopics
     except DataError as error:
         missing.append(error)
     try:
-        azimuth = search.azimuth(topics.azimuth, topics.object_frame, None if missing else image,
+        azimuth = search.azimuth(topics, None if missing else image,
                                  loops_own=not missing and of_views)
     except DataError as error:
         missing.append(error)
@@ -91,16 +91,16 @@ class _Search:
             f'no camera images on {name or "any topic"}{instead if others else ""}: expected '
             f'{" or ".join(IMAGE_TYPES)}; name the topic with --image', 'topics')
 
-    def azimuth(self, name: str, object_frame: str, image: TopicSummary | None,
-                loops_own: bool) -> TopicSummary:
+    def azimuth(self, asked: Topics, image: TopicSummary | None, loops_own: bool) -> TopicSummary:
         """Return the topic of the poses or azimuths; `loops_own`: that of the views only."""
+        name = asked.azimuth
         views = [topic for topic in self._present
                  if topic.name.endswith('/view') and topic.type_name == POSE]
         fitting = self._fitting(name, AZIMUTH_TYPES)
         found = (views if loops_own and not name else None) or self._known_by_name(
             name, fitting, POSE_ROLE)
         if not found and any(topic.type_name == TRANSFORMS for topic in fitting):
-            fitting = self._connected(fitting, object_frame, image)
+            fitting = self._connected(fitting, asked, image)
         found = found or fitting or views
         if not found or name and not fitting:
             raise DataError(f"no camera poses or azimuths on {name or 'any topic'}: expected "
@@ -117,18 +117,20 @@ class _Search:
         return next((topic for topic in statics if topic.name == azimuth.name + STATIC),
                     statics[0] if len(statics) == 1 else None)
 
-    def _connected(self, fitting: Sequence[TopicSummary], object_frame: str,
+    def _connected(self, fitting: Sequence[TopicSummary], asked: Topics,
                    image: TopicSummary | None) -> list[TopicSummary]:
         """
-        Return the topics whose transforms connect the images' frame with the object's.
+        Return the topics whose transforms connect the camera's frame with the object's.
 
         Where there are none, those that are no transforms, and `advice` tells what the transforms
         lack.
         """
         transforms = [topic for topic in fitting if topic.type_name == TRANSFORMS]
-        first = next(iter(self._bag.messages({image.name})), None) if image else None
-        wanted = [object_frame.lstrip('/')]
-        if first is not None:
+        wanted = [asked.object_frame.lstrip('/')]
+        if asked.camera_frame:
+            wanted.append(asked.camera_frame.lstrip('/'))
+        elif image:
+            first = next(iter(self._bag.messages({image.name})))
             wanted.append(read_message(first).header.frame_id.lstrip('/'))
         found, frames = connecting(self._bag, transforms, wanted)
         lacking = [repr(frame) for frame in wanted if frame not in frames]
@@ -137,7 +139,7 @@ class _Search:
                     else f'do not connect {" and ".join(map(repr, wanted))}')
             self.advice = (f'. The transforms {what}; there are {", ".join(sorted(frames))}: name '
                            "the object's with --object-frame, and with --object-position where "
-                           'the object is in it')
+                           "the object is in it; --camera-frame, if the images' is wrong")
         return found or [topic for topic in fitting if topic.type_name != TRANSFORMS]
 
     def camera_info(self, name: str, image: TopicSummary) -> TopicSummary | None:

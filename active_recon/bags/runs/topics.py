@@ -33,6 +33,7 @@ class Topics:
     - joint: the joint's name, if the JointState has several
     - turned_object: the angle is a turntable's under a fixed camera, whose azimuth is its negative
     - object_frame: the frame of the PoseStamped, or that of the transforms that the object is in
+    - camera_frame: the camera's optical frame among the transforms; '': the frame of the images
     - max_pose_gap: the longest time from an image to its neighbouring poses, s, as in the node
     """
 
@@ -43,6 +44,7 @@ class Topics:
     joint: str = ''
     turned_object: bool = False
     object_frame: str = ReconstructorParameters.object_frame
+    camera_frame: str = ''
     max_pose_gap: float = ReconstructorParameters.max_pose_gap
 
     def __post_init__(self) -> None:
@@ -55,6 +57,7 @@ class Topics:
         """Raise ConfigError on options for another type than the poses or azimuths have."""
         unused = [option for option, given in (
             ('--joint', self.joint and azimuth.type_name != JOINT_STATE),
+            ('--camera-frame', self.camera_frame and azimuth.type_name != TRANSFORMS),
             ('--turned-object', self.turned_object and azimuth.type_name in POSE_TYPES)) if given]
         if unused:
             raise ConfigError(f'{" and ".join(unused)}: not for {azimuth.type_name}, which the '
