@@ -7,10 +7,14 @@ import active_recon
 from active_recon.bags.replay.replay import replay
 from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.reading import read_run
+from active_recon.bags.runs.rebuilt import rebuilt
+from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import Topics
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera
 from active_recon.geometry.rotations import matrix_from_quaternion
+from active_recon.report.findings import findings
+from active_recon.report.subject import Subject
 from active_recon.volumes.depth_images import DepthImage, registered
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
@@ -135,6 +139,9 @@ def test_depth_that_cannot_be_used_is_told_and_the_views_go_on(
     folder = write_bag(tmp_path / 'run', far)
     assert command(monkeypatch, 'replay', folder, '--depth', '/wrist/depth/image_rect_raw') == 0
     assert 'depth of 2 of them was left out: depth contradicts' in capsys.readouterr().out
+    run, _ = rebuilt(read_run(folder, Topics(depth='/wrist/depth/image_rect_raw')), Scene())
+    said = [found.text for found in findings(Subject('A', run, run.episodes[0]))]
+    assert 'The reconstructor warned twice of a depth image that could not be used.' in said
 
 
 def test_depth_topics_that_are_none_or_not_connected_are_refused(chair, tmp_path):

@@ -32,6 +32,8 @@ _WARNED = {
     'never_heard': 'an input without messages',
     'no_publisher': 'a topic without a publisher',
     'lost': 'messages that did not arrive',
+    'depth': 'a depth image that could not be used',
+    'no_depth': 'a view without a depth image',
     'qos': 'incompatible QoS profiles',
 }
 _KEYS = {

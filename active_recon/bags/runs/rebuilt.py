@@ -1,5 +1,6 @@
 """Reconstructions of a bag that was recorded without any, from its images."""
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,8 @@ from active_recon.bags.runs.recorded_object import replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun
 from active_recon.bags.runs.scene import Scene
 from active_recon.reconstructor import Reconstructor
+
+_NODE = 'reconstructor'
 
 
 def lacks_reconstruction(run: RecordedRun) -> bool:
@@ -33,16 +36,25 @@ def rebuilt(run: RecordedRun, scene: Scene,
 
 
 def with_reconstruction(run: RecordedRun, reconstructor: Reconstructor) -> RecordedRun:
-    """Return the run with the reconstructions of its images."""
+    """
+    Return the run with the reconstructions of its images.
+
+    Depth images that could not be used are counted as the node would.
+    """
     network = {'needs_front': reconstructor.provenance['needs_front']}
-    return replace(run, provenance={**run.provenance, **network},
-                   episodes=[_reconstructed(episode, reconstructor) for episode in run.episodes])
+    refused: Counter[str] = Counter()
+    episodes = [_reconstructed(episode, reconstructor, refused) for episode in run.episodes]
+    counted = {**refused, **run.counters.get(_NODE, {})}
+    return replace(run, provenance={**run.provenance, **network}, episodes=episodes,
+                   counters={**run.counters, **({_NODE: counted} if counted else {})})
 
 
-def _reconstructed(episode: RecordedEpisode, reconstructor: Reconstructor) -> RecordedEpisode:
+def _reconstructed(episode: RecordedEpisode, reconstructor: Reconstructor,
+                   refused: Counter[str]) -> RecordedEpisode:
     views = []
     for step in replay_views(episode.views, reconstructor):
         grid = step.known.grid
+        refused.update(['warned/depth'] if step.known.depth_refusal else [])
         views.append(replace(step.view, reconstruction=grid, entropy=grid.entropy(),
                              occupied=grid.above(reconstructor.threshold),
                              quality=step.known.quality))
