@@ -10,14 +10,13 @@ import math
 from active_recon.errors import MessageError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics, OBJECT_FRAME
 from active_recon.geometry.lenses import Distortion, MODELS
-from active_recon.geometry.rotations import matrix_from_quaternion, quaternion_from_matrix
+from active_recon.geometry.rotations import pose_from_quaternion, quaternion_from_matrix
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-Triple = tuple[float, float, float]
 _LARGEST = 1e9  # metres or pixels: larger values may overflow
 
 
@@ -98,16 +97,13 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
                                              'camera pose')
     if math.hypot(*position) < 1e-6:
         raise MessageError("invalid camera pose: it is at the object's centre", 'pose')
-    pose = np.eye(4)
-    pose[:3, :3] = matrix_from_quaternion(quaternion)
-    pose[:3, 3] = position
-    return pose
+    return pose_from_quaternion(position, quaternion)
 
 
 def numbers_from_msgs(point: Point, turn: Quaternion,
-                      what: str) -> tuple[Triple, tuple[float, float, float, float]]:
+                      what: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """
-    Return a position, and a quaternion x, y, z, w of any length.
+    Return a position (3,), and a quaternion (4,), x, y, z, w, of any length.
 
     Raises MessageError, in which `what` names them, if they are not finite, a million kilometres
     away, or the quaternion is zero.

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 def matrix_from_quaternion(quaternion: Iterable[float]) -> NDArray[np.float64]:
@@ -18,6 +18,14 @@ def matrix_from_quaternion(quaternion: Iterable[float]) -> NDArray[np.float64]:
         [x * x - y * y - z * z + w * w, 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), -x * x + y * y - z * z + w * w, 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), -x * x - y * y + z * z + w * w]])
+
+
+def pose_from_quaternion(position: ArrayLike, quaternion: Iterable[float]) -> NDArray[np.float64]:
+    """Return the pose (4, 4) of a position (3,) and a quaternion as `matrix_from_quaternion`'s."""
+    pose = np.eye(4)
+    pose[:3, :3] = matrix_from_quaternion(quaternion)
+    pose[:3, 3] = position
+    return pose
 
 
 def quaternion_from_matrix(matrix: NDArray[np.float64]) -> tuple[float, float, float, float]:

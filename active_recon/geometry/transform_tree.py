@@ -1,11 +1,11 @@
 """Frames that hang together by transforms over time, as ROS's tf has them."""
 
-from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_right, insort
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from active_recon.errors import ViewError
-from active_recon.geometry.rotations import matrix_from_quaternion, pose_between
+from active_recon.geometry.rotations import pose_between, pose_from_quaternion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +27,7 @@ class Transform:
     @property
     def pose(self) -> NDArray[np.float64]:
         """Parent from child, (4, 4)."""
-        pose = np.eye(4)
-        pose[:3, :3] = matrix_from_quaternion(self.quaternion)
-        pose[:3, 3] = self.position
-        return pose
+        return pose_from_quaternion(self.position, self.quaternion)
 
 
 @dataclass
@@ -44,23 +41,23 @@ class TransformTree:
     """
 
     max_gap: float
-    _static: dict[str, Transform] = field(default_factory=dict)
-    _moving: dict[str, list[Transform]] = field(default_factory=dict)
-    _is_sorted: bool = True
+    _by_child: dict[str, list[Transform]] = field(default_factory=dict)
+    _static: set[str] = field(default_factory=set)
 
     def add(self, transform: Transform, static: bool) -> None:
         """Add a transform; of static ones with the same child the last counts."""
+        child = transform.child
         if static:
-            self._static[transform.child] = transform
-        else:
-            self._moving.setdefault(transform.child, []).append(transform)
-            self._is_sorted = False
+            self._static.add(child)
+            self._by_child[child] = [transform]
+        elif child not in self._static:
+            insort(self._by_child.setdefault(child, []), transform, key=_stamp)
 
     @property
     def frames(self) -> list[str]:
         """The names of all frames, in alphabetical order."""
-        every = [*self._static.values(), *(each[0] for each in self._moving.values())]
-        return sorted({name for each in every for name in (each.parent, each.child)})
+        firsts = [transforms[0] for transforms in self._by_child.values()]
+        return sorted({name for each in firsts for name in (each.parent, each.child)})
 
     def pose(self, target: str, source: str, stamp: int) -> NDArray[np.float64]:
         """
@@ -69,40 +66,35 @@ class TransformTree:
         Raises ViewError of kind `tf` where transforms do not connect them, of kind `no_pose` where
         one between them has no neighbours in time.
         """
-        self._sort()
-        down, up = ({name: number for number, name in enumerate(self._ancestors(frame, stamp))}
-                    for frame in (source, target))
-        common = next((name for name in down if name in up), None)
+        paths = [self._ancestors(frame, stamp) for frame in (source, target)]
+        common = next((name for name in paths[0] if name in paths[1]), None)
         if common is None:
             raise ViewError(self._not_connected(target, source), 'tf')
-        from_source, from_target = (self._in_ancestor(path, common, stamp) for path in (down, up))
+        from_source, from_target = (self._in_ancestor(path[:path.index(common)], stamp)
+                                    for path in paths)
         return np.linalg.inv(from_target) @ from_source
 
-    def _in_ancestor(self, path: Mapping[str, int], common: str,
-                     stamp: int) -> NDArray[np.float64]:
-        """Return where the first frame of a path upwards is in one that it passes, (4, 4)."""
+    def _in_ancestor(self, path: Sequence[str], stamp: int) -> NDArray[np.float64]:
+        """Return where the first frame of a path is in the parent of its last, (4, 4)."""
         pose = np.eye(4)
-        for name in list(path)[:path[common]]:
+        for name in path:
             pose = self._at(name, stamp) @ pose
         return pose
 
-    def _ancestors(self, frame: str, stamp: int) -> Iterator[str]:
-        """Yield a frame, its parent and so on; ends before a frame that came before."""
-        seen: set[str] = set()
-        while frame not in seen:
-            yield frame
-            seen.add(frame)
-            moving = None if frame in self._static else self._moving.get(frame)
-            if moving:
-                frame = moving[max(bisect_right(moving, stamp, key=_stamp) - 1, 0)].parent
-            elif frame in self._static:
-                frame = self._static[frame].parent
+    def _ancestors(self, frame: str, stamp: int) -> list[str]:
+        """Return a frame, its parent and so on; ends before a frame that came before."""
+        path: list[str] = []
+        while frame not in path:
+            path.append(frame)
+            if known := self._by_child.get(frame):
+                frame = known[max(bisect_right(known, stamp, key=_stamp) - 1, 0)].parent
+        return path
 
     def _at(self, child: str, stamp: int) -> NDArray[np.float64]:
         """Return where a frame is in its parent, (4, 4)."""
-        moving = self._moving.get(child)
-        if child in self._static or not moving:
-            return self._static[child].pose
+        moving = self._by_child[child]
+        if child in self._static:
+            return moving[0].pose
         after = bisect_right(moving, stamp, key=_stamp)
         before = moving[max(after - 1, 0)]
         if before.stamp == stamp:
@@ -133,12 +125,6 @@ class TransformTree:
         return (f'no transforms between the frames {target!r} and {source!r}: expected both in '
                 f'one tree, got {f"none with {unknown}" if unknown else "two trees"}; the frames '
                 f'are {", ".join(known) or "none"}')
-
-    def _sort(self) -> None:
-        if not self._is_sorted:
-            for moving in self._moving.values():
-                moving.sort(key=_stamp)
-            self._is_sorted = True
 
 
 def _stamp(transform: Transform) -> int:

@@ -6,7 +6,7 @@ import math
 
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera
-from active_recon.geometry.rotations import matrix_from_quaternion
+from active_recon.geometry.rotations import pose_from_quaternion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,10 +52,7 @@ class FixedCamera:
             raise ConfigError('camera_orientation: invalid orientation: expected x, y, z, w of '
                               f"the optical frame's unit quaternion, got {list(orientation)}; "
                               'active-recon calibrate measures it')
-        pose = np.eye(4)
-        pose[:3, :3] = matrix_from_quaternion(orientation)
-        pose[:3, 3] = position
-        return cls(pose, direction)
+        return cls(pose_from_quaternion(position, orientation), direction)
 
     def pose_at(self, angle: float) -> NDArray[np.float64]:
         """

@@ -39,8 +39,7 @@ def registered(image: DepthImage, pose: NDArray[np.float64]) -> DepthImage:
     assert image.camera is not None, 'depth without a camera is aligned with an image'
     lens = image.camera.intrinsics
     target = Camera(pose, lens)
-    with np.errstate(invalid='ignore'):
-        valid = np.isfinite(image.metres) & (image.metres > 0)
+    valid = _has_value(image.metres)
     rays = image.camera.ray_directions()[valid]  # (N, 3), of depth 1
     pixels, depths = target.project(image.camera.position + rays * image.metres[valid][:, None])
     with np.errstate(invalid='ignore'):
@@ -67,12 +66,16 @@ def usable_depth(image: DepthImage, view: Camera,
                         'camera says, got '
                         f'{" x ".join(map(str, metres.shape)) or "a number"}; register it to the '
                         'image, or give its own camera', 'depth')
-    with np.errstate(invalid='ignore'):
-        valid = np.isfinite(metres) & (metres > 0)
-    depth = np.where(valid, metres, 0).astype(np.float32) / np.float32(object_size)
+    depth = np.where(_has_value(metres), metres, 0).astype(np.float32) / np.float32(object_size)
     placed = camera.scaled(1 / object_size)
     _require_fitting(depth, placed, object_size)
     return depth, placed
+
+
+def _has_value(metres: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return where depth is finite and above 0."""
+    with np.errstate(invalid='ignore'):
+        return np.asarray(np.isfinite(metres) & (metres > 0))
 
 
 def _require_fitting(depth: NDArray[np.float32], camera: Camera, object_size: float) -> None:
