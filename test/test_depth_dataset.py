@@ -160,3 +160,6 @@ def test_a_training_may_begin_with_the_refiner_of_another_network(
     assert command(monkeypatch, *arguments, '--init-from', 'lifting.safetensors',
                    '--out', 'other') == 2
     assert 'takes no depth: expected lifting-depth.safetensors' in capsys.readouterr().err
+    assert command(monkeypatch, *arguments, '--init-from', 'none.safetensors',
+                   '--out', 'other') == 2
+    assert 'none.safetensors: cannot be read: expected weights' in capsys.readouterr().err

@@ -27,7 +27,7 @@ from active_recon.cli.reading import Split
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 from active_recon.policies import POLICIES
-from active_recon.whole_files import writable
+from active_recon.whole_files import whole_file, writable
 import typer
 
 if TYPE_CHECKING:
@@ -171,7 +171,8 @@ def evaluate(
     if training and validation is not None:
         result['baselines'] = print_baselines(training, validation, trial)
     if json_file:
-        json_file.write_text(json.dumps(result, indent=1) + '\n')
+        with whole_file(json_file) as unfinished:
+            unfinished.write_text(json.dumps(result, indent=1) + '\n')
         typer.echo(f'wrote {json_file}')
 
 

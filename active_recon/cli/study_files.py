@@ -10,7 +10,7 @@ from active_recon.whole_files import whole_file, writable
 
 def study_files(out: Path, name: str) -> list[Path]:
     """Return where figures and their page go; raises ConfigError where they cannot be written."""
-    return [writable(out / f'{name}.json'), writable(out / f'{name}.md')]
+    return [writable(path) for path in _paths(out, name)]
 
 
 def write_study(result: Mapping[str, Any], page: str, out: Path, name: str) -> list[Path]:
@@ -19,8 +19,12 @@ def write_study(result: Mapping[str, Any], page: str, out: Path, name: str) -> l
 
     Each is written whole or not at all: what an earlier run wrote stays where the disk is full.
     """
-    written = study_files(out, name)
+    written = _paths(out, name)
     for path, text in zip(written, (json.dumps(result, indent=1) + '\n', page), strict=True):
         with whole_file(path) as unfinished:
             unfinished.write_text(text)
     return written
+
+
+def _paths(out: Path, name: str) -> list[Path]:
+    return [out / f'{name}.json', out / f'{name}.md']

@@ -34,8 +34,8 @@ def load_refiner(weights: Path | None = None, device: str = 'cpu') -> DepthRefin
     trained for other weights.
     """
     weights = weights or SHIPPED
-    path = depth_path(weights)
+    digest, path = weights_hash(weights), depth_path(weights)
     if not path.is_file():
         raise WeightsError(f'{weights.name}: takes no depth: expected {path.name} beside it, '
                            'which `active-recon train-depth` makes')
-    return _REFINER.read(path, weights_hash(weights), device)
+    return _REFINER.read(path, digest, device)
