@@ -11,6 +11,8 @@ from active_recon.errors import WeightsError
 from safetensors import safe_open, SafetensorError
 
 DEFAULT_MODEL, PAPER_MODEL = 'lifting', '2d3d-attention'
+PHOTOS_MODEL = 'lifting-large'
+"""Of `active-recon reconstruct`: nothing waits for a photo as a robot waits for its goal."""
 FOLDER = Path(__file__).parents[1] / 'weights'
 SCORER = '-scorer'
 """What the name of a network's weights is followed by in that of its view policy's."""
