@@ -1,5 +1,5 @@
 """
-The default network before backgrounds of every kind, with the background removed and without.
+A network before backgrounds of every kind, with the background removed and without.
 
     python -m benchmarks.backgrounds data/test data/unseen data/real_val --photographs DINO
 
@@ -12,7 +12,8 @@ the IoU of the silhouettes, of five views for `together`.
 
 Photographs: IoU with the hull of all their masks after five even views, from the first one on,
 and the mean, least and greatest from any. Written are docs/results/backgrounds.json and two
-tables in doc/results.md.
+tables in doc/results.md; with --out, that file alone. Without data, photographs are measured
+alone.
 """
 
 import argparse
@@ -43,7 +44,12 @@ from active_recon.models.network import Cameras
 from active_recon.models.segmenter import Segmenter
 from active_recon.models.segmenter_weights import read_segmenter
 from active_recon.models.weights import load_weights
-from active_recon.models.weights_files import find_weights, SEGMENTER, weights_hash
+from active_recon.models.weights_files import (
+    DEFAULT_MODEL,
+    find_weights,
+    SEGMENTER,
+    weights_hash,
+)
 from active_recon.photos.backgrounds import grabcut
 from active_recon.photos.segmented_views import agreed_shares
 from active_recon.runtimes.torch import TorchSegmenterRuntime
@@ -70,14 +76,16 @@ _SEED = 90_000  # of no training: those count from 0
 def main() -> None:
     """Measure, and write JSON and the tables."""
     parser = argparse.ArgumentParser(description='The network before backgrounds of every kind.')
-    parser.add_argument('data', type=Path, nargs='+', help="datasets in R2N2's layout")
+    parser.add_argument('data', type=Path, nargs='*', help="datasets in R2N2's layout")
     parser.add_argument('--objects', type=int, default=60, help='drawn from each dataset')
     parser.add_argument('--photographs', type=Path, required=True,
                         help="folder in Middlebury's format")
     parser.add_argument('--workers', type=int, default=2, help='processes')
     parser.add_argument('--segmenter', type=Path, default=SEGMENTER)
+    parser.add_argument('--model', default=DEFAULT_MODEL, help='a model that ships, or weights')
+    parser.add_argument('--out', type=Path, default=RESULTS)
     options = parser.parse_args()
-    weights = find_weights('lifting')
+    weights = find_weights(options.model)
     result: dict[str, Any] = {
         'command': shlex.join(['python', '-m', 'benchmarks.backgrounds', *sys.argv[1:]]),
         'weights_sha256': weights_hash(weights),
@@ -85,28 +93,31 @@ def main() -> None:
         'counts': COUNTS, 'sets': {}}
     jobs = [(root, kind) for root in options.data for kind in KINDS]
     with ProcessPoolExecutor(options.workers, get_context('spawn')) as pool:
-        photographs = pool.submit(_of_photographs, options.segmenter, options.photographs)
-        found = pool.map(partial(_of_kind, options.segmenter, options.objects), *zip(
+        photographs = pool.submit(_of_photographs, weights, options.segmenter,
+                                  options.photographs)
+        found = pool.map(partial(_of_kind, weights, options.segmenter, options.objects), *zip(
             *jobs, strict=True))
         for (root, kind), told in track(zip(jobs, found, strict=True), 'backgrounds', len(jobs)):
             result['sets'].setdefault(str(root), {})[kind] = told
         result['photographs'] = photographs.result()
-    RESULTS.write_text(json.dumps(result, indent=1) + '\n')
-    DOCUMENT.write_text(with_table(DOCUMENT.read_text()))
+    options.out.write_text(json.dumps(result, indent=1) + '\n')
+    if options.out == RESULTS:
+        DOCUMENT.write_text(with_table(DOCUMENT.read_text()))
 
 
-def _of_kind(segmenter: Path, objects: int, root: Path, kind: str) -> dict[str, Any]:
+def _of_kind(weights: Path, segmenter: Path, objects: int, root: Path,
+             kind: str) -> dict[str, Any]:
     """Return what is told of a set before backgrounds of a kind."""
-    network, threshold = _network()
+    network, threshold = _network(weights)
     views = read_views(list_objects(root), resolution=64, image_size=128, framed=True,
                        at_once=False)
     return _told([_measured(network, threshold, read_segmenter(segmenter), views, kind, row)
                   for row in range(objects)])
 
 
-def _network() -> tuple[Lifting, float]:
+def _network(weights: Path) -> tuple[Lifting, float]:
     torch.set_num_threads(1)
-    bundle = load_weights(find_weights('lifting'))
+    bundle = load_weights(weights)
     assert isinstance(bundle.reconstruction, Lifting)
     return bundle.reconstruction, bundle.threshold
 
@@ -239,9 +250,9 @@ def _ious(network: Lifting, threshold: float, images: Tensor, batch: PosedBatch)
 
 
 @torch.inference_mode()
-def _of_photographs(segmenter: Path, folder: Path) -> dict[str, Any]:
+def _of_photographs(weights: Path, segmenter: Path, folder: Path) -> dict[str, Any]:
     """Return the IoU after five even views before each background, by each way."""
-    network, threshold = _network()
+    network, threshold = _network(weights)
     segmentation = Segmentation(TorchSegmenterRuntime(read_segmenter(segmenter)))
     photographs = read_photographs(folder)
     truth = hull(photographs, range(len(photographs)))

@@ -28,8 +28,9 @@ from active_recon.datasets.middlebury import PosedPhotographs, read_photographs
 from active_recon.errors import ActiveReconError
 from active_recon.evaluation.posed.photographs import averaged, EVEN, even_views, hull
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
+from active_recon.models.weights_files import DEFAULT_MODEL, PHOTOS_MODEL
 from active_recon.photos.camera_file import CameraFile
-from active_recon.photos.reconstruct import from_views, reconstruct
+from active_recon.photos.reconstruct import from_views, Options, reconstruct
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import BoardCameras
 from active_recon.photos.views import PhotoView
@@ -38,6 +39,7 @@ from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import iou
 from benchmarks.photos_on_tables import interval, MODELS, on_tables, SIZE, some_models
+from benchmarks.studies import with_tables_between_marks
 import numpy as np
 from numpy.typing import NDArray
 from phone_photos import as_of_a_phone
@@ -51,7 +53,6 @@ _GOAL = 0.8  # of the dinosaur, from the first photo on
 _VIEWS = 5
 _BOARD_VIEWS = 12
 _PHONE_VIEWS = 8
-_MARKS = '<!-- photos: begin -->', '<!-- photos: end -->'
 Taken = Callable[[NDArray[np.uint8], np.random.Generator], NDArray[np.uint8]]
 _EVERY = 3  # of the models that ship
 
@@ -62,68 +63,78 @@ def main() -> None:
     parser.add_argument('photos', type=Path, help='folder of dinoSparseRing')
     parser.add_argument('--runs', type=int, default=5, help='how often the command is timed')
     parser.add_argument('--objects', type=int, default=30, help='objects on the board')
+    parser.add_argument('--model', default=PHOTOS_MODEL,
+                        help='a model that ships, or a weights file')
     parser.add_argument('--out', type=Path, default=Path('photos.json'))
     parser.add_argument('--parts', nargs='*', default=[
         'photographs', 'command_s', 'rendered', 'board', 'phone', 'table'],
         help='others stay as they are')
     options = parser.parse_args()
-    measure = {'photographs': lambda: _photographs(options.photos),
-               'command_s': lambda: _timed(options.photos, options.runs), 'rendered': _rendered,
-               'board': lambda: _on_board(options.objects, _BOARD_VIEWS),
-               'phone': lambda: _on_board(options.objects, _PHONE_VIEWS, as_of_a_phone),
-               'table': lambda: on_tables(options.objects)}
+    model = options.model
+    measure = {'photographs': lambda: _photographs(options.photos, model),
+               'command_s': lambda: _timed(options.photos, options.runs, model),
+               'rendered': lambda: _rendered(model),
+               'board': lambda: _on_board(options.objects, _BOARD_VIEWS, model),
+               'phone': lambda: _on_board(options.objects, _PHONE_VIEWS, model, as_of_a_phone),
+               'table': lambda: on_tables(options.objects, model)}
     result = json.loads(options.out.read_text()) if options.out.exists() else {}
-    result['command'] = ('PYTHONPATH=test python -m benchmarks.photos photos/dino_sparse_ring '
-                         '--out docs/results/photos.json')
+    named = '' if model == PHOTOS_MODEL else f' --model {model}'
+    result['command'] = ('PYTHONPATH=test python -m benchmarks.photos photos/dino_sparse_ring'
+                         f'{named} --out docs/results/{options.out.name}')
     for part in options.parts:
         result[part] = measure[part]()
         options.out.write_text(json.dumps(result, indent=1) + '\n')
 
 
-def table(result: Mapping[str, Any]) -> str:
-    """Return the results as the Markdown table of doc/photos.md."""
-    taken, rendered, board = (result[part] for part in ('photographs', 'rendered', 'board'))
-    rows = ['| what | IoU | goal |', '|---|---|---|']
+def table(result: Mapping[str, Any], faster: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines of the table of doc/photos.md; `faster` was measured with DEFAULT_MODEL."""
+    yield f'| what | IoU | with `--model {DEFAULT_MODEL}` | goal |'
+    yield '|---|---|---|---|'
+    for (what, told, goal), (_, other, _) in zip(_rows(result), _rows(faster), strict=True):
+        yield f'| {what} | {told} | {other} | {goal} |'
+
+
+def _rows(result: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield what was measured, the IoU, and the goal with whether it was reached."""
+    taken, rendered, tables = (result[part] for part in ('photographs', 'rendered', 'table'))
     for way in WAYS:
         reached = 'reached' if taken[way][0] >= _GOAL else 'missed'
-        rows.append(f'| dinosaur, `--background {way}`, from the first photo on; from any, mean '
-                    f'[least, greatest] | {taken[way][0]:.3f}; {np.mean(taken[way]):.3f} '
-                    f'[{min(taken[way]):.3f}, {max(taken[way]):.3f}] | {_GOAL:.2f}: {reached} |')
-    rows.append(f'| the same, hull of the five true masks | {taken["hull"][0]:.3f}; '
-                f'{np.mean(taken["hull"]):.3f} | |')
+        yield (f'dinosaur, `--background {way}`, from the first photo on; from any, mean '
+               '[least, greatest]', f'{taken[way][0]:.3f}; {np.mean(taken[way]):.3f} '
+               f'[{min(taken[way]):.3f}, {max(taken[way]):.3f}]', f'{_GOAL:.2f}: {reached}')
+    yield ('the same, hull of the five true masks',
+           f'{taken["hull"][0]:.3f}; {np.mean(taken["hull"]):.3f}', '')
     for way, words in (('masks', 'true masks'), *((way, f'`--background {way}`') for way in WAYS)):
-        rows.append(f'| {len(rendered["objects"])} models before plain backgrounds, five photos, '
-                    f'{words} | {_told(rendered["iou"][way])} | |')
-    rows += _board_rows(board, 'photos', 0.03)
-    rows += _board_rows(result['phone'], 'photos as of a phone', 0.06)
-    tables = result['table']
-    rows += [f'| {len(tables["objects"])} models on tables before clutter, {tables["views"]} '
-             f'photos, {way} | {_told(told)} | |' for way, told in tables['iou'].items()]
-    return '\n'.join(rows)
+        yield (f'{len(rendered["objects"])} models before plain backgrounds, five photos, {words}',
+               _told(rendered['iou'][way]), '')
+    yield from _board_rows(result['board'], 'photos', 0.03)
+    yield from _board_rows(result['phone'], 'photos as of a phone', 0.06)
+    for way, told in tables['iou'].items():
+        yield (f'{len(tables["objects"])} models on tables before clutter, {tables["views"]} '
+               f'photos, {way}', _told(told), '')
 
 
-def _board_rows(board: Mapping[str, Any], photos: str, within: float) -> Iterator[str]:
+def _board_rows(board: Mapping[str, Any], photos: str,
+                within: float) -> Iterator[tuple[str, str, str]]:
     goal = board['iou']['true masks and poses']['mean'] - within
     reached = 'reached' if board['iou']['found']['mean'] >= goal else 'missed'
     for way, words in (('found', 'from the photos alone'), ('true masks', 'with true masks'),
                        ('true masks and poses', 'with true masks, lens and poses')):
-        told = f'within {within:.2f} of the row with all: {reached}' if way == 'found' else ''
-        yield (f'| {len(board["objects"])} models on a board before clutter, {board["views"]} '
-               f'{photos}, {words} | {_told(board["iou"][way])} | {told} |')
+        yield (f'{len(board["objects"])} models on a board before clutter, {board["views"]} '
+               f'{photos}, {words}', _told(board['iou'][way]),
+               f'within {within:.2f} of the row with all: {reached}' if way == 'found' else '')
 
 
-def with_table(text: str, result: Mapping[str, Any]) -> str:
+def with_table(text: str, result: Mapping[str, Any], faster: Mapping[str, Any]) -> str:
     """Return a page with the table between its marks."""
-    before, mark, rest = text.partition(_MARKS[0])
-    _, end, after = rest.partition(_MARKS[1])
-    return f'{before}{mark}\n{table(result)}\n{end}{after}'
+    return with_tables_between_marks(text, {'photos': lambda: table(result, faster)})
 
 
 def _told(interval: Mapping[str, float]) -> str:
     return f'{interval["mean"]:.3f} [{interval["low"]:.3f}, {interval["high"]:.3f}]'
 
 
-def _photographs(folder: Path) -> dict[str, Any]:
+def _photographs(folder: Path, model: str) -> dict[str, Any]:
     """Return the IoU by background: from the first photograph on, and over all first ones."""
     read = read_photographs(folder)
     truth = hull(read, range(len(read)))
@@ -131,38 +142,40 @@ def _photographs(folder: Path) -> dict[str, Any]:
     found: dict[str, Any] = {'photographs': len(read), 'views': orders[0], 'hull': [
         float(iou(hull(read, order), truth)) for order in orders]}
     for way in WAYS:
-        found[way] = [_score(read, order, way, truth) for order in orders]
+        found[way] = [_score(read, order, way, truth, model) for order in orders]
         print(f'{way}: {found[way][0]:.3f}, mean {np.mean(found[way]):.3f}',  # noqa: T201
               file=sys.stderr, flush=True)
     return found
 
 
-def _score(read: PosedPhotographs, order: Sequence[int], way: str, truth: Any) -> float:
+def _score(read: PosedPhotographs, order: Sequence[int], way: str, truth: Any,
+           model: str) -> float:
     """Return the IoU of a reconstruction from some photographs, with the box of README.txt."""
     files = [read.folder / read.names[view] for view in order]
-    shape = reconstruct(files, background=way)
+    shape = reconstruct(files, background=way, model=model)
     return float(iou(averaged(shape.occupancy, len(truth)) > shape.threshold, truth))
 
 
-def _timed(folder: Path, runs: int) -> list[float]:
+def _timed(folder: Path, runs: int, model: str) -> list[float]:
     """Return how long the command took each time, seconds."""
     took = []
     with TemporaryDirectory() as out:
         for _ in range(runs):
             start = time.perf_counter()
             subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'reconstruct',
-                            str(folder), '--views', str(EVEN), '--out', out],
+                            str(folder), '--views', str(EVEN), '--out', out,
+                            '--model', model],
                            check=True, capture_output=True)
             took.append(time.perf_counter() - start)
     return took
 
 
-def _rendered() -> dict[str, Any]:
+def _rendered(model: str) -> dict[str, Any]:
     """Return means over objects of the IoU at 64 cells by background, with intervals."""
     found: dict[str, list[float]] = {way: [] for way in ('masks', *WAYS)}
     files = sorted(MODELS.glob('*/*.glb'))[::_EVERY]
     for number, file in enumerate(files):
-        for way, value in _of_model(file, number):
+        for way, value in _of_model(file, number, model):
             found[way].append(value)
         print({way: round(values[-1], 3) for way, values in found.items()},  # noqa: T201
               file=sys.stderr, flush=True)
@@ -170,7 +183,7 @@ def _rendered() -> dict[str, Any]:
             'iou': {way: interval(values) for way, values in found.items()}}
 
 
-def _of_model(file: Path, seed: int) -> Iterator[tuple[str, float]]:
+def _of_model(file: Path, seed: int, model: str) -> Iterator[tuple[str, float]]:
     mesh, rng = load_mesh(file), np.random.default_rng(seed)
     truth = voxelise(mesh, 64).occupied(0.5)
     renderer = Renderer(mesh)
@@ -180,7 +193,8 @@ def _of_model(file: Path, seed: int) -> Iterator[tuple[str, float]]:
     color = rng.integers(0, 256, 3)
     images = {'masks': rgba, **dict.fromkeys(WAYS, [_before(each, color, rng) for each in rgba])}
     for way, shown in images.items():
-        shape = reconstruct(shown, cameras, 1.0, background='auto' if way == 'masks' else way)
+        shape = reconstruct(shown, cameras, 1.0, background='auto' if way == 'masks' else way,
+                            model=model)
         yield way, float(iou(shape.occupancy > shape.threshold, truth))
 
 
@@ -196,7 +210,8 @@ def _before(rgba: Any, color: Any, rng: np.random.Generator) -> Any:
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
-def _on_board(count: int, views: int, taken: Taken = lambda image, rng: image) -> dict[str, Any]:
+def _on_board(count: int, views: int, model: str,
+              taken: Taken = lambda image, rng: image) -> dict[str, Any]:
     """
     Return the IoU at 64 cells of objects on a board, by what is known, with intervals.
 
@@ -218,21 +233,21 @@ def _on_board(count: int, views: int, taken: Taken = lambda image, rng: image) -
                     path.parent.mkdir(exist_ok=True)
                     Image.fromarray(pixels).save(path)
             for way, name in (('found', 'rgb'), ('true masks', 'masked')):
-                shape = _tried(Path(folder, name))
+                shape = _tried(Path(folder, name), model)
                 found[way].append(0.0 if shape is None else _iou(shape, mesh))
         true = [PhotoView(str(view), image, camera, mask, 'masks') for view, (image, mask, camera)
                 in enumerate(zip(images, masks, cameras, strict=True))]
         found['true masks and poses'].append(_iou(from_views(
-            true, CameraFile('true', (), np.array([0.0, 0.0, 1.0]))), mesh))
+            true, CameraFile('true', (), np.array([0.0, 0.0, 1.0])), Options(model=model)), mesh))
         print(file.stem, {way: round(values[-1], 3) for way, values in found.items()},  # noqa: T201
               file=sys.stderr, flush=True)
     return {'objects': [file.stem for file in files], 'views': views,
             'each': found, 'iou': {way: interval(values) for way, values in found.items()}}
 
 
-def _tried(folder: Path) -> Shape | None:
+def _tried(folder: Path, model: str) -> Shape | None:
     try:
-        return reconstruct(folder, BoardCameras(BOARD))
+        return reconstruct(folder, BoardCameras(BOARD), model=model)
     except ActiveReconError as error:
         print(f'nothing: {error}', file=sys.stderr)  # noqa: T201
         return None

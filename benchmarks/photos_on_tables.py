@@ -27,13 +27,13 @@ _WAYS = ('the cube found', 'the cube told', 'the cube told, `--background networ
 _VIEWS = 8
 
 
-def on_tables(count: int) -> dict[str, Any]:
+def on_tables(count: int, model: str) -> dict[str, Any]:
     """Return the IoU of objects on tables, by what is known beside the poses, with intervals."""
     found: dict[str, list[float]] = {way: [] for way in _WAYS}
     models, file = some_models(count), CameraFile('true', (), np.array([0.0, 0.0, 1.0]))
-    for number, model in enumerate(models):
+    for number, each in enumerate(models):
         rng = np.random.default_rng(number)
-        mesh = centred(load_mesh(model), SIZE)
+        mesh = centred(load_mesh(each), SIZE)
         cameras = around(_VIEWS, 3 * SIZE, rng)
         pattern = list(PATTERNS)[number % len(PATTERNS)]
         images, masks = photographed(mesh, cameras, pattern, rng)
@@ -41,9 +41,10 @@ def on_tables(count: int) -> dict[str, Any]:
                  in enumerate(zip(images, cameras, strict=True))]
         masked = [replace(view, mask=mask, mask_source='masks')
                   for view, mask in zip(views, masks, strict=True)]
-        told = Options(box=(0.0, 0.0, 0.0, MARGIN * SIZE))
+        free = Options(model=model)
+        told = replace(free, box=(0.0, 0.0, 0.0, MARGIN * SIZE))
         for way, (some, options) in zip(_WAYS, (
-                (views, Options()), (views, told),
+                (views, free), (views, told),
                 (views, replace(told, background='network')), (masked, told)), strict=True):
             try:
                 shape = from_views(some, file, options)
@@ -51,10 +52,10 @@ def on_tables(count: int) -> dict[str, Any]:
             except ActiveReconError as error:
                 print(f'nothing: {error}', file=sys.stderr)  # noqa: T201
                 found[way].append(0.0)
-        print(model.stem, pattern, {  # noqa: T201
+        print(each.stem, pattern, {  # noqa: T201
             way: round(values[-1], 3) for way, values in found.items()},
             file=sys.stderr, flush=True)
-    return {'objects': [model.stem for model in models], 'views': _VIEWS,
+    return {'objects': [each.stem for each in models], 'views': _VIEWS,
             'each': found, 'iou': {way: interval(values) for way, values in found.items()}}
 
 
