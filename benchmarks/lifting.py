@@ -28,6 +28,8 @@ STUDIES: Mapping[str, str] = {
     'things-val': f"data/real_val {_BESIDE} --category 'thing_*' --objects 60 {_KNOWN}",
     'any-cameras-unseen': 'any/unseen --models lifting,carving --threads 1 --disturbed-views 5 '
                           '--disturbed-objects 24',
+    'robustness': "any/test any/unseen --models lifting,lifting-large --counts 1,5 --surfaces '' "
+                  '--threads 1 --disturbed-views 5 --disturbed-objects 104',
     'photographs': f'--photos photos/dino_sparse_ring {_BESIDE}',
     'r2n2-chairs': f"data/r2n2_sample {_BESIDE} --surfaces '' --disturbed-views 0",
     'large-parametric-test': 'data/test --models lifting-large,lifting,carving --threads 1 '
