@@ -12,8 +12,7 @@ the IoU of the silhouettes, of five views for `together`.
 
 Photographs: IoU with the hull of all their masks after five even views, from the first one on,
 and the mean, least and greatest from any. Written are docs/results/backgrounds.json and two
-tables in doc/results.md; with --out, that file alone. Without data, photographs are measured
-alone.
+tables in doc/results.md; with another --out, that file alone.
 """
 
 import argparse
@@ -76,7 +75,7 @@ _SEED = 90_000  # of no training: those count from 0
 def main() -> None:
     """Measure, and write JSON and the tables."""
     parser = argparse.ArgumentParser(description='The network before backgrounds of every kind.')
-    parser.add_argument('data', type=Path, nargs='*', help="datasets in R2N2's layout")
+    parser.add_argument('data', type=Path, nargs='+', help="datasets in R2N2's layout")
     parser.add_argument('--objects', type=int, default=60, help='drawn from each dataset')
     parser.add_argument('--photographs', type=Path, required=True,
                         help="folder in Middlebury's format")
@@ -101,7 +100,7 @@ def main() -> None:
             result['sets'].setdefault(str(root), {})[kind] = told
         result['photographs'] = photographs.result()
     options.out.write_text(json.dumps(result, indent=1) + '\n')
-    if options.out == RESULTS:
+    if options.out.resolve() == RESULTS:
         DOCUMENT.write_text(with_table(DOCUMENT.read_text()))
 
 

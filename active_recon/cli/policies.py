@@ -7,7 +7,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
-from active_recon.cli.study_files import study_files, write_study
+from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError, DataError
 from active_recon.policies import POLICIES
 import typer
@@ -76,7 +76,7 @@ def policies(
     from active_recon.models.weights_files import scorer_path
     import torch
 
-    study_files(out, 'policies')  # tells before hours of measuring
+    require_writable_study(out, 'policies')  # tells before hours of measuring
     torch.set_num_threads(threads)
     entrant, *others = load_entrants(model, runtime, bf16, threads)
     if others:

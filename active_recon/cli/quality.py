@@ -5,7 +5,7 @@ from typing import Annotated
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
-from active_recon.cli.study_files import study_files, write_study
+from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError, DataError
 from active_recon.whole_files import writable
 import typer
@@ -166,7 +166,7 @@ def study(
     if not files and not halved:
         raise ConfigError('study: nothing to measure: expected files of `quality measure`, or '
                           '--halved with some, got neither')
-    study_files(out, 'quality')  # tells before the work
+    require_writable_study(out, 'quality')  # tells before the work
     path = tables or tables_path(find_weights(model))
     found = QualityTables.read(path)
     sha256, sets = found.weights_sha256, {}

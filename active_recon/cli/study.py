@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
-from active_recon.cli.study_files import study_files, write_study
+from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError
 import typer
 
@@ -88,7 +88,7 @@ def study(
     if not data and photos is None:
         raise ConfigError('study: nothing to measure: expected folders of objects, or --photos '
                           'with a folder of photographs, got neither')
-    study_files(out, 'study')  # tells before hours of measuring
+    require_writable_study(out, 'study')  # tells before hours of measuring
     torch.set_num_threads(threads)
     plan = Plan(_numbers('counts', counts),
                 _numbers('surfaces', '1,5' if surfaces is None else surfaces), seed, bf16)

@@ -8,9 +8,10 @@ from typing import Any
 from active_recon.whole_files import whole_file, writable
 
 
-def study_files(out: Path, name: str) -> list[Path]:
-    """Return where figures and their page go; raises ConfigError where they cannot be written."""
-    return [writable(path) for path in _paths(out, name)]
+def require_writable_study(out: Path, name: str) -> None:
+    """Raise ConfigError where `write_study` could not write; to be asked before the work."""
+    for path in _paths(out, name):
+        writable(path)
 
 
 def write_study(result: Mapping[str, Any], page: str, out: Path, name: str) -> list[Path]:
