@@ -138,7 +138,7 @@ def test_a_cube_that_is_searched_in_vain_stays_as_wide_as_it_was(views, cluttere
 def test_the_segmenter_looks_at_the_cube_of_the_size_that_is_given(views, cluttered, monkeypatch):
     looked_at = []
 
-    def segmented(given, cube, segmentation):
+    def segmented(given, cube, segmentation, ground):
         looked_at.append(cube.side)
         return given, []
 

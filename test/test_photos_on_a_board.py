@@ -145,15 +145,6 @@ def test_an_object_on_a_board_is_reconstructed_from_photos_alone(taken, mesh, tm
     assert other.cube.side == 0.2 and other.cube.centre[2] == pytest.approx(0.1)
 
 
-def test_a_cube_of_another_side_keeps_its_place_or_stands_on_the_ground():
-    cube = Cube(np.array([1.0, 2, 3]), 0.5, np.array([0.0, 0, 2]))
-    np.testing.assert_allclose(cube.of_side(0.8, grounded=False).centre, cube.centre)
-    np.testing.assert_allclose(cube.of_side(0.8, grounded=True).centre, [1, 2, 0.4])
-    assert cube.of_side(0.8, True).above_ground(4).all()
-    below = Cube(np.zeros(3), 1.0, np.array([0.0, 0, 1])).above_ground(4)
-    np.testing.assert_array_equal(below[0, 0], [False, False, True, True])
-
-
 def test_a_photo_finds_its_camera_where_only_a_rim_of_the_board_is_free():
     wide = trimesh.creation.box([0.15, 0.15, 0.06])
     wide.visual.face_colors = [150, 90, 70, 255]

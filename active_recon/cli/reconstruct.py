@@ -60,6 +60,9 @@ def reconstruct(
     up: Annotated[str | None, typer.Option(
         help="Axis of the cameras' world that points up, e.g. z or -y. Default: by the "
              'format.')] = None,
+    ground: Annotated[bool, typer.Option(
+        help='Find the table under the object by its texture: nothing in or under it is the '
+             'object.')] = True,
     background: Annotated[str, typer.Option(
         help='auto (masks, alpha, the network before a plain background, else segment), plain '
              '(by the colour of a plain background), network, segment (by a learned segmenter), '
@@ -154,7 +157,7 @@ def reconstruct(
                           'them')
     source = sources[0] if sources else None
     options = Options(None if box is None else _numbers(box), unit, size, up, axes, background,
-                      masks, views, model, order=order)
+                      masks, views, model, order=order, ground=ground)
     if watch:
         from active_recon.cli.watch_photos import Pages, watch_photos
         from active_recon.policies.stopping import StoppingRule
@@ -184,10 +187,11 @@ def _print(shape: 'Shape') -> None:
     for warning in shape.warnings:
         typer.echo(f'warning: {warning}', err=True)
     side = shape.cube
+    stands = '' if shape.ground is None else ', on the ground that was found'
     deep = sum(view.depth is not None for view in shape.views)
     typer.echo(f'{len(shape.views)} photos{f", {deep} with depth" if deep else ""}; '
                f'silhouettes: {shape.background}; cube of {shape.size:.4g} m about '
-               f'{", ".join(f"{value:.4g}" for value in side.centre)}')
+               f'{", ".join(f"{value:.4g}" for value in side.centre)}{stands}')
     if shape.quality is not None:
         typer.echo(f'quality: {shape.quality.summary}')
 

@@ -8,6 +8,7 @@ from active_recon.calibration.board import Board
 from active_recon.errors import DataError
 from active_recon.photos.board_print import seen_board
 from active_recon.photos.cube import Cube
+from active_recon.photos.ground import BOARD_GROUND
 from active_recon.photos.hull import depth_in_masks, hull, object_box, seen_cells
 from active_recon.photos.silhouette_fusion import CELLS, silhouettes
 from active_recon.photos.views import PhotoView
@@ -48,7 +49,7 @@ def board_views(views: Sequence[PhotoView], board: Board, cube: Cube | None
         raise DataError(f'object not found: {empty[0]}', 'no_object')
     if not told:
         depths = depth_in_masks(found, [cube.camera(view.camera, 1.0) for view in found], CELLS)
-        agreed = hull(depths) & cube.above_ground(CELLS)
+        agreed = hull(depths) & BOARD_GROUND.above(cube, CELLS)
         cube = _about(agreed, cube) if agreed.any() else cube
     return found, empty, cube
 

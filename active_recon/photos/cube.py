@@ -68,18 +68,6 @@ class Cube:
         found[:3, 3] = self.centre
         return found
 
-    def above_ground(self, side: int) -> NDArray[np.bool_]:
-        """Return the cells, (side, side, side), that reach above 0 of the world's `up`."""
-        tops = (np.arange(side) + 1) / side - 0.5
-        height = float(self.centre @ self.up / np.linalg.norm(self.up))
-        return np.broadcast_to(height + tops * self.side > 0, (side, side, side))
-
-    def of_side(self, side: float, grounded: bool) -> 'Cube':
-        """Return a cube of another side about the same centre; if `grounded`, it stands on 0."""
-        up = self.up / np.linalg.norm(self.up)
-        raised = side / 2 - float(self.centre @ up) if grounded else 0.0
-        return Cube(self.centre + raised * up, side, self.up)
-
     def part(self, box: NDArray[np.float64]) -> 'Cube':
         """Return the cube about a box in sides of this cube, from its centre, (2, 3)."""
         centre = self.centre + self.rotation.T @ box.mean(axis=0) * self.side

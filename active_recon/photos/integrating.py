@@ -7,6 +7,7 @@ from typing import TypeVar
 from active_recon.errors import DataError, ViewError
 from active_recon.photos.backgrounds import shown_image
 from active_recon.photos.cube import Cube
+from active_recon.photos.ground import Ground
 from active_recon.photos.hull import (
     ceiling,
     coverage,
@@ -29,7 +30,7 @@ COVERED = 0.95
 _COVERED_PLAIN = 0.995  # of masks by colour: they lack what has the background's colour
 T = TypeVar('T')
 Advance = Callable[[int, str], None]
-_SEARCHED_VIEWS = 8
+SEARCHED_VIEWS = 8
 _ROUNDS = 4
 _HULL_CELLS = 48
 _WIDER = 1.2  # than where the search begins is the cube at most, before any background
@@ -85,14 +86,14 @@ def carved(grid: VoxelGrid, threshold: float, views: Sequence[PhotoView],
 
 
 def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstructor,
-               background: str, grounded: bool = False) -> Cube:
+               background: str, ground: Ground | None = None) -> Cube:
     """
     Return the cube about the object, found in `start` and cut down to what is in it.
 
-    Where every view has a mask, their hull is in it, else the network's reconstruction; if
-    `grounded`, only above 0 of the world's `up`. Raises DataError where nothing is.
+    Where every view has a mask, their hull is in it, else the network's reconstruction; nothing
+    under a ground is. Raises DataError where nothing is.
     """
-    some = even_choice(views, _SEARCHED_VIEWS)
+    some = even_choice(views, SEARCHED_VIEWS)
     cube, largest = start, start.side * (_WIDER if background == 'segment' else 1.0)
     for _ in range(_ROUNDS):
         cameras = [cube.camera(view.camera, 1.0) for view in some]
@@ -100,12 +101,12 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
             cells = hull(depth_in_masks(some, cameras, _HULL_CELLS))
             cells &= seen_cells(cameras, _HULL_CELLS)
         elif background == 'segment':
-            cells = segmented_cells(some, cube, shipped_segmentation())
+            cells = segmented_cells(some, cube, shipped_segmentation(), ground)
             cells &= seen_cells(cameras, len(cells))
         else:
             taken, _ = integrate(some, cube, 1.0, reconstructor, background)
             cells = taken[-1].known.grid.occupied(reconstructor.threshold)
-        box = object_box(cells & cube.above_ground(len(cells)) if grounded else cells)
+        box = object_box(cells if ground is None else cells & ground.above(cube, len(cells)))
         if box is None:
             raise DataError('object not found: expected one where the photos look, found nothing '
                             'there; give its place by --box, or masks by --masks', 'no_cube')

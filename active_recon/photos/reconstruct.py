@@ -15,7 +15,15 @@ from active_recon.photos.conventions import misreading
 from active_recon.photos.cube import Cube, first_cube, NARROWER, upward, WIDER
 from active_recon.photos.doubts import doubts
 from active_recon.photos.files import in_order_of, open_photos, photo_paths
-from active_recon.photos.integrating import carved, even_choice, found_cube, integrate
+from active_recon.photos.ground import BOARD_GROUND, Ground
+from active_recon.photos.ground_search import found_ground
+from active_recon.photos.integrating import (
+    carved,
+    even_choice,
+    found_cube,
+    integrate,
+    SEARCHED_VIEWS,
+)
 from active_recon.photos.segmented_views import segmented_views
 from active_recon.photos.shape import Shape, TakenView
 from active_recon.photos.sources import posed_by, Source
@@ -44,6 +52,7 @@ class Options:
     - background: one of BACKGROUNDS; masks: a folder of masks
     - views: how many photos at even steps are used; None: all
     - order: of the photos, one of ORDERS
+    - ground: whether the table under the object is searched in the photos
     - model: a model that ships by its name, or a weights file; threads: of the CPU
 
     Raises ConfigError on values that contradict each other.
@@ -60,6 +69,7 @@ class Options:
     model: str | Path = PHOTOS_MODEL
     threads: int | None = 1
     order: str = 'name'
+    ground: bool = True
 
     def __post_init__(self) -> None:
         """Reject what cannot be, before any photo is read."""
@@ -84,7 +94,8 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
                 *, background: str = 'auto', masks: Path | str | None = None,
                 box: Sequence[float] | None = None, unit: float = 1.0, up: str | None = None,
                 views: int | None = None, model: str | Path = PHOTOS_MODEL,
-                threads: int | None = 1, order: str = 'name', axes: str | None = None) -> Shape:
+                threads: int | None = 1, order: str = 'name', axes: str | None = None,
+                ground: bool = True) -> Shape:
     """
     Reconstruct an object from photos of known cameras.
 
@@ -97,7 +108,7 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
     cameras. Raises ActiveReconError where no photo can be used.
     """
     options = Options(box, unit, size, up, axes, background, None if masks is None else
-                      Path(masks), views, model, threads, order)
+                      Path(masks), views, model, threads, order, ground)
     if isinstance(cameras, str):
         cameras = Path(cameras)
     if cameras is not None and not isinstance(cameras, Source):
@@ -166,16 +177,20 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
     if background == 'auto' and before_clutter(views):
         background, views = 'segment', [
             replace(view, mask=None, mask_source='') for view in views]
-    if cube is None:
-        with reporting('finding the object', 1) as advance:
-            start = first_cube(poses, up, NARROWER if background == 'segment' else WIDER)
-            cube = found_cube(views, start, reconstructor, background, file.board is not None)
-            advance(1, '')
+    with reporting('finding the object', 1) as advance:
+        start = cube or first_cube(poses, up, NARROWER if background == 'segment' else WIDER)
+        ground = _ground(views, file, start, options.ground)
+        if ground is not None and up is None:
+            start = replace(start, up=ground.normal)
+        cube = start if cube is not None else found_cube(
+            views, start, reconstructor, background, ground)
+        advance(1, '')
     if options.size and file.metric and options.box is None:
-        cube = cube.of_side(options.size, file.board is not None)
+        cube = replace(cube, side=options.size)
+        cube = cube if ground is None else ground.under(cube)
     shown = views
     if background == 'segment':
-        shown, unfound = segmented_views(views, cube, shipped_segmentation())
+        shown, unfound = segmented_views(views, cube, shipped_segmentation(), ground)
         empty = [*empty, *unfound]
         if not shown:
             raise DataError(f'object not found: {empty[0]}', 'no_object')
@@ -184,14 +199,24 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         taken, unseen = integrate(shown, cube, size, reconstructor, background, advance,
                                   with_depth=True)
     grid, covered = carved(taken[-1].known.grid, reconstructor.threshold, views, cube)
-    if file.board is not None:
-        occupancy = np.where(cube.above_ground(len(grid.occupancy)), grid.occupancy, np.float32(0))
-        grid = VoxelGrid(occupancy, grid.size)
-    return Shape(grid, reconstructor.threshold, taken, cube,
+    if ground is not None:
+        above = ground.above(cube, len(grid.occupancy))
+        grid = VoxelGrid(np.where(above, grid.occupancy, np.float32(0)), grid.size)
+    return Shape(grid, reconstructor.threshold, taken, cube, ground,
                  named([view.background for view in taken]), [*left_out, *empty, *unseen],
                  [*doubts(taken, views, cube, reconstructor, background, covered,
                           file.looks),
                   *_without_depth(views, taken)], dict(reconstructor.provenance))
+
+
+def _ground(views: Sequence[PhotoView], file: CameraFile, start: Cube,
+            searched: bool) -> Ground | None:
+    """Return what the object stands on: the board, or a table if it is `searched` and found."""
+    if file.board is not None:
+        return BOARD_GROUND
+    if not searched:
+        return None
+    return found_ground(even_choice(views, SEARCHED_VIEWS), start.centre, start.up)
 
 
 def _without_depth(views: Sequence[PhotoView], taken: Sequence[TakenView]) -> list[str]:

@@ -56,6 +56,8 @@ def described(shape: Shape) -> dict[str, object]:
         'world_from_object': shape.world_from_object.tolist(),
         'cube': {'centre': shape.cube.centre.tolist(), 'side': shape.cube.side,
                  'up': shape.cube.up.tolist()},
+        'ground': None if shape.ground is None else {
+            'normal': shape.ground.normal.tolist(), 'level': shape.ground.level},
         'background': shape.background,
         'views': [{'photo': view.name, 'background': view.background,
                    'depth': view.depth is not None,

@@ -7,6 +7,7 @@ from dataclasses import replace
 from active_recon.errors import ViewError
 from active_recon.geometry.resampling import carried_back
 from active_recon.photos.cube import Cube
+from active_recon.photos.ground import Ground
 from active_recon.photos.seen_photo import SeenPhoto
 from active_recon.photos.silhouette_fusion import CELLS, segmented_silhouettes
 from active_recon.photos.views import PhotoView
@@ -17,12 +18,12 @@ from numpy.typing import NDArray
 _UNKNOWN = np.float32(0.5)  # the object's share of pixels that no photo has
 
 
-def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmentation
-                    ) -> tuple[list[PhotoView], list[str]]:
+def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmentation,
+                    ground: Ground | None = None) -> tuple[list[PhotoView], list[str]]:
     """
     Return views on white by what all of them agree is the object, and why others are left out.
 
-    Edges and what is in doubt are in between.
+    Edges and what is in doubt are in between. Nothing under a ground is the object.
     """
     found, left_out = [], []
     for view in views:
@@ -30,7 +31,8 @@ def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmen
             found.append((view, segmentation.framed(view.image, cube.camera(view.camera, 1.0))))
         except ViewError as error:
             left_out.append(f'{view.name}: {error}')
-    agreed = agreed_shares([framed for _, framed in found])
+    agreed = agreed_shares([framed for _, framed in found],
+                           None if ground is None else ground.above(cube, CELLS))
     shown = []
     for (view, framed), share in zip(found, agreed, strict=True):
         if share.max() <= _UNKNOWN:
@@ -43,22 +45,28 @@ def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmen
     return shown, left_out
 
 
-def segmented_cells(views: Sequence[PhotoView], cube: Cube,
-                    segmentation: Segmentation) -> NDArray[np.bool_]:
+def segmented_cells(views: Sequence[PhotoView], cube: Cube, segmentation: Segmentation,
+                    ground: Ground | None = None) -> NDArray[np.bool_]:
     """Return the cells of a cube, (C, C, C), that the views agree are the object."""
     found = []
     for view in views:
         with suppress(ViewError):
             found.append(segmentation.framed(view.image, cube.camera(view.camera, 1.0)))
-    return _agreed(found)[1] if found else np.zeros((CELLS,) * 3, np.bool_)
+    above = None if ground is None else ground.above(cube, CELLS)
+    return _agreed(found, above)[1] if found else np.zeros((CELLS,) * 3, np.bool_)
 
 
-def agreed_shares(framed: Sequence[FramedShares]) -> list[NDArray[np.float32]]:
-    """Return the object's share in each pixel, (S, S) each, that framed images agree on."""
-    return _agreed(framed)[0] if framed else []
+def agreed_shares(framed: Sequence[FramedShares], above: NDArray[np.bool_] | None = None
+                  ) -> list[NDArray[np.float32]]:
+    """
+    Return the object's share in each pixel, (S, S) each, that framed images agree on.
+
+    Only the cells of the cube, (C, C, C), that are `above` a ground may be the object.
+    """
+    return _agreed(framed, above)[0] if framed else []
 
 
-def _agreed(framed: Sequence[FramedShares]
+def _agreed(framed: Sequence[FramedShares], above: NDArray[np.bool_] | None
             ) -> tuple[list[NDArray[np.float32]], NDArray[np.bool_]]:
     """Return the shares and the cells, (C, C, C), that framed images agree on."""
     photos = []
@@ -67,4 +75,4 @@ def _agreed(framed: Sequence[FramedShares]
         seen = (np.full(image.shape[:2], True) if each.image.shape[2] == 3
                 else each.image[..., 3] > 127)
         photos.append(SeenPhoto(each.camera, image, image, seen, np.zeros_like(image)))
-    return segmented_silhouettes(photos, [each.shares for each in framed])
+    return segmented_silhouettes(photos, [each.shares for each in framed], above)

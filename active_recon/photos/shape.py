@@ -9,6 +9,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.meshes.coloring import colored
 from active_recon.meshes.photos import album_of
 from active_recon.photos.cube import Cube
+from active_recon.photos.ground import Ground
 from active_recon.quality.quality import Quality
 from active_recon.reconstructor import Reconstruction
 from active_recon.volumes.depth_images import DepthImage
@@ -47,6 +48,7 @@ class Shape:
     - grid: its occupancy; cells above `threshold` are occupied
     - views: the photos it was made from; left_out: why others were not used
     - cube: the object's place in the world of the camera file
+    - ground: the board or table that it stands on, in the same world; None: none was found
     - background: in words, where the silhouettes are from
     - provenance: hashes and runtime of the network
     """
@@ -55,6 +57,7 @@ class Shape:
     threshold: float
     views: Sequence[TakenView]
     cube: Cube
+    ground: Ground | None
     background: str
     left_out: Sequence[str] = ()
     warnings: Sequence[str] = ()

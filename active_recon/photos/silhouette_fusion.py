@@ -17,6 +17,7 @@ from active_recon.geometry.cameras import Camera
 from active_recon.geometry.framing import cube_corners
 from active_recon.photos.board_print import SeenBoard, UNIFORM
 from active_recon.photos.cube import Cube
+from active_recon.photos.ground import BOARD_GROUND
 from active_recon.photos.seen_photo import SeenPhoto
 from active_recon.volumes.voxels import cell_centers
 import cv2
@@ -71,7 +72,7 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
     A cell has to show the object in `least_share` of the photos, the more so where another one
     shows the board through it. Nothing is found outside of the cube or below the board.
     """
-    above = cube.above_ground(CELLS).ravel()
+    above = BOARD_GROUND.above(cube, CELLS).ravel()
     places = [_place(cube.camera(photo.camera, 1.0), above) for photo in photos]
     sure = [place.outline & (photo.known & (UNIFORM - photo.fit > _SURE))
             for photo, place in zip(photos, places, strict=True)]
@@ -92,16 +93,18 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
     return found, ((total > 0) & above).reshape((CELLS,) * 3)
 
 
-def segmented_silhouettes(photos: Sequence[SeenPhoto], shares: Sequence[NDArray[np.float32]]
+def segmented_silhouettes(photos: Sequence[SeenPhoto], shares: Sequence[NDArray[np.float32]],
+                          above: NDArray[np.bool_] | None = None
                           ) -> tuple[list[NDArray[np.float32]], NDArray[np.bool_]]:
     """
     Return the object's share in each pixel, (H, W) in [0, 1] each, and its cells, (S, S, S).
 
     `shares` are those of a segmenter. The cameras are in the object frame, lengths in sides of the
-    cube. Pixels that are not `known`, which the camera did not see, tell nothing.
+    cube. Pixels that are not `known`, which the camera did not see, tell nothing. Only the cells
+    `above` a ground may be the object; None: all may.
     """
-    everywhere = np.full(CELLS ** 3, True)
-    places = [_place(photo.camera, everywhere) for photo in photos]
+    may_be = np.full(CELLS ** 3, True) if above is None else above.ravel()
+    places = [_place(photo.camera, may_be) for photo in photos]
     places = [replace(place, shown=place.shown & photo.known[place.down, place.across])
               for photo, place in zip(photos, places, strict=True)]
     sure = [share.clip(_LEAST_SHARE, 1 - _LEAST_SHARE) for share in shares]
@@ -117,7 +120,7 @@ def segmented_silhouettes(photos: Sequence[SeenPhoto], shares: Sequence[NDArray[
             for photo, logit in zip(photos, logits, strict=True)]
 
     found, total = _agreed(photos, places, by_both(shares), by_both, _SEGMENTED_SHARE)
-    return found, (total > 0).reshape((CELLS,) * 3)
+    return found, ((total > 0) & may_be).reshape((CELLS,) * 3)
 
 
 def _agreed(photos: Sequence[SeenPhoto], places: Sequence['_Place'], own: list[Logits],

@@ -1,0 +1,149 @@
+"""The table under an object is found where photos agree on its texture; nothing is in it."""
+
+from active_recon.geometry.cameras import Camera
+from active_recon.photos.camera_file import CameraFile
+from active_recon.photos.cube import Cube
+from active_recon.photos.ground import BOARD_GROUND, Ground
+from active_recon.photos.ground_search import found_ground
+from active_recon.photos.reconstruct import from_views, Options
+from active_recon.photos.saving import described
+from active_recon.photos.views import view_of
+from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxels import cell_centers, iou
+import numpy as np
+from photo_scene import thing
+import photo_table
+import pytest
+import trimesh
+
+UP = np.array([0.0, 0.0, 1.0])
+SIZE = 0.14
+
+
+def photos_of(mesh, cameras, pattern='boards', seed=0):
+    images, _ = photo_table.photographed(mesh, cameras, pattern, np.random.default_rng(seed))
+    return [view_of(str(number), *both)
+            for number, both in enumerate(zip(images, cameras, strict=True))]
+
+
+@pytest.fixture(scope='module')
+def mesh():
+    return photo_table.centred(thing(), SIZE)
+
+
+@pytest.fixture(scope='module')
+def cameras():
+    return photo_table.around(8, 3 * SIZE, np.random.default_rng(1))
+
+
+@pytest.fixture(scope='module')
+def views(mesh, cameras):
+    return photos_of(mesh, cameras)
+
+
+def test_cells_are_above_the_ground_that_reach_above_it():
+    below = BOARD_GROUND.above(Cube(np.zeros(3), 1.0, UP), 4)
+    np.testing.assert_array_equal(below[0, 0], [False, False, True, True])
+    cube = Cube(np.array([0.3, -0.2, 0.1]), 0.8, np.array([0.2, 0.1, 1.0]))
+    tilted = Ground(np.array([0.6, 0.0, 0.8]), 0.15)
+    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T / 16
+    reach = (cell_centers(16)[:, None] + corners) @ cube.rotation * cube.side + cube.centre
+    np.testing.assert_array_equal(tilted.above(cube, 16).ravel(),
+                                  (tilted.height(reach) > 0).any(axis=1))
+
+
+@pytest.mark.parametrize('normal', [UP, np.array([0.0, 0.6, 0.8])])
+def test_a_cube_on_the_ground_touches_it_with_its_lowest_corner(normal):
+    ground = Ground(normal, -0.4)
+    cube = ground.under(Cube(np.array([1.0, 2, 3]), 0.5, np.array([0.1, 0.0, 2])))
+    corners = np.array(np.meshgrid(*[[-0.25, 0.25]] * 3)).reshape(3, -1).T
+    heights = ground.height(corners @ cube.rotation + cube.centre)
+    assert heights.min() == pytest.approx(0, abs=1e-9) and cube.side == 0.5
+    moved = cube.centre - [1, 2, 3]
+    np.testing.assert_allclose(np.cross(moved, normal), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize(('up', 'middle'), [
+    (UP, np.zeros(3)), (np.array([0.04, -0.03, 1.0]), np.array([0.02, -0.01, 0.03]))])
+def test_a_table_is_found_as_high_as_it_is_and_level(views, mesh, up, middle):
+    ground = found_ground(views, middle, up)
+    assert np.degrees(np.arccos(ground.normal @ UP)) < 0.5
+    under = np.array([0, 0, mesh.bounds[0, 2]])
+    assert abs(ground.height(under)) < 0.01 * SIZE
+
+
+def test_any_similarity_of_the_world_carries_the_table_along(views):
+    turn = trimesh.transformations.rotation_matrix(2.0, [1, 2, -1])
+    moved = []
+    for view in views:
+        pose = turn @ view.camera.pose
+        pose[:3, 3] = 7 * pose[:3, 3] + [5, -3, 2]
+        moved.append(view_of(view.name, view.image, Camera(pose, view.camera.intrinsics)))
+    here = found_ground(views, np.zeros(3), UP)
+    there = found_ground(moved, np.array([5.0, -3, 2]), turn[:3, :3] @ UP)
+    np.testing.assert_allclose(there.normal, turn[:3, :3] @ here.normal, atol=0.01)
+    assert float(there.height(np.array([5.0, -3, 2]))) == pytest.approx(
+        7 * float(here.height(np.zeros(3))), abs=0.01 * 7 * SIZE)
+
+
+def test_a_lid_with_a_texture_is_not_taken_for_the_table_below_it(cameras):
+    box = trimesh.creation.box([SIZE, SIZE, 0.6 * SIZE]).subdivide().subdivide().subdivide()
+    rng = np.random.default_rng(0)
+    box.visual.vertex_colors = rng.integers(0, 256, (len(box.vertices), 3))
+    ground = found_ground(photos_of(box, cameras), np.zeros(3), UP)
+    assert float(ground.height(np.zeros(3))) == pytest.approx(0.3 * SIZE, abs=0.01 * SIZE)
+
+
+@pytest.mark.parametrize('count', [0, 2])
+def test_two_photos_tell_no_table(views, count):
+    assert found_ground(views[:count], np.zeros(3), UP) is None
+
+
+def test_a_texture_as_coarse_as_the_object_tells_no_table(mesh, cameras):
+    assert found_ground(photos_of(mesh, cameras, 'coarse'), np.zeros(3), UP) is None
+
+
+def test_without_a_table_there_is_none(views):
+    rng = np.random.default_rng(0)
+    for images in (np.full((8, 480, 640, 3), 200), rng.integers(0, 256, (8, 480, 640, 3))):
+        others = [view_of(view.name, image.astype(np.uint8), view.camera)
+                  for view, image in zip(views, images, strict=True)]
+        assert found_ground(others, np.zeros(3), UP) is None
+
+
+def test_what_is_seen_from_below_stands_on_nothing(views):
+    low = view_of('low', views[0].image, Camera(
+        np.diag([1.0, -1, -1, 1]) @ views[0].camera.pose, views[0].camera.intrinsics))
+    assert low.camera.position[2] < 0
+    assert found_ground([*views, low], np.zeros(3), UP) is None
+
+
+@pytest.fixture(scope='module')
+def shapes(views):
+    """Return the shape on the table that is found, and that with none."""
+    return [from_views(views, CameraFile('a table', ()), Options(ground=ground))
+            for ground in (True, False)]
+
+
+def test_nothing_of_the_object_is_in_the_table_that_was_found(shapes, mesh):
+    shape, without = shapes
+    assert without.ground is None and described(without)['ground'] is None
+    assert described(shape)['ground']['level'] == shape.ground.level
+    carried = trimesh.transform_points(shape.mesh().vertices, shape.world_from_object)
+    assert shape.ground.height(carried).min() > -0.03 * SIZE
+    carried = trimesh.transform_points(without.mesh().vertices, without.world_from_object)
+    assert shape.ground.height(carried).min() < -0.05 * SIZE
+    ious = []
+    for each in shapes:
+        placed = mesh.copy()
+        placed.apply_transform(np.linalg.inv(each.world_from_object))
+        placed.apply_scale(1 / each.size)
+        ious.append(iou(each.occupancy > each.threshold,
+                        voxelise(placed, len(each.occupancy)).occupied(0.5)))
+    assert ious[0] > ious[1]
+
+
+def test_the_object_is_upright_on_its_table_where_the_cameras_do_not_tell_what_is_up(shapes):
+    shape, without = shapes
+    np.testing.assert_allclose(shape.cube.up, shape.ground.normal)
+    assert np.arccos(shape.cube.up @ UP) < np.arccos(without.cube.up @ UP)
