@@ -38,6 +38,7 @@ from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import iou
+from benchmarks.photographed_grounds import ground_table, grounds
 from benchmarks.photos_on_tables import interval, MODELS, on_tables, SIZE, some_models
 from benchmarks.studies import with_tables_between_marks
 import numpy as np
@@ -67,7 +68,7 @@ def main() -> None:
                         help='a model that ships, or a weights file')
     parser.add_argument('--out', type=Path, default=Path('photos.json'))
     parser.add_argument('--parts', nargs='*', default=[
-        'photographs', 'command_s', 'rendered', 'board', 'phone', 'table'],
+        'photographs', 'command_s', 'rendered', 'board', 'phone', 'table', 'grounds'],
         help='others stay as they are')
     options = parser.parse_args()
     model = options.model
@@ -76,7 +77,8 @@ def main() -> None:
                'rendered': lambda: _rendered(model),
                'board': lambda: _on_board(options.objects, _BOARD_VIEWS, model),
                'phone': lambda: _on_board(options.objects, _PHONE_VIEWS, model, as_of_a_phone),
-               'table': lambda: on_tables(options.objects, model)}
+               'table': lambda: on_tables(options.objects, model),
+               'grounds': lambda: grounds(options.objects)}
     result = json.loads(options.out.read_text()) if options.out.exists() else {}
     named = '' if model == PHOTOS_MODEL else f' --model {model}'
     result['command'] = ('PYTHONPATH=test python -m benchmarks.photos photos/dino_sparse_ring'
@@ -126,8 +128,10 @@ def _board_rows(board: Mapping[str, Any], photos: str,
 
 
 def with_table(text: str, result: Mapping[str, Any], faster: Mapping[str, Any]) -> str:
-    """Return a page with the table between its marks."""
-    return with_tables_between_marks(text, {'photos': lambda: table(result, faster)})
+    """Return a page with the tables between their marks."""
+    return with_tables_between_marks(text, {
+        'photos': lambda: table(result, faster),
+        'grounds': lambda: ground_table(result['grounds'])})
 
 
 def _told(interval: Mapping[str, float]) -> str:

@@ -31,3 +31,12 @@ def test_the_network_of_photos_ships_and_is_ahead_of_the_faster_one():
     for part in ('rendered', 'board', 'phone', 'table'):
         for way, figure in result[part]['iou'].items():
             assert figure['mean'] > faster[part]['iou'][way]['mean'], (part, way)
+
+
+def test_tables_that_were_found_are_where_they_are_and_most_with_a_texture_were():
+    for kind, patterns in measured()['grounds'].items():
+        errors = [error for errors in patterns.values() for error in errors if error is not None]
+        assert max(errors) < 0.04, kind
+        for pattern in ('boards', 'fine'):
+            missed = [error is None for error in patterns[pattern]]
+            assert np.mean(missed) <= 0.1, (kind, pattern)

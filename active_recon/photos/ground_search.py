@@ -90,10 +90,9 @@ def _peaks(compared: Callable[[NDArray[np.float64], float], _Plane], up: NDArray
            step: float) -> list[_Plane]:
     """Return the planes across about `up` that look most alike, of all heights in steps."""
     heights = (np.arange(_HEIGHTS) - _HEIGHTS // 2) * step
-    swept = [compared(up, height) for height in heights]
-    if max(plane.shown for plane in swept) < _SHOWN:
-        return []
-    alike, found = np.array([plane.alike for plane in swept]), []
+    if max(compared(up, height).shown for height in heights[::_APART]) < _SHOWN:
+        return []  # before a plain background, in a fifth of the time
+    alike, found = np.array([compared(up, height).alike for height in heights]), []
     for _ in range(_PEAKS):
         peak = int(alike.argmax())
         if alike[peak] > 0:
