@@ -1,5 +1,6 @@
 """The table under an object is found where photos agree on its texture; nothing is in it."""
 
+from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.cube import Cube
@@ -141,6 +142,15 @@ def test_nothing_of_the_object_is_in_the_table_that_was_found(shapes, mesh):
         ious.append(iou(each.occupancy > each.threshold,
                         voxelise(placed, len(each.occupancy)).occupied(0.5)))
     assert ious[0] > ious[1]
+
+
+def test_where_nothing_is_above_what_was_taken_for_a_table_the_error_names_the_way_out(
+        views, monkeypatch):
+    monkeypatch.setattr('active_recon.photos.reconstruct.found_ground',
+                        lambda views, middle, up: Ground(UP, 2 * SIZE))
+    for box in (None, (0.0, 0.0, 0.0, 1.1 * SIZE)):
+        with pytest.raises(DataError, match='leave it out by --no-ground'):
+            from_views(views[:3], CameraFile('a table', ()), Options(box=box))
 
 
 def test_the_object_is_upright_on_its_table_where_the_cameras_do_not_tell_what_is_up(shapes):

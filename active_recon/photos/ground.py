@@ -38,3 +38,9 @@ class Ground:
 
 BOARD_GROUND = Ground(np.array([0.0, 0.0, 1.0]), 0.0)
 """The printed face of a board, in the board's world."""
+
+
+def no_table(ground: Ground | None) -> str:
+    """Return what to try where nothing is found above a table: it may be the object's lid."""
+    return '' if ground in (None, BOARD_GROUND) else (
+        '; or, if what was taken for a table is the object, leave it out by --no-ground')

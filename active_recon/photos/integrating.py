@@ -7,7 +7,7 @@ from typing import TypeVar
 from active_recon.errors import DataError, ViewError
 from active_recon.photos.backgrounds import shown_image
 from active_recon.photos.cube import Cube
-from active_recon.photos.ground import Ground
+from active_recon.photos.ground import Ground, no_table
 from active_recon.photos.hull import (
     ceiling,
     coverage,
@@ -109,7 +109,8 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
         box = object_box(cells if ground is None else cells & ground.above(cube, len(cells)))
         if box is None:
             raise DataError('object not found: expected one where the photos look, found nothing '
-                            'there; give its place by --box, or masks by --masks', 'no_cube')
+                            'there; give its place by --box, or masks by --masks'
+                            + no_table(ground), 'no_cube')
         before, cube = cube, cube.part(box)
         cube = replace(cube, side=min(cube.side, largest))
         moved = float(np.linalg.norm(cube.centre - before.centre))

@@ -15,7 +15,7 @@ from active_recon.photos.conventions import misreading
 from active_recon.photos.cube import Cube, first_cube, NARROWER, upward, WIDER
 from active_recon.photos.doubts import doubts
 from active_recon.photos.files import in_order_of, open_photos, photo_paths
-from active_recon.photos.ground import BOARD_GROUND, Ground
+from active_recon.photos.ground import BOARD_GROUND, Ground, no_table
 from active_recon.photos.ground_search import found_ground
 from active_recon.photos.integrating import (
     carved,
@@ -193,7 +193,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         shown, unfound = segmented_views(views, cube, shipped_segmentation(), ground)
         empty = [*empty, *unfound]
         if not shown:
-            raise DataError(f'object not found: {empty[0]}', 'no_object')
+            raise DataError(f'object not found: {empty[0]}{no_table(ground)}', 'no_object')
     size = options.size or cube.side * options.unit
     with reporting('reconstructing', len(views)) as advance:
         taken, unseen = integrate(shown, cube, size, reconstructor, background, advance,
