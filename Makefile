@@ -18,7 +18,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet
 # Live tests mostly wait, hence more workers than two cores; one thread each, so that they share.
 TEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:cacheprovider -n 4 --dist loadfile \
-	--no-loadscope-reorder
+	--no-loadscope-reorder --max-worker-restart 0
 SPHINX := $(BIN)/python -m sphinx -q -W --keep-going -b html
 SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell find \
 	active_recon msg_tools resource scripts launch config rviz security \
