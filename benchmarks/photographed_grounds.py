@@ -7,15 +7,13 @@ from active_recon.geometry.cameras import Camera
 from active_recon.photos.cube import first_cube, NARROWER
 from active_recon.photos.ground_search import found_ground
 from active_recon.photos.views import PhotoView
-from active_recon.volumes.meshes import load_mesh
-from benchmarks.photos_on_tables import SIZE, some_models
+from benchmarks.photos_on_tables import scenes, SIZE, some_models
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from phone_photos import as_of_a_phone
-from photo_table import around, centred, PATTERNS, photographed
+from photo_table import PATTERNS
 
-_VIEWS = 8
 _ANGLE, _SHARE = np.radians(0.3), 0.003  # rad, and of the distance, by which poses are off
 _UP = np.array([0.0, 0.0, 1.0])
 Image = NDArray[np.uint8]
@@ -45,15 +43,11 @@ def grounds(count: int) -> dict[str, Any]:
     """
     found: dict[str, dict[str, list[float | None]]] = {
         kind: {pattern: [] for pattern in PATTERNS} for kind in KINDS}
-    for number, file in enumerate(some_models(count)):
-        rng = np.random.default_rng(number)
-        mesh, cameras = centred(load_mesh(file), SIZE), around(_VIEWS, 3 * SIZE, rng)
-        pattern = list(PATTERNS)[number % len(PATTERNS)]
-        images, _ = photographed(mesh, cameras, pattern, rng)
+    for mesh, pattern, photos, _, rng in scenes(some_models(count)):
         under = np.array([0.0, 0.0, mesh.bounds[0, 2]])
         for kind, change in KINDS.items():
-            views = [PhotoView('', *change(*both, rng))
-                     for both in zip(images, cameras, strict=True)]
+            views = [PhotoView(photo.name, *change(photo.image, photo.camera, rng))
+                     for photo in photos]
             start = first_cube([view.camera for view in views], _UP, NARROWER)
             ground = found_ground(views, start.centre, _UP)
             found[kind][pattern].append(

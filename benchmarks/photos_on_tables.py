@@ -1,6 +1,6 @@
 """Photos of objects on tables before clutter: poses are known, masks are not."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 import sys
@@ -17,6 +17,7 @@ from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import cell_centers, iou
 import numpy as np
+from numpy.typing import NDArray
 from photo_table import around, centred, PATTERNS, photographed
 
 MODELS = Path(__file__).parent / 'real_cc0'
@@ -31,14 +32,7 @@ def on_tables(count: int, model: str) -> dict[str, Any]:
     """Return the IoU of objects on tables, by what is known beside the poses, with intervals."""
     found: dict[str, list[float]] = {way: [] for way in _WAYS}
     models, file = some_models(count), CameraFile('true', (), np.array([0.0, 0.0, 1.0]))
-    for number, each in enumerate(models):
-        rng = np.random.default_rng(number)
-        mesh = centred(load_mesh(each), SIZE)
-        cameras = around(_VIEWS, 3 * SIZE, rng)
-        pattern = list(PATTERNS)[number % len(PATTERNS)]
-        images, masks = photographed(mesh, cameras, pattern, rng)
-        views = [PhotoView(str(view), image, camera) for view, (image, camera)
-                 in enumerate(zip(images, cameras, strict=True))]
+    for each, (mesh, pattern, views, masks, _) in zip(models, scenes(models), strict=True):
         masked = [replace(view, mask=mask, mask_source='masks')
                   for view, mask in zip(views, masks, strict=True)]
         free = Options(model=model)
@@ -57,6 +51,19 @@ def on_tables(count: int, model: str) -> dict[str, Any]:
             file=sys.stderr, flush=True)
     return {'objects': [each.stem for each in models], 'views': _VIEWS,
             'each': found, 'iou': {way: interval(values) for way, values in found.items()}}
+
+
+def scenes(models: Sequence[Path]) -> Iterator[tuple[
+        Any, str, list[PhotoView], list[NDArray[np.bool_]], np.random.Generator]]:
+    """Yield the mesh of each model, its table's pattern, photos, true masks, and the generator."""
+    for number, each in enumerate(models):
+        rng = np.random.default_rng(number)
+        mesh = centred(load_mesh(each), SIZE)
+        cameras = around(_VIEWS, 3 * SIZE, rng)
+        pattern = list(PATTERNS)[number % len(PATTERNS)]
+        images, masks = photographed(mesh, cameras, pattern, rng)
+        yield mesh, pattern, [PhotoView(str(view), image, camera) for view, (image, camera)
+                              in enumerate(zip(images, cameras, strict=True))], masks, rng
 
 
 def _iou_around(shape: Shape, mesh: Any) -> float:

@@ -48,11 +48,7 @@ class Cube:
     @property
     def rotation(self) -> NDArray[np.float64]:
         """Object frame from world, (3, 3): `up` becomes z, the axis farthest from it turns x."""
-        z = self.up / np.linalg.norm(self.up)
-        axis = np.eye(3)[int(np.abs(z).argmin())]
-        x = axis - z * (z @ axis)
-        x /= np.linalg.norm(x)
-        return np.array([x, np.cross(z, x), z])
+        return upright(self.up)
 
     def camera(self, camera: Camera, size: float) -> Camera:
         """Return a camera of the world in the object frame, where the cube's side is `size`."""
@@ -72,6 +68,22 @@ class Cube:
         """Return the cube about a box in sides of this cube, from its centre, (2, 3)."""
         centre = self.centre + self.rotation.T @ box.mean(axis=0) * self.side
         return Cube(centre, MARGIN * float(np.ptp(box, axis=0).max()) * self.side, self.up)
+
+
+def upright(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return x, y, z of an upright frame, (3, 3): `up` is z, the axis farthest from it turns x."""
+    z = up / np.linalg.norm(up)
+    axis = np.eye(3)[int(np.abs(z).argmin())]
+    x = axis - z * (z @ axis)
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(z, x), z])
+
+
+def shown_width(camera: Camera, point: NDArray[np.float64]) -> float:
+    """Return how wide a part a camera shows at a point, along the shorter side of its image."""
+    lens = camera.intrinsics
+    return float(np.linalg.norm(camera.position - point)) * min(
+        lens.width / lens.fx, lens.height / lens.fy)
 
 
 def meeting_point(cameras: Sequence[Camera]) -> NDArray[np.float64]:
@@ -104,9 +116,7 @@ def first_cube(cameras: Sequence[Camera], up: NDArray[np.float64] | None,
     """
     centre = meeting_point(cameras)
     distances = [float(np.linalg.norm(camera.position - centre)) for camera in cameras]
-    lenses = [camera.intrinsics for camera in cameras]
-    widths = [distance * min(lens.width / lens.fx, lens.height / lens.fy)
-              for distance, lens in zip(distances, lenses, strict=True)]
+    widths = [shown_width(camera, centre) for camera in cameras]
     side = min(share * float(np.median(widths)), _OF_DISTANCE * min(distances))
     return Cube(centre, side, upward(cameras) if up is None else up)
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from active_recon.geometry.cameras import Camera
+from active_recon.photos.cube import shown_width, upright
 from active_recon.photos.ground import Ground
 from active_recon.photos.views import PhotoView
 import cv2
@@ -65,7 +66,7 @@ def found_ground(views: Sequence[PhotoView], middle: NDArray[np.float64],
     """
     if len(views) < _FEWEST:
         return None
-    width = float(np.median([_width(view.camera, middle) for view in views]))
+    width = float(np.median([shown_width(view.camera, middle) for view in views]))
     photos = [_reduced(view, middle, width) for view in views]
     step = 2 * _REACH * width / (_HEIGHTS - 1)
 
@@ -101,13 +102,6 @@ def _peaks(compared: Callable[[NDArray[np.float64], float], _Plane], up: NDArray
     return found
 
 
-def _width(camera: Camera, middle: NDArray[np.float64]) -> float:
-    """Return how wide a part a camera shows at a point, along the shorter side of its image."""
-    lens = camera.intrinsics
-    return float(np.linalg.norm(camera.position - middle)) * min(
-        lens.width / lens.fx, lens.height / lens.fy)
-
-
 def _reduced(view: PhotoView, middle: NDArray[np.float64], width: float
              ) -> tuple[Camera, NDArray[np.float32]]:
     """Return a camera and its grey image, as fine as the points of the plane."""
@@ -124,31 +118,24 @@ def _reduced(view: PhotoView, middle: NDArray[np.float64], width: float
 def _refined(compared: Callable[[NDArray[np.float64], float], _Plane], up: NDArray[np.float64],
              height: float, step: float) -> _Plane:
     """Return the plane near a height that looks most alike, with its normal (Nelder, Mead)."""
-    across, along = _axes(up)
+    along, across, _ = upright(up)
 
     def plane(place: NDArray[np.float64]) -> _Plane:
         normal = up + place[1] * across + place[2] * along
         return compared(normal / np.linalg.norm(normal), place[0])
 
     first = np.array([height, 0.0, 0.0])
-    simplex = first + np.vstack([np.zeros(3), np.diag([step, _TILT, _TILT])])
+    simplex = first + np.vstack([np.zeros(3), np.diag([step, _TILT, -_TILT])])
     found = minimize(lambda place: -plane(place).correlation, first, method='Nelder-Mead',
                      options={'initial_simplex': simplex, 'maxfev': _TRIES})
     return plane(found.x)
-
-
-def _axes(normal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return two directions across a normal and each other, (3,) each."""
-    across = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
-    across /= np.linalg.norm(across)
-    return across, np.cross(normal, across)
 
 
 def _compared(photos: Sequence[tuple[Camera, NDArray[np.float32]]], middle: NDArray[np.float64],
               width: float, normal: NDArray[np.float64], height: float) -> _Plane:
     """Return a plane with the share of its windows that look alike, and that are shown."""
     ticks = ((np.arange(_POINTS) + 0.5) / _POINTS - 0.5) * _WIDTH * width
-    across, along = _axes(normal)
+    along, across, _ = upright(normal)
     points = (middle + height * normal + ticks[:, None, None] * across
               + ticks[None, :, None] * along).reshape(-1, 3)
     windows = [_even(*_seen(camera, grey, points)) for camera, grey in photos]
