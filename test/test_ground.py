@@ -2,8 +2,8 @@
 
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
-from active_recon.photos.camera_file import CameraFile
-from active_recon.photos.cube import Cube
+from active_recon.photos.camera_file import CameraFile, Entry, sized
+from active_recon.photos.cube import Cube, upward
 from active_recon.photos.ground import BOARD_GROUND, Ground
 from active_recon.photos.ground_search import found_ground
 from active_recon.photos.reconstruct import from_views, Options
@@ -157,3 +157,11 @@ def test_the_object_is_upright_on_its_table_where_the_cameras_do_not_tell_what_i
     shape, without = shapes
     np.testing.assert_allclose(shape.cube.up, shape.ground.normal)
     assert np.arccos(shape.cube.up @ UP) < np.arccos(without.cube.up @ UP)
+
+
+def test_without_a_table_all_cameras_of_the_file_tell_what_is_up(views):
+    poses = [view.camera.pose for view in views]
+    file = CameraFile('a file', [Entry(str(number), pose, sized(photo_table.LENS))
+                                 for number, pose in enumerate(poses)])
+    shape = from_views(views[:1], file, Options(box=(0, 0, 0, SIZE), background='network'))
+    np.testing.assert_allclose(shape.cube.up, upward(poses))

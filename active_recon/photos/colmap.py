@@ -31,10 +31,9 @@ _Image = tuple[str, int, tuple[float, ...]]
 
 def read_colmap(folder: Path) -> CameraFile:
     """
-    Read the model in a folder.
+    Read the model in a folder; its world has no direction of its own that is up.
 
-    `up` is the mean of what is up in the photos, since a model's world has no direction of its
-    own. Raises DataError on files that are missing, cut off, or of a lens without an equivalent.
+    Raises DataError on files that are missing, cut off, or of a lens without an equivalent.
     """
     binary = (folder / 'images.bin').is_file() and (folder / 'cameras.bin').is_file()
     suffix = '.bin' if binary else '.txt'
@@ -53,9 +52,7 @@ def read_colmap(folder: Path) -> CameraFile:
     entries = [_entry(image, lenses, images_file) for image in images]
     if not entries:
         raise DataError(f'{images_file}: no cameras: expected a pose for each image, got none')
-    above = -np.mean([entry.pose[:3, 1] for entry in entries], axis=0)
-    length = float(np.linalg.norm(above))
-    return CameraFile(str(folder), entries, up=above / length if length > 0.1 else None)
+    return CameraFile(str(folder), entries)
 
 
 def _entry(image: _Image, lenses: Mapping[int, Lens], path: Path) -> Entry:

@@ -118,11 +118,15 @@ def first_cube(cameras: Sequence[Camera], up: NDArray[np.float64] | None,
     distances = [float(np.linalg.norm(camera.position - centre)) for camera in cameras]
     widths = [shown_width(camera, centre) for camera in cameras]
     side = min(share * float(np.median(widths)), _OF_DISTANCE * min(distances))
-    return Cube(centre, side, upward(cameras) if up is None else up)
+    return Cube(centre, side, upward([camera.pose for camera in cameras]) if up is None else up)
 
 
-def upward(cameras: Sequence[Camera]) -> NDArray[np.float64]:
-    """Return the mean of what is up in the photos, (3,); z where they contradict each other."""
-    mean = -np.mean([camera.pose[:3, 1] for camera in cameras], axis=0)
+def upward(poses: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """
+    Return the mean of what is up in the photos of poses (4, 4), (3,).
+
+    It is z where they contradict each other.
+    """
+    mean = -np.mean([pose[:3, 1] for pose in poses], axis=0)
     length = float(np.linalg.norm(mean))
     return np.asarray(mean / length) if length > 0.1 else np.array([0.0, 0.0, 1.0])

@@ -167,8 +167,10 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
     """
     reconstructor = reconstructor or load(options.model, threads=options.threads)
     poses = [view.camera for view in views]
-    up = axis_direction(options.up) if options.up else file.up
-    cube = _told_cube(options, file, upward(poses) if up is None else up)
+    told = axis_direction(options.up) if options.up else file.up
+    up = told if told is not None else upward(
+        [entry.pose for entry in file.entries] or [camera.pose for camera in poses])
+    cube = _told_cube(options, file, up)
     wrong = misreading(poses, None if cube is None else cube.centre, file.looks)
     if wrong:
         raise DataError(f'{file.source}: {wrong}', 'convention')
@@ -180,7 +182,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
     with reporting('finding the object', 1) as advance:
         start = cube or first_cube(poses, up, NARROWER if background == 'segment' else WIDER)
         ground = _ground(views, file, start, options.ground)
-        if ground is not None and up is None:
+        if ground is not None and told is None:
             start = replace(start, up=ground.normal)
         cube = start if cube is not None else found_cube(
             views, start, reconstructor, background, ground)
