@@ -66,6 +66,19 @@ def test_transforms_have_the_cameras_they_were_written_from(shared, suffix, phot
     assert_same(tmp_path, photos, rig())  # found in its folder
 
 
+def test_a_name_without_a_suffix_may_have_dots(photos, tmp_path):
+    content = transforms(rig())
+    named = []
+    for number, (frame, photo) in enumerate(zip(content['frames'], photos, strict=True)):
+        frame['file_path'] = f'images/frame.{number:04}'
+        named.append(replace(photo, path=photo.path.with_name(f'frame.{number:04}.png')))
+    (tmp_path / 'transforms.json').write_text(json.dumps(content))
+    posed, left_out = posed_photos(read_transforms(tmp_path / 'transforms.json'), named)
+    assert not left_out
+    for each, camera in zip(posed, rig(), strict=True):
+        np.testing.assert_allclose(each.pose, camera.pose, atol=1e-9)
+
+
 @pytest.mark.parametrize('named', [True, False])
 @pytest.mark.parametrize('suffix', ['yml', 'xml', 'yaml'])
 def test_what_opencv_writes_has_the_cameras_it_was_written_from(named, suffix, photos, tmp_path):

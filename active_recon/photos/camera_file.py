@@ -130,17 +130,19 @@ def _posed(entry: Entry, photo: PhotoFile) -> PosedPhoto:
 def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]
              ) -> Mapping[Path, list[Entry]]:
     """Return the cameras that fit a photo best, by its path: by name, else by stem; by folders."""
+    # A camera's name may have no suffix, but dots
+    ways = ((_name, _name), (_name, _stem), (_stem, _stem))  # of camera and photo, the best first
     tables: list[dict[str, list[Path]]] = []
-    for part in (_name, _stem):
+    for _, of_photo in ways:
         tables.append({})
         for photo in photos:
-            tables[-1].setdefault(part(photo.path.name), []).append(photo.path)
-    found: dict[Path, dict[tuple[bool, int], list[Entry]]] = {}
+            tables[-1].setdefault(of_photo(photo.path.name), []).append(photo.path)
+    found: dict[Path, dict[tuple[int, int], list[Entry]]] = {}
     for entry in entries:
-        for part, table in zip((_name, _stem), tables, strict=True):
-            fitting = table.get(part(entry.name), [])
+        for rank, ((of_camera, _), table) in enumerate(zip(ways, tables, strict=True)):
+            fitting = table.get(of_camera(entry.name), [])
             if len(fitting) == 1:
-                fit = part is _name, _folders_alike(entry.name, fitting[0])
+                fit = -rank, _folders_alike(entry.name, fitting[0])
                 found.setdefault(fitting[0], {}).setdefault(fit, []).append(entry)
                 break
     return {path: fits[max(fits)] for path, fits in found.items()}
