@@ -148,9 +148,10 @@ def test_where_nothing_is_above_what_was_taken_for_a_table_the_error_names_the_w
         views, monkeypatch):
     monkeypatch.setattr('active_recon.photos.reconstruct.found_ground',
                         lambda views, middle, up: Ground(UP, 2 * SIZE))
-    for box in (None, (0.0, 0.0, 0.0, 1.1 * SIZE)):
+    box = 0.0, 0.0, 0.0, 1.1 * SIZE
+    for options in (Options(), Options(box=box), Options(box=box, background='network')):
         with pytest.raises(DataError, match='leave it out by --no-ground'):
-            from_views(views[:3], CameraFile('a table', ()), Options(box=box))
+            from_views(views[:3], CameraFile('a table', ()), options)
 
 
 def test_the_object_is_upright_on_its_table_where_the_cameras_do_not_tell_what_is_up(shapes):

@@ -85,6 +85,16 @@ def carved(grid: VoxelGrid, threshold: float, views: Sequence[PhotoView],
     return VoxelGrid(np.minimum(grid.occupancy, ceiling(depths, threshold)), grid.size), covered
 
 
+def above_ground(grid: VoxelGrid, threshold: float, cube: Cube, ground: Ground) -> VoxelGrid:
+    """Return the grid with nothing under a ground; raises DataError where that is all there is."""
+    above = ground.above(cube, len(grid.occupancy))
+    kept = VoxelGrid(np.where(above, grid.occupancy, np.float32(0)), grid.size)
+    if grid.occupied(threshold).any() and not kept.occupied(threshold).any():
+        raise DataError('object not found: expected one above the ground, found nothing but what '
+                        f'is under it{no_table(ground)}', 'no_object')
+    return kept
+
+
 def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstructor,
                background: str, ground: Ground | None = None) -> Cube:
     """

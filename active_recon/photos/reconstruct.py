@@ -18,6 +18,7 @@ from active_recon.photos.files import in_order_of, open_photos, photo_paths
 from active_recon.photos.ground import BOARD_GROUND, Ground, no_table
 from active_recon.photos.ground_search import found_ground
 from active_recon.photos.integrating import (
+    above_ground,
     carved,
     even_choice,
     found_cube,
@@ -32,7 +33,6 @@ from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
 from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.meshes import axis_direction
-from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
@@ -202,8 +202,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
                                   with_depth=True)
     grid, covered = carved(taken[-1].known.grid, reconstructor.threshold, views, cube)
     if ground is not None:
-        above = ground.above(cube, len(grid.occupancy))
-        grid = VoxelGrid(np.where(above, grid.occupancy, np.float32(0)), grid.size)
+        grid = above_ground(grid, reconstructor.threshold, cube, ground)
     return Shape(grid, reconstructor.threshold, taken, cube, ground,
                  named([view.background for view in taken]), [*left_out, *empty, *unseen],
                  [*doubts(taken, views, cube, reconstructor, background, covered,
