@@ -117,6 +117,9 @@ def test_what_is_seen_from_below_stands_on_nothing(views):
         np.diag([1.0, -1, -1, 1]) @ views[0].camera.pose, views[0].camera.intrinsics))
     assert low.camera.position[2] < 0
     assert found_ground([*views, low], np.zeros(3), UP) is None
+    shape = from_views([*views, low], CameraFile('a table', (), UP),
+                       Options(box=(0, 0, 0, SIZE), background='network'))
+    assert shape.ground is None  # though more photos than are compared
 
 
 @pytest.fixture(scope='module')

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.cube import shown_width, upright
 from active_recon.photos.ground import Ground
+from active_recon.photos.integrating import even_choice, SEARCHED_VIEWS
 from active_recon.photos.views import PhotoView
 import cv2
 import numpy as np
@@ -59,15 +60,16 @@ def found_ground(views: Sequence[PhotoView], middle: NDArray[np.float64],
     """
     Return the textured plane that lies across `up` around or under a point, (3,); None without.
 
-    It is searched as far as the photos show it around the point, a few degrees off `up`. Of
+    It is searched as far as some photos show it around the point, a few degrees off `up`. Of
     several planes, such as a table and the lid of a box, the lowest counts: too low a plane costs
     less than one that cuts the object. There is none where texture is so coarse that planes
     beside it look alike, too, or where a camera looks from below.
     """
     if len(views) < _FEWEST:
         return None
-    width = float(np.median([shown_width(view.camera, middle) for view in views]))
-    photos = [_reduced(view, middle, width) for view in views]
+    some = even_choice(views, SEARCHED_VIEWS)
+    width = float(np.median([shown_width(view.camera, middle) for view in some]))
+    photos = [_reduced(view, middle, width) for view in some]
     step = 2 * _REACH * width / (_HEIGHTS - 1)
 
     def compared(normal: NDArray[np.float64], height: float) -> _Plane:

@@ -23,7 +23,6 @@ from active_recon.photos.integrating import (
     even_choice,
     found_cube,
     integrate,
-    SEARCHED_VIEWS,
 )
 from active_recon.photos.segmented_views import segmented_views
 from active_recon.photos.shape import Shape, TakenView
@@ -217,7 +216,7 @@ def _ground(views: Sequence[PhotoView], file: CameraFile, start: Cube,
         return BOARD_GROUND
     if not searched:
         return None
-    return found_ground(even_choice(views, SEARCHED_VIEWS), start.centre, start.up)
+    return found_ground(views, start.centre, start.up)
 
 
 def _without_depth(views: Sequence[PhotoView], taken: Sequence[TakenView]) -> list[str]:
