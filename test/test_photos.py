@@ -102,7 +102,8 @@ def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, view
                                [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views]
     own = active_recon.reconstruct([on_plain(image) for image in rgba], placed, BOX[3], views=3)
     stacked = active_recon.reconstruct(
-        np.stack([on_plain(image) for image in rgba]), placed, BOX[3], views=3)
+        np.stack([on_plain(image) for image in rgba]), placed, BOX[3], views=3,
+        box=np.array([0, 0, 0, BOX[3]]))
     read = active_recon.reconstruct(plain, box=BOX, views=3)
     np.testing.assert_array_equal(stacked.occupancy, own.occupancy)
     np.testing.assert_allclose(own.occupancy, read.occupancy, atol=1e-4)
@@ -348,6 +349,8 @@ def test_pixels_without_cameras_are_refused(rgba, views):
         active_recon.reconstruct([rgba[0]], views[:1])
     with pytest.raises(ConfigError, match='expected one for each of 2 images, got 1'):
         active_recon.reconstruct(rgba[:2], views[:1], 0.3)
+    with pytest.raises(ConfigError, match='image 1: expected pixels, .*, got list$'):
+        active_recon.reconstruct([rgba[0].tolist()], views[:1], 0.3)
     for given in (views[0], [views[0].pose], np.array([views[0].pose])):
         with pytest.raises(ConfigError, match=r'a Camera\(pose, intrinsics\) for each image, got'):
             active_recon.reconstruct(rgba[:1], given, 0.3)

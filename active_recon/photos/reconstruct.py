@@ -247,10 +247,10 @@ def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Op
     for number, (image, camera) in enumerate(zip(images, cameras, strict=True), 1):
         if not isinstance(image, np.ndarray):
             raise ConfigError(f'image {number}: expected pixels, (H, W, 3) uint8 RGB, for a '
-                              f'camera of its own, got {image!r}')
+                              f'camera of its own, got {type(image).__name__}')
         views.append(view_of(f'image {number}', image, camera))
     file = CameraFile('cameras', (), np.array([0.0, 0.0, 1.0]))
-    box = options.box or (0.0, 0.0, 0.0, options.size)
+    box = (0.0, 0.0, 0.0, options.size) if options.box is None else options.box
     return from_views(even_choice(views, options.views or len(views)), file,
                       replace(options, box=box))
 
