@@ -130,6 +130,8 @@ def test_depth_files_are_millimetres_or_metres_at_the_size_of_the_photo(tmp_path
     found = read_depth(tmp_path / 'b.tiff', 320, 240)
     np.testing.assert_array_equal(found[1:], PHOTO_DEPTH[1:])
     assert not found[0, :2].any()
+    write_depth(tmp_path / 'c.tiff', spoilt, np.float64)
+    np.testing.assert_array_equal(read_depth(tmp_path / 'c.tiff', 320, 240), found)
 
 
 def test_depth_of_another_shape_or_kind_is_refused(tmp_path):

@@ -43,7 +43,8 @@ def read_depth(path: Path, width: int, height: int) -> NDArray[np.float32]:
     shape. Raises DataError on another file.
     """
     stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if stored is None or stored.ndim != 2 or stored.dtype not in (np.uint16, np.float32):
+    if stored is None or stored.ndim != 2 or stored.dtype not in (
+            np.uint16, np.float32, np.float64):
         found = 'no image' if stored is None else f'the shape {stored.shape} {stored.dtype}'
         raise DataError(f'{path.name}: no depth image: expected one channel of 16 bits in '
                         f'millimetres, or of floats in metres, got {found}')
