@@ -55,6 +55,11 @@ def test_a_board_that_is_hardly_seen_is_refused(photos):
         posed_by(BoardCameras(BOARD), [*photos[:2], photos[-1]])
 
 
+def test_where_all_photos_show_the_board_but_are_too_few_the_error_asks_for_more(photos):
+    with pytest.raises(DataError, match='seen in 2 of 2 photos: .* take more, or give the lens'):
+        posed_by(BoardCameras(BOARD), photos[:2])
+
+
 def test_a_board_that_is_in_no_photo_is_refused(photos):
     with pytest.raises(DataError, match='board: seen in 0 of 1 photos') as raised:
         posed_by(BoardCameras(BOARD), photos[-1:])

@@ -99,10 +99,11 @@ def _lens(seen: Sequence[SeenPhoto], board: Board, lens_file: Path | None,
     if focal is not None:
         width, height = same[0][1].size
         return Intrinsics(focal, focal, width / 2, height / 2, width, height)
+    advice = ('take more, or give the lens by --camera-info' if len(seen) == of_photos else
+              f'check that it has {board.columns} x {board.rows} squares and the dictionary '
+              f'{board.dictionary}, that it is sharp, and that several of its squares stay free')
     raise DataError(f'board: seen in {len(seen)} of {of_photos} photos: expected it in '
-                    f'{FEWEST} or more; check that it has {board.columns} x {board.rows} '
-                    f'squares and the dictionary {board.dictionary}, that it is sharp, and '
-                    'that several of its squares stay free', 'too_few_images')
+                    f'{FEWEST} or more; {advice}', 'too_few_images')
 
 
 def _pose(name: str, found: Detection, lens: Intrinsics) -> NDArray[np.float64]:
