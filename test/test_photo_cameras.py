@@ -149,7 +149,10 @@ def test_cameras_are_found_beside_the_photos(tmp_path):
     ({'fl_x': 1e400}, 'fl_x of inf'),
     ({'frames': [{'file_path': 'a.png'}]}, 'frame 0: no camera: .*transform_matrix'),
     ({'frames': [{'file_path': 'a.png', 'transform_matrix': np.ones((4, 4)).tolist()}]},
-     'frame 0: no rotation')])
+     'frame 0: no rotation'),
+    ({'frames': [{'file_path': 'a.png', 'transform_matrix': [
+        [1, 0, 0, float('nan')], [0, 1, 0, 0], [0, 0, 1, 0]]}]},
+     'frame 0: no position: expected finite numbers, got .nan')])
 def test_transforms_that_cannot_be_used_are_refused_by_what_is_wrong(change, expected, tmp_path):
     path = tmp_path / 'transforms.json'
     path.write_text(json.dumps({**transforms(rig()), **change}))

@@ -169,10 +169,13 @@ def rigid(rotation: NDArray[np.float64], position: NDArray[np.float64],
     """
     Return a pose (4, 4) of a rotation (3, 3) and a position (3,), made exactly orthogonal.
 
-    Raises DataError where the matrix is far from a rotation; `where` begins its message.
+    Raises DataError where the matrix is far from a rotation, or the position not finite; `where`
+    begins its message.
     """
     pose = np.eye(4)
-    if np.isfinite(rotation).all() and np.isfinite(position).all():
+    if not np.isfinite(position).all():
+        raise DataError(f'{where}: no position: expected finite numbers, got {position.tolist()}')
+    if np.isfinite(rotation).all():
         left, _, right = np.linalg.svd(rotation)
         nearest = left @ right
         if np.allclose(nearest, rotation, atol=1e-2) and np.linalg.det(nearest) > 0:
