@@ -432,6 +432,14 @@ def test_options_of_the_command_that_contradict_each_other_are_refused(
     assert not (tmp_path / 'out').exists()
 
 
+def test_a_file_in_place_of_the_folder_to_write_is_refused_before_any_work(tmp_path):
+    out = tmp_path / 'out'
+    out.touch()
+    result = CliRunner().invoke(app, ['reconstruct', str(tmp_path), '--out', str(out)])
+    assert isinstance(result.exception, ConfigError)
+    assert '--out: no folder' in str(result.exception)
+
+
 @pytest.mark.skipif(not DINO.is_dir(), reason='needs dinoSparseRing of Middlebury: name it by '
                                              'ACTIVE_RECON_DINO')
 @pytest.mark.parametrize(('background', 'least'), [('auto', 0.77), ('plain', 0.77)])

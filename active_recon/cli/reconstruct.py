@@ -152,6 +152,9 @@ def reconstruct(
     if out.resolve() == photos.resolve():
         raise ConfigError(f'--out: the folder of photos, {out}: its picture.png would be a photo '
                           'of the next run; give another folder')
+    if out.exists() and not out.is_dir():
+        raise ConfigError(f'--out: no folder: expected one, or a name for a new one, got the file '
+                          f'{out}')
     if len(sources) > 1:
         raise ConfigError('several of --cameras, --board and --turntable-step-deg: give one of '
                           'them')
