@@ -2,6 +2,7 @@
 
 from pathlib import Path
 import resource
+from shutil import rmtree
 
 from active_recon.errors import RecordingError
 import pytest
@@ -48,6 +49,25 @@ def test_a_disk_that_fills_while_the_bag_is_closed_is_told(tmp_path):
         bag.close()
     with AnyReader([bag.path]) as reader:
         assert reader.message_count == 0
+
+
+@pytest.mark.parametrize('end', ['flush', 'close'])
+def test_a_bag_that_is_deleted_or_moved_while_it_is_recorded_says_so(tmp_path, end):
+    bag = announced(tmp_path / 'deleted')
+    bag.write('/episode', cdr(header(0)), time_of(0), time_of(0))
+    bag.flush()
+    rmtree(bag.folder)
+    with pytest.raises(RecordingError, match='deleted or moved while it was recorded') as refusal:
+        getattr(bag, end)()
+    assert refusal.value.kind == 'bag_gone'
+    bag = announced(tmp_path / 'moved')
+    bag.write('/episode', cdr(header(0)), time_of(0), time_of(0))
+    moved = bag.folder.rename(tmp_path / 'elsewhere')
+    bag.flush()  # it goes on where the file is now
+    with pytest.raises(RecordingError, match='deleted or moved'):
+        bag.close()
+    with AnyReader([*moved.iterdir()]) as reader:
+        assert reader.message_count == 1
 
 
 def resident():

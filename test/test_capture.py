@@ -109,6 +109,13 @@ def test_a_folder_comes_by_its_numbers_and_what_cannot_be_read_is_left_out(tmp_p
     assert '4.png: not readable' in broken
 
 
+def test_a_size_is_asked_of_a_device_alone(tmp_path):
+    Image.new('RGB', SIZE).save(tmp_path / '1.png')
+    for place in (tmp_path, film(tmp_path / 'film.avi')):
+        with pytest.raises(ConfigError, match='no device, so no size .* got 1280 x 720; files'):
+            open_source(str(place), 1280, 720)
+
+
 def test_a_folder_whose_first_image_cannot_be_read_begins_with_the_others(tmp_path):
     (tmp_path / '0.png').write_bytes(b'no image')
     with pytest.raises(DataError, match='0.png: not readable'):

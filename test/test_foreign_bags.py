@@ -119,6 +119,18 @@ def test_a_pose_and_the_camera_info_are_the_camera_as_it_was(tmp_path):
     assert found[1].camera.intrinsics.fx == pytest.approx(CANONICAL_INTRINSICS.fx * 32 / 137)
 
 
+def test_the_option_that_names_the_frame_of_the_poses_is_told_where_they_have_another(tmp_path):
+    moved = list(cameras())
+    for _, topic, msg in moved:
+        if topic == '/tracker':
+            msg.header.frame_id = 'base_link'
+    with pytest.raises(DataError, match="expected 'object', got 'base_link'; name it with "
+                                        '--object-frame'):
+        views(tmp_path / 'run', [*images(), *moved])
+    assert azimuths(views(tmp_path / 'named', [*images(), *moved],
+                          object_frame='base_link')) == AZIMUTHS
+
+
 def test_a_pose_between_two_is_interpolated_within_the_gap(tmp_path):
     messages = [*images(), *cameras(late=PERIOD // 2)]
     found = views(tmp_path / 'run', messages)

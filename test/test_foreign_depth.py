@@ -166,6 +166,20 @@ def test_depth_of_another_size_than_its_lens_is_left_out_with_its_reason(
     assert 'of 2 of them was left out: wrong depth image: expected 137' in capsys.readouterr().out
 
 
+def test_a_replay_with_another_model_tells_what_was_assumed_and_left_out(
+        chair, tmp_path, monkeypatch, capsys):
+    late = BEGIN + 10**10
+    lost = (late, '/wrist/color/image_raw',
+            image_to_msg(np.zeros((137, 137, 3), np.uint8), header(late, FRAME)))
+    folder = write_bag(tmp_path / 'run', [*recording(chair[0]), lost])
+    assert command(monkeypatch, 'replay', folder, '--depth', '/wrist/depth/image_rect_raw',
+                   '--model', '2d3d', '--out', tmp_path / 'other') == 0
+    said = capsys.readouterr().out
+    assert "assumed: the object's cube has a side of 1 m (--object-size)" in said
+    assert '1 image was dropped: no camera pose arrived' in said
+    assert 'depth of 2 of them was left out: 2d3d.safetensors: takes no depth' in said
+
+
 def test_depth_that_no_view_has_is_refused_with_the_reason(chair, tmp_path):
     metres = np.ones((137, 137), np.float32)
     late = [(time, topic, depth_to_msg(metres, header(time + 10**10, FRAME))

@@ -137,6 +137,16 @@ def test_transforms_of_a_robots_namespace_go_with_the_static_ones_of_all(tmp_pat
     np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
 
 
+def test_of_two_robots_with_the_same_frames_one_has_to_be_named(tmp_path):
+    both = [[(time, f'/{robot}{topic}', msg) for time, topic, msg in transforms()]
+            for robot in ('left', 'right')]
+    folder = bag(tmp_path / 'run', images(), LENSES, *both)
+    with pytest.raises(DataError, match='on several topics, /left/tf, /right/tf: choose one'):
+        read_run(folder)
+    np.testing.assert_allclose(
+        poses(read_run(folder, Topics(azimuth='/right/tf'))), POSES, atol=1e-9)
+
+
 def test_a_first_slash_of_a_frame_does_not_count(tmp_path):
     run = read_run(bag(tmp_path / 'run', images(), LENSES, transforms('/object', '/tool0')),
                    Topics(object_frame='/object'))

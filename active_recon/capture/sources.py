@@ -51,7 +51,8 @@ def open_source(place: str, width: int = 0, height: int = 0, rate: float = 0.0) 
     Open /dev/videoN, or N alone, a video file, or a folder of images.
 
     `width`, `height` and `rate` are asked of a device, 0 for its own; `rate` is that of files
-    too. Raises ConfigError without a place, DataError where nothing can be read from it.
+    too. Raises ConfigError without a place or with a size of files, DataError where nothing can
+    be read from it.
     """
     if not place:
         raise ConfigError('no source: expected a video device, a video file, or a folder of '
@@ -61,6 +62,9 @@ def open_source(place: str, width: int = 0, height: int = 0, rate: float = 0.0) 
     path = Path(place)
     if place.startswith(_DEVICE):
         return _Device(path, width, height, rate)
+    if width or height:
+        raise ConfigError(f'{place}: no device, so no size can be asked for: expected 0 x 0, got '
+                          f'{width} x {height}; files keep the size of their images')
     if path.is_dir():
         return _Folder(path, rate or FOLDER_RATE)
     if not path.is_file():

@@ -1,6 +1,6 @@
 """`active-recon replay`: replays a recorded run without ROS, as recorded or with overrides."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 import math
@@ -119,9 +119,7 @@ def replay(
 def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
                           reconstructor: 'Reconstructor') -> None:
     """Print the result for a bag that has no record of the loop to compare with."""
-    for assumption in run.assumed:
-        typer.echo(f'assumed: {assumption}')
-    print_refusals(run)
+    _print_input(run)
     for episode in verified.episodes:
         if not episode.steps:
             continue
@@ -134,11 +132,22 @@ def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
             f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():.0f} to '
             f'{last.entropy():.0f} nats; the bag has no record to compare with')
         _print_quality(episode)
-        refused = [step.reconstruction.depth_refusal for step in episode.steps
-                   if step.reconstruction.depth_refusal]
-        if refused:
-            typer.echo(f'depth of {len(refused)} of them was left out: {refused[0]}')
+        _print_refused_depth([step.reconstruction.depth_refusal for step in episode.steps])
     typer.echo(f'hash {verified.hash}')
+
+
+def _print_input(run: 'RecordedRun') -> None:
+    """Print what was assumed, and what was left out, of a bag without a record of the loop."""
+    for assumption in run.assumed:
+        typer.echo(f'assumed: {assumption}')
+    print_refusals(run)
+
+
+def _print_refused_depth(refusals: Sequence[str]) -> None:
+    """Print how many of an episode's views went without their depth; '' is none refused."""
+    refused = [refusal for refusal in refusals if refusal]
+    if refused:
+        typer.echo(f'depth of {len(refused)} of them was left out: {refused[0]}')
 
 
 def _print_quality(episode: 'ReplayedEpisode') -> None:
@@ -187,11 +196,13 @@ def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Ov
               for episode in other.episodes if episode.views]
     threshold = setup.with_overrides(overrides).load_reconstructor().threshold
     files.write([(grid, views) for grid, views in shapes if grid is not None], threshold)
+    _print_input(run)
     for episode in other.episodes:
         entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)
         azimuths = ', '.join(
             f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
         typer.echo(f'views from {azimuths} degrees; entropy {entropies} nats')
+        _print_refused_depth([view.depth_refusal for view in episode.views])
     typer.echo(f'wrote {folder}')
 
 

@@ -22,11 +22,12 @@ def require_in_image(camera: Camera, object_size: float,
     cube's silhouette, [0, 1], that may be outside.
     """
     seen, depth = camera.project(_EDGES * object_size)
-    if depth.max() <= 0:
+    at_plane = 1e-3 * object_size
+    if depth.max() <= 0 or depth.min() <= at_plane and camera.distance > object_size:
         raise ViewError('camera looks away from the object: expected one that looks at it; check '
                         'that the pose is that of the optical frame (z forward, y down)',
                         'out_of_image')
-    if depth.min() <= 1e-3 * object_size:
+    if depth.min() <= at_plane:
         raise ViewError(
             "camera in the object's cube or beside it: expected a distance at which the whole "
             f'cube of {object_size:g} m is in front of the camera, got {camera.distance:.3g} m; '

@@ -3,7 +3,13 @@
 from types import SimpleNamespace
 
 from active_recon.nodes.runtime import diagnostics as diagnostics_module
-from active_recon.nodes.runtime.diagnostics import Diagnostics, FORGOTTEN_S, LOG_EVERY_S
+from active_recon.nodes.runtime.diagnostics import (
+    Diagnostics,
+    FORGOTTEN_S,
+    LOG_EVERY_S,
+    PROBLEM_FOR_S,
+)
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 import pytest
 from rclpy.node import Node
 
@@ -63,6 +69,20 @@ def test_a_trouble_that_stays_is_said_although_one_of_its_kind_was_said_just_bef
     diagnostics.clear_warning('silent')
     diagnostics.clear_warning('silent')
     assert said[3:] == ['INFO over: still nothing']
+
+
+def test_a_problem_is_told_for_a_second_whatever_else_changes_meanwhile(bench, clock, said):
+    heard = bench.subscribe(DiagnosticArray, '/diagnostics')
+    diagnostics = Diagnostics(bench.node)
+    bench.until(lambda: heard, 'the state at the start')
+    diagnostics.warn('late', 'too late')
+    for number in range(20):  # some of them right after the one of every second
+        diagnostics.set_value('Number', str(number))
+        bench.until(lambda number=number: KeyValue(key='Number', value=str(number)) in
+                    heard[-1].status[0].values, 'the change')
+        assert heard[-1].status[0].message == 'too late'
+    clock.now += PROBLEM_FOR_S + 0.01
+    bench.until(lambda: heard[-1].status[0].message == 'ok', 'an all-clear')
 
 
 def test_a_node_says_that_another_has_its_name_until_that_is_gone(bench, clock, said):

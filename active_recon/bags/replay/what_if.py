@@ -168,4 +168,5 @@ def _reconstructed(view: RecordedView, reconstruction: Reconstruction,
     grid = reconstruction.grid
     return replace(
         view, reconstruction=grid.above(PUBLISHED_FLOOR), occupied=grid.above(threshold),
-        latent=reconstruction.latent, entropy=grid.entropy(), quality=reconstruction.quality)
+        latent=reconstruction.latent, entropy=grid.entropy(), quality=reconstruction.quality,
+        depth_refusal=reconstruction.depth_refusal)

@@ -14,6 +14,7 @@ from msg_tools.views import NOT_BEGUN, PATIENCE_S
 import numpy as np
 from numpy.typing import NDArray
 
+USUAL = '/tf'
 STATIC = '_static'
 """What the name of a topic ends with whose transforms hold at any time."""
 
@@ -23,7 +24,8 @@ def connecting(bag: Bag, topics: Sequence[TopicSummary],
     """
     Return the topics whose transforms, with the static ones, connect the wanted frames.
 
-    The second value are all frames, read until one topic connects them.
+    The second value are all frames, read until every topic connects them. Where `/tf` does, it
+    alone is returned.
     """
     statics = [topic.name for topic in topics if topic.name.endswith(STATIC)]
     moving = [topic for topic in topics if topic.name not in statics] or list(topics)
@@ -37,11 +39,12 @@ def connecting(bag: Bag, topics: Sequence[TopicSummary],
                 if one is not other:
                     one |= other
                     tree.update(dict.fromkeys(other, one))
-        if any(set(wanted) <= tree.get(next(iter(wanted)), set()) for tree in trees.values()):
+        if all(set(wanted) <= tree.get(next(iter(wanted)), set()) for tree in trees.values()):
             break
     found = [topic for topic in moving
              if set(wanted) <= trees[topic.name].get(next(iter(wanted)), set())]
-    return found, {name for tree in trees.values() for name in tree}
+    return ([topic for topic in found if topic.name == USUAL] or found,
+            {name for tree in trees.values() for name in tree})
 
 
 class RecordedTransforms:

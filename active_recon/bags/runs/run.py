@@ -94,7 +94,8 @@ class RecordedView:
     - goal: decided after this view; None also if the episode was done
     - done: the reason if the episode was done after this view, else ''; a goal may follow if
       `plan` was called then
-    - depth: of the depth camera beside the camera, where the loop took it in
+    - depth: of the depth camera beside the camera, where the loop took it in; depth_refusal: why
+      the network did not, in one line, where a replay tried
     - received: receive times of the view's messages, nanoseconds, by topic name in the loop:
       'camera/image_raw', 'view', 'occupancy', 'probabilities', 'entropy', ...
     - reduced: returns a smaller image and its camera; None where the image was worked on
@@ -112,6 +113,7 @@ class RecordedView:
     done: str = ''
     quality: Quality | None = None
     depth: DepthImage | None = None
+    depth_refusal: str = ''
     reduced: Callable[[int], tuple[NDArray[np.uint8], Camera]] | None = None
 
     def for_network(self, reduction: int) -> tuple[NDArray[np.uint8], Camera]:

@@ -1,6 +1,7 @@
 """The output stream of the MCAP writer: after each flush the file is readable to its end."""
 
 from contextlib import suppress
+import errno
 import fcntl
 import os
 from pathlib import Path
@@ -21,6 +22,7 @@ class ChunkFile:
     """
 
     def __init__(self, path: Path) -> None:
+        self._path = path
         self._file = path.open('xb', buffering=0)
         with suppress(OSError):  # keeps `bag repair` away, if the file system has locks
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -45,8 +47,14 @@ class ChunkFile:
         self._pending.clear()
 
     def sync(self) -> None:
-        """Block until the flushed bytes would survive a power cut; raises OSError."""
+        """
+        Block until the flushed bytes would survive a power cut; raises OSError.
+
+        That is FileNotFoundError where the file was deleted, into which writing still succeeds.
+        """
         os.fsync(self._file.fileno())
+        if not os.fstat(self._file.fileno()).st_nlink and not self._path.exists():
+            raise FileNotFoundError(errno.ENOENT, 'it was deleted')
 
     def end(self) -> None:
         """Write the buffered bytes, which end the file, and close it; raises OSError."""

@@ -41,7 +41,7 @@ class BagWriter:
     (`new_in_bag` skips the repeated messages).
     Messages reach the disk in chunks, by `flush` or when a chunk is full. If the disk is full or
     fails, the call raises RecordingError, the open chunk is dropped and the bag is closed; it
-    remains readable up to its last chunk.
+    remains readable up to its last chunk. So does a call that finds the bag deleted.
     """
 
     def __init__(self, folder: Path, max_bytes: int | None = None) -> None:
@@ -145,7 +145,7 @@ class BagWriter:
         """
         Write all messages to the disk, where they survive a power cut.
 
-        Raises RecordingError if the disk is full.
+        Raises RecordingError if the disk is full, or the file was deleted.
         """
         self._require_open()
         try:
@@ -212,6 +212,12 @@ class BagWriter:
     def _abandon(self, error: OSError) -> None:
         """Close the bag after its last complete chunk and raise RecordingError."""
         self._closed = True
+        if isinstance(error, FileNotFoundError):
+            self._file.abandon()
+            raise RecordingError(
+                f'{self.path}: deleted or moved while it was recorded: expected it to stay in its '
+                'place until the recording ends; `active-recon bag repair` completes one that was '
+                'moved', 'bag_gone') from error
         kept = total(contents for _, contents in self._files()).counts.total() - self._repeated
         lost = self.message_count - kept
         message = (f'{self.path}: writing failed ({error.strerror}); the bag ends after {kept} '

@@ -21,6 +21,8 @@ from rclpy.node import Node
 LOG_EVERY_S = 10.0
 PUBLISH_EVERY_S = 1.0
 CHANGES_WITHIN_S = 0.1
+PROBLEM_FOR_S = 1.0
+"""How long a problem is told that does not persist, so that slow subscribers see it."""
 FORGOTTEN_S = 25.0
 """DDS knows a node that was killed for 20 s more: one started anew is not alone meanwhile."""
 
@@ -68,7 +70,7 @@ class Diagnostics:
         self._latency = Durations()
         self._warnings: dict[str, str] = {}
         self._logged_warnings: set[str] = set()
-        self._last_problem = '', ''  # its key and its message
+        self._last_problem = '', '', -math.inf  # its key, its message and when it was
         self._unlogged: Counter[str] = Counter()
         self._logged_at: dict[str, float] = {}
 
@@ -156,7 +158,7 @@ class Diagnostics:
 
     def _notice(self, key: str, message: str) -> None:
         self._counts[key] += 1
-        self._last_problem = key, message
+        self._last_problem = key, message, time.monotonic()
         self._note_change()
 
     def _log(self, key: str, message: str) -> bool:
@@ -178,8 +180,6 @@ class Diagnostics:
     def _publish_regularly(self) -> None:
         self._check_name()
         self._publish()
-        # A problem is published for up to a second, so that slow subscribers see it.
-        self._last_problem = '', ''
 
     def _check_name(self) -> None:
         """Warn while another node has this node's name, as one that was left running."""
@@ -206,9 +206,10 @@ class Diagnostics:
             latency = self._latency.percentile(percent)
             if not math.isnan(latency):
                 values[f'Latency p{percent} (ms)'] = f'{1e3 * latency:.1f}'
-        key, last = self._last_problem
+        key, last, at = self._last_problem
         # What still holds stands among the warnings, perhaps in newer words
-        last = '' if key.removeprefix('warned/') in self._warnings else last
+        if key.removeprefix('warned/') in self._warnings or now - at > PROBLEM_FOR_S:
+            last = ''
         problems = dict.fromkeys(filter(None, [*self._warnings.values(), last]))
         return NodeStatus(self._node.get_fully_qualified_name(), self._counts, values,
                           '; '.join(problems), self._failure, self._host)
