@@ -26,7 +26,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full doc html bench soak policies weights ready read-doc chromium lint clean
+.PHONY: help venv demo golden test test-full test-jazzy doc html bench soak policies weights ready read-doc chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -50,6 +50,10 @@ test: ready  ## style, types, documentation, every test but the long ones; ARGS 
 test-full: ready .venv/full  ## every test, high counts and soak too
 	@echo '== testing everything'
 	@$(TEST) $(ARGS)
+
+test-jazzy: ready .venv/jazzy/installed  ## the same with numpy 1.26, for which Jazzy is built
+	@echo '== testing with numpy 1.26; the long tests run with `make test-full`'
+	@PYTHONPATH=$(CURDIR)/.venv/jazzy $(TEST) -m 'not slow' $(ARGS)
 
 # What the tests begin with; two at a time, since each keeps one core busy.
 ready:
@@ -127,6 +131,13 @@ clean:  ## forget .venv and what was built
 	@echo '== installing what the long tests need'
 	@$(PIP) install --no-compile --no-build-isolation -c constraints.txt '.[test-full]'
 	@rm -rf build active_recon.egg-info
+	@touch $@
+
+# Instead of those of .venv, for which they stand first on the path.
+.venv/jazzy/installed: constraints-jazzy.txt .venv/installed
+	@echo '== installing numpy 1.26 and what belongs to it'
+	@rm -rf .venv/jazzy
+	@$(PIP) install --no-compile --no-deps --target .venv/jazzy -r $<
 	@touch $@
 
 # colcon needs an older setuptools than ours: both stand in a folder that only colcon sees.

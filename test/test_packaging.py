@@ -98,6 +98,12 @@ def test_tested_version_is_within_the_declared_range(name):
     assert pins('constraints.txt')[name] in requirements()[name].specifier
 
 
+def test_the_versions_for_jazzy_are_within_the_declared_ranges():
+    found = pins('constraints-jazzy.txt')
+    assert found['numpy'].startswith('1.26.')
+    assert all(version in requirements()[name].specifier for name, version in found.items())
+
+
 def test_torch_that_make_installs_is_within_the_declared_range():
     chosen = re.search(r'^TORCH \?= torch==(.*)$', (ROOT / 'Makefile').read_text(), re.MULTILINE)
     assert chosen[1] in requirements()['torch'].specifier

@@ -18,7 +18,9 @@ _FILM_RATE = 30.0  # of a file that does not tell
 _HIGHEST_RATE = 1000.0
 # The reason is said in one line here, not by the libraries
 os.environ.setdefault('OPENCV_FFMPEG_LOGLEVEL', '-8')
-cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+_SILENT = 0
+# OpenCV 4, which numpy below 2 needs, has it elsewhere than OpenCV 5
+(getattr(cv2, 'setLogLevel', None) or cv2.utils.logging.setLogLevel)(_SILENT)
 
 
 class ImageSource(Protocol):

@@ -58,8 +58,10 @@ def seen_within(target: Camera, image: NDArray[np.uint8], camera: Camera,
         _place(rows[band], y, top, down, height)
     # OpenCV samples four channels in a third of the time of three, and to the same bits
     padded = cv2.cvtColor(window, cv2.COLOR_RGB2RGBA) if image.shape[2:] == (3,) else window
+    # In steps of 1/32 pixel all versions of OpenCV sample alike, so that bags replay on any
+    places = cv2.convertMaps(columns, rows, cv2.CV_16SC2)
     sampled = _shrunk(np.asarray(cv2.remap(
-        padded, columns, rows, cv2.INTER_LINEAR, borderMode=beyond), np.uint8), size, size)
+        padded, *places, cv2.INTER_LINEAR, borderMode=beyond), np.uint8), size, size)
     if padded is not window:
         sampled = np.asarray(cv2.cvtColor(sampled, cv2.COLOR_RGBA2RGB), np.uint8)
     return sampled, within

@@ -1,5 +1,6 @@
 """Voxels as a file of numpy."""
 
+from io import BytesIO
 from pathlib import Path
 
 from active_recon.volumes.voxels import VoxelGrid
@@ -14,5 +15,7 @@ def write_npz(grid: VoxelGrid, path: Path, threshold: float) -> None:
     The file appears whole, under that name whatever its suffix.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as unfinished, unfinished.open('wb') as file:
-        np.savez_compressed(file, occupancy=grid.occupancy, size=grid.size, threshold=threshold)
+    packed = BytesIO()
+    np.savez_compressed(packed, occupancy=grid.occupancy, size=grid.size, threshold=threshold)
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(packed.getbuffer())
