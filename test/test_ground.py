@@ -147,6 +147,13 @@ def test_nothing_of_the_object_is_in_the_table_that_was_found(shapes, mesh):
     assert ious[0] > ious[1]
 
 
+def test_a_size_that_is_told_widens_the_cube_about_the_object_though_it_stands_on_a_table(views):
+    file = CameraFile('a turntable', (), UP, metric=True)
+    found, told = (from_views(views, file, Options(size=size)) for size in (None, 2 * SIZE))
+    assert told.ground is not None and told.cube.side == 2 * SIZE
+    np.testing.assert_array_equal(told.cube.centre, found.cube.centre)
+
+
 def test_where_nothing_is_above_what_was_taken_for_a_table_the_error_names_the_way_out(
         views, monkeypatch):
     monkeypatch.setattr('active_recon.photos.reconstruct.found_ground',

@@ -188,7 +188,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         advance(1, '')
     if options.size and file.metric and options.box is None:
         cube = replace(cube, side=options.size)
-        cube = cube if ground is None else ground.under(cube)
+        cube = cube if file.board is None else BOARD_GROUND.under(cube)
     shown = views
     if background == 'segment':
         shown, unfound = segmented_views(views, cube, shipped_segmentation(), ground)
