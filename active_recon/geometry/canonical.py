@@ -154,6 +154,10 @@ def framing_camera(camera: Camera, object_size: float = 1.0, image_size: int = 6
 
 def _require_size(image: NDArray[np.uint8], camera: Camera) -> None:
     lens = camera.intrinsics
+    if not isinstance(image, np.ndarray):
+        raise ViewError('wrong image size or type: expected an array, '
+                        f'{lens.height} x {lens.width} x 3 uint8, got a '
+                        f'{type(image).__name__}; np.asarray makes one', 'image_size')
     if image.dtype != np.uint8 or image.shape != (lens.height, lens.width, 3):
         raise ViewError(f'wrong image size or type: expected {lens.height} x {lens.width} x 3 '
                         f'uint8, as the camera says, got {image.shape} '
