@@ -217,7 +217,12 @@ class Reconstructor:
             self._depth_runtime()
         shown, seen_by = network_image(image, camera, self._runtime.spec, self.object_size)
         placed = seen_by.turned(-self._yaw).scaled(1 / self.object_size)
-        occupancy, latent, self._state = self._runtime.step(shown, placed, self._state)
+        occupancy, latent, state = self._runtime.step(shown, placed, self._state)
+        if not (np.isfinite(occupancy).all() and np.isfinite(latent).all()):
+            raise ViewError('not finite: expected an occupancy and a latent of finite numbers '
+                            'from the network, got others; take other weights, or precision f32',
+                            'not_finite')
+        self._state = state
         self._view_count += 1
         refusal = '' if depth is None else self._add_depth(depth, camera)
         if self._evidence is not None:

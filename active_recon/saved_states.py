@@ -121,10 +121,6 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
             for number, camera in enumerate(_read_cameras('seen', arrays))]
     photos = [Photo(arrays[f'image/{number}'], camera)
               for number, camera in enumerate(_read_cameras('photo', arrays))]
-    for photo in photos:
-        lens = photo.camera.intrinsics
-        if photo.image.dtype != np.uint8 or photo.image.shape[:2] != (lens.height, lens.width):
-            raise ValueError(f'an image of {photo.image.shape} {photo.image.dtype}')
     evidence, side = arrays.get(_EVIDENCE), reconstructor.spec.resolution
     if evidence is not None and evidence.shape != no_evidence(side).shape:
         raise ValueError(f'depth evidence of {evidence.shape}')

@@ -24,6 +24,7 @@ from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import iou
 import cv2
 import numpy as np
+from PIL import Image
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -103,6 +104,12 @@ def test_an_image_that_is_not_the_camera_s_is_refused(image):
                        'uint8') as refusal:
         shown_of(image, orbit_camera(0.0))
     assert refusal.value.kind == 'image_size'
+
+
+@pytest.mark.parametrize('image', [Image.new('RGB', (137, 137)), [[[0, 0, 0]]], None])
+def test_an_image_that_is_no_array_is_refused_by_the_name_of_its_type(image):
+    with pytest.raises(ViewError, match=f'expected an array.*got a {type(image).__name__}'):
+        shown_of(image, orbit_camera(0.0))
 
 
 def test_a_camera_straight_above_has_no_canonical_one_and_is_refused():

@@ -2,6 +2,7 @@
 
 import math
 
+from active_recon.errors import ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.meshes.coloring import colored, surface_colors
 from active_recon.meshes.exposure import find_exposure
@@ -39,6 +40,14 @@ def ball():
     """Return a ball that is red where x > 0 and blue elsewhere."""
     made = trimesh.creation.icosphere(4, 0.35)
     return painted(made, np.where(made.triangles_center[:, :1] > 0, RED, BLUE).astype(np.uint8))
+
+
+@pytest.mark.parametrize('wrong', [
+    np.zeros((128, 128, 3)), np.zeros((64, 128, 3), np.uint8), np.zeros((128, 128), np.uint8),
+    np.zeros((128, 128, 2), np.uint8), None], ids=['dtype', 'size', 'gray', 'channels', 'none'])
+def test_a_photo_is_of_its_camera_s_size_and_type(wrong):
+    with pytest.raises(ViewError, match='wrong image size or type: expected .*128 x 128 x 3 or 4'):
+        Photo(wrong, orbit_camera(0.0, intrinsics=LENS))
 
 
 def off(found, true):

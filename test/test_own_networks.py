@@ -37,18 +37,21 @@ def none_known(monkeypatch):
 def test_the_example_is_trained_for_ten_steps_and_its_weights_load_where_it_is_named(
         dataset, tmp_path, monkeypatch, capsys):
     threads = torch.get_num_threads()
+    network = tmp_path / 'my network.py'
+    network.write_text(EXAMPLE.read_text())
     assert command(monkeypatch, 'train', dataset, '--validation', dataset, '--out', tmp_path,
-                   '--model', f'{EXAMPLE}:Net', '--steps', 10, '--batch-size', 2, '--threads',
+                   '--model', f'{network}:Net', '--steps', 10, '--batch-size', 2, '--threads',
                    1) == 0
     torch.set_num_threads(threads)
     told = capsys.readouterr().out
-    assert f'they load where {OWN_NETWORKS}={EXAMPLE}:Net is set' in ' '.join(told.split())
+    told_name = f"they load where {OWN_NETWORKS}='{network}:Net' is set"  # for a shell to read
+    assert told_name in ' '.join(told.split())
     weights = tmp_path / 'weights.safetensors'
     assert load_weights(weights).model == 'Net'
     registry._OWN.clear()  # as in another process
     with pytest.raises(WeightsError, match=f"no network is called 'Net'.*{OWN_NETWORKS}"):
         load_weights(weights)
-    monkeypatch.setenv(OWN_NETWORKS, f'{EXAMPLE}:Net')
+    monkeypatch.setenv(OWN_NETWORKS, f'{network}:Net')
     assert type(load_weights(weights).reconstruction).__name__ == 'Net'
 
 

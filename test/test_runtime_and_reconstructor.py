@@ -77,6 +77,26 @@ def test_a_view_that_is_refused_changes_nothing(runtime, wrong):
                                   add(undisturbed, 1).grid.occupancy)
 
 
+@pytest.mark.parametrize('part', ['occupancy', 'latent'])
+def test_a_network_s_answer_that_is_not_finite_is_refused_and_changes_nothing(
+        runtime, monkeypatch, part):
+    undisturbed, disturbed = Reconstructor(runtime), Reconstructor(runtime)
+    step = runtime.step
+
+    def overflowing(*given):
+        occupancy, latent, state = step(*given)
+        (occupancy if part == 'occupancy' else latent)[0, 0, 0] = np.nan
+        return occupancy, latent, state
+
+    with monkeypatch.context() as patched:
+        patched.setattr(runtime, 'step', overflowing)
+        with pytest.raises(ViewError, match='not finite.*from the network') as refusal:
+            add(disturbed, 0)
+    assert refusal.value.kind == 'not_finite' and disturbed.view_count == 0
+    np.testing.assert_array_equal(add(disturbed, 1).grid.occupancy,
+                                  add(undisturbed, 1).grid.occupancy)
+
+
 def test_a_camera_that_looks_away_is_refused(runtime):
     away = orbit_camera(0.0).pose.copy()
     away[:3, :3] = away[:3, :3] @ np.diag([-1, 1, -1])

@@ -1,6 +1,7 @@
 """Weights on disk: what was saved is loaded, and everything else is refused in words."""
 
 import json
+import math
 from pathlib import Path
 
 from active_recon.errors import WeightsError
@@ -42,6 +43,16 @@ def test_what_was_saved_is_loaded_to_half_precision(saved, network, attention, t
     for loaded, module in ((bundle.reconstruction, network), (bundle.attention, attention)):
         for name, tensor in module.state_dict().items():
             assert_close(loaded.state_dict()[name], tensor, rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize('number', [math.nan, math.inf])
+def test_weights_with_numbers_that_are_not_finite_are_refused_and_named(saved, tiny, number):
+    tensors = load_file(saved)
+    name = next(name for name in tensors if name.startswith('reconstruction'))
+    tensors[name].view(-1)[0] = number
+    rewritten(saved, tiny, tensors)
+    with pytest.raises(WeightsError, match=f'not finite: expected finite numbers in {name}'):
+        load_weights(saved)
 
 
 def test_the_same_weights_are_written_as_the_same_bytes(saved, network, attention, tiny, tmp_path):

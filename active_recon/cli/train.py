@@ -3,6 +3,7 @@
 from dataclasses import replace
 import math
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.command_line import command_line
@@ -176,7 +177,7 @@ def train(
         typer.echo(f'threshold {bundle.threshold:.2f}, chosen on validation\n'
                    f'wrote {weights} and its card')
         if own_file != model:
-            typer.echo(f'they load where {OWN_NETWORKS}={own_file} is set')
+            typer.echo(f'they load where {OWN_NETWORKS}={quote(own_file)} is set')
 
 
 def _begun(path: Path, model: str, widen_to: str | None) -> 'Bundle':

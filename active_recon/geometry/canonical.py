@@ -1,5 +1,6 @@
 """Warp or crop a camera's image to what a network was trained on, and return its new camera."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from active_recon.errors import ViewError
@@ -81,7 +82,7 @@ def canonical_image(image: NDArray[np.uint8], camera: Camera, object_size: float
     exact on that plane only. Raises ViewError where the image is not (H, W, 3) uint8 of the
     camera's size, or the cube of `object_size` metres is not in it.
     """
-    _require_size(image, camera)
+    require_size(image, camera)
     require_in_image(camera, object_size)
     target = _canonical_camera(camera, object_size, image_size)
     return seen_by(target, image, camera), target
@@ -99,7 +100,7 @@ def framed_image(image: NDArray[np.uint8], camera: Camera, object_size: float = 
     the pixels that were in the image and 0 elsewhere. Raises ViewError as `canonical_image` does,
     but up to 90 % of the cube's silhouette may be outside of the image.
     """
-    _require_size(image, camera)
+    require_size(image, camera)
     require_in_image(camera, object_size, _MOST_MISSING)
     target = framing_camera(camera, object_size, image_size)
     framed, seen = seen_within(target, image, camera)
@@ -152,9 +153,15 @@ def framing_camera(camera: Camera, object_size: float = 1.0, image_size: int = 6
     return Camera(pose, Intrinsics(focal, focal, middle, middle, image_size, image_size))
 
 
-def _require_size(image: NDArray[np.uint8], camera: Camera) -> None:
+def require_size(image: NDArray[np.uint8], camera: Camera,
+                 channels: Sequence[int] = (3,)) -> None:
+    """Raise ViewError unless an image is (H, W, one of `channels`) uint8 of the camera's size."""
     lens = camera.intrinsics
-    if image.dtype != np.uint8 or image.shape != (lens.height, lens.width, 3):
-        raise ViewError(f'wrong image size or type: expected {lens.height} x {lens.width} x 3 '
-                        f'uint8, as the camera says, got {image.shape} '
-                        f'{image.dtype}', 'image_size')
+    expected = f'{lens.height} x {lens.width} x {" or ".join(map(str, channels))} uint8'
+    if not isinstance(image, np.ndarray):
+        raise ViewError(f'wrong image size or type: expected an array, {expected}, got a '
+                        f'{type(image).__name__}; np.asarray makes one', 'image_size')
+    if image.dtype != np.uint8 or image.shape not in {
+            (lens.height, lens.width, number) for number in channels}:
+        raise ViewError(f'wrong image size or type: expected {expected}, as the camera says, got '
+                        f'{image.shape} {image.dtype}', 'image_size')

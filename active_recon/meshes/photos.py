@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from active_recon.geometry.cameras import Camera
-from active_recon.geometry.canonical import framed_layers
+from active_recon.geometry.canonical import framed_layers, require_size
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,10 +20,15 @@ class Photo:
     An image and the camera that took it, in the object frame.
 
     `image` is (H, W, 3) uint8 RGB or (H, W, 4), whose fourth channel is 0 where nothing is known.
+    Raises ViewError where it is another array, or of another size than the camera's.
     """
 
     image: NDArray[np.uint8]
     camera: Camera
+
+    def __post_init__(self) -> None:
+        """Reject other arrays."""
+        require_size(self.image, self.camera, (3, 4))
 
     @classmethod
     def of(cls, image: NDArray[np.uint8], camera: Camera, object_size: float,

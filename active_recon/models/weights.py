@@ -54,8 +54,8 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
     """
     Read weights and build their networks, in evaluation mode, in float32.
 
-    None reads the weights that ship. Raises WeightsError where the file is missing, truncated or
-    of a model that is not in the registry.
+    None reads the weights that ship. Raises WeightsError where the file is missing, truncated, of
+    a model that is not in the registry, or has parameters that are not finite.
     """
     path = path or SHIPPED
     metadata = read_metadata(path)
@@ -83,6 +83,10 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
             module.load_state_dict(own, assign=True)
         except RuntimeError as error:
             raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
+        for name, parameter in module.named_parameters():
+            if not parameter.isfinite().all():
+                raise WeightsError(f'{path}: not finite: expected finite numbers in {part}.{name},'
+                                   ' got others; a training may have diverged: take other weights')
         module.to(device).eval().requires_grad_(False)
     return bundle
 
