@@ -51,9 +51,12 @@ test-full: ready .venv/full  ## every test, high counts and soak too
 	@echo '== testing everything'
 	@$(TEST) $(ARGS)
 
-test-jazzy: ready .venv/jazzy/installed  ## the same with numpy 1.26, for which Jazzy is built
-	@echo '== testing with numpy 1.26; the long tests run with `make test-full`'
-	@PYTHONPATH=$(CURDIR)/.venv/jazzy $(TEST) -m 'not slow' $(ARGS)
+# Whatever is made next has the versions of constraints.txt again.
+test-jazzy: ready  ## `make test` with numpy 1.26 and OpenCV 4, for which Jazzy is built
+	@echo '== installing numpy 1.26 and what belongs to it'
+	@rm .venv/installed
+	@$(PIP) install --no-compile --no-deps -r constraints-jazzy.txt
+	@$(TEST) -m 'not slow' $(ARGS)
 
 # What the tests begin with; two at a time, since each keeps one core busy.
 ready:
@@ -131,13 +134,6 @@ clean:  ## forget .venv and what was built
 	@echo '== installing what the long tests need'
 	@$(PIP) install --no-compile --no-build-isolation -c constraints.txt '.[test-full]'
 	@rm -rf build active_recon.egg-info
-	@touch $@
-
-# Instead of those of .venv, for which they stand first on the path.
-.venv/jazzy/installed: constraints-jazzy.txt .venv/installed
-	@echo '== installing numpy 1.26 and what belongs to it'
-	@rm -rf .venv/jazzy
-	@$(PIP) install --no-compile --no-deps --target .venv/jazzy -r $<
 	@touch $@
 
 # colcon needs an older setuptools than ours: both stand in a folder that only colcon sees.
