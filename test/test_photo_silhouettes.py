@@ -118,7 +118,7 @@ def test_the_object_frame_has_z_up_and_is_undone_by_world_from_object(up, views)
 def test_optical_axes_meet_where_all_cameras_look(views):
     taken = [view.camera for view in views]
     np.testing.assert_allclose(meeting_point(taken), CENTRE, atol=1e-9)
-    np.testing.assert_allclose(first_cube(taken, None).centre, CENTRE, atol=1e-9)
+    np.testing.assert_allclose(first_cube(taken, UP).centre, CENTRE, atol=1e-9)
     np.testing.assert_allclose(upward([camera.pose for camera in taken]), UP, atol=0.1)
     with pytest.raises(DataError, match='expected photos from several directions, got 1'):
         meeting_point(taken[:1])

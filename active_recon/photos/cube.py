@@ -105,20 +105,19 @@ def meeting_point(cameras: Sequence[Camera]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.solve(normal, moment))
 
 
-def first_cube(cameras: Sequence[Camera], up: NDArray[np.float64] | None,
+def first_cube(cameras: Sequence[Camera], up: NDArray[np.float64],
                share: float = WIDER) -> Cube:
     """
     Return a cube where the optical axes meet, of a share of the photos' width at that place.
 
     It is wider than the photos by default: an object may fill them. All cameras stay outside of
-    the cube. `up` None: the mean of what is up in the photos. Raises DataError as `meeting_point`
-    does.
+    the cube. Raises DataError as `meeting_point` does.
     """
     centre = meeting_point(cameras)
     distances = [float(np.linalg.norm(camera.position - centre)) for camera in cameras]
     widths = [shown_width(camera, centre) for camera in cameras]
     side = min(share * float(np.median(widths)), _OF_DISTANCE * min(distances))
-    return Cube(centre, side, upward([camera.pose for camera in cameras]) if up is None else up)
+    return Cube(centre, side, up)
 
 
 def upward(poses: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """Transforms in a bag: whether they have the object's frame, and the cameras by them."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,9 +24,12 @@ def connecting(bag: Bag, topics: Sequence[TopicSummary],
     """
     Return the topics whose transforms, with the static ones, connect the wanted frames.
 
-    The second value are all frames, read until every topic connects them. Where `/tf` does, it
-    alone is returned.
+    The second value are all frames, read until `/tf` connects them, which is then returned alone,
+    or every topic does.
     """
+    def connects(tree: Mapping[str, set[str]]) -> bool:
+        return set(wanted) <= tree.get(next(iter(wanted)), set())
+
     statics = [topic.name for topic in topics if topic.name.endswith(STATIC)]
     moving = [topic for topic in topics if topic.name not in statics] or list(topics)
     trees: dict[str, dict[str, set[str]]] = {topic.name: {} for topic in moving}
@@ -39,10 +42,9 @@ def connecting(bag: Bag, topics: Sequence[TopicSummary],
                 if one is not other:
                     one |= other
                     tree.update(dict.fromkeys(other, one))
-        if all(set(wanted) <= tree.get(next(iter(wanted)), set()) for tree in trees.values()):
+        if connects(trees.get(USUAL, {})) or all(map(connects, trees.values())):
             break
-    found = [topic for topic in moving
-             if set(wanted) <= trees[topic.name].get(next(iter(wanted)), set())]
+    found = [topic for topic in moving if connects(trees[topic.name])]
     return ([topic for topic in found if topic.name == USUAL] or found,
             {name for tree in trees.values() for name in tree})
 
