@@ -46,6 +46,14 @@ def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, m
     assert len(pictures) == 2 and all(cv2.imread(str(path)) is not None for path in pictures)
 
 
+def test_numbers_of_views_that_objects_lack_are_named(made, tmp_path, monkeypatch, capsys):
+    assert command(monkeypatch, 'study', made, '--models', 'carving', '--counts', '1,3,5,8',
+                   '--surfaces', '', '--disturbed-views', 0, '--threads', 1, '--out',
+                   tmp_path) == 0
+    told = capsys.readouterr().err
+    assert f'{made}: not measured after 5, 8 views: its objects have 3\n' in told
+
+
 def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypatch, capsys):
     def refused(*arguments):
         return refusal(monkeypatch, capsys, 'study', *arguments, '--out', tmp_path)

@@ -1,5 +1,7 @@
 """What of a bag can be played."""
 
+import os
+
 from active_recon.bags.runs.playing import Played, played
 from active_recon.bags.storage.bag import RawMessage
 from active_recon.bags.storage.metadata import Contents, Topic, total
@@ -140,3 +142,16 @@ def test_bags_of_others_are_played_with_their_qos_too(tmp_path, storage):
             '/episode', HEADER, typestore=STORE, offered_qos_profiles=[profile])
         writer.write(connection, time_of(0), cdr(header(0)))
     assert played(tmp_path / 'run', 1.0).topics == [Topic('/episode', HEADER, (LATCHED,))]
+
+
+def test_a_bag_without_messages_is_refused(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        pass
+    with pytest.raises(DataError, match='nothing to play: expected a bag with messages'):
+        played(bag.folder, 1.0)
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / 'run.mcap')
+    with pytest.raises(DataError, match='run.mcap: no bag: expected a file or a folder'):
+        played(tmp_path / 'run.mcap', 1.0)

@@ -437,6 +437,8 @@ def test_objects_that_cannot_be_read_are_left_out_by_name(tmp_path, monkeypatch,
     assert command(monkeypatch, *asked) == 0
     assert str(last.voxels_path(64)) in capsys.readouterr().err
     assert len(Measured.read(tmp_path / 'm.npz').iou) == 4
+    line = refusal(monkeypatch, capsys, *asked, '--views', 3)
+    assert '--views: too many: expected at most the 2 of the objects, got 3' in line
     for folder in others:
         folder.voxels_path(64).unlink()
     assert refusal(monkeypatch, capsys, *asked).endswith('expected at least one, got none')

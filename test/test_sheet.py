@@ -66,6 +66,11 @@ def test_one_thing_is_shown(tmp_path, monkeypatch, capsys):
     assert 'expected one of --category, --meshes, --training, got --category and --t' in line
 
 
+def test_training_images_are_those_of_a_dataset(tmp_path, monkeypatch, capsys):
+    line = refused(monkeypatch, capsys, 'sheet', tmp_path / 'x.png', '--model', 'lifting')
+    assert '--model without --training' in line
+
+
 def test_a_folder_without_meshes_or_objects_is_refused(tmp_path):
     with pytest.raises(DataError, match='no mesh files: expected some'):
         run(tmp_path / 'none.png', '--meshes', tmp_path)

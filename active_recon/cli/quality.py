@@ -74,6 +74,9 @@ def measure(
             except DataError as error:  # of these few no one; perhaps of the others
                 left_out.append(str(error))
             else:
+                if views > (most := some.poses.shape[1]):
+                    raise ConfigError(f'--views: too many: expected at most the {most} of the '
+                                      f'objects, got {views}')
                 left_out += some.unreadable
                 parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
                                       seed + at, policy, sha256))

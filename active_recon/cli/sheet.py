@@ -23,9 +23,10 @@ def sheet(
     training: Annotated[Path | None, typer.Option(
         help='Dataset whose augmented training images are shown instead: one sequence of views '
              'in each row.')] = None,
-    model: Annotated[str, typer.Option(
+    model: Annotated[str | None, typer.Option(
+        show_default='lifting',
         help='With --training: the network whose images are shown. lifting takes any cameras, '
-             "2d3d-attention the turntable's.")] = 'lifting',
+             "2d3d-attention the turntable's.")] = None,
     count: Annotated[int, typer.Option(
         min=1, help='Number of objects of each category; with --training, of rows.')] = 8,
     azimuth_deg: Annotated[float, typer.Option(
@@ -44,11 +45,14 @@ def sheet(
     if len(given := [name for name, value in asked.items() if value]) > 1:
         raise ConfigError(f'sheet: several things to show: expected one of {", ".join(asked)}, '
                           f'got {" and ".join(given)}')
+    if model is not None and training is None:
+        raise ConfigError('sheet: --model without --training: expected a dataset whose training '
+                          'images are shown as the network sees them, got none')
     if out.suffix.lower() != '.png':
         raise ConfigError(f'{out}: no PNG file: expected a path that ends with .png')
     writable(out)
     picture = _objects(category, meshes, count, azimuth_deg) if training is None else (
-        _training(training, count, model))
+        _training(training, count, model or 'lifting'))
     if not cv2.imwrite(str(out), picture[..., ::-1]):
         raise DataError(f'{out}: cannot be written: expected the path of a PNG file')
     typer.echo(f'wrote {out}')

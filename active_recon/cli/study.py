@@ -110,7 +110,11 @@ def study(
     result: dict[str, Any] = {'command': command_line(),
                               'sets': []}
     for folder in data or []:
-        result['sets'].append(study_set(folder, entrants, plan, extent, library, progress_bar))
+        found = study_set(folder, entrants, plan, extent, library, progress_bar)
+        if beyond := [str(count) for count in plan.counts if count > found['views']]:
+            typer.echo(f'{folder}: not measured after {", ".join(beyond)} views: its objects have '
+                       f'{found["views"]}', err=True)
+        result['sets'].append(found)
         _write(result, out)  # keeps the results if a later folder fails
     if photos is not None:
         result['photographs'] = _photographs(photos, box, up, entrants)

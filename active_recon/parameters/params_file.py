@@ -30,7 +30,7 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
     """
     given: dict[str, dict[str, Any]] = {}
     shared: dict[str, Any] = {}
-    for key, entry in _mapping(path, path.name, read_yaml(path)).items():
+    for key, entry in _document(path).items():
         name = str(key).rpartition('/')[2]
         values = _mapping(path, str(key), entry)
         if list(values) != ['ros__parameters']:
@@ -54,7 +54,7 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
 
 def nodes_left_out(path: Path) -> list[str]:
     """Return the nodes of others that a file has parameters for; raises as `read_params_file`."""
-    names = (str(key).rpartition('/')[2] for key in _mapping(path, path.name, read_yaml(path)))
+    names = (str(key).rpartition('/')[2] for key in _document(path))
     return [name for name in names if name in _BESIDE]
 
 
@@ -65,7 +65,7 @@ def check_reach(path: Path, namespace: str) -> None:
     ROS compares keys with full names; there, `*` is any one part and `**` any number of them.
     """
     keys = defaultdict(list)
-    for key in map(str, _mapping(path, path.name, read_yaml(path))):
+    for key in map(str, _document(path)):
         keys[key.rpartition('/')[2]].append(f'/{key.removeprefix("/")}')
     for name in keys:
         # All nodes of `/cell/**`, else those of the name in what stands before it
@@ -106,6 +106,14 @@ def _as_ros_reads(parameter: Declared, value: object) -> object:
         raise ConfigError(f'parameter {parameter.name}: not of one type: expected all numbers of '
                           f'a list with a point, as 0.0 is, for ROS, got {value!r}')
     return [floating(each) for each in value] if isinstance(value, list) else floating(value)
+
+
+def _document(path: Path) -> Mapping[Any, Any]:
+    value = read_yaml(path)
+    if not isinstance(value, Mapping):
+        raise ConfigError(f'{path}: no parameters file: expected nodes with ros__parameters, got '
+                          f'{"nothing" if value is None else repr(value)}')
+    return value
 
 
 def _mapping(path: Path, where: str, value: object) -> Mapping[Any, Any]:

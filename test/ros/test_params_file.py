@@ -96,8 +96,8 @@ def test_the_driver_of_a_turntable_is_left_out_and_named(tmp_path):
 
 
 @pytest.mark.parametrize(('text', 'said'), [
-    ('', 'not a mapping: expected names with values, got None'),
-    ('- a', 'not a mapping: expected names with values'),
+    ('', 'no parameters file: expected nodes with ros__parameters, got nothing'),
+    ('- a', r"no parameters file: expected nodes with ros__parameters, got \['a'\]"),
     ('{', 'no ROS parameters file in YAML'),
     ('/**: {ros__parameters: {a: 1}}', 'no node: expected one or more of reconstructor.*, got '
                                        'none'),

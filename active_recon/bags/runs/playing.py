@@ -8,7 +8,7 @@ from pathlib import Path
 from active_recon.bags.storage.bag import Bag, RawMessage
 from active_recon.bags.storage.metadata import Topic
 from active_recon.bags.storage.opening import open_bag
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, DataError
 from active_recon.reporting import Reporting, silent
 
 
@@ -44,7 +44,7 @@ def played(path: Path, rate: float, names: str = '', reporting: Reporting = sile
 
     The whole bag is read, so that a damaged one is rejected and not played in part. `names` are
     separated by commas and may lack the first '/'. Raises ConfigError if the rate is not above 0
-    or the bag has no such topic, DataError if the bag is missing or damaged.
+    or the bag has no such topic, DataError if the bag is missing, damaged or without messages.
     """
     if not 0 < rate < float('inf'):
         raise ConfigError('--rate: invalid rate: expected one above 0, where 1 is that of the '
@@ -54,6 +54,8 @@ def played(path: Path, rate: float, names: str = '', reporting: Reporting = sile
     topics = {topic.name: Topic(topic.name, topic.type_name, topic.qos)
               for topic in summary.topics if topic.count}
     wanted = [f'/{name.strip().lstrip("/")}' for name in names.split(',') if name] or list(topics)
+    if not topics:
+        raise DataError(f'{path}: nothing to play: expected a bag with messages, got one without')
     missing = [name for name in wanted if name not in topics]
     if missing:
         raise ConfigError(f'{path}: no topics {", ".join(missing)} in the bag: expected some of '

@@ -18,6 +18,8 @@ def open_bag(path: Path) -> Bag:
     if not path.exists():
         raise DataError(f'{path}: no bag there: no such file or folder')
     if not path.is_dir():
+        if not path.is_file():  # opening a named pipe waits for its writer
+            raise DataError(f'{path}: no bag: expected a file or a folder, got a pipe or a device')
         alone = StoredFiles([path], 'file' if path.suffix == '.zstd' else '')
         return McapBag(path, alone) if _is_mcap(path) else _sqlite3_bag(path, alone)
     if (path / 'metadata.yaml').exists():
