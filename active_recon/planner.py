@@ -23,7 +23,12 @@ from active_recon.policies import (
 )
 from active_recon.policies.automatic import SWEEP
 from active_recon.policies.checked import checked_choice
-from active_recon.policies.planner_views import observation, PlannerView, policy_poses
+from active_recon.policies.planner_views import (
+    cameras_of,
+    observation,
+    PlannerView,
+    policy_poses,
+)
 from active_recon.policies.reasons import goal_reason, GoalReason
 from active_recon.policies.stopping import StoppingRule
 from active_recon.quality.quality import Quality
@@ -199,20 +204,26 @@ class Planner:
         self._early = view, choice, state
 
     def add_view(self, latent: NDArray[np.float32], camera: Camera, entropy: float,
-                 volume: VoxelGrid | None = None, quality: Quality | None = None) -> Decision:
+                 volume: VoxelGrid | None = None, quality: Quality | None = None,
+                 earlier: Sequence[Camera] = ()) -> Decision:
         """
         Take in a view and decide.
 
-        The arguments are those of `PlannerView`. Raises ViewError, and then nothing has changed.
+        The arguments are those of `PlannerView`; of an episode's views before its first, which
+        are `earlier`, a planner knows the cameras alone. They count and are not asked for again.
+        Raises ViewError, and then nothing has changed.
         """
         if not (math.isfinite(entropy) and np.isfinite(latent).all()):
             raise ViewError('latent or entropy not finite: expected finite numbers, got entropy '
                             f'{entropy}', 'latent')
         before = self._candidates
+        if earlier and not self._views:
+            self._early = None  # chosen without them
         self._look_from(camera)
         # A volume takes a megabyte, and only the last is looked at
         views = [*self._views[:-1], *(replace(view, volume=None) for view in self._views[-1:]),
-                 PlannerView(latent, camera, entropy, volume, quality)]
+                 PlannerView(latent, camera, entropy, volume, quality,
+                             () if self._views else tuple(earlier))]
         try:
             self._choose(views)
         except ViewError:
@@ -223,7 +234,8 @@ class Planner:
         if self._stopped:
             return self.stop()
         worth = None if self._goal is None else self._goal.worth
-        reason = self._stopping.reason([view.entropy for view in views], quality, worth,
+        entropies = [*[math.nan] * len(views[0].earlier), *(view.entropy for view in views)]
+        reason = self._stopping.reason(entropies, quality, worth,
                                        bool(self.provenance) and self._goes_around)
         return Decision(None, reason) if reason else self.next_goal()
 
@@ -281,7 +293,7 @@ class Planner:
         if self.sweeps:
             return GoalReason('next of an even sweep, since the views are unusual')
         poses = np.stack([camera.scaled(1 / last.volume.size).pose for camera in (
-            self._goal.camera, *(view.camera for view in self._views))])
+            self._goal.camera, *cameras_of(self._views))])
         return goal_reason(Observation(last.latent[None], poses[None, 1:], poses[None, :1],
                                        last.volume.occupancy[None]), poses[0], self._goal.gain)
 
@@ -333,5 +345,5 @@ class Planner:
         """Return the best goal for a camera that is somewhere; None where none is left."""
         assert self._wanted is not None
         return best_goal(
-            self._wanted, self._candidates, camera, [view.camera for view in self._views],
+            self._wanted, self._candidates, camera, cameras_of(self._views),
             self._failed, self._limits, self._cost if self._views else MotionCost())

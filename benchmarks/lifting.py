@@ -19,7 +19,8 @@ DOCUMENTS = (ROOT / 'README.md', ROOT / 'doc' / 'results.md',
              ROOT / 'active_recon' / 'weights' / 'MODEL_CARD.md')
 _BESIDE = '--models lifting,carving,2d3d-attention --threads 1'
 _KNOWN = '--surfaces 1,5 --disturbed-views 0'
-_LARGE = "--models lifting-large,lifting --threads 1 --surfaces '' --disturbed-views 0"
+_IN_OPENVINO = '--threads 1 --runtime openvino --no-bf16'
+_LARGE = f"--models lifting-large,lifting {_IN_OPENVINO} --surfaces '' --disturbed-views 0"
 STUDIES: Mapping[str, str] = {
     'parametric-test': f'data/test {_BESIDE} --surfaces 1,5 --disturbed-views 5 '
                        '--disturbed-objects 12',
@@ -32,13 +33,13 @@ STUDIES: Mapping[str, str] = {
                   '--threads 1 --disturbed-views 5 --disturbed-objects 104',
     'photographs': f'--photos photos/dino_sparse_ring {_BESIDE}',
     'r2n2-chairs': f"data/r2n2_sample {_BESIDE} --surfaces '' --disturbed-views 0",
-    'large-parametric-test': 'data/test --models lifting-large,lifting,carving --threads 1 '
+    'large-parametric-test': f'data/test --models lifting-large,lifting,carving {_IN_OPENVINO} '
                              f'{_KNOWN}',
     'large-parametric-unseen': f'data/unseen {_LARGE}',
     'large-real-val': f"data/real_val {_LARGE} --category '!thing_*' --objects 60",
     'large-things-val': f"data/real_val {_LARGE} --category 'thing_*' --objects 60",
     'large-photographs': '--photos photos/dino_sparse_ring --models lifting-large,lifting '
-                         '--threads 1',
+                         f'{_IN_OPENVINO}',
     'large-r2n2-chairs': f'data/r2n2_sample {_LARGE}',
 }
 SETS: Mapping[str, str] = {

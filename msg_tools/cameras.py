@@ -1,17 +1,18 @@
 """
-Cameras to and from CameraInfo and PoseStamped.
+Cameras to and from CameraInfo, PoseStamped and PoseArray.
 
 A pose is that of the camera's optical frame in the object frame. Pixel coordinates of the core
 begin at the image's corner (the first pixel's centre is 0.5), those of ROS at that centre (0).
 """
 
+from collections.abc import Iterable
 import math
 
 from active_recon.errors import MessageError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics, OBJECT_FRAME
 from active_recon.geometry.lenses import Distortion, MODELS
 from active_recon.geometry.rotations import pose_from_quaternion, quaternion_from_matrix
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
@@ -90,11 +91,24 @@ def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.flo
     Raises MessageError if the pose is in another frame, not finite, a million kilometres away or
     at the frame's origin, or its quaternion is zero.
     """
-    if msg.header.frame_id != frame:
+    _check_frame(msg.header, frame)
+    return _matrix(msg.pose)
+
+
+def poses_from_msg(msg: PoseArray, frame: str = OBJECT_FRAME) -> list[NDArray[np.float64]]:
+    """Return the poses, (4, 4) each; raises MessageError as `pose_from_msg` does."""
+    _check_frame(msg.header, frame)
+    return [_matrix(pose) for pose in msg.poses]
+
+
+def _check_frame(header: Header, frame: str) -> None:
+    if header.frame_id != frame:
         raise MessageError(f'wrong frame of a camera pose: expected {frame!r}, '
-                           f'got {msg.header.frame_id!r}', 'frame')
-    position, quaternion = numbers_from_msgs(msg.pose.position, msg.pose.orientation,
-                                             'camera pose')
+                           f'got {header.frame_id!r}', 'frame')
+
+
+def _matrix(pose: Pose) -> NDArray[np.float64]:
+    position, quaternion = numbers_from_msgs(pose.position, pose.orientation, 'camera pose')
     if math.hypot(*position) < 1e-6:
         raise MessageError("invalid camera pose: it is at the object's centre", 'pose')
     return pose_from_quaternion(position, quaternion)
@@ -121,10 +135,18 @@ def numbers_from_msgs(point: Point, turn: Quaternion,
 
 def pose_to_msg(pose: NDArray[np.float64], header: Header) -> PoseStamped:
     """Return a pose, (4, 4), as a message; the header names the object frame."""
+    return PoseStamped(header=header, pose=_pose_msg(pose))
+
+
+def poses_to_msg(poses: Iterable[NDArray[np.float64]], header: Header) -> PoseArray:
+    """Return poses, (4, 4) each, as a message; the header names the object frame."""
+    return PoseArray(header=header, poses=[_pose_msg(pose) for pose in poses])
+
+
+def _pose_msg(pose: NDArray[np.float64]) -> Pose:
     x, y, z, w = quaternion_from_matrix(pose[:3, :3])
     px, py, pz = pose[:3, 3].tolist()
-    return PoseStamped(header=header, pose=Pose(
-        position=Point(x=px, y=py, z=pz), orientation=Quaternion(x=x, y=y, z=z, w=w)))
+    return Pose(position=Point(x=px, y=py, z=pz), orientation=Quaternion(x=x, y=y, z=z, w=w))
 
 
 def pose_through_msg(pose: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -19,6 +19,8 @@ from msg_tools.cameras import (
     intrinsics_to_msg,
     pose_from_msg,
     pose_through_msg,
+    poses_from_msg,
+    poses_to_msg,
 )
 from msg_tools.goals import (
     azimuth_goal_from_msg,
@@ -145,6 +147,16 @@ def test_a_quaternion_of_any_length_is_read():
     turn = msg.pose.orientation
     turn.x, turn.y, turn.z, turn.w = (3 * part for part in (turn.x, turn.y, turn.z, turn.w))
     np.testing.assert_allclose(pose_from_msg(msg), orbit_camera(1.0).pose, atol=1e-12)
+
+
+def test_poses_come_through_one_message_as_through_one_each():
+    poses = [orbit_camera(azimuth).pose for azimuth in (0.0, 1.0, 4.0)]
+    header = Header(frame_id='object')
+    found = poses_from_msg(poses_to_msg(poses, header))
+    np.testing.assert_array_equal(found, [pose_through_msg(each) for each in poses])
+    assert poses_from_msg(poses_to_msg([], header)) == []
+    with pytest.raises(MessageError, match="expected 'map', got 'object'"):
+        poses_from_msg(poses_to_msg([], header), 'map')
 
 
 def pose(frame='object', x=1.0, w=1.0):

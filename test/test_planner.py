@@ -423,6 +423,35 @@ def test_a_view_that_was_expected_is_planned_as_any_other(policy):
         LATENT, orbit_camera(4.0), some_cells(3)), policy) == never
 
 
+@pytest.mark.parametrize('policy', ['unseen_entropy', 'attention', 'uniform', 'farthest'])
+@pytest.mark.parametrize('expected', [False, True])
+def test_a_planner_that_knows_the_cameras_of_earlier_views_decides_as_one_that_took_them(
+        policy, expected):
+    cameras = [orbit_camera(azimuth) for azimuth in (0.3, 1.4, 4.0)]
+    always, late = (Planner.load(policy, max_views=5, entropy_tolerance=0) for _ in range(2))
+    for number, camera in enumerate(cameras):
+        decision = always.add_view(LATENT, camera, 10.0, some_cells(number))
+    if expected:
+        late.expect_view(LATENT, cameras[-1], volume := some_cells(2))
+    else:
+        volume = some_cells(2)
+    found = late.add_view(LATENT, cameras[-1], 10.0, volume, earlier=cameras[:-1])
+    np.testing.assert_array_equal(found.goal.camera.pose, decision.goal.camera.pose)
+    for number, reason in enumerate(('', 'max_views'), 3):
+        one, other = (each.add_view(LATENT, decision.goal.camera, 10.0, some_cells(number))
+                      for each in (always, late))
+        assert one.reason == other.reason == reason
+        np.testing.assert_array_equal(always.plan().camera.pose, late.plan().camera.pose)
+
+
+def test_views_before_a_planner_s_first_settle_no_entropy():
+    planner = Planner(FarthestPolicy(), max_views=9, entropy_tolerance=0.01)
+    cameras = [orbit_camera(azimuth) for azimuth in (0.3, 1.4, 4.0)]
+    assert not planner.add_view(LATENT, cameras[-1], 10.0, earlier=cameras[:-1]).reason
+    assert not planner.add_view(LATENT, orbit_camera(2.0), 10.0).reason
+    assert planner.add_view(LATENT, orbit_camera(3.0), 10.0).reason == 'entropy_settled'
+
+
 @pytest.mark.parametrize('yaw', [0.0, 0.3])
 def test_a_policy_that_has_prepared_for_a_camera_has_its_lines_of_sight_and_chooses_the_same(yaw):
     size, camera = 0.2, orbit_camera(1.234, 0.321, 0.4)

@@ -50,8 +50,8 @@ FACTS = {'weights_sha256': 'SHA-256 of the weights',
          'needs_front': "whether the network needs the object's front"}
 """Read-only parameters that describe the network, with their descriptions."""
 TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'camera/mask', DEPTH_TOPIC,
-          DEPTH_INFO_TOPIC, 'next_view', 'view', 'view_image', 'network_image', 'occupancy',
-          'probabilities', 'latent', 'entropy', 'quality', 'episode', 'mesh')
+          DEPTH_INFO_TOPIC, 'next_view', 'view', 'views', 'view_image', 'network_image',
+          'occupancy', 'probabilities', 'latent', 'entropy', 'quality', 'episode', 'mesh')
 """Topics that the node subscribes to and publishes."""
 
 
@@ -168,6 +168,7 @@ class ReconstructorNode(ManagedNode):
         self._diagnostics.count('episodes')
         self._diagnostics.set_value('Episode', self._episode.id)
         self._tell_view_count()
+        self._publisher.begin_episode(self._episode.begin)
         self._episode_pub.publish(episode_to_msg(self._episode))
         self._products.begin_episode(self._episode)
 

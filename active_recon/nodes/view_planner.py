@@ -30,8 +30,8 @@ from std_srvs.srv import Trigger
 
 REPEAT_S = 1.0
 """Period at which an open goal is published again."""
-TOPICS = ('camera/pose', 'view', 'latent', 'entropy', 'quality', 'probabilities', 'episode',
-          'next_view', 'next_azimuth', 'azimuth_scores', 'goal_reason', 'done')
+TOPICS = ('camera/pose', 'view', 'views', 'latent', 'entropy', 'quality', 'probabilities',
+          'episode', 'next_view', 'next_azimuth', 'azimuth_scores', 'goal_reason', 'done')
 """Topics that the node subscribes to and publishes."""
 
 
@@ -191,7 +191,7 @@ class ViewPlannerNode(ManagedNode):
         if self._episode is None:
             return
         decision = self._planner.add_view(view.latent, view.camera, view.entropy, view.volume,
-                                          view.quality)
+                                          view.quality, view.earlier)
         self._diagnostics.clear_warning(NO_GOAL)
         self._started = True
         self._diagnostics.count('views')

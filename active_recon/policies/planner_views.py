@@ -22,6 +22,7 @@ class PlannerView:
     - entropy: of the reconstruction, nats
     - volume: the published probabilities, for a policy that wants them
     - quality: None where it is not judged
+    - earlier: cameras of the views that the episode had before the planner's first
     """
 
     latent: NDArray[np.float32]
@@ -29,6 +30,7 @@ class PlannerView:
     entropy: float
     volume: VoxelGrid | None = None
     quality: Quality | None = None
+    earlier: Sequence[Camera] = ()
 
     def is_of(self, other: 'PlannerView') -> bool:
         """Whether it is the same view, whatever its entropy and quality."""
@@ -49,10 +51,15 @@ def observation(views: Sequence[PlannerView], candidates: Sequence[Camera], yaw:
         raise ViewError('no probabilities: expected them beside the latent, as this policy '
                         'looks at them, got none', 'volume')
     unit = 1.0 if last.volume is None else 1 / last.volume.size
-    taken = policy_poses([view.camera for view in views], yaw, unit)
+    taken = policy_poses(cameras_of(views), yaw, unit)
     volume = None if last.volume is None else turned(last.volume.occupancy, -yaw)[None]
     return Observation(
         last.latent[None], taken[None], policy_poses(candidates, yaw, unit)[None], volume)
+
+
+def cameras_of(views: Sequence[PlannerView]) -> list[Camera]:
+    """Return the cameras of all views of an episode, those before the planner's first, too."""
+    return [camera for view in views for camera in (*view.earlier, view.camera)]
 
 
 def policy_poses(cameras: Sequence[Camera], yaw: float, unit: float) -> NDArray[np.float64]:

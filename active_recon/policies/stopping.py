@@ -45,11 +45,11 @@ class StoppingRule:
         Return why no further view is needed, '' where one is.
 
         It is one of target_reached, max_views, target_out_of_reach, entropy_settled and
-        gain_too_small. `entropies` are those after each view, nats; `quality` is that after the
-        last, which ends nothing while its views are flagged as unusual; `worth` is what the best
-        further view is expected to gain, None where that is not known; `learned_around` is
-        whether the policy of the weights chooses views of a turntable, for which promises are its
-        own.
+        gain_too_small. `entropies` are those after each view, nats, NaN where it is not known;
+        `quality` is that after the last, which ends nothing while its views are flagged as
+        unusual; `worth` is what the best further view is expected to gain, None where that is not
+        known; `learned_around` is whether the policy of the weights chooses views of a turntable,
+        for which promises are its own.
         """
         known = quality if self.target_quality and quality and not quality.suspect else None
         if known is not None and known.promise_for(learned_around) >= self.target_quality:

@@ -15,8 +15,8 @@ from active_recon.geometry.cameras import CANONICAL_ELEVATION, orbit_camera
 from active_recon.nodes.runtime.shared_memory import PROFILE
 from active_recon.quality.quality import Quality
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import camera_to_msgs, pose_to_msg
+from geometry_msgs.msg import PoseArray, PoseStamped
+from msg_tools.cameras import camera_to_msgs, pose_to_msg, poses_to_msg
 from msg_tools.diagnostics import diagnostics_from_msg, NodeStatus
 from msg_tools.entropy import entropy_to_msg
 from msg_tools.episodes import Episode, episode_to_msg
@@ -255,7 +255,7 @@ class FakeCamera:
 class FakeReconstructor:
     """A reconstructor in the bench's hand; it begins to publish when it is made."""
 
-    TOPICS = {'episode': Header, 'latent': Image, 'view': PoseStamped,
+    TOPICS = {'episode': Header, 'latent': Image, 'view': PoseStamped, 'views': PoseArray,
               'entropy': JointState, 'quality': DiagnosticArray}
     PARTS = ('entropy', 'latent', 'view')
 
@@ -280,13 +280,16 @@ class FakeReconstructor:
 
     def show(self, latent: np.ndarray, azimuth: float, stamp: int | None = None,
              parts: Sequence[str] = PARTS, elevation: float = CANONICAL_ELEVATION,
-             quality: Quality | None = None, weights: str = '') -> int:
-        """Publish a view's parts; return their stamp."""
+             quality: Quality | None = None, weights: str = '',
+             earlier: Sequence[float] = ()) -> int:
+        """Publish a view's parts, `views` with those at earlier azimuths; return their stamp."""
         stamp = self.bench.now() if stamp is None else stamp
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
         messages = {'entropy': entropy_to_msg(_ENTROPY, header),
                     'latent': latent_to_msg(latent, header),
-                    'view': pose_to_msg(orbit_camera(azimuth, elevation).pose, header)}
+                    'view': pose_to_msg(orbit_camera(azimuth, elevation).pose, header),
+                    'views': poses_to_msg([orbit_camera(each, elevation).pose
+                                           for each in (*earlier, azimuth)], header)}
         if quality is not None:
             messages['quality'] = quality_to_msg(quality, header, weights)
         for part in parts:

@@ -7,7 +7,7 @@ from active_recon.datasets.layout import ObjectFolder, write_object
 from active_recon.geometry.cameras import azimuth_difference, AZIMUTHS, orbit_camera
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxels import VoxelGrid
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseArray, PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.goals import azimuth_goal_from_msg, view_goal_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
@@ -168,17 +168,25 @@ def test_a_plan_is_a_new_goal(bench, watch):
     watch.wait_done()
 
 
-def test_a_planner_that_comes_back_goes_on_and_repeats_no_first_view(
+def test_all_views_of_an_episode_are_told_together(bench, watch):
+    _, end = new_episode(watch)
+    told = bench.subscribe(PoseArray, 'views', LATCHED_QOS)
+    bench.until(lambda: told and stamp_of(told[-1]) == stamp_of(end), 'the views')
+    bench.until(lambda: stamp_of(end) in map(stamp_of, watch.views), 'the last view')
+    assert told[-1].poses == [msg.pose for msg in watch.views[-VIEWS:]]
+
+
+def test_a_planner_that_comes_back_after_the_end_says_so_and_asks_for_nothing(
         bench, watch, loop, start_planner):
-    begin = stamp_of(watch.episode())
+    begin, taken = stamp_of(watch.episode()), len(watch.views)
     loop['view_planner'].stop(signal.SIGKILL)
     bench.within(0.3, lambda: False)  # a goal of before may be on its way
-    taken, goals = len(watch.views), len(watch.goals)
+    goals, ends = len(watch.goals), len(watch.done)
     loop['view_planner'] = start_planner()
-    bench.until(lambda: len(watch.views) >= taken + VIEWS - 1, 'the views after the one found')
+    bench.until(lambda: any(msg.frame_id for msg in watch.done[ends:]), 'the end, told again')
+    assert watch.done[-1].frame_id == 'max_views'
     assert stamp_of(watch.episode()) == begin
-    first = view_goal_from_msg(watch.views[taken - 1]).azimuth
-    assert abs(azimuth_difference(azimuth_goal_from_msg(watch.goals[goals]), first)) > 0.01
+    assert not bench.within(1.0, lambda: watch.goals[goals:] or watch.views[taken:])
 
 
 def test_a_reconstructor_that_comes_back_begins_a_new_episode(

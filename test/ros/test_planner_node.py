@@ -128,6 +128,21 @@ def test_a_planner_that_comes_late_goes_on_from_the_latched_view(start_node, ben
     assert all(view_goal_from_msg(msg).azimuth != pytest.approx(1.0) for msg in fake.goals)
 
 
+def test_a_planner_that_comes_late_counts_the_views_before_and_asks_for_none_of_them(
+        start_node, bench, latent):
+    fake = FakeReconstructor(bench, ('episode', *FakeReconstructor.PARTS, 'views'), heard=False)
+    everything = (*FakeReconstructor.PARTS, 'views')
+    fake.begin('before')
+    fake.show(latent, 3.0, parts=everything, earlier=(1.0, 5.0))
+    start_node('view_planner', policy='farthest', max_views=4, entropy_tolerance=0.0)
+    goal = view_goal_from_msg(bench.until(lambda: fake.goals, 'a goal')[-1]).azimuth
+    away = [abs(azimuth_difference(goal, azimuth)) for azimuth in (1.0, 3.0, 5.0)]
+    assert min(away) > 0.8
+    fake.show(latent, goal, parts=everything, earlier=(1.0, 5.0, 3.0))
+    bench.until(lambda: fake.done and fake.done[-1].frame_id == 'max_views', 'the end')
+    bench.until(lambda: bench.counts('view_planner').get('views') == 2, 'its two views')
+
+
 @pytest.mark.parametrize('simulated', [False, True])
 def test_a_planner_that_comes_late_waits_until_it_could_hear_every_part_of_a_view(
         start_node, bench, latent, simulated):

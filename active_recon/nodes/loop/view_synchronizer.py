@@ -12,8 +12,8 @@ from active_recon.nodes.runtime.qos import LATCHED_QOS
 from active_recon.policies.planner_views import PlannerView
 from active_recon.quality.quality import Quality
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import pose_from_msg
+from geometry_msgs.msg import PoseArray, PoseStamped
+from msg_tools.cameras import pose_from_msg, poses_from_msg
 from msg_tools.entropy import entropy_from_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
@@ -30,7 +30,9 @@ class ViewSynchronizer:
     """
     Joins `latent`, `view` and `entropy`, which arrive in any order while the node is active.
 
-    With them goes the `quality` of their stamp, for which they wait while it has a publisher;
+    With them goes the `quality` of their stamp, for which they wait while it has a publisher, and
+    with the first likewise, from `views`, the cameras of those before it: a planner that is
+    started again knows where they were taken.
     `on_waiting` is called with the last view when it begins to wait, and `on_camera` with its
     camera, which arrives before. `on_weights` is called with the SHA-256 of the network's weights,
     or '', where a quality tells of them.
@@ -53,6 +55,7 @@ class ViewSynchronizer:
         self._on_weights = on_weights
         self._joiner = StampJoiner(['latent', 'camera', 'entropy'])
         self._has_volume = False
+        self._frame = frame
         self._begin = 0
         self._matched_at: float | None = None
         self.last: tuple[int, PlannerView] | None = None
@@ -65,6 +68,8 @@ class ViewSynchronizer:
         self._qualities: dict[int, Quality] = {}
         self._quality = node.create_subscription(
             DiagnosticArray, 'quality', self._on_quality, LATCHED_QOS)
+        self._listed = 0, PoseArray()
+        self._views = node.create_subscription(PoseArray, 'views', self._on_views, LATCHED_QOS)
 
     def subscribe_volume(self, object_size: float) -> None:
         """Join the probabilities, too, of a voxel grid of that side in metres, for the policy."""
@@ -98,6 +103,7 @@ class ViewSynchronizer:
         self._joiner.clear()
         self._waiting.clear()
         self._qualities.clear()
+        self._listed = 0, PoseArray()
         self.last = None
 
     def is_caught_up(self) -> bool:
@@ -137,14 +143,35 @@ class ViewSynchronizer:
                 self._on_weights(judging_weights(msg))
                 self._hand_over()
 
+    def _on_views(self, msg: PoseArray) -> None:
+        with refusing_views(self._diagnostics):
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            if not self._node.clock_monitor.is_ahead(stamp):
+                self._listed = stamp, msg
+                self._hand_over()
+
     def _hand_over(self) -> None:
         """Pass on the complete views whose quality is there, or will not come."""
-        comes = self._quality.get_publisher_count() > 0
         for stamp in sorted(self._waiting):
-            if comes and stamp not in self._qualities and stamp == max(self._waiting):
+            if stamp == max(self._waiting) and self._awaits(stamp):
                 return  # a later view shows that it was lost
             parts = self._waiting.pop(stamp)
-            self.last = stamp, PlannerView(**parts, quality=self._qualities.get(stamp))
+            self.last = stamp, PlannerView(**parts, quality=self._qualities.get(stamp),
+                                           earlier=self._cameras_before(stamp))
             for old in [each for each in self._qualities if each <= stamp]:
                 del self._qualities[old]
             self._on_view(*self.last)
+
+    def _awaits(self, stamp: int) -> bool:
+        """Whether a message of a complete view is still to come."""
+        return (self._quality.get_publisher_count() > 0 and stamp not in self._qualities
+                or self.last is None and self._views.get_publisher_count() > 0
+                and self._listed[0] < stamp)
+
+    def _cameras_before(self, stamp: int) -> list[Camera]:
+        """Return the cameras of an episode's views before the first that this planner hears of."""
+        listed, msg = self._listed
+        if self.last is None and listed == stamp:
+            with refusing_views(self._diagnostics):
+                return [Camera(pose) for pose in poses_from_msg(msg, self._frame)[:-1]]
+        return []

@@ -18,7 +18,7 @@ _CHECKS = round(AWAITED_S / CHECK_EVERY_S)  # a busy node checks less often, and
 _LOOK_EVERY = 5  # checks: the remedies need all of the graph
 _MAX_CANDIDATES = 3
 _RESULTS = {'entropy', 'latent', 'network_image', 'next_azimuth', 'next_view', 'view',
-            'view_image'}
+            'view_image', 'views'}
 """Topics of the loop's own nodes, which are nobody's camera or turntable."""
 
 
