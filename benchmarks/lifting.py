@@ -33,8 +33,8 @@ STUDIES: Mapping[str, str] = {
                   '--threads 1 --disturbed-views 5 --disturbed-objects 104',
     'photographs': f'--photos photos/dino_sparse_ring {_BESIDE}',
     'r2n2-chairs': f"data/r2n2_sample {_BESIDE} --surfaces '' --disturbed-views 0",
-    'large-parametric-test': f'data/test --models lifting-large,lifting,carving {_IN_OPENVINO} '
-                             f'{_KNOWN}',
+    'large-parametric-test': 'data/test --models lifting-large,lifting,carving --threads 1 '
+                             f'--runtime auto --no-bf16 {_KNOWN}',
     'large-parametric-unseen': f'data/unseen {_LARGE}',
     'large-real-val': f"data/real_val {_LARGE} --category '!thing_*' --objects 60",
     'large-things-val': f"data/real_val {_LARGE} --category 'thing_*' --objects 60",
