@@ -11,6 +11,7 @@ from active_recon.parameters.declaration import Declared, declared, nearest
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from active_recon.parameters.value_text import floating
 from active_recon.parameters.yaml_files import read_yaml
+import yaml
 
 _OF_ROS = {'start_type_description_service', 'use_sim_time'}
 """Parameters that every ROS node declares."""
@@ -95,7 +96,8 @@ def _as_ros_reads(parameter: Declared, value: object) -> object:
     """
     Return a value with the numbers that YAML's older version takes for text: nan, 1e-3.
 
-    Raises ConfigError on what ROS does not read: nothing, and integers among other numbers.
+    Raises ConfigError on what ROS does not read: nothing, integers among other numbers, and
+    numbers in quotes.
     """
     if value is None:
         raise ConfigError(f'parameter {parameter.name}: no value: expected {parameter.expected}, '
@@ -105,7 +107,18 @@ def _as_ros_reads(parameter: Declared, value: object) -> object:
     if isinstance(value, list) and len({type(each) is int for each in value}) > 1:
         raise ConfigError(f'parameter {parameter.name}: not of one type: expected all numbers of '
                           f'a list with a point, as 0.0 is, for ROS, got {value!r}')
-    return [floating(each) for each in value] if isinstance(value, list) else floating(value)
+    given = value if isinstance(value, list) else [value]
+    for each in given:
+        if isinstance(each, str) and _is_number(each):  # text only by its quotes, for ROS as well
+            raise ConfigError(f'parameter {parameter.name}: text: expected {parameter.expected}, '
+                              f'without quotes, got {each!r}')
+    return list(map(floating, given)) if isinstance(value, list) else floating(value)
+
+
+def _is_number(text: str) -> bool:
+    """Whether YAML reads a text without quotes as a number."""
+    tag = yaml.SafeLoader('').resolve(yaml.ScalarNode, text, (True, False))
+    return str(tag).endswith((':float', ':int'))
 
 
 def _document(path: Path) -> Mapping[Any, Any]:

@@ -113,6 +113,12 @@ def test_the_driver_of_a_turntable_is_left_out_and_named(tmp_path):
     ('view_planner: {ros__parameters: {elevation_range: [0, 1.2]}}',
      'parameter elevation_range: not of one type: expected all numbers of a list with a point, as '
      r'0.0 is, for ROS, got \[0, 1.2\]'),
+    ('view_planner: {ros__parameters: {entropy_tolerance: "0.1"}}',
+     "parameter entropy_tolerance: text: expected a number from .* without quotes, got '0.1'"),
+    ('view_planner: {ros__parameters: {entropy_tolerance: "{"}}',
+     "entropy_tolerance: invalid value: expected a number from .*, got '{'"),
+    ('view_planner: {ros__parameters: {elevation_range: [0.0, "1.2"]}}',
+     "parameter elevation_range: text: expected .* without quotes, got '1.2'"),
     ('view_planner: {ros__parameters: {reachable_views: }}',
      'parameter reachable_views: no value: expected a list.* got nothing; an empty list is '),
     ('recorder: {ros__parameters: {max_bag_size_mb: 0}}',
