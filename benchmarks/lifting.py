@@ -30,7 +30,7 @@ STUDIES: Mapping[str, str] = {
     'any-cameras-unseen': 'any/unseen --models lifting,carving --threads 1 --disturbed-views 5 '
                           '--disturbed-objects 24',
     'robustness': "any/test any/unseen --models lifting,lifting-large --counts 1,5 --surfaces '' "
-                  '--threads 1 --disturbed-views 5 --disturbed-objects 104',
+                  f'{_IN_OPENVINO} --disturbed-views 5 --disturbed-objects 104',
     'photographs': f'--photos photos/dino_sparse_ring {_BESIDE}',
     'r2n2-chairs': f"data/r2n2_sample {_BESIDE} --surfaces '' --disturbed-views 0",
     'large-parametric-test': 'data/test --models lifting-large,lifting,carving --threads 1 '

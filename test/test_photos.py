@@ -133,7 +133,7 @@ def test_a_cube_that_is_searched_in_vain_stays_as_wide_as_it_was(views, cluttere
     shape = active_recon.reconstruct(write_photos(tmp_path, views, cluttered),
                                      background='network')
     assert shape.cube.side < 1.01 * first_cube(views, np.array([0.0, 0, 1])).side
-    assert len(shape.views) == COUNT and shape.quality.lower_bound < 0.3
+    assert len(shape.views) == COUNT and shape.quality.suspect == 'object_size'
 
 
 def test_the_segmenter_looks_at_the_cube_of_the_size_that_is_given(views, cluttered, monkeypatch):

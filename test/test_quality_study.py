@@ -417,6 +417,10 @@ def test_what_was_measured_with_another_network_is_refused(tmp_path, monkeypatch
         monkeypatch, capsys, 'quality', 'fit', '--known', abc, '--calibration', abc, '--out',
         tmp_path / 'new.json')
     assert not (tmp_path / 'new.json').exists()
+    (tmp_path / 'file').touch()
+    assert 'file/new.json: cannot be written' in refusal(
+        monkeypatch, capsys, 'quality', 'fit', '--calibration', abc, '--out',
+        tmp_path / 'file/new.json')
 
 
 def test_a_study_of_nothing_and_an_unknown_fault_are_refused(tmp_path, monkeypatch, capsys):

@@ -121,6 +121,7 @@ def fit(
 
     weights = find_weights(model)
     sha256 = weights_hash(weights)
+    path = writable(out or tables_path(weights))
     together = Measured.read_all(calibration, sha256)
     if known:
         first, notes = together.rows(halves(together)), {}
@@ -134,7 +135,6 @@ def fit(
         typer.echo(f'warning: calibrated on {tables.fewest_usual} episodes: expected '
                    f'{FEWEST_USUAL} or more in this half, else no view is flagged as unusual and '
                    'no target promised; measure more', err=True)
-    path = out or tables_path(weights)
     tables.write(path, **{'command': command_line(), **notes,
                           _SOURCES: sorted(set(first.source.tolist()))})
     typer.echo(f'wrote {path}')
