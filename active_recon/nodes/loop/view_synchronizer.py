@@ -56,7 +56,7 @@ class ViewSynchronizer:
         self._joiner = StampJoiner(['latent', 'camera', 'entropy'])
         self._has_volume = False
         self._frame = frame
-        self._begin = 0
+        self._begin, self._heard = 0, -1
         self._matched_at: float | None = None
         self.last: tuple[int, PlannerView] | None = None
         self._inputs = [node.create_subscription(kind, topic, self._on(name, read), LATCHED_QOS)
@@ -99,7 +99,7 @@ class ViewSynchronizer:
 
     def clear(self) -> None:
         """Forget the messages and the episode."""
-        self._begin = 0
+        self._begin, self._heard = 0, -1
         self._joiner.clear()
         self._waiting.clear()
         self._qualities.clear()
@@ -107,7 +107,9 @@ class ViewSynchronizer:
         self.last = None
 
     def is_caught_up(self) -> bool:
-        """Whether any view latched before this node started has been received by now."""
+        """Whether any view latched before this node started has been handed over by now."""
+        if self._heard >= self._begin and (self.last is None or self.last[0] < self._heard):
+            return False  # a part of a view is there, the others are on their way
         if not all(each.get_publisher_count() for each in self._inputs):
             return False
         now = time.monotonic()
@@ -126,6 +128,7 @@ class ViewSynchronizer:
         if stamp < self._begin:
             self._diagnostics.count('dropped/last_episode')
             return
+        self._heard = max(self._heard, stamp)
         if name == 'camera':
             self._on_camera(part)
         parts = self._joiner.add(name, stamp, part)
@@ -148,6 +151,7 @@ class ViewSynchronizer:
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             if not self._node.clock_monitor.is_ahead(stamp):
                 self._listed = stamp, msg
+                self._heard = max(self._heard, stamp if msg.poses else -1)
                 self._hand_over()
 
     def _hand_over(self) -> None:
