@@ -18,14 +18,14 @@ from benchmarks.idle import idle_figure
 from benchmarks.loop import demo_figure, reconstructor_figures
 from benchmarks.published_networks import published_figures
 from benchmarks.record import HEAD, keep, part_record, rows
-from benchmarks.runtimes import large_figures, runtime_figures, segmenter_figures
+from benchmarks.runtimes import runtime_figures, segmenter_figures, small_figures
 from benchmarks.stream import stream_figures
 from benchmarks.viewer import watching_figures
 
 PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'view': episode_figures,
     'runtimes': runtime_figures,
-    'large': large_figures,
+    'small': small_figures,
     'segmenter': segmenter_figures,
     'evaluation': evaluation_figures,
     'published': published_figures,

@@ -29,7 +29,7 @@ from active_recon.evaluation.surfaces import (
     surface_scores,
     thin_cells,
 )
-from active_recon.models.weights_files import find_weights
+from active_recon.models.weights_files import DEFAULT_MODEL, find_weights
 from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.refinement import refined, refined_mesh
 from active_recon.volumes.rendering import composite, Renderer
@@ -73,7 +73,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument('manifest', type=Path, help='table of real models (CSV)')
     parser.add_argument('--split', default='val')
     parser.add_argument('--objects', type=int, default=40, help='at most so many, drawn')
-    parser.add_argument('--model', default='lifting', help='a model that ships, or weights')
+    parser.add_argument('--model', default=DEFAULT_MODEL, help='a model that ships, or weights')
     parser.add_argument('--out', type=Path, default=Path('meshes.json'))
     return parser.parse_args()
 

@@ -28,7 +28,7 @@ from active_recon.datasets.middlebury import PosedPhotographs, read_photographs
 from active_recon.errors import ActiveReconError
 from active_recon.evaluation.posed.photographs import averaged, EVEN, even_views, hull
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
-from active_recon.models.weights_files import DEFAULT_MODEL, PHOTOS_MODEL
+from active_recon.models.weights_files import DEFAULT_MODEL, SMALL_MODEL
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.reconstruct import from_views, Options, reconstruct
 from active_recon.photos.shape import Shape
@@ -64,7 +64,7 @@ def main() -> None:
     parser.add_argument('photos', type=Path, help='folder of dinoSparseRing')
     parser.add_argument('--runs', type=int, default=5, help='how often the command is timed')
     parser.add_argument('--objects', type=int, default=30, help='objects on the board')
-    parser.add_argument('--model', default=PHOTOS_MODEL,
+    parser.add_argument('--model', default=DEFAULT_MODEL,
                         help='a model that ships, or a weights file')
     parser.add_argument('--out', type=Path, default=Path('photos.json'))
     parser.add_argument('--parts', nargs='*', default=[
@@ -80,7 +80,7 @@ def main() -> None:
                'table': lambda: on_tables(options.objects, model),
                'grounds': lambda: grounds(options.objects)}
     result = json.loads(options.out.read_text()) if options.out.exists() else {}
-    named = '' if model == PHOTOS_MODEL else f' --model {model}'
+    named = '' if model == DEFAULT_MODEL else f' --model {model}'
     result['command'] = ('PYTHONPATH=test python -m benchmarks.photos photos/dino_sparse_ring'
                          f'{named} --out docs/results/{options.out.name}')
     for part in options.parts:
@@ -89,8 +89,8 @@ def main() -> None:
 
 
 def table(result: Mapping[str, Any], faster: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of the table of doc/photos.md; `faster` was measured with DEFAULT_MODEL."""
-    yield f'| what | IoU | with `--model {DEFAULT_MODEL}` | goal |'
+    """Yield the lines of the table of doc/photos.md; `faster` was measured with SMALL_MODEL."""
+    yield f'| what | IoU | with `--model {SMALL_MODEL}` | goal |'
     yield '|---|---|---|---|'
     for (what, told, goal), (_, other, _) in zip(_rows(result), _rows(faster), strict=True):
         yield f'| {what} | {told} | {other} | {goal} |'

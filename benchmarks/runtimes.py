@@ -10,7 +10,7 @@ import time
 
 from active_recon.geometry.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera
 from active_recon.geometry.canonical import network_image
-from active_recon.models.weights_files import find_weights
+from active_recon.models.weights_files import find_weights, SMALL_MODEL
 from active_recon.planner import Planner
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_runtime
@@ -39,9 +39,9 @@ def runtime_figures() -> list[Figure]:
     return [*_views(1), *_views(2), *_plans(24, 1), *_plans(200, 20), *_starts()]
 
 
-def large_figures() -> list[Figure]:
-    """Return the figures of a view of the large network, beside the default's in the same run."""
-    return [figure for threads in (1, 2) for figure in _views(threads, (None, 'lifting-large'))]
+def small_figures() -> list[Figure]:
+    """Return the figures of a view of the small network, beside the default's in the same run."""
+    return [figure for threads in (1, 2) for figure in _views(threads, (None, SMALL_MODEL))]
 
 
 def segmenter_figures() -> list[Figure]:

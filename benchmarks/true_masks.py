@@ -23,7 +23,7 @@ from active_recon.evaluation.statistics import mean_interval
 from active_recon.models.lifted import projected, projection, sampled
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import load_weights
-from active_recon.models.weights_files import find_weights, weights_hash
+from active_recon.models.weights_files import DEFAULT_MODEL, find_weights, weights_hash
 from active_recon.volumes.voxels import iou
 import numpy as np
 from rich.progress import track
@@ -43,7 +43,7 @@ def main() -> None:
     parser.add_argument('dataset', type=Path, help="folder of a dataset in R2N2's layout")
     parser.add_argument('--validation', type=Path, required=True)
     parser.add_argument('--objects', type=int, default=104, help='at most so many, drawn')
-    parser.add_argument('--model', default='lifting')
+    parser.add_argument('--model', default=DEFAULT_MODEL)
     parser.add_argument('--out', type=Path, default=Path('true-masks.json'))
     options = parser.parse_args()
     torch.set_num_threads(1)

@@ -5,11 +5,12 @@ What choosing views is worth: the studies of the default's view policy, and thei
 lists the commands that make it); `python -m benchmarks.views` only updates the tables.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 import json
 from pathlib import Path
 from typing import Any
 
+from active_recon.models.weights_files import SMALL_MODEL
 from benchmarks.studies import chosen_studies, run_study, with_tables_between_marks
 
 ROOT = Path(__file__).parents[1]
@@ -17,60 +18,65 @@ RESULTS = ROOT / 'docs' / 'results' / 'views'
 DOCUMENTS = (ROOT / 'README.md', ROOT / 'doc' / 'results.md')
 _SETS = {'test': 'parametric test', 'unseen': 'categories never trained on', 'real': 'real models'}
 _DATA = {'test': 'test', 'unseen': 'unseen', 'real': 'real_val'}
-_FOLDERS = {'turntable': 'data', 'dome': 'dome'}
 _HOW = '--starts 1 --seeds 2 --threads 1 --runtime openvino'
+_SIXTY = f'--objects 60 {_HOW}'
+_OF_SMALL = f'--model {SMALL_MODEL}'
 _SWAPPED = 'random,attention,swapped,swapped_turned'
-_PLAIN = {
-    'turntable': 'random,uniform,farthest,unseen_entropy,rendered_uncertainty',
-    'dome': 'random,uniform,farthest,unseen_entropy',
-}
+_AROUND = 'random,uniform,farthest,unseen_entropy,rendered_uncertainty'
+_ON_DOME = 'random,uniform,farthest,unseen_entropy'
 _ON_TRAINING = '--training turn/train --training-objects'
 _COUNTS = (1, 2, 3, 5)
 
 
 def _studies() -> Iterator[tuple[str, str]]:
-    """Yield the name of each study and the arguments of `active-recon policies`."""
-    sixty = f'--objects 60 {_HOW}'
+    """Yield the name of each study of the default and the arguments of `active-recon policies`."""
+    yield 'turntable-validation-cost', (
+        'turn/val --policies random,uniform,attention,'
+        f'{_by_cost("0.005", "0.01", "0.015", "0.02", "0.03")} {_SIXTY}')
+    for name, data in _DATA.items():
+        yield f'turntable-{name}-learned', f'data/{data} {_LEARNED}'
+        yield f'turntable-{name}-swapped', f'data/{data} --policies {_SWAPPED} {_SIXTY}'
+    yield 'turntable-real-all', (
+        f'data/real_val --policies random,uniform,attention --objects 347 {_HOW}')
+
+
+def _studies_of_small() -> Iterator[tuple[str, str]]:
+    """Yield the same of the small network."""
     yield 'turntable-validation', (
         'turn/val --policies random,uniform,farthest,attention,'
-        + _by_cost('0.03', '0.035', '0.04', '0.045', '0.05') + f' {_ON_TRAINING} 8 {sixty}')
-    yield 'turntable-validation-cost', (
-        f'turn/val --policies random,uniform,{_by_cost("0.05", "0.06", "0.07", "0.08", "0.1")} '
-        f'{sixty}')
-    for cameras, folder in _FOLDERS.items():
-        for name, data in _DATA.items():
-            learned = 'attention' if cameras == 'dome' else (
-                f'attention,{_by_cost("0.01", "0.02", "0.03", "0.035", "0.04")}')
-            yield f'{cameras}-{name}-learned', (
-                f'{folder}/{data} --policies {_PLAIN[cameras]},{learned},oracle {sixty}')
-            yield f'{cameras}-{name}-swapped', f'{folder}/{data} --policies {_SWAPPED} {sixty}'
+        + _by_cost('0.03', '0.035', '0.04', '0.045', '0.05') + f' {_ON_TRAINING} 8 {_SIXTY}')
     for name, data in _DATA.items():
-        yield f'turntable-{name}-cost', (
-            f'data/{data} --policies random,uniform,{_by_cost("0.05", "0.06")} {sixty}')
+        yield f'turntable-{name}-learned', f'data/{data} {_LEARNED}'
         yield f'turntable-{name}-peeking', (
-            f'data/{data} --policies random,uniform,attention,peeking,oracle {sixty}')
+            f'data/{data} --policies random,uniform,attention,peeking,oracle {_SIXTY}')
+        yield f'dome-{name}-learned', (
+            f'dome/{data} --policies {_ON_DOME},attention,oracle {_SIXTY}')
+        yield f'dome-{name}-swapped', f'dome/{data} --policies {_SWAPPED} {_SIXTY}'
     for name in ('unseen', 'real'):
         yield f'turntable-{name}-sequence', (
             f'data/{_DATA[name]} --policies random,uniform,sequence,attention '
-            f'{_ON_TRAINING} 60 {sixty}')
+            f'{_ON_TRAINING} 60 {_SIXTY}')
     yield 'turntable-unseen-together', (
         'data/unseen --policies random,uniform,attention,oracle,together --views 3 --objects 12 '
         f'{_HOW}')
-    yield 'turntable-real-all', (
-        f'data/real_val --policies random,uniform,attention --objects 347 {_HOW}')
 
 
 def _by_cost(*costs: str) -> str:
     return ','.join(f'attention@{cost}' for cost in costs)
 
 
-STUDIES: Mapping[str, str] = dict(_studies())
+_LEARNED = (f'--policies {_AROUND},attention,'
+            f'{_by_cost("0.01", "0.02", "0.03", "0.035", "0.04")},oracle {_SIXTY}')
+STUDIES: Mapping[str, str] = {
+    **dict(_studies()),
+    **{f'small-{name}': f'{how} {_OF_SMALL}' for name, how in _studies_of_small()}}
 
 
 def with_tables(text: str) -> str:
     """Return the document with the tables between their marks."""
     return with_tables_between_marks(text, {
-        'views': views_table, 'swapped': swapped_table, 'views-short': short_table})
+        'views': views_table, 'views-small': small_table, 'views-short': short_table,
+        'swapped': swapped_table})
 
 
 def short_table() -> Iterator[str]:
@@ -87,16 +93,26 @@ def short_table() -> Iterator[str]:
 
 def views_table() -> Iterator[str]:
     """Yield the lines of the table of all policies but those that count motion."""
+    yield from _table(('turntable',), '')
+
+
+def small_table() -> Iterator[str]:
+    """Yield the same with the small network, from the dome, too."""
+    yield from _table(('turntable', 'dome'), 'small-')
+
+
+def _table(places: Sequence[str], prefix: str) -> Iterator[str]:
     yield ('| objects (60 each) | policy | 1 view | 2 | 3 | 5 views | ahead of random '
            '| ahead of the sweep | share of the gap |')
     yield '|---|---|---|---|---|---|---|---|---|'
-    for cameras in _FOLDERS:
+    for cameras in places:
         for name, objects in _SETS.items():
-            found = policies_of(f'{cameras}-{name}-learned')
-            if (sequence := f'{cameras}-{name}-sequence') in STUDIES:
-                found['sequence'] = policies_of(sequence)['sequence']
-            shown = [policy for policy in (*_PLAIN[cameras].split(','), 'sequence', 'attention',
-                                           'oracle') if policy in found]
+            study = f'{prefix}{cameras}-{name}'
+            found = policies_of(f'{study}-learned')
+            if f'{study}-sequence' in STUDIES:
+                found['sequence'] = policies_of(f'{study}-sequence')['sequence']
+            shown = [policy for policy in (*_AROUND.split(','), 'sequence', 'attention', 'oracle')
+                     if policy in found]
             for policy in shown:
                 yield _row(f'{cameras}, {objects}' if policy == shown[0] else '', policy,
                            found[policy])
@@ -106,14 +122,14 @@ def swapped_table() -> Iterator[str]:
     """Yield the lines of the table of what another object's volume costs, indented for a list."""
     yield '  | objects | another object | another object, turned |'
     yield '  |---|---|---|'
-    for cameras in _FOLDERS:
+    for prefix, cameras, of in (('', 'turntable', ''), ('small-', 'dome', ', small network')):
         for name, objects in _SETS.items():
-            study = f'{cameras}-{name}-swapped'
+            study = f'{prefix}{cameras}-{name}-swapped'
             ahead = policies_of(study)['attention']['ahead']
             cells = (f'{_interval(ahead[policy])}, '
                      f'{100 * ahead[policy]["mean"] / ahead["random"]["mean"]:.0f} %'
                      for policy in ('swapped', 'swapped_turned'))
-            yield (f'  | [{cameras}, {objects}](../docs/results/views/{study}.md) | '
+            yield (f'  | [{cameras}, {objects}](../docs/results/views/{study}.md){of} | '
                    f'{" | ".join(cells)} |')
 
 

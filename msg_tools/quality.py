@@ -11,16 +11,19 @@ from std_msgs.msg import Header
 NAME = 'quality'
 _SUSPECT = 'suspect'
 _LATER = 'promise_learned'  # messages of earlier versions lack it
+_SIZE = 'object_size'  # likewise
 _NUMBERS = tuple(field.name for field in fields(Quality) if field.name not in (_SUSPECT, _LATER))
 
 
-def quality_to_msg(quality: Quality, header: Header, weights_sha256: str = '') -> DiagnosticArray:
+def quality_to_msg(quality: Quality, header: Header, weights_sha256: str = '',
+                   object_size: float | None = None) -> DiagnosticArray:
     """
     Return one status: the numbers as values; WARN, with the question to ask, if flagged.
 
-    `hardware_id` is the SHA-256 of the network's weights, which are what judges.
+    `hardware_id` is the SHA-256 of the network's weights, which are what judges; `object_size` the
+    side in metres of the cube that is judged.
     """
-    values = asdict(quality)
+    values = {**asdict(quality), _SIZE: object_size}
     return DiagnosticArray(header=header, status=[DiagnosticStatus(
         level=DiagnosticStatus.WARN if quality.suspect else DiagnosticStatus.OK, name=NAME,
         message=quality.warning or 'ok', hardware_id=weights_sha256,
@@ -51,6 +54,16 @@ def quality_from_msg(msg: DiagnosticArray) -> Quality:
 def judging_weights(msg: DiagnosticArray) -> str:
     """Return the SHA-256 of the weights that judged; '' where the message does not tell."""
     return next((status.hardware_id for status in msg.status if status.name == NAME), '')
+
+
+def judged_size(msg: DiagnosticArray) -> float | None:
+    """Return the side of the cube that was judged, metres; None where the message tells none."""
+    told = (pair.value for status in msg.status if status.name == NAME
+            for pair in status.values if pair.key == _SIZE)
+    try:
+        return next(map(float, told), None)
+    except ValueError:
+        return None
 
 
 def _share(name: str, text: str) -> float:

@@ -77,9 +77,7 @@ def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
         for topic in TOPICS:
             if not topic.startswith('/'):
                 observer.create_publisher(Header, f'{RECORDED}/{topic}', 10)
-        for namespace, parameters in starts(Path(folder)).items():
-            for name, values in parameters.items():
-                nodes.start(name, {'use_sim_time': True, **values}, namespace)
+        waiting = list(starts(Path(folder)).items())
         seen: dict[str, list[Access]] = {}
         deadline = time.monotonic() + BUDGET_S
         while time.monotonic() < deadline:
@@ -91,6 +89,11 @@ def live_accesses() -> Iterator[tuple[bool, dict[str, Access]]]:
             known = {name: joined(each) for name, each in seen.items()}
             seen = {name: [access] for name, access in known.items()}
             ready = all(']: ready' in log.read_text() for log in Path(folder).glob('*.txt'))
+            if ready and waiting:  # after the loop, since a viewer follows the first that it finds
+                namespace, parameters = waiting.pop(0)
+                for name, values in parameters.items():
+                    nodes.start(name, {'use_sim_time': True, **values}, namespace)
+                ready = False
             yield ready, known
             time.sleep(_POLL_S)
 

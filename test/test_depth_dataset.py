@@ -12,6 +12,7 @@ from active_recon.models.depth_refiner import DepthRefiner, DepthRefinerConfig
 from active_recon.models.depth_weights import load_refiner
 from active_recon.models.lifting import Lifting
 from active_recon.models.weights import Bundle, save_weights
+from active_recon.models.weights_files import find_weights
 from active_recon.training.depth import depth_sample, depth_view
 from active_recon.training.posed_batches import draw_posed_batch
 from active_recon.volumes.depth_evidence import depth_evidence
@@ -152,7 +153,7 @@ def test_a_training_may_begin_with_the_refiner_of_another_network(
                  '--threads', 1)
     assert command(monkeypatch, *arguments, '--init-from', 'lifting', '--out', 'run') == 0
     trained = load_file(tmp_path / 'run' / 'lifting-depth.safetensors')
-    shipped = load_refiner().state_dict()
+    shipped = load_refiner(find_weights('lifting')).state_dict()
     different = {name for name, tensor in trained.items() if name != 'calibration' and (
         tensor.shape != shipped[name].shape
         or not torch.allclose(tensor.float(), shipped[name], atol=1e-3))}

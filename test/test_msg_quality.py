@@ -4,7 +4,7 @@ from active_recon.errors import MessageError
 from active_recon.quality.quality import Quality, SUSPECTS
 from diagnostic_msgs.msg import DiagnosticStatus
 from judged_quality import quality_of
-from msg_tools.quality import quality_from_msg, quality_to_msg
+from msg_tools.quality import judged_size, quality_from_msg, quality_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 import pytest
 from std_msgs.msg import Header
@@ -45,6 +45,15 @@ def test_a_quality_from_before_there_were_promises_of_the_learned_policy_has_non
     msg.status[0].values = [pair for pair in msg.status[0].values
                             if pair.key != 'promise_learned']
     assert quality_from_msg(msg) == quality_of(promise=0.5)
+
+
+def test_the_side_of_the_judged_cube_comes_back_to_the_bit_where_it_is_told():
+    told, untold = (quality_to_msg(quality_of(), HEADER, object_size=size)
+                    for size in (1 / 3, None))
+    assert judged_size(told) == 1 / 3 and judged_size(untold) is None
+    assert quality_from_msg(told) == quality_from_msg(untold) == quality_of()
+    next(pair for pair in told.status[0].values if pair.key == 'object_size').value = 'wide'
+    assert judged_size(told) is None
 
 
 def test_a_quality_that_lacks_a_value_is_refused():

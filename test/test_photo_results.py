@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from active_recon.models.weights_files import DEFAULT_MODEL, find_weights, PHOTOS_MODEL
+from active_recon.models.weights_files import DEFAULT_MODEL, find_weights, SMALL_MODEL
 from benchmarks.photos import with_table
 import numpy as np
 
@@ -15,7 +15,7 @@ def measured(name='photos'):
 
 
 def test_the_page_shows_the_figures_that_were_measured():
-    result, faster = measured(), measured(f'photos-{DEFAULT_MODEL}')
+    result, faster = measured(), measured(f'photos-{SMALL_MODEL}')
     text = (ROOT / 'doc/photos.md').read_text()
     assert with_table(text, result, faster) == text
     result['photographs']['auto'][0] = 0.123
@@ -23,8 +23,8 @@ def test_the_page_shows_the_figures_that_were_measured():
 
 
 def test_the_network_of_photos_ships_and_is_ahead_of_the_faster_one():
-    assert find_weights(PHOTOS_MODEL).is_file()
-    result, faster = measured(), measured(f'photos-{DEFAULT_MODEL}')
+    assert find_weights(DEFAULT_MODEL).is_file()
+    result, faster = measured(), measured(f'photos-{SMALL_MODEL}')
     for way in ('auto', 'plain'):  # the dinosaur before black is behind by `network`, as is told
         ahead = np.subtract(result['photographs'][way], faster['photographs'][way])
         assert ahead.mean() > 0, way

@@ -19,7 +19,7 @@ def demo(
         also=(AUTO_POLICY,))] = AUTO_POLICY,
     model: Annotated[str | None, typer.Option(
         help='Name of a model that ships, or a weights file; the policy attention needs '
-             'lifting, lifting-large or 2d3d-attention.')
+             'lifting-large, lifting or 2d3d-attention.')
     ] = None,
     precision: Annotated[str, typer.Option(
         help=f"The network's numbers: {', '.join(PRECISIONS)}; auto: bf16 where the processor has "

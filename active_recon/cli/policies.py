@@ -9,6 +9,7 @@ from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError, DataError
+from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.policies import POLICIES
 import typer
 
@@ -26,7 +27,7 @@ def policies(
         help="Folders of objects in R2N2's layout, each measured by itself; `--cameras turntable` "
              'leaves azimuths to choose, `--cameras dome` elevations too.')],
     model: Annotated[str, typer.Option(
-        help='A network of posed views: a model that ships, or a weights file.')] = 'lifting',
+        help='A network of posed views: a model that ships, or a weights file.')] = DEFAULT_MODEL,
     names: Annotated[str | None, typer.Option(
         '--policies', help=f'Policies, separated by commas, out of {", ".join(POLICIES)}, '
         'sequence (the best that is the same for all objects, found on --training), swapped '

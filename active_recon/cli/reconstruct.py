@@ -8,7 +8,7 @@ from active_recon.cli.calibrate import printed_board
 from active_recon.cli.needed_options import refuse_lone
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError, RecordingError
-from active_recon.models.weights_files import PHOTOS_MODEL
+from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.parameters.viewer import DEFAULT_PORT, HIGHEST_PORT
 import typer
 
@@ -79,7 +79,7 @@ def reconstruct(
         '--bag', help='Also write the bag of the run, for replay, and its report.')] = False,
     model: Annotated[str, typer.Option(
         help='A model that ships, by its name, or a .safetensors file; lifting takes less '
-             'time.')] = PHOTOS_MODEL,
+             'time.')] = DEFAULT_MODEL,
     watch: Annotated[bool, typer.Option(
         '--watch', help='Take photos in as they arrive in the folder, and show on a page where '
                         'to stand next, until Ctrl-C.')] = False,

@@ -9,9 +9,10 @@ from active_recon.cli.progress import progress_bar
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError
+from active_recon.models.weights_files import DEFAULT_MODEL, PAPER_MODEL, SMALL_MODEL
 import typer
 
-_SHIPPED = ('lifting', 'carving', '2d3d-attention')
+_SHIPPED = (DEFAULT_MODEL, SMALL_MODEL, 'carving', PAPER_MODEL)
 
 
 def study(

@@ -7,6 +7,7 @@ from active_recon.cli.command_line import command_line
 from active_recon.cli.one_training import checkpoint_in, shown_steps
 from active_recon.cli.reading import read_objects, warn_of_shared_objects
 from active_recon.errors import ConfigError
+from active_recon.models.weights_files import DEFAULT_MODEL
 import typer
 
 
@@ -18,7 +19,7 @@ def train_depth(
         help='Folder of other objects, on which the corrected occupancy is calibrated.')],
     model: Annotated[str, typer.Option(
         help='The network, which stays as it is: a model that ships, or a weights file.'
-        )] = 'lifting',
+        )] = DEFAULT_MODEL,
     init_from: Annotated[str | None, typer.Option(
         help='A model that ships, or a weights file: begin with its depth refiner. Default: fresh '
              'weights.')] = None,

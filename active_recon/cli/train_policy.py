@@ -10,6 +10,7 @@ from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import warn_of_shared_objects
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
+from active_recon.models.weights_files import DEFAULT_MODEL
 import typer
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def train_policy(
              'several times.')],
     model: Annotated[str, typer.Option(
         help='The network, which stays as it is: a model that ships, or a weights file.'
-        )] = 'lifting',
+        )] = DEFAULT_MODEL,
     out: Annotated[Path, typer.Option(
         help='Folder of the measured gains, and of the weights at the end.'
         )] = Path('runs/policy'),

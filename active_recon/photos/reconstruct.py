@@ -7,7 +7,7 @@ from pathlib import Path
 
 from active_recon.errors import ConfigError, DataError, ViewError, WeightsError
 from active_recon.geometry.cameras import Camera
-from active_recon.models.weights_files import PHOTOS_MODEL
+from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.photos.backgrounds import BACKGROUNDS, before_clutter, named, separated
 from active_recon.photos.board_masks import board_views
 from active_recon.photos.camera_file import CameraFile
@@ -65,7 +65,7 @@ class Options:
     background: str = 'auto'
     masks: Path | None = None
     views: int | None = None
-    model: str | Path = PHOTOS_MODEL
+    model: str | Path = DEFAULT_MODEL
     threads: int | None = 1
     order: str = 'name'
     ground: bool = True
@@ -92,7 +92,7 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
                 cameras: Source | str | Sequence[Camera] | None = None, size: float | None = None,
                 *, background: str = 'auto', masks: Path | str | None = None,
                 box: Sequence[float] | None = None, unit: float = 1.0, up: str | None = None,
-                views: int | None = None, model: str | Path = PHOTOS_MODEL,
+                views: int | None = None, model: str | Path = DEFAULT_MODEL,
                 threads: int | None = 1, order: str = 'name', axes: str | None = None,
                 ground: bool = True) -> Shape:
     """

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from active_recon.acquisition.goals import Goal
-from active_recon.models.weights_files import find_weights, PHOTOS_MODEL
+from active_recon.models.weights_files import DEFAULT_MODEL, find_weights
 from active_recon.photos.shape import Shape
 from active_recon.planner import Planner
 from active_recon.policies import AUTO_POLICY, load_policy, PolicyOptions
@@ -43,7 +43,7 @@ class Advice:
 class Adviser:
     """Plans the next photo by the view policy of a model's weights, or by an even sweep."""
 
-    def __init__(self, stopping: StoppingRule, model: str | Path = PHOTOS_MODEL,
+    def __init__(self, stopping: StoppingRule, model: str | Path = DEFAULT_MODEL,
                  threads: int | None = 1) -> None:
         self._stopping = stopping
         self._policy = load_policy(AUTO_POLICY, PolicyOptions(

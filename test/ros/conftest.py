@@ -135,7 +135,8 @@ class Bench:
     def until(self, condition: Callable[[], Any], what: str, budget_s: float = BUDGET_S) -> Any:
         """Spin until the condition holds; return what it returned."""
         value = self.within(budget_s, condition)
-        assert value, f'waited {budget_s} s in vain for {what}'
+        assert value, (f'waited {budget_s} s in vain for {what}; nodes: '
+                       f'{sorted(self.node.get_fully_qualified_node_names())}')
         return value
 
     def within(self, budget_s: float, condition: Callable[[], Any]) -> Any:
@@ -281,7 +282,7 @@ class FakeReconstructor:
     def show(self, latent: np.ndarray, azimuth: float, stamp: int | None = None,
              parts: Sequence[str] = PARTS, elevation: float = CANONICAL_ELEVATION,
              quality: Quality | None = None, weights: str = '',
-             earlier: Sequence[float] = ()) -> int:
+             earlier: Sequence[float] = (), object_size: float | None = None) -> int:
         """Publish a view's parts, `views` with those at earlier azimuths; return their stamp."""
         stamp = self.bench.now() if stamp is None else stamp
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='object')
@@ -291,7 +292,7 @@ class FakeReconstructor:
                     'views': poses_to_msg([orbit_camera(each, elevation).pose
                                            for each in (*earlier, azimuth)], header)}
         if quality is not None:
-            messages['quality'] = quality_to_msg(quality, header, weights)
+            messages['quality'] = quality_to_msg(quality, header, weights, object_size)
         for part in parts:
             self._publishers[part].publish(messages[part])
         return stamp

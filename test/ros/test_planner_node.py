@@ -218,6 +218,21 @@ def test_other_weights_than_the_policy_s_are_told_until_they_are_the_same(
                     == weights.startswith('aaaa'), 'a warning, and its end')  # noqa: B023
 
 
+def test_another_object_size_than_the_reconstructor_s_is_told_until_it_is_the_same(
+        start_node, bench, latent):
+    start_node('view_planner', policy='farthest', start_azimuth=1.0, entropy_tolerance=0.0)
+    fake = FakeReconstructor(bench, ('episode', *FakeReconstructor.PARTS, 'quality'))
+    fake.begin('only')
+    stamp = 0
+    for size in (0.25, 1.0):
+        goal = view_goal_from_msg(fake.wait_goal(stamp))
+        stamp = fake.show(latent, goal.azimuth, parts=('quality', *FakeReconstructor.PARTS),
+                          quality=quality_of(), object_size=size)
+        told = 'object_size: expected that of the reconstructor, 0.25 m, got 1:'
+        bench.until(lambda: (told in bench.state('view_planner').problem)  # noqa: B023
+                    == (size == 0.25), 'a warning, and its end')  # noqa: B023
+
+
 def test_a_sweep_in_the_policy_s_place_is_told_while_views_are_unusual(start_node, bench, latent):
     start_node('view_planner', policy='farthest', start_azimuth=1.0, entropy_tolerance=0.0,
                min_gain=0.01)

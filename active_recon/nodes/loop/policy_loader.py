@@ -1,6 +1,7 @@
 """Loads the policy that the planner's parameters name, and tells which it is."""
 
 from dataclasses import dataclass
+import math
 
 from active_recon.models.weights_files import find_weights, weights_hash
 from active_recon.nodes.runtime.diagnostics import Diagnostics
@@ -18,7 +19,7 @@ from active_recon.policies import (
 from active_recon.policies.automatic import LEARNED_POLICY
 import numpy as np
 
-_WARNING, _OTHER_NETWORK = 'learned_policy', 'weights'
+_WARNING, _OTHER_NETWORK, _OTHER_SIZE = 'learned_policy', 'weights', 'object_size'
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,3 +76,13 @@ def tell_network(diagnostics: Diagnostics, loaded: LoadedPolicy, weights_sha256:
             'of both nodes to the same'))
     else:
         diagnostics.clear_warning(_OTHER_NETWORK)
+
+
+def tell_size(diagnostics: Diagnostics, own: float, told: float | None) -> None:
+    """Warn where the reconstructor's cube has another side in metres than the planner's."""
+    if told is not None and not math.isclose(own, told):
+        diagnostics.raise_warning(_OTHER_SIZE, (
+            f'object_size: expected that of the reconstructor, {told:g} m, got {own:g}: goals are '
+            'planned for another cube; set it in both nodes to the same'))
+    else:
+        diagnostics.clear_warning(_OTHER_SIZE)

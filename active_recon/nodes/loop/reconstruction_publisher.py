@@ -76,7 +76,7 @@ class ReconstructionPublisher:
         # While this judges, the planner reads what came before; then come images, for people
         if self._quality_pub is not None and reconstruction.quality is not None:
             self._quality_pub.publish(
-                quality_to_msg(reconstruction.quality, header, self._weights))
+                quality_to_msg(reconstruction.quality, header, self._weights, grid.size))
         if cleared_image is not None:
             self._view_image_pub.publish(image_to_msg(cleared_image, header))
         if reconstruction.image is not None:

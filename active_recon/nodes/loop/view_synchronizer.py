@@ -17,7 +17,7 @@ from msg_tools.cameras import pose_from_msg, poses_from_msg
 from msg_tools.entropy import entropy_from_msg
 from msg_tools.images import latent_from_msg
 from msg_tools.joins import StampJoiner
-from msg_tools.quality import judging_weights, quality_from_msg
+from msg_tools.quality import judged_size, judging_weights, quality_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 from sensor_msgs.msg import Image, JointState, PointCloud2
@@ -34,8 +34,9 @@ class ViewSynchronizer:
     with the first likewise, from `views`, the cameras of those before it: a planner that is
     started again knows where they were taken.
     `on_waiting` is called with the last view when it begins to wait, and `on_camera` with its
-    camera, which arrives before. `on_weights` is called with the SHA-256 of the network's weights,
-    or '', where a quality tells of them.
+    camera, which arrives before. `on_judge` is called with what a quality tells of the
+    reconstructor: the SHA-256 of the network's weights, or '', and the side of the cube in metres,
+    or None.
     `on_view` is called with the stamp (nanoseconds) and the view when all parts have arrived,
     unless it is older than the episode. `last` keeps the last one: it may arrive before the
     message of the episode that it belongs to. A part that cannot be read, and a view on which
@@ -47,12 +48,12 @@ class ViewSynchronizer:
                  on_view: Callable[[int, PlannerView], None],
                  on_waiting: Callable[[PlannerView], None],
                  on_camera: Callable[[Camera], None],
-                 on_weights: Callable[[str], None]) -> None:
+                 on_judge: Callable[[str, float | None], None]) -> None:
         self._node = node
         self._diagnostics = diagnostics
         node.add_cleanup(lambda: diagnostics.clear_warning(NO_GOAL, log=False))
         self._on_view, self._on_waiting, self._on_camera = on_view, on_waiting, on_camera
-        self._on_weights = on_weights
+        self._on_judge = on_judge
         self._joiner = StampJoiner(['latent', 'camera', 'entropy'])
         self._has_volume = False
         self._frame = frame
@@ -143,7 +144,7 @@ class ViewSynchronizer:
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             if stamp >= self._begin and not self._node.clock_monitor.is_ahead(stamp):
                 self._qualities[stamp] = quality_from_msg(msg)
-                self._on_weights(judging_weights(msg))
+                self._on_judge(judging_weights(msg), judged_size(msg))
                 self._hand_over()
 
     def _on_views(self, msg: PoseArray) -> None:
