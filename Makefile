@@ -94,7 +94,7 @@ soak: .venv/installed  ## an hour of the loop, for docs/soak.md; ARGS='--minutes
 	@echo '== soaking'
 	@$(BIN)/python -m benchmarks.soak $(ARGS)
 
-weights: .venv/installed  ## the default weights from scratch, resumable; see weights.mk
+weights: .venv/installed  ## the small network's weights from scratch, resumable; see weights.mk
 	@$(MAKE) --no-print-directory -f weights.mk $(ARGS)
 
 policies: .venv/installed  ## security/policies.xml anew, from the live graph

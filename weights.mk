@@ -1,4 +1,4 @@
-# The default weights from scratch: `make weights MESHES=FOLDER`, resumable at every step.
+# The small network's weights from scratch: `make weights MESHES=FOLDER`, resumable at every step.
 #
 # Renders the training data, trains the network, its view policy, the tables of its quality, its depth
 # refiner and a segmenter, and puts all of it, exported, into RUN/weights. What stands is not made again, an
