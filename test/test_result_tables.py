@@ -23,7 +23,8 @@ def test_a_table_that_was_changed_by_hand_is_mended():
 
 
 @pytest.mark.parametrize(('path', 'table'), [
-    (views.DOCUMENTS[0], views.short_table), (views.DOCUMENTS[1], views.small_table)])
+    (views.DOCUMENTS[0], views.short_table), (views.DOCUMENTS[1], views.views_table),
+    (views.DOCUMENTS[1], views.small_table)])
 def test_a_table_of_view_policies_is_of_what_was_measured(path, table):
     text = path.read_text()
     assert views.with_tables(text) == text

@@ -83,7 +83,7 @@ def test_photographs_before_clutter_gain_where_all_of_them_are_looked_at():
         shape = active_recon.reconstruct(images, cameras, size=1.0, background=background)
         found[background] = iou(averaged(shape.occupancy, len(truth)) > shape.threshold, truth)
     assert 'the segmenter' in shape.background and not shape.left_out
-    assert found['segment'] > found['network'] + 0.05
+    assert found['segment'] > found['network'] + 0.08
 
 
 def test_the_table_of_backgrounds_is_of_what_was_measured():

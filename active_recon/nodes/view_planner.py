@@ -7,12 +7,7 @@ from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import Camera
 from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
-from active_recon.nodes.loop.policy_loader import (
-    loaded_policy,
-    tell_network,
-    tell_policy,
-    tell_size,
-)
+from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy, tell_reconstructor
 from active_recon.nodes.loop.refused_views import NO_GOAL, refusing_views
 from active_recon.nodes.loop.target_warning import tell_min_gain, tell_target
 from active_recon.nodes.loop.told_runtime import tell_of_runtime
@@ -77,8 +72,8 @@ class ViewPlannerNode(ManagedNode):
         self._reset_episode()
         self._views = ViewSynchronizer(
             self, self._frame, self._diagnostics, self._decide, self._expect, self._prepare,
-            self._tell_of_reconstructor)
-        self.add_cleanup(lambda: self._tell_of_reconstructor('', None))
+            lambda *told: tell_reconstructor(self._diagnostics, self._loaded, *told))
+        self.add_cleanup(lambda: tell_reconstructor(self._diagnostics, self._loaded, '', None))
         if self._planner.wants_volume:
             self._views.subscribe_volume(self._params.values.object_size)
         inputs.subscribe(Header, 'episode', self._on_episode, LATCHED_QOS)
@@ -124,11 +119,6 @@ class ViewPlannerNode(ManagedNode):
                 self._tell_reason()
 
         return commit
-
-    def _tell_of_reconstructor(self, weights_sha256: str, object_size: float | None) -> None:
-        """Warn where it has other weights, or another cube, than this planner."""
-        tell_network(self._diagnostics, self._loaded, weights_sha256)
-        tell_size(self._diagnostics, self._params.values.object_size, object_size)
 
     def _reset_episode(self) -> None:
         """Forget the camera, the goal and the views."""

@@ -67,7 +67,14 @@ def tell_policy(node: ManagedNode, diagnostics: Diagnostics, in_use: PolicyInUse
         diagnostics.clear_warning(_WARNING)
 
 
-def tell_network(diagnostics: Diagnostics, loaded: LoadedPolicy, weights_sha256: str) -> None:
+def tell_reconstructor(diagnostics: Diagnostics, loaded: LoadedPolicy, weights_sha256: str,
+                       object_size: float | None) -> None:
+    """Warn where the reconstructor told of other weights or another cube than the planner has."""
+    _tell_network(diagnostics, loaded, weights_sha256)
+    _tell_size(diagnostics, loaded.params.object_size, object_size)
+
+
+def _tell_network(diagnostics: Diagnostics, loaded: LoadedPolicy, weights_sha256: str) -> None:
     """Warn where the reconstructor has other weights than the policy was trained for."""
     if loaded.network and weights_sha256 and loaded.network != weights_sha256:
         diagnostics.raise_warning(_OTHER_NETWORK, (
@@ -78,7 +85,7 @@ def tell_network(diagnostics: Diagnostics, loaded: LoadedPolicy, weights_sha256:
         diagnostics.clear_warning(_OTHER_NETWORK)
 
 
-def tell_size(diagnostics: Diagnostics, own: float, told: float | None) -> None:
+def _tell_size(diagnostics: Diagnostics, own: float, told: float | None) -> None:
     """Warn where the reconstructor's cube has another side in metres than the planner's."""
     if told is not None and not math.isclose(own, told):
         diagnostics.raise_warning(_OTHER_SIZE, (
