@@ -36,6 +36,9 @@ def _studies() -> Iterator[tuple[str, str]]:
     for name, data in _DATA.items():
         yield f'turntable-{name}-learned', f'data/{data} {_LEARNED}'
         yield f'turntable-{name}-swapped', f'data/{data} --policies {_SWAPPED} {_SIXTY}'
+        yield f'dome-{name}-learned', (
+            f'dome/{data} --policies {_ON_DOME},attention,oracle {_SIXTY}')
+        yield f'dome-{name}-swapped', f'dome/{data} --policies {_SWAPPED} {_SIXTY}'
     yield 'turntable-real-all', (
         f'data/real_val --policies random,uniform,attention --objects 347 {_HOW}')
 

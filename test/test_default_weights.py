@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 from active_recon.models.depth_weights import load_refiner
+from active_recon.models.lifting import SIZES
 from active_recon.models.scorer_weights import load_scorer
 from active_recon.models.segmenter_weights import is_segmenter
 from active_recon.models.weights import load_weights
@@ -21,7 +22,8 @@ ROOT = Path(__file__).parent.parent
 CHAIRS, THING = '--category chair --train 2 --val 2', '--category thing --train 1 --val 0'
 TINY = {
     'AR': f'{sys.executable} -m active_recon.cli.main', 'STEPS': 1, 'DEVICES': 1, 'DEPTH_STEPS': 1,
-    'SEGMENTER_STEPS': 1,
+    'SEGMENTER_STEPS': 1, 'LARGE_STEPS': 1, 'LARGE_BATCH': 2, 'MAKE_PROCESSES': 1,
+    'MADE': '--kept 4',
     'PARAMETRIC': CHAIRS, 'TURNTABLE': CHAIRS, 'DOME': CHAIRS, 'DEEP': CHAIRS,
     'THINGS': THING, 'TURNTABLE_THINGS': THING, 'DOME_THINGS': THING, 'DEEP_THINGS': THING,
     'POLICY': '--objects 2 --rounds 1 --starts 1 --views 2 --epochs 1'}
@@ -66,3 +68,17 @@ def test_what_was_deleted_is_made_again_with_what_follows_from_it(run):
     (run / 'policy' / 'weights-scorer.safetensors').unlink()
     said = made(run)
     assert ' train-policy ' in said and ' export ' in said and ' train-depth ' not in said
+
+
+def test_the_large_network_is_trained_on_made_objects_from_the_small_one(run):
+    said = made(run, SIZE='large')
+    assert ' train --make 1 ' in said and '--widen-to large' in said
+    assert 'train-segmenter' not in said
+    weights = run / 'weights' / 'lifting-large.safetensors'
+    assert load_weights(weights).config == SIZES['large']
+    assert load_scorer(weights).members and load_refiner(weights) is not None
+    assert weights_hash(weights) in (run / 'weights' / 'lifting-large-quality.json').read_text()
+    assert {path.name for path in weights.parent.glob('lifting-large-*.onnx')} == {
+        f'lifting-large-{graph}.onnx'
+        for graph in ('encode', 'update', 'decode', 'policy', 'depth')}
+    assert 'Nothing to be done' in made(run) and 'Nothing to be done' in made(run, SIZE='large')

@@ -6,6 +6,7 @@ from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.cluster_option import Cluster, reachable, Workers, workers_of
 from active_recon.cli.progress import progress_bar
+from active_recon.datasets.seeds import FIRST_SEEDS, SEEDS
 from active_recon.errors import ConfigError, DataError
 import typer
 
@@ -32,9 +33,6 @@ Turned = Annotated[bool, typer.Option(
 
 dataset = typer.Typer(help='Datasets of parametric shapes, made without any download.',
                       no_args_is_help=True)
-
-_SEEDS = 1_000_000  # for each split
-_SPLIT_SEEDS = {'train': 0, 'val': _SEEDS, 'test': 2 * _SEEDS, 'unseen': 3 * _SEEDS}
 
 
 def render(
@@ -93,13 +91,13 @@ def render(
 def build(
     out: Annotated[Path, typer.Argument(help='Folder for train/, val/, test/ and unseen/.')],
     train: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Training objects per category.')] = 400,
+        min=0, max=SEEDS, help='Training objects per category.')] = 400,
     val: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Validation objects per category.')] = 50,
+        min=0, max=SEEDS, help='Validation objects per category.')] = 50,
     test: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Test objects per category.')] = 100,
+        min=0, max=SEEDS, help='Test objects per category.')] = 100,
     unseen: Annotated[int, typer.Option(
-        min=0, max=_SEEDS, help='Objects per held-out category.')] = 100,
+        min=0, max=SEEDS, help='Objects per held-out category.')] = 100,
     category: Annotated[list[str] | None, typer.Option(
         help='Only these categories (may be given several times).')] = None,
     samples: Samples = 2,
@@ -128,7 +126,7 @@ def build(
     jobs = [job for name in dict.fromkeys(category or ALL_CATEGORIES)
             for split, count in counts.items()
             if (split == 'unseen') == (name in UNSEEN_CATEGORIES)
-            for job in shape_jobs(name, range(_SPLIT_SEEDS[split], _SPLIT_SEEDS[split] + count),
+            for job in shape_jobs(name, range(FIRST_SEEDS[split], FIRST_SEEDS[split] + count),
                                   out / split)]
     made_by, code = out / 'generators.sha256', generators_hash()
     if made_by.is_file() and made_by.read_text().strip() != code:

@@ -1,5 +1,6 @@
 """`active-recon train`: trains networks and policies, with checkpoints and a log."""
 
+from contextlib import ExitStack
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -7,6 +8,17 @@ from shlex import quote
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.command_line import command_line
+from active_recon.cli.made_objects import (
+    Kept,
+    MadeCameras,
+    MadeOf,
+    MadeOptions,
+    make_first,
+    MakeProcesses,
+    making_told,
+    Meshes,
+    Uses,
+)
 from active_recon.cli.reading import read_objects, Split, warn_of_shared_objects
 from active_recon.errors import ConfigError
 import typer
@@ -16,11 +28,12 @@ if TYPE_CHECKING:
 
 
 def train(
-    data: Annotated[list[Path], typer.Argument(
-        help="Folders of training objects in R2N2's layout (see `active-recon dataset build`).")],
     validation: Annotated[list[Path], typer.Option(
         help='Folder of validation objects, on which the threshold is chosen. May be given '
              'several times.')],
+    data: Annotated[list[Path] | None, typer.Argument(
+        help="Folders of training objects in R2N2's layout (see `active-recon dataset build`). "
+             'Or --make.', show_default=False)] = None,
     split_file: Split = None,
     out: Annotated[Path, typer.Option(
         help='Run folder: checkpoints, TensorBoard log, weights.')] = Path('runs/default'),
@@ -82,7 +95,14 @@ def train(
     augment: Annotated[bool, typer.Option(
         help='Augment backgrounds, light, shift and scale; --no-augment: plain white, as in the '
              'paper.')] = True,
-    seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and of the batches.')] = 0,
+    make: MakeProcesses = None,
+    meshes: Meshes = None,
+    made_of: MadeOf = None,
+    made_cameras: MadeCameras = None,
+    uses: Uses = 6,
+    kept: Kept = 2000,
+    seed: Annotated[int, typer.Option(
+        min=0, help='Seed of the weights, of the batches and of what --make makes.')] = 0,
     bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     devices: Annotated[int, typer.Option(
@@ -101,15 +121,21 @@ def train(
     the policy then learns by policy gradient with the reconstruction frozen, or both learn
     together (--scheme joint). Ctrl-C saves a checkpoint; --resume continues an interrupted
     training. The weights are written to OUT/weights.safetensors, with their card beside them.
+
+    Objects that are made while it trains, on a machine with 16 cores and a graphics card:
+
+      active-recon train --make 14 --validation data/val --model lifting --batch-size 96
     """
     from active_recon.cli.training_log import SummaryLog
     from active_recon.config import LossConfig, RewardConfig
+    from active_recon.datasets.views import ViewSet
     from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
     from active_recon.models.trial import try_network
     from active_recon.models.weights import save_weights
     from active_recon.models.weights_files import find_weights
     from active_recon.shapes import generators_hash
     from active_recon.training.loop import make_fabric, TrainingConfig, TrainingStoppedError
+    from active_recon.training.made_objects import MadeObjects
     from active_recon.training.plan import Plan, train_plan
     import torch
 
@@ -122,6 +148,10 @@ def train(
     if not resume and begun_here:
         raise ConfigError(f'{out}: holds another training ({begun_here[0].name}); continue it '
                           'with --resume, or name another folder with --out')
+    if bool(data) == (make is not None):
+        raise ConfigError('training objects: expected folders of them, or --make to make them '
+                          f'during the training, got {"both" if data else "neither"}')
+    making = MadeOptions(make or 0, meshes, made_of, made_cameras, uses, kept)
     if freeze_from and init_from:
         raise ConfigError('both --freeze-from and --init-from: give one of them')
     if widen_to and not init_from:
@@ -156,12 +186,19 @@ def train(
     if own_file != model:
         try_network(network, own_file)
     asked = network.spec
-    training = read_objects(data, 'training data', asked, split_file, 'train', at_once=False)
-    held_out = read_objects(validation, 'validation data', asked, split_file, 'val')
-    if fabric.is_global_zero:
-        warn_of_shared_objects(training.folders, held_out.folders,
-                               'the threshold is biased, and their IoU is too high')
-    with SummaryLog(out / 'tensorboard', held_out) as log:
+    with ExitStack() as stack:
+        if data:
+            training: ViewSet | MadeObjects = read_objects(
+                data, 'training data', asked, split_file, 'train', at_once=False)
+        else:
+            training = stack.enter_context(making.objects(
+                asked, first, fabric.global_rank, fabric.world_size))
+            make_first(training, out / 'reconstruction.safetensors' if resume else None)
+        held_out = read_objects(validation, 'validation data', asked, split_file, 'val')
+        if isinstance(training, ViewSet) and fabric.is_global_zero:
+            warn_of_shared_objects(training.folders, held_out.folders,
+                                   'the threshold is biased, and their IoU is too high')
+        log = stack.enter_context(SummaryLog(out / 'tensorboard', held_out))
         try:
             bundle = train_plan(plan, training, held_out, out, log.reporting, fabric, resume,
                                 log.show)
@@ -169,6 +206,8 @@ def train(
             if fabric.is_global_zero:
                 typer.echo(str(stopped))
             raise typer.Exit(130) from None
+        if isinstance(training, MadeObjects) and fabric.is_global_zero:
+            typer.echo(making_told(training))
     if fabric.is_global_zero:
         bundle.card.update(command=command_line(),
                            generators_sha256=generators_hash())

@@ -110,9 +110,13 @@ _function: Callable[[Any], Any] | None = None
 
 
 def _begin(function: Callable[[Any], Any]) -> None:
-    """Prepare a worker: Ctrl-C is the driver's, and no worker outlives it."""
     global _function
     _function = function
+    begin_worker()
+
+
+def begin_worker() -> None:
+    """Prepare a worker: Ctrl-C is the driver's, and no worker outlives it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None

@@ -5,10 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 
+from active_recon.datasets.cropped import cropped, cropped_camera
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
-from active_recon.geometry.canonical import framed_layers, framing_camera
+from active_recon.geometry.canonical import framing_camera
 from active_recon.geometry.resampling import depth_seen_by
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +45,8 @@ class FramedViews:
         for index in range(count):
             self._sides[index] = side = folders[index].grid_side(resolution)
             for view, camera in enumerate(self._shown[index]):
-                target = framing_camera(camera, side, image_size)
-                self.poses[index, view] = target.scaled(1 / side).pose
+                target = cropped_camera(camera, side, image_size)
+                self.poses[index, view] = target.pose
                 self.intrinsics[index, view] = target.intrinsics.matrix
         self.image_shapes = ((count, views, image_size, image_size, 4),
                              (count, views, image_size, image_size))
@@ -58,8 +59,7 @@ class FramedViews:
         number, camera = self._numbers[index][view], self._shown[index][view]
         image = self.folders[index].image(number)
         _require_size(image, camera, self.folders[index].images_folder / f'{number:02d}.png')
-        layers = np.asarray(weighted(image).round(), np.uint8)
-        return framed_layers(layers, camera, self._sides[index], self._size)[:2]
+        return cropped(image, camera, self._sides[index], self._size)
 
     def read_depth(self, index: int, view: int) -> NDArray[np.float32]:
         """Read a depth image, (S, S), in sides of the grid; raises DataError on bad ones."""
@@ -123,9 +123,3 @@ def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],
             errors.append(str(error))
     return good, shown, tuple(errors)
 
-
-def weighted(rgba: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return an RGBA image (H, W, 4), premultiplied by alpha, values in [0, 255]."""
-    layers = rgba.astype(np.float32)
-    layers[..., :3] *= layers[..., 3:] / 255
-    return layers

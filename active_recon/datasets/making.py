@@ -19,12 +19,14 @@ from active_recon.datasets.layout import (
     write_voxels,
 )
 from active_recon.errors import ActiveReconError, DataError
+from active_recon.geometry.cameras import Camera
 from active_recon.shapes import check_category, make_shape
 from active_recon.volumes.meshes import file_rotation, fit_to_grid, load_mesh
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import FINE_RESOLUTION, iou
 import numpy as np
+from numpy.typing import NDArray
 import trimesh
 
 _ALIKE = 1e-5  # difference of poses by which files round them
@@ -163,13 +165,25 @@ def _check_shape(folder: ObjectFolder, mesh: trimesh.Trimesh) -> None:
 
 
 def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int, viewing: Viewing) -> None:
-    renderer = Renderer(mesh)
     cameras, lights = viewing.of(_name(folder))
+    images = rendered(mesh, cameras, lights, samples)
+    write_object(folder, images, cameras, voxelise(mesh))
+
+
+def rendered(mesh: trimesh.Trimesh, cameras: Sequence[Camera],
+             lights: Sequence[NDArray[np.float64] | None],
+             samples: int) -> list[NDArray[np.uint8]]:
+    """
+    Return the RGBA images of a mesh from cameras, each under its light; see `Viewing.of`.
+
+    Raises DataError where none of them shows a surface.
+    """
+    renderer = Renderer(mesh)
     images = [renderer.render(camera, samples, light)
               for camera, light in zip(cameras, lights, strict=True)]
     if not np.any(images):
         raise DataError('no visible surface: expected one in at least one image, got none')
-    write_object(folder, images, cameras, voxelise(mesh))
+    return images
 
 
 def _name(folder: ObjectFolder) -> str:

@@ -4,9 +4,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+import hashlib
 from typing import Any
 
-from active_recon.datasets.framed import FramedViews, OnDemand, read_cameras, weighted
+from active_recon.datasets.cropped import weighted
+from active_recon.datasets.framed import FramedViews, OnDemand, read_cameras
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.errors import DataError
@@ -62,6 +64,24 @@ class ViewSet:
     def azimuths(self) -> Tensor:
         """Azimuths of the cameras, (N, V) float32, radians in [0, 2 pi)."""
         return Cameras(self.poses, self.intrinsics).azimuths
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of which objects there are, in their order, and of their cameras."""
+        digest = hashlib.sha256()
+        for folder in self.folders:
+            digest.update(f'{folder.category}/{folder.name}\n'.encode())
+        for cameras in (self.poses, self.intrinsics):
+            digest.update(cameras.contiguous().numpy().tobytes())
+        return digest.hexdigest()
+
+    def at(self, step: int) -> 'ViewSet':
+        """Return what a step of a training draws from: always the same."""
+        return self
+
+    def names(self, objects: Tensor) -> tuple[str, ...]:
+        """Return the names of objects (B,)."""
+        return tuple(self.folders[index].name for index in objects.tolist())
 
     def cameras(self, objects: Tensor, views: Tensor) -> Cameras:
         """Return the cameras of views (...) of objects (...)."""

@@ -64,6 +64,17 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
     return Checkpoint(meta['step'], with_current_keys(meta['settings']), meta['log'])
 
 
+def step_reached(path: Path) -> int:
+    """Return the steps that a checkpoint has behind it, 0 where there is no whole one."""
+    from safetensors import safe_open
+
+    try:
+        with safe_open(path, framework='np') as stored:
+            return int(json.loads(stored.metadata()['checkpoint'])['step'])
+    except (OSError, SafetensorError, KeyError, TypeError, ValueError):
+        return 0
+
+
 def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
                       settings: dict[str, Any]) -> Checkpoint:
     """

@@ -79,10 +79,11 @@ def train_depth(refiner: DepthRefiner, network: Lifting, views: ViewSet, config:
         batch = draw_posed_batch(views, config.batch_size, length, rng, config.augment)
         sample = depth_sample(network, batch, rng, config.bfloat16)
         return Draw((sample.logits, sample.evidence, sample.count, sample.total, sample.voxels),
-                    batch.objects)
+                    views.names(batch.objects))
 
     train_steps(run, DepthLearner(refiner), refiner, config,
-                {'training': config.to_dict(), **facts}, views, draw, dict, weight_decay=0.01)
+                {'training': config.to_dict(), **facts}, views.fingerprint, draw, dict,
+                weight_decay=0.01)
 
 
 def calibrate_depth(refiner: DepthRefiner, network: Lifting,

@@ -93,5 +93,5 @@ def train_jointly(
     train_steps(
         run, JointLearner(network, attention, views, loss, rewards, config.max_views,
                           config.augment),
-        JointModel(network, attention), config, settings, views, draw,
+        JointModel(network, attention), config, settings, views.fingerprint, draw,
         lambda: validate(network, attention), weight_decay=0.01)

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from active_recon.config import LossConfig
-from active_recon.datasets.views import ViewSet
 from active_recon.models.lifting import Lifting
 from active_recon.models.lifting_encoder import Maps
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
@@ -15,6 +14,7 @@ from active_recon.training.loop import (
     share_of_batch,
     train_steps,
     TrainingConfig,
+    TrainingObjects,
 )
 from active_recon.training.losses import volume_loss
 from active_recon.training.posed_batches import draw_posed_batch
@@ -75,7 +75,7 @@ class LiftingLearner(nn.Module):
 
 
 def train_lifting(
-    network: Lifting, views: ViewSet, config: TrainingConfig, loss: LossConfig, run: Run,
+    network: Lifting, objects: TrainingObjects, config: TrainingConfig, loss: LossConfig, run: Run,
     validate: Callable[[ReconstructionNetwork], Measured],
 ) -> None:
     """Train a network in place on random views of random objects; see `train_steps`."""
@@ -83,9 +83,12 @@ def train_lifting(
 
     def draw(step: int) -> Draw:
         length, own = drawn_length(step, config, run.fabric.global_rank)
+        views = objects.at(step)
         batch = draw_posed_batch(views, size, length, own, config.augment)
-        return Draw((batch.images, batch.cameras, batch.alpha, batch.voxels), batch.objects)
+        return Draw((batch.images, batch.cameras, batch.alpha, batch.voxels),
+                    views.names(batch.objects))
 
     train_steps(run, LiftingLearner(network, loss), network, config,
-                {'training': config.to_dict(), 'loss': loss.to_dict()}, views, draw,
+                {'training': config.to_dict(), 'loss': loss.to_dict()},
+                objects.fingerprint, draw,
                 lambda: validate(network), weight_decay=0.01)

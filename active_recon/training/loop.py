@@ -1,12 +1,11 @@
 """The loop that every training shares: steps, validation, checkpoints, several processes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-import hashlib
 import math
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from active_recon.config import Config
 from active_recon.datasets.views import ViewSet
@@ -67,10 +66,25 @@ class TrainingStoppedError(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Draw:
-    """What a step learns from: the arguments of the learner, and the indices of the objects."""
+    """What a step learns from: the arguments of the learner, and the names of the objects."""
 
     arguments: tuple[Any, ...]
-    objects: Tensor
+    names: tuple[str, ...]
+
+
+class TrainingObjects(Protocol):
+    """
+    The objects that a training draws from: those of a `ViewSet`, or objects made meanwhile.
+
+    `fingerprint` is a SHA-256: a training is resumed with the same objects only.
+    """
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of what tells the objects of all steps."""
+
+    def at(self, step: int) -> ViewSet:
+        """Return the objects that a step draws from, which depend on its number alone."""
 
 
 @dataclass(frozen=True)
@@ -130,15 +144,16 @@ def share_of_batch(config: TrainingConfig, fabric: Fabric) -> int:
 
 def train_steps(
     run: Run, learner: nn.Module, trained: nn.Module, config: TrainingConfig,
-    settings: dict[str, Any], views: ViewSet, draw: Callable[[int], Draw],
+    settings: dict[str, Any], fingerprint: str, draw: Callable[[int], Draw],
     validate: Callable[[], Measured], weight_decay: float,
 ) -> None:
     """
     Train in place: `learner`, called with the arguments of `draw`, returns losses, also `loss`.
 
-    `trained` is the part of the learner that checkpoints hold. Every step's draw, and what torch
-    draws in it, such as dropout, depend on the seed and the step alone, so a training that was
-    interrupted and resumed gives the same result as one that was not. `run.report` is called after
+    `trained` is the part of the learner that checkpoints hold, `fingerprint` that of the objects
+    it learns from. Every step's draw, and what torch draws in it, such as dropout, depend on the
+    seed and the step alone, so a training that was interrupted and resumed gives the same result
+    as one that was not. `run.report` is called after
     every step with the losses, and with what `validate` measured where it did. Raises
     TrainingDivergedError naming the batch where a loss is not finite, ConfigError on a checkpoint
     of other settings or data, and TrainingStoppedError where it was interrupted.
@@ -148,7 +163,7 @@ def train_steps(
     raw = torch.optim.AdamW(parameters, config.learning_rate, betas=(0.9, 0.99),
                             weight_decay=weight_decay)
     wrapped, optimizer = fabric.setup(learner, raw)
-    settings = {**settings, 'data': _hash(views), 'begun_with': run.begun_with}
+    settings = {**settings, 'data': fingerprint, 'begun_with': run.begun_with}
     begun = Checkpoint(0, settings, [])
     if run.resume and run.checkpoint_path.is_file():
         begun = resume_checkpoint(run.checkpoint_path, trained, raw, settings)
@@ -161,7 +176,7 @@ def train_steps(
         for step, drawn in drawn_ahead(draw, steps, threads):
             torch.manual_seed(_torch_seed(config.seed, step, fabric.global_rank))
             losses = wrapped(*fabric.to_device(drawn.arguments))
-            _refuse_divergence(fabric, step, losses['loss'], views, drawn.objects)
+            _refuse_divergence(fabric, step, losses['loss'], drawn.names)
             optimizer.zero_grad(set_to_none=True)
             fabric.backward(losses['loss'])
             fabric.clip_gradients(wrapped, optimizer, max_norm=1.0)
@@ -194,16 +209,6 @@ def train_steps(
     learner.eval()
 
 
-def _hash(views: ViewSet) -> str:
-    """Return the SHA-256 of which objects a training draws from, in their order, and cameras."""
-    digest = hashlib.sha256()
-    for folder in views.folders:
-        digest.update(f'{folder.category}/{folder.name}\n'.encode())
-    for cameras in (views.poses, views.intrinsics):
-        digest.update(cameras.contiguous().numpy().tobytes())
-    return digest.hexdigest()
-
-
 def _torch_seed(*numbers: int) -> int:
     return int(np.random.SeedSequence(numbers).generate_state(1)[0])
 
@@ -221,14 +226,12 @@ def _is_asked_to_stop(fabric: Fabric, raise_if_asked: Callable[[], None]) -> boo
     return asked
 
 
-def _refuse_divergence(fabric: Fabric, step: int, loss: Tensor, views: ViewSet,
-                       objects: Tensor) -> None:
+def _refuse_divergence(fabric: Fabric, step: int, loss: Tensor, names: Sequence[str]) -> None:
     """Raise TrainingDivergedError on every process, each naming its own batch (B,)."""
     finite = torch.isfinite(loss.detach())
     if fabric.world_size > 1:
         finite = torch.as_tensor(fabric.all_reduce(finite.float(), reduce_op='sum')
                                  == fabric.world_size)
     if not finite:
-        names = [views.folders[i].name for i in objects.tolist()]
         raise TrainingDivergedError(f'step {step}: the loss is {loss.item()} on the batch '
                                     f'{", ".join(names)}; try a lower learning rate')

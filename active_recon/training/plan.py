@@ -1,5 +1,6 @@
 """A whole training from its plan: reconstruction, threshold, policy; weights with their card."""
 
+from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from active_recon.training.calibration import calibrate, MOST_OBJECTS
 from active_recon.training.joint import train_jointly
 from active_recon.training.lifting import train_lifting
 from active_recon.training.loop import Measured, Run, TrainingConfig
+from active_recon.training.made_objects import MadeObjects
 from active_recon.training.policy_gradient import train_policy
 from active_recon.training.supervised import train_reconstruction
 from lightning_fabric import Fabric
@@ -85,17 +87,24 @@ class Plan:
             {**config.to_dict(), 'view_separation': self.view_separation})
 
 
-def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
+def train_plan(plan: Plan, training: ViewSet | MadeObjects, validation: ViewSet, out: Path,
                reporting: Reporting, fabric: Fabric, resume: bool = False,
                show: Show = lambda stage, step, network: None) -> Bundle:
     """
     Train as planned, with checkpoints of every stage in `out`; return what is to be saved.
 
-    The threshold is chosen on validation. With `resume` a stage continues from its checkpoint, if
-    there is one. `show` gets the network after every validation.
+    Objects may be made meanwhile for a network that learns from any cameras and has no view
+    policy; raises ConfigError for others. The threshold is chosen on validation. With `resume` a
+    stage continues from its checkpoint, if there is one. `show` gets the network after every
+    validation.
     """
     entry = network_entry(plan.model)
     config = plan.config
+    fixed = training if isinstance(training, ViewSet) else None
+    if fixed is None and (plan.joint or plan.policy or entry.fit):
+        raise ConfigError(f'{plan.model}: objects made while it trains: expected a network that '
+                          'learns from any cameras without a view policy, such as lifting; give '
+                          'folders of objects')
     network = plan.begun.reconstruction if plan.begun else entry.build(config)
     frozen = plan.begun is not None and plan.frozen
     begun_with = state_hash(network) if plan.begun else ''
@@ -106,13 +115,13 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
         return Run(fabric, out / f'{stage}.safetensors', report, resume,
                    show=lambda step: show(stage, step, network), begun_with=begun_with)
 
-    if plan.joint and attention is not None:
+    if plan.joint and attention is not None and fixed:
         with reporting('joint', plan.reconstruction.steps) as report:
-            train_jointly(network, attention, training, plan.reconstruction, plan.loss,
+            train_jointly(network, attention, fixed, plan.reconstruction, plan.loss,
                           plan.rewards, run('joint', report),
                           lambda model, _: reconstruction_iou(model, validation))
-    elif entry.fit is not None:
-        entry.fit(network, training.voxels, training.categories)
+    elif entry.fit is not None and fixed:
+        entry.fit(network, fixed.voxels, fixed.categories)
     elif isinstance(network, Lifting) and not frozen:
         with reporting('reconstruction', plan.reconstruction.steps) as report:
             train_lifting(network, training, plan.reconstruction, plan.loss,
@@ -131,9 +140,9 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
     threshold: float = fabric.broadcast(
         plan.begun.threshold if plan.begun and plan.frozen
         else best_threshold(network, validation) if fabric.is_global_zero else math.nan)
-    if plan.policy and attention is not None:
+    if plan.policy and attention is not None and fixed:
         with reporting('policy', plan.policy.steps) as report:
-            train_policy(network, attention, training, threshold, plan.policy, plan.rewards,
+            train_policy(network, attention, fixed, threshold, plan.policy, plan.rewards,
                          run('policy', report),
                          lambda model: policy_auc(network, learned_policy(
                              plan.model, TorchPolicyRuntime(model)), validation, threshold))
@@ -141,11 +150,10 @@ def train_plan(plan: Plan, training: ViewSet, validation: ViewSet, out: Path,
                   _card(plan, training), plan.model)
 
 
-def _card(plan: Plan, training: ViewSet) -> dict[str, Any]:
-    roots = sorted({str(folder.root) for folder in training.folders})
+def _card(plan: Plan, training: ViewSet | MadeObjects) -> dict[str, Any]:
     card = {
-        'data': {root: sum(str(folder.root) == root for folder in training.folders)
-                 for root in roots},
+        'data': training.card if isinstance(training, MadeObjects) else dict(sorted(
+            Counter(str(folder.root) for folder in training.folders).items())),
         'reconstruction': plan.reconstruction.to_dict() | plan.loss.to_dict(),
         'scheme': 'joint' if plan.joint else 'two-stage',
         'policy': plan.policy.to_dict() | plan.rewards.to_dict() if plan.policy else None,

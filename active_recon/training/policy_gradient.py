@@ -145,7 +145,7 @@ def draw_episodes(views: ViewSet, size: int, key: list[int], group_size: int = 1
     objects, starts = (
         torch.from_numpy(rng.integers(count, size=size // group_size).repeat(group_size))
         for count in views.images.shape[:2])
-    return Draw((objects, starts, rng), objects)
+    return Draw((objects, starts, rng), views.names(objects))
 
 
 def train_policy(
@@ -159,7 +159,7 @@ def train_policy(
                 'network': state_hash(network), 'view_separation': attention.view_separation}
     train_steps(
         run, PolicyLearner(network, attention, views, threshold, config.max_views, rewards),
-        attention, config, settings, views,
+        attention, config, settings, views.fingerprint,
         lambda step: draw_episodes(views, size, [config.seed, 1, step, run.fabric.global_rank],
                                    rewards.group_size),
         lambda: validate(attention), weight_decay=0.0)

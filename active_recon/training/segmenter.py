@@ -49,8 +49,9 @@ def train_segmenter(segmenter: Segmenter, views: ViewSet, config: TrainingConfig
         rng = np.random.default_rng([config.seed, step, run.fabric.global_rank])
         batch = draw_posed_batch(views, size, VIEWS, rng, config.augment, SHARES,
                                  TABLE_SHARE)
-        return Draw((batch.images.flatten(0, 1), batch.alpha.flatten(0, 1)), batch.objects)
+        return Draw((batch.images.flatten(0, 1), batch.alpha.flatten(0, 1)),
+                    views.names(batch.objects))
 
     train_steps(run, SegmenterLearner(segmenter), segmenter, config,
                 {'training': config.to_dict(), 'backgrounds': SHARES, 'tables': TABLE_SHARE},
-                views, draw, dict, weight_decay=0.01)
+                views.fingerprint, draw, dict, weight_decay=0.01)

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from active_recon.config import LossConfig
-from active_recon.datasets.views import ViewSet
 from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.training.batches import draw_batch
@@ -14,6 +13,7 @@ from active_recon.training.loop import (
     share_of_batch,
     train_steps,
     TrainingConfig,
+    TrainingObjects,
 )
 from active_recon.training.losses import reconstruction_loss
 from active_recon.training.posed_batches import draw_posed_batch
@@ -102,8 +102,8 @@ def mean_length(max_views: int, curriculum_fraction: float = 0.5) -> float:
 
 
 def train_reconstruction(
-    network: ReconstructionNetwork, views: ViewSet, config: TrainingConfig, loss: LossConfig,
-    run: Run, validate: Callable[[ReconstructionNetwork], Measured],
+    network: ReconstructionNetwork, objects: TrainingObjects, config: TrainingConfig,
+    loss: LossConfig, run: Run, validate: Callable[[ReconstructionNetwork], Measured],
 ) -> None:
     """
     Train a network in place on random views of random objects; see `train_steps`.
@@ -115,10 +115,13 @@ def train_reconstruction(
     def draw(step: int) -> Draw:
         length, own = drawn_length(step, config, run.fabric.global_rank)
         drawn = draw_batch if network.needs_front else draw_posed_batch
+        views = objects.at(step)
         batch = drawn(views, size, length, own, config.augment)
         seen_from = torch.from_numpy(own.integers(len(AZIMUTHS), size=size))
-        return Draw((batch.images, batch.cameras, batch.voxels, seen_from), batch.objects)
+        return Draw((batch.images, batch.cameras, batch.voxels, seen_from),
+                    views.names(batch.objects))
 
     train_steps(run, ReconstructionLearner(network, loss), network, config,
-                {'training': config.to_dict(), 'loss': loss.to_dict()}, views, draw,
+                {'training': config.to_dict(), 'loss': loss.to_dict()},
+                objects.fingerprint, draw,
                 lambda: validate(network), weight_decay=0.01)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 import math
 
-from active_recon.datasets.framed import weighted
+from active_recon.datasets.cropped import weighted
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.posed.robustness import poses_off
