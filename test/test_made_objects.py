@@ -250,13 +250,14 @@ def training(validation, out, *more):
 
 def test_a_training_on_made_objects_tells_them_in_its_card(
         validation, tmp_path, monkeypatch, capsys):
-    meshes = tmp_path / 'meshes' / 'part'
+    meshes = tmp_path / 'meshes' / 'lamp'
     meshes.mkdir(parents=True)
-    a_box().export(meshes / 'box.stl')
+    a_box().export(meshes / 'lamp-1000000.stl')  # as the object of the validation is called
     asked = training(validation, tmp_path / 'run', '--meshes', meshes.parent, '--made-of',
                      'thing=1,mesh=1', '--made-cameras', 'any=1', '--uses', 1)
     assert command(monkeypatch, *asked) == 0
-    told = capsys.readouterr().out
+    told, warned = capsys.readouterr()
+    assert '1 of 1 validation objects have the names of meshes that are trained on' in warned
     assert 'making the first objects: 16/16' in told and '18 objects made; the steps wai' in told
     data = json.loads((tmp_path / 'run' / 'weights.json').read_text())['data']
     assert (data['made in training'], data['mesh files']) == (18, 1)

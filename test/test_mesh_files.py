@@ -1,8 +1,10 @@
 """Mesh files: what other software reads is what was written, in metres, where it stands."""
 
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.meshes.files import MESH_FORMATS, write_mesh
 from active_recon.volumes.meshes import read_mesh
+from active_recon.volumes.rendering import Renderer
 import numpy as np
 import pytest
 import trimesh
@@ -83,3 +85,18 @@ def test_writing_leaves_the_mesh_as_it_was(mesh, tmp_path):
 def test_a_mesh_of_another_format_is_refused(mesh, tmp_path):
     with pytest.raises(ConfigError, match='no mesh has that suffix: expected ply, obj, stl, glb'):
         write_mesh(mesh, tmp_path / 'ball.docx')
+
+
+def test_a_glb_of_one_material_has_the_color_that_it_has_beside_another(tmp_path):
+    parts = [trimesh.creation.box().apply_translation([place, 0, 0]) for place in (0, 2)]
+    for part, light in zip(parts, ([0.2, 0.5, 0.05], [0.9, 0.1, 0.5]), strict=True):
+        part.visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(baseColorFactor=[*light, 1.0]))
+    parts[0].export(tmp_path / 'alone.glb')
+    trimesh.Scene(parts).export(tmp_path / 'both.glb')
+    assert (read_mesh(tmp_path / 'alone.glb').visual.face_colors[:, :3] == [124, 188, 64]).all()
+    shown = [Renderer(read_mesh(tmp_path / name)).render(orbit_camera(0.0, 0.5, 6.0))
+             for name in ('alone.glb', 'both.glb')]
+    colors = [np.unique(each[each[..., 3] == 255][:, :3], axis=0).astype(int) for each in shown]
+    apart = np.abs(colors[0][:, None] - colors[1]).max(axis=2).min(axis=1)
+    assert apart.max() <= 2

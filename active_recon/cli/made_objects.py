@@ -1,6 +1,6 @@
 """What `train --make` means: objects that are made while a network learns from them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
@@ -10,6 +10,7 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.datasets.layout import ObjectFolder
     from active_recon.datasets.making import Job
     from active_recon.geometry.canonical import NetworkSpec
     from active_recon.training.loop import TrainingConfig
@@ -92,6 +93,16 @@ def make_first(objects: 'MadeObjects', checkpoint: Path | None) -> None:
     step = step_reached(checkpoint) if checkpoint else 0
     with progress_bar('making the first objects', objects.lacking(step)) as advance:
         objects.at(step, lambda: advance(1, ''))
+
+
+def warn_of_meshes(objects: 'MadeObjects', held_out: 'Sequence[ObjectFolder]') -> None:
+    """Warn where validation objects have the names of meshes that are trained on."""
+    trained = set(objects.meshes)
+    shared = sum(f'{folder.category}/{folder.name}' in trained for folder in held_out)
+    if shared:
+        typer.echo(f'warning: {shared} of {len(held_out)} validation objects have the names of '
+                   'meshes that are trained on: if they are the same, the threshold is biased, '
+                   'and their IoU is too high', err=True)
 
 
 def making_told(objects: 'MadeObjects') -> str:

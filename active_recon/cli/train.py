@@ -18,6 +18,7 @@ from active_recon.cli.made_objects import (
     making_told,
     Meshes,
     Uses,
+    warn_of_meshes,
 )
 from active_recon.cli.reading import read_objects, Split, warn_of_shared_objects
 from active_recon.errors import ConfigError
@@ -195,7 +196,9 @@ def train(
                 asked, first, fabric.global_rank, fabric.world_size))
             make_first(training, out / 'reconstruction.safetensors' if resume else None)
         held_out = read_objects(validation, 'validation data', asked, split_file, 'val')
-        if isinstance(training, ViewSet) and fabric.is_global_zero:
+        if isinstance(training, MadeObjects):
+            warn_of_meshes(training, held_out.folders)
+        elif fabric.is_global_zero:
             warn_of_shared_objects(training.folders, held_out.folders,
                                    'the threshold is biased, and their IoU is too high')
         log = stack.enter_context(SummaryLog(out / 'tensorboard', held_out))

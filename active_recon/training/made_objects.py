@@ -77,10 +77,13 @@ class MadeObjects:
     def fingerprint(self) -> str:
         """SHA-256 of the recipe, the pace, the names of the meshes and the generators' code."""
         told = {'recipe': self._maker.recipe.to_dict(), 'pace': self._pace.to_dict(),
-                'meshes': [f'{job.folder.category}/{job.folder.name}'
-                           for job in self._maker.meshes],
-                'generators': generators_hash()}
+                'meshes': self.meshes, 'generators': generators_hash()}
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def meshes(self) -> list[str]:
+        """The categories and names of the mesh files, CATEGORY/NAME."""
+        return [f'{job.folder.category}/{job.folder.name}' for job in self._maker.meshes]
 
     @property
     def made(self) -> int:
@@ -91,7 +94,7 @@ class MadeObjects:
     def card(self) -> dict[str, Any]:
         """What a card of weights tells of the data."""
         return {'made in training': self.made,
-                'recipe': self._maker.recipe.to_dict(), 'mesh files': len(self._maker.meshes)}
+                'recipe': self._maker.recipe.to_dict(), 'mesh files': len(self.meshes)}
 
     def lacking(self, step: int) -> int:
         """Return how many objects are still to be made before a step can draw."""

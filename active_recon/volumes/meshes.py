@@ -78,19 +78,30 @@ def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
         raise MeshError(f'{path}: no surface: expected faces with finite corners and an area, got '
                         f'extents {mesh.extents}')
     if path.suffix.lower() in GLTF:
-        _take_corner_colors(mesh, path)
+        _take_colors(mesh, path)
     transform = np.eye(4)
     transform[:3, :3] = rotation
     mesh.apply_transform(transform)
     return mesh
 
 
-def _take_corner_colors(mesh: trimesh.Trimesh, path: Path) -> None:
-    """Let the colours of the corners in a glTF file be the mesh's where it has no others."""
+def _take_colors(mesh: trimesh.Trimesh, path: Path) -> None:
+    """Let the mesh have the sRGB colours of a glTF file that has no texture."""
     visual: Any = mesh.visual
-    if visual.kind != 'texture' or visual.uv is not None or getattr(
-            visual.material, 'baseColorFactor', None) is not None:
+    if visual.kind != 'texture':
         return
+    factor = getattr(visual.material, 'baseColorFactor', None)
+    if factor is None and visual.uv is None:
+        _take_corner_colors(mesh, path)
+    elif factor is not None and getattr(visual.material, 'baseColorTexture', None) is None:
+        # It is light. Where trimesh makes one mesh of several materials, it knows that
+        color = from_linear(np.asarray(factor)[:3])
+        mesh.visual = trimesh.visual.ColorVisuals(
+            mesh, vertex_colors=np.tile(color, (len(mesh.vertices), 1)))
+
+
+def _take_corner_colors(mesh: trimesh.Trimesh, path: Path) -> None:
+    """Let the colours of the corners in a file be the mesh's where it has no others."""
     # They are lost where trimesh makes one mesh of a file
     scene: Any = trimesh.load(path, force='scene', process=False)
     light = [part.visual.vertex_attributes['color'] for part in scene.geometry.values()
