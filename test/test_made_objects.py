@@ -126,12 +126,23 @@ def test_a_mesh_is_seen_from_other_places_each_time_and_sometimes_stretched():
 
 
 def test_an_object_that_cannot_be_made_is_replaced_by_another():
-    maker = of_meshes(job('bad', partial(no_mesh, 'bad')), job('box', a_box))
-    assert {maker(index).name.partition('-')[0] for index in range(4)} == {'box'}
+    maker = of_meshes(job('bad', partial(no_mesh, 'bad.stl')), job('box', a_box))
+    made = [maker(index) for index in range(4)]
+    assert {each.name.partition('-')[0] for each in made} == {'box'}
+    assert {each.left_out for each in made} >= {(), ('part/bad: bad.stl: a mesh without faces',)}
+
+
+def test_an_object_that_cannot_be_made_is_told_once():
+    told = []
+    maker = of_meshes(job('bad', partial(no_mesh, 'bad.stl')), job('box', a_box))
+    with MadeObjects(maker, Pace(8, 0, 8), 1, left_out=told.append) as objects:
+        assert len(objects.at(0)) == 8
+    assert told == ['part/bad: bad.stl: a mesh without faces']
 
 
 def test_where_no_object_can_be_made_the_reasons_are_told():
-    with pytest.raises(DataError, match='10 objects in a row cannot be made:\n  bad-0: bad'):
+    told = '10 objects in a row cannot be made:\n  part/bad: bad.stl: a mesh without faces$'
+    with pytest.raises(DataError, match=told):
         of_meshes(job('bad', partial(no_mesh, 'bad.stl')))(0)
 
 
@@ -139,6 +150,7 @@ def test_where_no_object_can_be_made_the_reasons_are_told():
     ({'sources': {'chair': 1}}, "for parametric, thing, mesh, got {'chair': 1}"),
     ({'cameras': {'any': -1}}, 'numbers of 0 or more'),
     ({'cameras': {'any': 0}}, 'not all 0'),
+    ({'cameras': {'any': float('inf')}}, 'invalid shares'),
     ({'views': 25}, 'expected 1 to 24 views')])
 def test_a_recipe_that_makes_nothing_is_refused(values, told):
     with pytest.raises(ConfigError, match=told):

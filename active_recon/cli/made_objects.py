@@ -83,7 +83,7 @@ class MadeOptions:
         pace = Pace(min(_FIRST_BATCHES * batch, kept), batch / self.uses, kept)
         jobs = tuple(_jobs(self.meshes)) if self.meshes else ()
         return MadeObjects(Maker(recipe, jobs, spec), pace, max(1, self.processes // world), rank,
-                           world)
+                           world, lambda reason: typer.echo(f'left out: {reason}', err=True))
 
 
 def make_first(objects: 'MadeObjects', checkpoint: Path | None) -> None:

@@ -125,7 +125,7 @@ def train(
 
     Objects that are made while it trains, on a machine with 16 cores and a graphics card:
 
-      active-recon train --make 14 --validation data/val --model lifting --batch-size 96
+      active-recon train --make 8 --validation data/val --model lifting --batch-size 96
     """
     from active_recon.cli.training_log import SummaryLog
     from active_recon.config import LossConfig, RewardConfig

@@ -122,4 +122,3 @@ def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],
         except DataError as error:
             errors.append(str(error))
     return good, shown, tuple(errors)
-

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+import math
 from pathlib import Path
 
 from active_recon.config import Config
@@ -53,8 +54,8 @@ class Recipe(Config):
         """Reject what cannot be made."""
         for name, shares, known in (('sources', self.sources, SOURCES),
                                     ('cameras', self.cameras, KINDS)):
-            if not set(shares) <= set(known) or min(shares.values(), default=0) < 0 or not sum(
-                    shares.values()) > 0:
+            if not set(shares) <= set(known) or min(shares.values(), default=0) < 0 or not (
+                    0 < sum(shares.values()) < math.inf):
                 raise ConfigError(f'{name}: invalid shares: expected numbers of 0 or more, not '
                                   f'all 0, for {", ".join(known)}, got {dict(shares)}')
         if not 1 <= self.views <= 24 or min(self.samples, self.seed + 1) < 1:
@@ -64,7 +65,12 @@ class Recipe(Config):
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """One object, of V views; see `ViewSet` for the arrays, which are those of one row."""
+    """
+    One object, of V views; see `ViewSet` for the arrays, which are those of one row.
+
+    `left_out` tells of objects that were to be made instead, and could not be: their categories
+    and names, and why.
+    """
 
     category: str
     name: str
@@ -73,6 +79,7 @@ class Made:
     poses: NDArray[np.float64]
     intrinsics: NDArray[np.float64]
     voxels: NDArray[np.bool_]
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +104,19 @@ class Maker:
         """
         Return the object of a number, which depends on that and on the recipe alone.
 
-        One that cannot be made is replaced by the next that is drawn. Raises DataError where ten
-        in a row cannot be made.
+        One that cannot be made is replaced by the next that is drawn, and told. Raises DataError
+        where ten in a row cannot be made.
         """
-        reasons = []
+        left_out: list[str] = []
         for attempt in range(_ATTEMPTS):
             job, viewing, rng = self.drawn(index, attempt)
             try:
-                return self._made(job, viewing, rng)
+                return replace(self._made(job, viewing, rng), left_out=tuple(left_out))
             except (ActiveReconError, OSError) as error:
-                reasons.append(f'\n  {job.folder.name}: {error}')
-        raise DataError(f'{_ATTEMPTS} objects in a row cannot be made:' + ''.join(reasons))
+                name = job.folder.name.removesuffix(f'-{index}')
+                left_out.append(f'{job.folder.category}/{name}: {error}')
+        raise DataError(f'{_ATTEMPTS} objects in a row cannot be made:'
+                        + ''.join(f'\n  {reason}' for reason in dict.fromkeys(left_out)))
 
     def drawn(self, index: int, attempt: int) -> tuple[Job, Viewing, np.random.Generator]:
         """

@@ -56,14 +56,16 @@ class MadeObjects:
     They depend on the maker, the pace and the step alone, not on how fast they are made: a
     training waits for those that are not ready. So it can be interrupted; resumed, it makes those
     again that are still drawn. Each of `world` processes that train together makes its own, in
-    `workers` processes. `waited` are the seconds in which a step had to wait. A context: what
-    makes objects ends with it.
+    `workers` processes. `left_out` is called once with the name of each object that cannot be
+    made, and why. `waited` are the seconds in which a step had to wait. A context: what makes
+    objects ends with it.
     """
 
-    def __init__(self, maker: Maker, pace: Pace, workers: int, rank: int = 0,
-                 world: int = 1) -> None:
+    def __init__(self, maker: Maker, pace: Pace, workers: int, rank: int = 0, world: int = 1,
+                 left_out: Callable[[str], None] = lambda reason: None) -> None:
         self._maker, self._pace, self._workers = maker, pace, workers
         self._rank, self._world = rank, world
+        self._tell, self._told = left_out, set[str]()
         self._ahead: MadeAhead | None = None
         self._lock = threading.Lock()
         self._made = 0
@@ -150,6 +152,10 @@ class MadeObjects:
                     np.empty((self._places, *part.shape), part.dtype))
             self._rows[name][place] = torch.from_numpy(part)
         self._folders[place] = ObjectFolder(ROOT, made.category, made.name)
+        for reason in made.left_out:
+            if reason not in self._told:
+                self._told.add(reason)
+                self._tell(reason)
         self._made += 1
 
 
