@@ -7,6 +7,7 @@ from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import Camera
 from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
+from active_recon.nodes.loop.other_planner import OtherPlanner
 from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy, tell_reconstructor
 from active_recon.nodes.loop.refused_views import NO_GOAL, refusing_views
 from active_recon.nodes.loop.target_warning import tell_min_gain, tell_target
@@ -81,7 +82,9 @@ class ViewPlannerNode(ManagedNode):
             self, 0.1, self._publish_first_goal, self._first_goal_is_due)
         self._timeout_timer = RestingTimer(self, 0.1, self._give_up_timed_out, lambda: (
             self._params.values.goal_timeout > 0 and self._goals.camera is not None))
-        self.create_timer(REPEAT_S, self._goals.repeat, clock=STEADY)
+        self._other_planner = OtherPlanner(self, self._diagnostics)
+        self.add_cleanup(self._other_planner.clear)
+        self.create_timer(REPEAT_S, self._repeat, clock=STEADY)
 
     def _free_policy(self) -> None:
         del self._loaded, self._planner
@@ -238,6 +241,11 @@ class ViewPlannerNode(ManagedNode):
         self._started = True
         self._timeout_timer.wake()
         self._diagnostics.count('goals')
+
+    def _repeat(self) -> None:
+        """Publish the open goal again, and tell whether another planner does so, too."""
+        self._goals.repeat()
+        self._other_planner.tell()
 
     def _give_up_timed_out(self) -> None:
         """Publish the next best goal where one has been open for too long."""
