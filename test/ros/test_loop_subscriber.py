@@ -14,6 +14,7 @@ from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
 import pytest
+from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
@@ -53,6 +54,19 @@ def found(bench):
     loops = Found()
     loops.finder = LoopFinder(bench.node, loops.append)
     return loops
+
+
+def test_a_node_that_is_listed_and_answers_nothing_keeps_from_no_loop(start_node, bench, found):
+    # As one that was killed, and stayed in DDS's lists
+    silent = Node('reconstructor', context=bench.node.context, start_parameter_services=False)
+    try:
+        bench.until(lambda: '/reconstructor' in bench.node.get_fully_qualified_node_names(),
+                    'the silent node')
+        start_node('view_planner', policy='farthest', namespace='cell_1')
+        found.until(lambda loops: loops, 'the loop that answers')
+        assert found[-1].namespace == '/cell_1'
+    finally:
+        silent.destroy_node()
 
 
 def test_the_size_the_frame_and_the_names_of_a_running_loop_are_found(

@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+import time
 
 from active_recon.geometry.cameras import OBJECT_FRAME
 from active_recon.nodes.runtime.parameter_collector import ParameterCollector
 from active_recon.nodes.runtime.qos import endpoint_node
 from active_recon.nodes.runtime.topic_names import full_names
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 
 _HEADER = 'std_msgs/msg/Header'
 _LOOP_TOPICS = ('/episode', '/done')  # published by reconstructor and planner only
 _NAMES = ('reconstructor', 'view_planner')
+SILENT_S = 5.0
+"""A node without parameter services for so long is none: DDS may list nodes that were killed."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +53,12 @@ class LoopFinder:
         self._on_loop = on_loop
         self._collector = ParameterCollector(node, self._take)
         self._parameters_of: dict[str, dict[str, object]] = {}
+        self._served_at: dict[str, float] = {}
         self.others: tuple[str, ...] = ()
 
     def update(self) -> None:
         """Request the parameters of newly found nodes; to be called repeatedly."""
-        nodes = set(self._nodes())
+        nodes = {name for name in set(self._nodes()) if not self._is_silent(name)}
         spaces = sorted({_namespace(name) for name in nodes})
         own = self._node.get_namespace()
         chosen = own if own in spaces else spaces[0] if len(spaces) == 1 else None
@@ -70,6 +74,18 @@ class LoopFinder:
             if topic.endswith(_LOOP_TOPICS) and _HEADER in kinds:
                 publishers = self._node.get_publishers_info_by_topic(topic)
                 yield from filter(None, map(endpoint_node, publishers))
+
+    def _is_silent(self, name: str) -> bool:
+        """Return whether a node has been without parameter services for too long."""
+        now = time.monotonic()
+        space, _, own = name.rpartition('/')
+        try:
+            services = self._node.get_service_names_and_types_by_node(own, space or '/')
+        except NodeNameNonExistentError:
+            services = []
+        if any(service == f'{name}/list_parameters' for service, _ in services):
+            self._served_at[name] = now
+        return now - self._served_at.setdefault(name, now) > SILENT_S
 
     def _take(self, name: str, parameters: dict[str, object]) -> None:
         self._parameters_of[name] = parameters
