@@ -98,7 +98,7 @@ def make_first(objects: 'MadeObjects', checkpoint: Path | None) -> None:
 def warn_of_meshes(objects: 'MadeObjects', held_out: 'Sequence[ObjectFolder]') -> None:
     """Warn where validation objects have the names of meshes that are trained on."""
     trained = set(objects.meshes)
-    shared = sum(f'{folder.category}/{folder.name}' in trained for folder in held_out)
+    shared = sum(folder.full_name in trained for folder in held_out)
     if shared:
         typer.echo(f'warning: {shared} of {len(held_out)} validation objects have the names of '
                    'meshes that are trained on: if they are the same, the threshold is biased, '

@@ -156,7 +156,7 @@ def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Vie
     before = f', {kept} of them finished before, kept as they are' if kept else ''
     typer.echo(f'{len(jobs) - len(rejected)} of {len(jobs)} objects made{before}')
     for outcome in rejected:
-        typer.echo(f'rejected: {outcome.folder.category}/{outcome.folder.name}: '
+        typer.echo(f'rejected: {outcome.folder.full_name}: '
                    f'{outcome.refusal}', err=True)
     if rejected and len(rejected) == len(jobs):
         raise typer.Exit(2)

@@ -51,6 +51,11 @@ class ObjectFolder:
     name: str
 
     @property
+    def full_name(self) -> str:
+        """CATEGORY/NAME, by which it is known wherever its dataset lies."""
+        return f'{self.category}/{self.name}'
+
+    @property
     def images_folder(self) -> Path:
         """Folder of the images and their metadata."""
         return self.root / RENDERING / self.category / self.name / 'rendering'

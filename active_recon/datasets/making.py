@@ -126,7 +126,7 @@ def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = T
             if not (lacks_fine or lacks_depth):
                 return Outcome(job.folder, kept=True)
         mesh = job.make_mesh()
-        yaw = viewing.yaw(_name(job.folder))
+        yaw = viewing.yaw(job.folder.full_name)
         if yaw:
             mesh = yawed(mesh, yaw)
         if finished:
@@ -147,7 +147,7 @@ def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = T
 
 def _check_cameras(folder: ObjectFolder, viewing: Viewing) -> None:
     """Raise DataError where a finished object was rendered from other cameras."""
-    found, asked = folder.cameras(), viewing.of(_name(folder))[0]
+    found, asked = folder.cameras(), viewing.of(folder.full_name)[0]
     if len(found) != len(asked) or any(
             there.intrinsics != here.intrinsics
             or not np.allclose(there.pose, here.pose, rtol=0, atol=_ALIKE)
@@ -165,7 +165,7 @@ def _check_shape(folder: ObjectFolder, mesh: trimesh.Trimesh) -> None:
 
 
 def _render(folder: ObjectFolder, mesh: trimesh.Trimesh, samples: int, viewing: Viewing) -> None:
-    cameras, lights = viewing.of(_name(folder))
+    cameras, lights = viewing.of(folder.full_name)
     images = rendered(mesh, cameras, lights, samples)
     write_object(folder, images, cameras, voxelise(mesh))
 
@@ -186,10 +186,6 @@ def rendered(mesh: trimesh.Trimesh, cameras: Sequence[Camera],
     return images
 
 
-def _name(folder: ObjectFolder) -> str:
-    return f'{folder.category}/{folder.name}'
-
-
 def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool = False,
                  viewing: Viewing = TURNTABLE, depth: bool = False, crew: Crew | None = None,
                  reads: Sequence[Path] = ()) -> Iterator[Outcome]:
@@ -203,7 +199,7 @@ def make_dataset(jobs: list[Job], samples: int = 2, workers: int = 1, fine: bool
     for folder, count in Counter(job.folder for job in jobs).most_common(1):
         if count > 1:
             raise DataError('several meshes of one name: expected each object once, got '
-                            f'{count} meshes for {folder.category}/{folder.name}; rename their '
+                            f'{count} meshes for {folder.full_name}; rename their '
                             'files')
     out = Path(os.path.commonpath([job.folder.root for job in jobs])) if jobs else None
     make = partial(make_object, samples=samples, fine=fine, viewing=viewing,

@@ -137,7 +137,7 @@ class Maker:
         return shape_jobs(category, [seed], ROOT)[0], viewing, rng
 
     def _made(self, job: Job, viewing: Viewing, rng: np.random.Generator) -> Made:
-        name, size = f'{job.folder.category}/{job.folder.name}', self.spec.image_size
+        name, size = job.folder.full_name, self.spec.image_size
         mesh, yaw = job.make_mesh(), viewing.yaw(name)
         if yaw:
             mesh = yawed(mesh, yaw)

@@ -70,7 +70,7 @@ class ViewSet:
         """SHA-256 of which objects there are, in their order, and of their cameras."""
         digest = hashlib.sha256()
         for folder in self.folders:
-            digest.update(f'{folder.category}/{folder.name}\n'.encode())
+            digest.update(f'{folder.full_name}\n'.encode())
         for cameras in (self.poses, self.intrinsics):
             digest.update(cameras.contiguous().numpy().tobytes())
         return digest.hexdigest()

@@ -108,7 +108,7 @@ def stored_object(folder: ObjectFolder, object_size: float = 1.0,
     if not cameras:
         raise DataError(f'{folder.images_folder}: no views: expected one or more, got none')
     images = [composite(folder.image(index), background) for index in range(len(cameras))]
-    return ShownObject(f'{folder.category}/{folder.name}', images,
+    return ShownObject(folder.full_name, images,
                        [_scaled(camera, object_size) for camera in cameras])
 
 

@@ -167,4 +167,4 @@ def _mixed(rng: np.random.Generator) -> Chooser:
 
 
 def _key(folder: ObjectFolder) -> bytes:
-    return hashlib.sha256(f'{folder.category}/{folder.name}'.encode()).digest()
+    return hashlib.sha256(folder.full_name.encode()).digest()

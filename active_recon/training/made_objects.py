@@ -85,7 +85,7 @@ class MadeObjects:
     @property
     def meshes(self) -> list[str]:
         """The categories and names of the mesh files, CATEGORY/NAME."""
-        return [f'{job.folder.category}/{job.folder.name}' for job in self._maker.meshes]
+        return [job.folder.full_name for job in self._maker.meshes]
 
     @property
     def made(self) -> int:

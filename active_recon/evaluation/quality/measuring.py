@@ -160,7 +160,7 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
             found.append((features(cells, threshold, seen[row]), latents[row], truth, number,
                           row))
     numbers, pools, ious, counts, rows = zip(*found, strict=True)
-    names = np.array([f'{folder.category}/{folder.name}' for folder in views.folders])
+    names = np.array([folder.full_name for folder in views.folders])
     at_row = np.array(rows)
     return Measured(
         np.array(numbers), np.array(pools), np.array(ious),
