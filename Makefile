@@ -19,7 +19,7 @@ PIP := $(BIN)/python -m pip --quiet
 # Live tests mostly wait, hence more workers than two cores; one thread each, so that they share.
 TEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:cacheprovider -n 4 --dist loadfile \
 	--no-loadscope-reorder --max-worker-restart 0
-SPHINX := $(BIN)/python -m sphinx -q -W --keep-going -b html
+SPHINX := $(BIN)/python -m sphinx -q -W --keep-going
 SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell find \
 	active_recon msg_tools resource scripts launch config rviz security \
 	-type f -not -path '*/__pycache__/*' 2>/dev/null)
@@ -77,14 +77,14 @@ doc: html  ## the documentation, built and opened; ARGS=--no-open only builds
 	@$(if $(filter --no-open,$(ARGS)),echo build/doc/index.html,$(BIN)/python -m webbrowser \
 		'file://$(CURDIR)/build/doc/index.html')
 
-# The theme repeats the whole navigation on each page: half of the time, for nothing to check.
+# Every warning comes without pages being written, too.
 read-doc: .venv/installed
 	@echo '== checking the documentation'
-	@$(SPHINX) -D html_theme=basic -d build/doc-check/.doctrees doc build/doc-check
+	@$(SPHINX) -b dummy -d build/doc-check/.doctrees doc build/doc-check
 
 html: .venv/installed
 	@echo '== building the documentation'
-	@$(SPHINX) -d build/doc/.doctrees doc build/doc
+	@$(SPHINX) -b html -d build/doc/.doctrees doc build/doc
 
 bench: .venv/installed  ## the figures of doc/benchmarks.md, measured here
 	@echo '== measuring'
@@ -103,19 +103,21 @@ policies: .venv/installed  ## security/policies.xml anew, from the live graph
 lint: .venv/installed  ## ruff and mypy
 	@echo '== checking the style and the types'
 	@$(BIN)/ruff check
-	@$(BIN)/mypy
+	@$(BIN)/mypy --num-workers 2
 
 clean:  ## forget .venv and what was built
 	@echo '== removing .venv and what was built'
 	@rm -rf .venv build install log *.egg-info
 
-# Modules are compiled when they are first used: compiling all of them takes half a minute.
+# Modules are compiled when they are first used: compiling all of them takes half a minute. The
+# pip that comes with Python takes 20 s longer to find what belongs together.
 # torch goes first, by itself: what needs torch would otherwise choose the build.
 .venv/torch:
 	@test -n '$(PYTHON)' || { echo 'expected Python 3.11 or 3.12 with venv on the PATH, found' \
 		"none: install one, or name it by PYTHON=..."; exit 1; }
 	@echo '== making .venv with $(PYTHON) (a few minutes, once)'
 	@$(PYTHON) -m venv --clear .venv
+	@$(PIP) install --no-compile -c constraints.txt --upgrade pip
 	@echo '== installing $(TORCH)'
 	@$(PIP) install --no-compile -c constraints.txt $(TORCH) setuptools
 	@touch $@
@@ -140,5 +142,5 @@ clean:  ## forget .venv and what was built
 .venv/colcon/installed: constraints-colcon.txt | .venv/torch
 	@echo '== installing colcon'
 	@rm -rf .venv/colcon
-	@$(PIP) install --no-compile --target .venv/colcon -c $< setuptools colcon-common-extensions
+	@$(PIP) install --no-compile --no-deps --target .venv/colcon -r $<
 	@touch $@

@@ -10,8 +10,13 @@ from pathlib import Path
 import re
 import sys
 
+from astroid import MANAGER, nodes
+from astroid.brain.brain_dataclasses import dataclass_transform, is_decorated_with_dataclass
+
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))  # linked_files
+# astroid, which autodoc2 reads the source with, would look up the types of all fields, for nothing
+MANAGER.unregister_transform(nodes.ClassDef, dataclass_transform, is_decorated_with_dataclass)
 
 
 def _repository() -> Path:

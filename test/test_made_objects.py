@@ -3,27 +3,26 @@
 from dataclasses import replace
 from functools import partial
 import json
-import os
-from pathlib import Path
 import subprocess
 import sys
 
 from active_recon.config import LossConfig
 from active_recon.datasets.drawn_cameras import Viewing
-from active_recon.datasets.layout import list_objects, ObjectFolder
+from active_recon.datasets.layout import list_objects
 from active_recon.datasets.made_ahead import MadeAhead
-from active_recon.datasets.making import Job, make_dataset, shape_jobs
+from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.datasets.recipes import Maker, Recipe
 from active_recon.datasets.views import read_views
-from active_recon.errors import ConfigError, DataError, MeshError, WorkError
+from active_recon.errors import ConfigError, DataError, WorkError
 from active_recon.geometry.cameras import AZIMUTHS, pose_azimuths
 from active_recon.geometry.canonical import NetworkSpec
 from active_recon.models.lifting import Lifting, LiftingConfig
-from active_recon.shapes import CATEGORIES, make_shape
+from active_recon.shapes import CATEGORIES
 from active_recon.training.lifting import train_lifting
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
 from active_recon.training.made_objects import MadeObjects, Pace
 from command_line import command, refusal
+from mesh_jobs import a_box, a_death, job, no_mesh
 import numpy as np
 import pytest
 from small_datasets import lamps_and_tables
@@ -52,22 +51,6 @@ def drawn(objects, step):
     return [folder.name for folder in views.folders], *(part.clone() for part in (
         views.images[across], views.seen[across], views.poses, views.intrinsics,
         views.voxels[every]))
-
-
-def a_box():
-    return make_shape('speaker', 1)
-
-
-def no_mesh(name):
-    raise MeshError(f'{name}: a mesh without faces')
-
-
-def a_death():
-    os._exit(3)
-
-
-def job(name, make):
-    return Job(ObjectFolder(Path('meshes'), 'part', name), make)
 
 
 def of_meshes(*jobs):

@@ -114,6 +114,8 @@ def test_modules_and_their_data_come_from_the_install(install, source, tmp_path)
         assert shipped <= {path.name for path in Path(found[0], folder).iterdir()}
 
 
+@pytest.mark.parametrize('install', [
+    pytest.param('pip', marks=pytest.mark.slow), 'colcon'], indirect=True)
 def test_every_executable_publishes_and_ends_when_asked(
         install, ros_domain, tmp_path, monkeypatch):
     mesh = tmp_path / 'box.ply'
