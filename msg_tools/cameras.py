@@ -84,14 +84,16 @@ def _distortion(msg: CameraInfo) -> Distortion | None:
         raise MessageError(str(error), error.kind) from error
 
 
-def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME) -> NDArray[np.float64]:
+def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME,
+                  advice: str = '') -> NDArray[np.float64]:
     """
     Return the pose, (4, 4), object from optical frame; its quaternion is normalised.
 
-    Raises MessageError if the pose is in another frame, not finite, a million kilometres away or
-    at the frame's origin, or its quaternion is zero.
+    Raises MessageError if the pose is in another frame, which ends with the `advice` for that
+    case, not finite, a million kilometres away or at the frame's origin, or its quaternion is
+    zero.
     """
-    _check_frame(msg.header, frame)
+    _check_frame(msg.header, frame, advice)
     return _matrix(msg.pose)
 
 
@@ -101,10 +103,10 @@ def poses_from_msg(msg: PoseArray, frame: str = OBJECT_FRAME) -> list[NDArray[np
     return [_matrix(pose) for pose in msg.poses]
 
 
-def _check_frame(header: Header, frame: str) -> None:
+def _check_frame(header: Header, frame: str, advice: str = '') -> None:
     if header.frame_id != frame:
         raise MessageError(f'wrong frame of a camera pose: expected {frame!r}, '
-                           f'got {header.frame_id!r}', 'frame')
+                           f'got {header.frame_id!r}{advice and "; "}{advice}', 'frame')
 
 
 def _matrix(pose: Pose) -> NDArray[np.float64]:

@@ -115,7 +115,7 @@ def image_without_a_stamp(camera):
     (image_of_nan, 'image_values', r'out of range: expected 32FC3 in \[0, 1\], got nan'),
     (image_with_no_pose, 'no_pose', 'no pose for the image .*the nearest is'),
     (image_with_no_camera_info, 'no_camera_info', "camera info of the image's stamp.*the last is"),
-    (pose_in_another_frame, 'frame', "frame .*expected 'object', got 'map'"),
+    (pose_in_another_frame, 'frame', "frame .*expected 'object', got 'map'; .*by object_frame"),
     (pose_with_a_zero_quaternion, 'quaternion', r'expected a unit quaternion.*got \[0.0'),
     (pose_of_nan, 'pose', r'camera pose not finite: got position \[nan'),
     (camera_info_of_another_size, 'camera_info', 'camera info: expected 137 x 137, got 640 x 480'),

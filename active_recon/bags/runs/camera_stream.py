@@ -166,12 +166,9 @@ class CameraStream:
         """Return the camera's pose, or its azimuth where the bag has no more."""
         kind = self._camera.azimuth.type_name
         if kind == POSE:
-            try:
-                return pose_from_msg(msg, self._topics.object_frame)
-            except MessageError as error:
-                advice = ('; name it with --object-frame, and with --object-position where the '
-                          'object is in it' if error.kind == 'frame' else '')
-                raise MessageError(f'{error}{advice}', error.kind) from error
+            return pose_from_msg(
+                msg, self._topics.object_frame, 'name it with --object-frame, and with '
+                '--object-position where the object is in it')
         if kind == JOINT_STATE:
             self._joints.update(msg.name)
             angle = joint_position_from_msg(msg, self._topics.joint)

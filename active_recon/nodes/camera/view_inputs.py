@@ -142,7 +142,9 @@ class ViewInputs:
         with self._diagnostics.rejecting():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
             self._monitor.add_message('poses', stamp)
-            pose = pose_from_msg(msg, self._object_frame)
+            pose = pose_from_msg(
+                msg, self._object_frame, "give the camera's pose in the object's frame, whose "
+                "origin is the cube's centre, or name that frame by object_frame")
             self._monitor.add_pose(Camera(pose), stamp, self._gate.open_goal)
             self._joiner.add_pose(stamp, pose)
         self._on_message()
