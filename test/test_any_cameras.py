@@ -10,7 +10,8 @@ from active_recon.datasets.views import read_views
 from active_recon.errors import ConfigError, DataError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.geometry.canonical import framed_image, framed_layers, framing_camera
-from active_recon.geometry.framing import share_outside
+from active_recon.geometry.framing import cube_corners, require_in_image, share_outside
+from active_recon.geometry.lenses import Distortion
 from active_recon.shapes import make_shape
 from active_recon.volumes.binvox import binvox_side
 from active_recon.volumes.rendering import composite, Renderer
@@ -103,9 +104,10 @@ def test_cameras_that_are_none_are_refused_by_their_path(text, made, tmp_path):
 
 def test_a_binvox_file_without_a_side_is_refused(tmp_path):
     path = tmp_path / 'model.binvox'
-    path.write_bytes(b'#binvox 1\ndim 2 2 2\ndata\n')
-    with pytest.raises(DataError, match='no readable scale: expected a binvox'):
-        binvox_side(path)
+    for scale in (b'', b'scale 0\n'):
+        path.write_bytes(b'#binvox 1\ndim 2 2 2\n' + scale + b'data\n')
+        with pytest.raises(DataError, match=r'model\.binvox: no readable scale: expected'):
+            binvox_side(path)
 
 
 @pytest.mark.parametrize('number', range(4))
@@ -157,6 +159,21 @@ def test_a_cube_that_is_hardly_in_the_image_is_refused():
     camera = orbit_camera(0.0, 0.0, 2.5, Intrinsics(150, 150, -38, 80, 160, 160))
     with pytest.raises(ViewError, match='% of it outside'):
         framed_image(np.zeros((160, 160, 3), np.uint8), camera, 1.0, 128)
+
+
+def test_a_cube_that_is_in_front_of_a_wide_camera_but_not_of_its_frame_is_refused():
+    away = np.array([0.56, 0.45, 0.3])
+    looks = np.array([-0.5, 0.1, 0.1]) - away
+    looks /= np.linalg.norm(looks)
+    right = np.cross(looks, [0, 0, 1]) / np.hypot(*looks[:2])
+    pose = np.eye(4)
+    pose[:3] = np.column_stack([right, np.cross(looks, right), looks, away])
+    wide = Camera(pose, Intrinsics(200, 200, 320, 240, 640, 480, Distortion(
+        'equidistant', (0.0,) * 4)))
+    assert wide.project(cube_corners())[1].min() > 0.001
+    assert framing_camera(wide).project(cube_corners())[1].min() < 0
+    with pytest.raises(ViewError, match="camera in the object's cube or beside it"):
+        require_in_image(wide, 1.0, 0.9)
 
 
 def test_framed_views_are_what_the_cameras_saw(views, made):

@@ -17,7 +17,7 @@ def write(path, text):
 
 
 def test_images_come_in_the_order_of_their_numbers(tmp_path):
-    for name in ('view10.png', 'view9.JPG', 'view1.png', 'notes.txt'):
+    for name in ('view10.png', 'view9.JPG', 'view1.png', 'notes.txt', '._view2.png'):
         (tmp_path / name).touch()
     assert [path.name for path in image_paths([tmp_path])] == [
         'view1.png', 'view9.JPG', 'view10.png']

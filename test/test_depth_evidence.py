@@ -81,6 +81,12 @@ def test_a_lens_without_distortion_is_a_pinhole():
     assert differs.mean() < 0.01
 
 
+def test_a_distorted_camera_beside_the_grid_casts_no_point_that_is_not_finite():
+    camera = orbit_camera(0.3, 0.1, 0.4, replace(
+        LENS, distortion=Distortion('plumb_bob', (-0.28, 0.07, 0.001, -0.002, 0.01))))
+    assert np.isfinite(depth_evidence(plane_depth(camera, 0.5), camera, SIDE)).all()
+
+
 def test_before_the_first_image_there_is_no_evidence():
     assert no_evidence(SIDE).shape == (3, SIDE, SIDE, SIDE)
     assert not no_evidence(SIDE).any()

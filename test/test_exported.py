@@ -1,5 +1,6 @@
 """Exported networks answer as torch does, whatever runs them, and bad files are refused."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 import json
 import math
@@ -127,6 +128,17 @@ def test_a_runtime_answers_as_torch_does_after_every_view(exported, model, libra
     assert {key: ours.provenance[key] for key in ('weights_sha256', 'config_sha256')} == {
         key: theirs.provenance[key] for key in ('weights_sha256', 'config_sha256')}
     assert ours.provenance['computed_by'].startswith(f'{library} ')
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+def test_threads_may_share_a_network(exported, library):
+    runtime = load_runtime(exported['lifting'], library, threads=1)
+    image, camera = next(some_views(runtime.spec))
+    expected = runtime.step(image, camera, runtime.initial_state())[0]
+    with ThreadPoolExecutor(3) as pool:
+        found = list(pool.map(lambda _: runtime.step(
+            image, camera, runtime.initial_state())[0], range(60)))
+    assert all(np.array_equal(each, expected) for each in found)
 
 
 @pytest.mark.parametrize('library', LIBRARIES)

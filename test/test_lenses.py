@@ -41,6 +41,15 @@ def test_undistortion_inverts_distortion(lens):
     np.testing.assert_allclose(lens.undistort(lens.distort(points())), points(), atol=1e-9)
 
 
+def test_beside_a_nearly_cancelled_pole_hardly_anything_moves():
+    # Calibrated for a TurtleBot 4: numerator and denominator nearly share a root, at 0.67
+    lens, beyond = Distortion('rational_polynomial', (
+        -4.8608, 17.2820, 0.000204, 0.001025, -25.1723, -4.9436, 17.5144, -25.2908)), points(0.9)
+    assert np.abs(lens.distort(beyond) - beyond).max() < 0.05
+    bent = lens.distort(points(0.66))
+    np.testing.assert_allclose(lens.distort(lens.undistort(bent)), bent, atol=1e-6)
+
+
 @EACH
 def test_the_middle_stays_and_near_it_next_to_nothing_moves(lens):
     np.testing.assert_allclose(lens.distort(np.zeros((1, 2))), [[0, 0]], atol=1e-12)
@@ -70,7 +79,7 @@ def test_a_curve_that_turns_back_is_followed_to_where_it_does():
         math.tan(math.sqrt(1 / 0.6)), rel=1e-3)
     assert Distortion('rational_polynomial', (0, 0, 0, 0, 0, 0, 0, 0)).max_radius > 999
     pole = Distortion('rational_polynomial', (0, 0, 0, 0, 0, -4.0, 0, 0))
-    assert pole.max_radius == pytest.approx(0.5, rel=1e-3)
+    assert 0.25 < pole.max_radius < 0.5  # where it gets steep before the pole
 
 
 @pytest.mark.parametrize(('model', 'coefficients', 'said'), [

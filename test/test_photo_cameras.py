@@ -4,8 +4,10 @@ from dataclasses import replace
 import json
 from pathlib import Path
 import struct
+import unicodedata
 
 from active_recon.errors import ConfigError, DataError, ViewError
+from active_recon.geometry.cameras import Intrinsics
 from active_recon.photos.camera_file import CameraFile, Entry, posed_photos, sized
 from active_recon.photos.colmap import read_colmap
 from active_recon.photos.cube import upward
@@ -24,6 +26,7 @@ from photo_rigs import (
     write_opencv,
     write_transforms,
 )
+from PIL import Image
 import pytest
 
 COLMAP = Path(__file__).parent / 'colmap'
@@ -136,6 +139,25 @@ def test_cameras_are_found_beside_the_photos(tmp_path):
     assert find_cameras([tmp_path]) == tmp_path / 'sparse/0'
     (tmp_path / 'transforms.json').touch()
     assert find_cameras([tmp_path]) == tmp_path / 'transforms.json'
+
+
+@pytest.mark.parametrize('name', ('cameras.yaml', 'cameras.yml', 'cameras.xml', 'cup_par.txt'))
+def test_cameras_are_found_whatever_macos_has_put_beside_them(name, tmp_path):
+    (tmp_path / f'._{name}').touch()
+    assert find_cameras([tmp_path]) is None
+    (tmp_path / name).touch()
+    assert find_cameras([tmp_path]) == tmp_path / name
+
+
+def test_an_umlaut_of_two_characters_is_that_of_one(tmp_path):
+    names = [unicodedata.normalize('NFD', f'Büste {number}.png') for number in range(3)]
+    for number, name in enumerate(names):
+        Image.new('RGB', (40, 30), (number, 0, 0)).save(tmp_path / name)
+    photos = open_photos([tmp_path / name for name in names])[0]
+    lens = sized(Intrinsics(50, 50, 20, 15, 40, 30))
+    entries = [Entry(unicodedata.normalize('NFC', name), np.eye(4), lens) for name in names]
+    posed, left_out = posed_photos(CameraFile('it', entries), photos)
+    assert len(posed) == 3 and not left_out
 
 
 @pytest.mark.parametrize(('change', 'expected'), [

@@ -13,7 +13,7 @@ from active_recon.photos.files import (
     read_photo,
 )
 from active_recon.photos.large_images import opened as opened_large
-from active_recon.photos.views import load_views, view_of
+from active_recon.photos.views import load_view, load_views, view_of
 from active_recon.watching.arrivals import Arrivals
 import cv2
 import numpy as np
@@ -59,6 +59,28 @@ def test_the_lens_decides_whether_a_photo_is_taken_as_stored(tmp_path):
         posed, _ = posed_photos(CameraFile('it', [Entry('photo', np.eye(4), lens)]), [photo])
         assert posed[0].upright is upright
         assert load_views(posed)[0][0].image.shape == (height, width, 3)
+
+
+@pytest.mark.parametrize('orientation', [1, 3, 6, 8])
+def test_masks_and_depth_of_a_photo_as_it_is_seen_fit_it_as_it_is_stored(orientation, tmp_path):
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = orientation
+    Image.fromarray(drawn()).save(tmp_path / 'photo.png', exif=exif)
+    photo = opened(tmp_path / 'photo.png')
+    stored = drawn()[..., 0] > 90
+    Image.fromarray(stored).save(tmp_path / 'stored.png', exif=exif)
+    with Image.open(tmp_path / 'stored.png') as image:
+        seen = np.array(ImageOps.exif_transpose(image))
+    (tmp_path / 'masks').mkdir()
+    Image.fromarray(seen).save(tmp_path / 'masks' / 'photo.png')
+    cv2.imwrite(str(tmp_path / 'photo_depth.png'), seen.astype(np.uint16) * 500)
+    posed = PosedPhoto(photo, orbit_camera(0).pose, Intrinsics(50, 50, 20, 15, 40, 30), False)
+    view = load_view(posed, tmp_path / 'masks')
+    np.testing.assert_array_equal(view.mask, stored)
+    np.testing.assert_array_equal(view.depth, stored * np.float32(0.5))
+    if orientation in (6, 8):  # only the photo as stored has this shape
+        Image.fromarray(stored).save(tmp_path / 'masks' / 'photo.png')
+        np.testing.assert_array_equal(load_view(posed, tmp_path / 'masks').mask, stored)
 
 
 @pytest.mark.parametrize('ending', ['png', 'tif'])
@@ -213,6 +235,9 @@ def test_masks_are_found_by_the_photo_s_name_and_scaled(tmp_path):
     Image.fromarray(mask[:, :30]).save(tmp_path / 'masks0/a.png')
     with pytest.raises(DataError, match='no mask of the right size: expected 40 x 30'):
         load_views(posed, tmp_path / 'masks0')
+    with pytest.raises(DataError, match=r'a\.jpg: .*masks0/a\.png: no mask of the right size'):
+        load_view(posed[0], tmp_path / 'masks0')
     (tmp_path / 'none').mkdir()
+    assert load_view(posed[0], tmp_path / 'none').mask is None
     with pytest.raises(DataError, match='masks of other photos: expected some named like a.jpg'):
         load_views(posed, tmp_path / 'none')

@@ -8,6 +8,7 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.photos.board_photos import seen_board
 from active_recon.photos.files import LARGEST_SIDE, open_photos, photo_paths
+from active_recon.photos.reconstruct import from_files, Options
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 import numpy as np
 from photo_rigs import blank_photos, PINHOLE, rig
@@ -122,6 +123,17 @@ def test_the_table_has_turned_to_photos_that_cannot_be_read_too(tmp_path):
     assert len(left_out) == 2
     azimuths = [math.atan2(*each.pose[[1, 0], 3]) for each in posed]
     np.testing.assert_allclose(azimuths, [0, -0.3, -0.9, -1.2])
+
+
+def test_by_time_the_place_of_a_photo_that_cannot_be_read_is_unknown(tmp_path):
+    for number, name in enumerate(('IMG_9998', 'IMG_9999', 'IMG_0001', 'IMG_0002')):
+        exif = Image.Exif()
+        exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.DateTimeOriginal] = (
+            f'2026:01:01 12:00:0{number}')
+        Image.new('RGB', (40, 30), (number, 0, 0)).save(tmp_path / f'{name}.jpg', exif=exif)
+    (tmp_path / 'IMG_0001.jpg').write_bytes(b'damaged')
+    with pytest.raises(DataError, match='the place of a photo that is left out is unknown'):
+        from_files(tmp_path, TurntableCameras(0.3, 0.2, 0.6, 0.9), Options(order='time'))
 
 
 def test_a_turntable_s_photos_have_their_focal_length_by_exif(tmp_path):

@@ -36,6 +36,14 @@ def test_a_side_that_no_view_has_seen_is_named_by_its_azimuth(azimuth_deg):
     assert told.startswith('shows the side')
 
 
+def test_a_side_just_below_a_whole_turn_is_towards_azimuth_0():
+    cells = block_in_doubt()
+    cells[0, :, 8:16] -= (cells[0, :, 8:16] == 0.5) * np.float32(0.007)  # a little less at -y
+    seen = Observation(np.zeros((1, 1, 4, 4), np.float32), np.array([[pose(180)]]),
+                       np.array([[pose(0)]]), cells)
+    assert 'the side towards azimuth 0 degrees' in goal_reason(seen, pose(0), None).shows
+
+
 @pytest.mark.parametrize(('elevation_deg', 'part'), [(80, 'the top'), (-80, 'the underside')])
 def test_top_and_underside_are_named(elevation_deg, part):
     told = reason(pose(0, elevation_deg), pose(0, -elevation_deg)).shows

@@ -82,6 +82,17 @@ def test_another_speed_counts_from_where_the_camera_is():
     assert azimuth_difference(turntable.azimuth_at(200.0), 1.0) == pytest.approx(0)
 
 
+def test_at_rest_after_half_a_turn_another_speed_moves_nothing():
+    for start_deg in range(0, 360, 15):
+        goal = math.radians((start_deg + 180) % 360)
+        turntable = Turntable(math.radians(start_deg))
+        turntable.turn_to(goal, now=0.0)
+        turntable.set_speed(0.5, 1.0, now=10.0)
+        for now in (10.0, 12.0, 14.0, 30.0):
+            apart = azimuth_difference(turntable.azimuth_at(now), goal)
+            assert apart == pytest.approx(0, abs=1e-9)
+
+
 def test_an_orbit_turns_as_a_turntable_does_and_keeps_its_elevation():
     orbit, turntable = Orbit(1.0, speed=0.5), Turntable(1.0, 0.5)
     for motion in (orbit, turntable):

@@ -107,6 +107,14 @@ def test_a_photo_is_kept_under_a_name_of_the_server_s_own(server, folder):
     assert [path.name for path in folder.parent.iterdir()] == ['photos']
 
 
+def test_a_phone_s_photo_with_a_second_image_in_it_is_a_jpeg(server, folder):
+    path = folder.parent / 'hdr.jpg'
+    first, second = (Image.new('RGB', (20, 20), color) for color in ('red', 'blue'))
+    first.save(path, 'MPO', save_all=True, append_images=[second])
+    assert send(server, path.read_bytes())[0] == 200
+    assert (folder / 'phone-0001.jpg').read_bytes() == path.read_bytes()
+
+
 def test_the_answer_says_what_became_of_the_photo_and_where_to_stand(server, verdicts, folder):
     verdicts.put('phone-0001.jpg', 'phone-0001.jpg: no board seen in it')
     _, told = send(server, encoded('JPEG', folder))

@@ -300,6 +300,33 @@ def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(photos, t
     assert '9.jpg: gone from the folder' in said
 
 
+def test_where_the_original_is_deleted_its_copy_is_taken_in(photos, tmp_path, adviser):
+    shutil.copy(photos[0], tmp_path / 'a.png')
+    shutil.copy(photos[0], tmp_path / 'b.png')
+    said = []
+    watcher = Watcher(tmp_path, Collection(SOURCE, Options()), adviser, said.append)
+    for now in range(4):
+        watcher.step(float(now))
+    assert 'left out: b.png: the same photo as a.png' in said
+    (tmp_path / 'a.png').unlink()
+    for now in range(4, 8):
+        watcher.step(float(now))
+    assert said.index('b.png: taken in') > said.index('a.png: gone from the folder')
+
+
+def test_photos_that_arrive_may_have_a_mask_or_none(tmp_path):
+    views = cameras(4)
+    write_photos(tmp_path, views, [on_plain(image) for image in rendered(views)])
+    (tmp_path / 'masks').mkdir()
+    mask = np.zeros(rendered(views[:1])[0].shape[:2], np.uint8)
+    mask[60:120, 80:160] = 255
+    Image.fromarray(mask).save(tmp_path / 'masks' / 'photo0.png')
+    found = Collection(tmp_path / 'transforms.json', Options(masks=tmp_path / 'masks'))
+    for number in range(4):
+        assert found.add(tmp_path / f'photo{number}.png') == ''
+    assert len(found.shape.views) == 4 and not found.shape.left_out
+
+
 def test_while_the_folder_cannot_be_read_photos_neither_come_nor_go(tmp_path):
     folder, said = tmp_path / 'photos', []
     folder.mkdir()

@@ -53,8 +53,9 @@ def find_roots(named: Sequence[str]) -> list[Place]:
     found: set[Place] = set()
     for text in named:
         place = place_of(text)
-        matches = [place] if place.exists() or not has_magic(str(place)) else _matches(place)
-        if not matches or not all(each.exists() for each in matches):
+        exists = place.exists()
+        matches = _matches(place) if not exists and has_magic(str(place)) else [place] * exists
+        if not matches:  # what is gone of those that match is refused by itself
             raise DataError(f'{text}: no bags there: expected a bag, a folder of bags, or a '
                             'pattern that matches some')
         found.update(each if isinstance(each, Stored) else Path(os.path.normpath(each))

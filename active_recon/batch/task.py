@@ -36,7 +36,8 @@ class TruthSource:
     up: str | None = None
     front: str | None = None
 
-    def read(self, run: RecordedRun, object_size: float | None) -> Truth | None:
+    def read(self, run: RecordedRun, object_size: float | None,
+             object_yaw: float | None = None) -> Truth | None:
         """Return a run's true shape; None where a folder has none, and none is known."""
         path = self.path
         if path.is_dir():
@@ -45,7 +46,8 @@ class TruthSource:
             if not own:
                 return known_truth(run)
             path = own[0]
-        return TruthFile(path, self.fit, self.up, self.front).read(run, object_size)
+        return TruthFile(path, self.fit, self.up, self.front).read(run, object_size,
+                                                                   object_yaw)
 
     @property
     def identity(self) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def rows_of(task: Task, bag: Place) -> list[Row]:
         if not run.episodes:
             raise DataError(f'{path}: no episode: expected one or more, got none', 'no_episode')
         true = (known_truth(run) if task.truth is None
-                else task.truth.read(run, task.scene.object_size))
+                else task.truth.read(run, task.scene.object_size, task.scene.object_yaw))
         cells, placed = (true.cells, true.placed) if true else (None, '')
         subjects = [Subject(letter, run, episode, cells, computed, placed)
                     for letter, episode in zip(letters(), run.episodes, strict=False)]
@@ -106,6 +106,7 @@ def _considered(task: Task, run: RecordedRun) -> tuple[RecordedRun, str, str]:
         return run_with_overrides(run, setup, task.overrides), '', ''
     reconstructor = setup.load_reconstructor()
     if task.kind != 'replay':
+        run = replace(run, provenance={**run.provenance, **reconstructor.provenance})
         return with_reconstruction(run, reconstructor), made_by, ''
     verified = verify(run, reconstructor, setup.load_planner())
     return replace(run, provenance={**run.provenance, **reconstructor.provenance},

@@ -22,7 +22,8 @@ def image_paths(places: list[Path]) -> list[Path]:
     """
     paths = [path for place in places
              for path in (place.iterdir() if place.is_dir() else [place])
-             if not place.is_dir() or path.suffix.lower() in SUFFIXES]
+             if not place.is_dir() or (path.suffix.lower() in SUFFIXES
+                                       and not path.name.startswith('.'))]
     if not paths:
         raise DataError(f'{", ".join(map(str, places))}: no images: expected some '
                         f'({", ".join(SUFFIXES)}), found none')

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.needed_options import refuse_lone
@@ -119,8 +120,9 @@ def calibrate(
                f'{out / "calibration.png"}')
     for command in found.static_transforms():
         typer.echo(command)
-    typer.echo(f'wrote {out / "calibration.yaml"}: ros2 run active_recon reconstructor '
-               f'--ros-args --params-file {out / "calibration.yaml"}, and view_planner likewise')
+    written = out / 'calibration.yaml'
+    typer.echo(f'wrote {written}: ros2 run active_recon reconstructor --ros-args --params-file '
+               f'{quote(str(written))}, and view_planner likewise')
 
 
 def printed_board(squares: str, square_mm: float, marker_mm: float | None,

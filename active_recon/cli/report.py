@@ -95,7 +95,8 @@ def _subjects(run: 'RecordedRun', scene: 'Scene', truth: 'TruthFile | None', epi
         raise ConfigError(f'--episode: {run.path} has no episode {episode}: expected 1 to '
                           f'{len(run.episodes)}')
     run, computed = rebuilt(run, scene, find_weights(model) if model else None)
-    true = known_truth(run) if truth is None else truth.read(run, scene.object_size)
+    true = (known_truth(run) if truth is None
+            else truth.read(run, scene.object_size, scene.object_yaw))
     cells, placed = (true.cells, true.placed) if true else (None, '')
     episodes = run.episodes if episode is None else run.episodes[episode - 1:episode]
     shown = [each for each in episodes if each.views]

@@ -27,7 +27,10 @@ def require_in_image(camera: Camera, object_size: float,
         raise ViewError('camera looks away from the object: expected one that looks at it; check '
                         'that the pose is that of the optical frame (z forward, y down)',
                         'out_of_image')
-    if depth.min() <= at_plane:
+    # Networks get the image of a camera that is aimed at the cube's centre: it is in front of that
+    aimed = 0.0 if camera.distance == 0 else (
+        camera.distance - float((_EDGES @ camera.direction).max()) * object_size)
+    if min(float(depth.min()), aimed) <= at_plane:
         raise ViewError(
             "camera in the object's cube or beside it: expected a distance at which the whole "
             f'cube of {object_size:g} m is in front of the camera, got {camera.distance:.3g} m; '

@@ -18,6 +18,7 @@ MODELS = {'plumb_bob': (4, 5), 'rational_polynomial': (8, 12), 'equidistant': (4
 """The allowed numbers of coefficients of each model, in OpenCV's order: k1, k2, p1, p2, k3, ..."""
 _LARGEST = 1e6  # larger than in any lens, and its sixth power does not overflow
 _STEP = 1e-6
+_STEEPEST = 3.0  # of any lens: beyond, a model is beside a pole, as fits of 8 coefficients have
 _WITHIN = 0.9999  # at the maximum radius itself a model may divide by 0
 
 
@@ -91,7 +92,8 @@ class Distortion:
         # r N(s) / D(s), with s the square of the radius r, folds where its derivative is 0
         s, n, d = Polynomial([0, 1]), Polynomial([1, *k[:2], *k[4:5]]), Polynomial([1, *k[5:8]])
         turns = (n + 2 * s * n.deriv()) * d - 2 * s * n * d.deriv()
-        return _WITHIN * math.sqrt(min(_first_root(turns), _first_root(d)))
+        return _WITHIN * math.sqrt(min(
+            _first_root(turns), _first_root(d), _first_root(turns - _STEEPEST * d * d)))
 
     def _modelled(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return OpenCV's model at points (N, 2); its own function is a hundred times slower."""

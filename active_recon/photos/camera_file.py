@@ -8,6 +8,7 @@ from active_recon.calibration.board import Board
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Intrinsics
 from active_recon.photos.files import PhotoFile
+from active_recon.photos.names import comparable
 import numpy as np
 from numpy.typing import NDArray
 
@@ -150,14 +151,14 @@ def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]
 
 def _folders_alike(name: str, path: Path) -> int:
     """Return how many folders of a name are also those of a path, from the last one up."""
-    named = PurePosixPath(name.replace('\\', '/').lower()).parts[-2::-1]
-    there = Path(str(path.resolve()).lower()).parts[-2::-1]
+    named = PurePosixPath(comparable(name)).parts[-2::-1]
+    there = PurePosixPath(comparable(str(path.resolve()))).parts[-2::-1]
     unlike = (at for at, (a, b) in enumerate(zip(named, there, strict=False)) if a != b)
     return next(unlike, min(len(named), len(there)))
 
 
 def _name(path: str) -> str:
-    return PurePosixPath(path.replace('\\', '/')).name.lower()
+    return PurePosixPath(comparable(path)).name
 
 
 def _stem(path: str) -> str:

@@ -1,9 +1,11 @@
 """Depth images beside photos: where they are, and their values in metres."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from active_recon.errors import DataError
+from active_recon.photos.names import comparable
 from active_recon.volumes.depth_images import MM_PER_METRE
 import cv2
 import numpy as np
@@ -24,23 +26,25 @@ def depth_files(photos: Sequence[Path]) -> Mapping[Path, Path]:
     """Return the depth image of each photo that has one beside it or in `depth`."""
     found = {}
     for folder in {photo.parent for photo in photos}:
-        beside = {path.stem.lower(): path for place in (folder, folder / FOLDER)
+        beside = {comparable(path.stem): path for place in (folder, folder / FOLDER)
                   if place.is_dir() for path in sorted(place.iterdir())
                   if path.suffix.lower() in _ENDINGS and (place != folder or is_depth(path))}
         for photo in (each for each in photos if each.parent == folder):
             for stem in (f'{photo.stem}{SUFFIX}', photo.stem):
-                if (path := beside.get(stem.lower())) and path != photo:
+                if (path := beside.get(comparable(stem))) and path != photo:
                     found[photo] = path
                     break
     return found
 
 
-def read_depth(path: Path, width: int, height: int) -> NDArray[np.float32]:
+def read_depth(path: Path, width: int, height: int,
+               turned: Callable[[NDArray[Any]], NDArray[Any]] = lambda stored: stored
+               ) -> NDArray[np.float32]:
     """
     Return depth in metres, of a photo's size in pixels (height, width); 0 is no value.
 
-    Reads one channel of 16 bits in millimetres, or of floats in metres, of any size of the photo's
-    shape. Raises DataError on another file.
+    Reads one channel of 16 bits in millimetres, or of floats in metres, which `turned` turns as
+    the photo, of any size of the photo's shape. Raises DataError on another file.
     """
     stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if stored is None or stored.ndim != 2 or stored.dtype not in (
@@ -48,6 +52,7 @@ def read_depth(path: Path, width: int, height: int) -> NDArray[np.float32]:
         found = 'no image' if stored is None else f'the shape {stored.shape} {stored.dtype}'
         raise DataError(f'{path.name}: no depth image: expected one channel of 16 bits in '
                         f'millimetres, or of floats in metres, got {found}')
+    stored = turned(stored)
     if abs(stored.shape[1] * height - width * stored.shape[0]) > _SHAPE_OFF * stored.size:
         raise DataError(f'{path.name}: depth of another size: expected {width} x {height} pixels '
                         f'or the same shape, got {stored.shape[1]} x {stored.shape[0]}')

@@ -64,8 +64,9 @@ def find_cameras(folders: Sequence[Path]) -> Path | None:
         if not folder.is_dir():
             continue
         for pattern in ('transforms.json', glob.escape(own), 'transforms_train.json', '*_par.txt',
-                        'cameras.y*ml'):
-            found = sorted(folder.glob(pattern))
+                        'cameras.y*ml', 'cameras.xml'):
+            found = sorted(path for path in folder.glob(pattern)
+                           if not path.name.startswith('.'))
             if len(found) == 1:
                 return found[0]
         for model in (folder / name for name in _MODEL_FOLDERS):

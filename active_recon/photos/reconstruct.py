@@ -26,7 +26,7 @@ from active_recon.photos.integrating import (
 )
 from active_recon.photos.segmented_views import segmented_views
 from active_recon.photos.shape import Shape, TakenView
-from active_recon.photos.sources import posed_by, Source
+from active_recon.photos.sources import posed_by, Source, TurntableCameras
 from active_recon.photos.views import load_views, PhotoView, view_of
 from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
@@ -134,7 +134,11 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
     """
     photos, left_out = open_photos(photo_paths(place))
     with _telling(left_out):
-        photos = in_order_of(options.order, photos)
+        ordered = in_order_of(options.order, photos)
+        if isinstance(source, TurntableCameras) and left_out and ordered != photos:
+            raise DataError('order: the place of a photo that is left out is unknown: expected '
+                            'all photos of a turntable, or names in their order', 'no_time')
+        photos = ordered
         file, posed, unposed = posed_by(source, photos, options.axes, reporting)
         left_out += unposed
         chosen = even_choice(posed, options.views or len(posed))

@@ -10,6 +10,7 @@ from active_recon.photos.camera_file import PosedPhoto
 from active_recon.photos.depth_files import depth_files, read_depth
 from active_recon.photos.files import ENDINGS, read_photo
 from active_recon.photos.large_images import opened
+from active_recon.photos.names import comparable
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 _SEE_THROUGH = 250  # alpha below which a photo has an alpha channel worth the name
 _EMPTY_SHARE = 0.02
 _FULL = (1, 255, 65535)  # the object in masks of labels, of 8 and of 16 bits
+_QUARTER_TURNS = {3: 2, 6: 1, 8: 3}  # counter-clockwise, which take back those of EXIF
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,16 +58,28 @@ def load_views(posed: Sequence[PosedPhoto], masks: Path | None = None,
     for each in posed:
         try:
             views.append(_with_depth(_view(each, known),
-                                     each.depth or depths.get(each.photo.path)))
+                                     each.depth or depths.get(each.photo.path), each))
         except DataError as error:
             left_out.append(str(error))
         advance(1, each.photo.name)
     if not views:
         raise DataError(f'no photo can be used: {"; ".join(left_out[:3])}', 'no_photos')
+    require_masks(views, masks)
+    return views, left_out
+
+
+def load_view(posed: PosedPhoto, masks: Path | None = None) -> PhotoView:
+    """Read one photo with its mask, if it has one, and its depth; raises DataError."""
+    depth = posed.depth or depth_files([posed.photo.path]).get(posed.photo.path)
+    return _with_depth(_view(posed, _masks_by_stem(masks)), depth, posed)
+
+
+def require_masks(views: Sequence[PhotoView], masks: Path | None) -> None:
+    """Raise DataError where a folder of masks has none for any of the photos."""
     if masks is not None and not any(view.mask_source == 'masks' for view in views):
         raise DataError(f'{masks}: masks of other photos: expected some named like '
-                        f'{views[0].name}, found none of {len(known)}', 'no_masks')
-    return views, left_out
+                        f'{views[0].name}, found none of {len(_masks_by_stem(masks))}',
+                        'no_masks')
 
 
 def view_of(name: str, image: NDArray[np.uint8], camera: Camera) -> PhotoView:
@@ -100,18 +114,37 @@ def _view(posed: PosedPhoto, masks: dict[str, Path]) -> PhotoView:
     camera = Camera(posed.pose, _reduced(posed.intrinsics, width, height))
     name = posed.photo.name
     view = view_of(name, pixels, camera)
-    path = masks.get(Path(name).stem.lower())
+    path = masks.get(comparable(Path(name).stem))
     if path is None:
         return view
-    return PhotoView(name, view.image, camera, _mask(path, width, height), 'masks')
+    try:
+        mask = _mask(path, width, height, posed)
+    except DataError as error:
+        raise DataError(f'{name}: {error}') from error
+    return PhotoView(name, view.image, camera, mask, 'masks')
 
 
-def _with_depth(view: PhotoView, path: Path | None) -> PhotoView:
+def _turned_back(values: NDArray[np.float32], posed: PosedPhoto, width: int,
+                 height: int) -> NDArray[np.float32]:
+    """
+    Return a mask or depth, (H, W), turned as its photo of `width` x `height` was read.
+
+    It belongs to the photo as EXIF turns it, unless only the photo as stored has its shape.
+    """
+    turns = 0 if posed.upright else _QUARTER_TURNS.get(posed.photo.orientation, 0)
+    rows, columns = values.shape
+    if turns % 2 and abs(rows * height - width * columns) > 0.01 * width * columns:
+        return values
+    return np.rot90(values, turns)
+
+
+def _with_depth(view: PhotoView, path: Path | None, posed: PosedPhoto) -> PhotoView:
     if path is None:
         return view
     height, width = view.image.shape[:2]
     try:
-        return replace(view, depth=read_depth(path, width, height))
+        return replace(view, depth=read_depth(
+            path, width, height, lambda stored: _turned_back(stored, posed, width, height)))
     except DataError as error:
         return replace(view, depth_refusal=str(error))
 
@@ -126,12 +159,12 @@ def _masks_by_stem(folder: Path | None) -> dict[str, Path]:
     if not folder.is_dir():
         raise DataError(f'{folder}: no such folder: expected one with masks', 'no_masks')
     # nerfstudio and COLMAP name the mask of a.jpg a.jpg.png
-    return {Path(path.stem).stem.lower() if Path(path.stem).suffix.lower() in ENDINGS
-            else path.stem.lower(): path
+    return {comparable(Path(path.stem).stem if Path(path.stem).suffix.lower() in ENDINGS
+                       else path.stem): path
             for path in sorted(folder.iterdir()) if path.suffix.lower() in ENDINGS}
 
 
-def _mask(path: Path, width: int, height: int) -> NDArray[np.bool_]:
+def _mask(path: Path, width: int, height: int, posed: PosedPhoto) -> NDArray[np.bool_]:
     try:
         with opened(path) as image:
             alpha = image.getchannel('A') if image.mode in ('RGBA', 'LA') else None
@@ -140,6 +173,7 @@ def _mask(path: Path, width: int, height: int) -> NDArray[np.bool_]:
             grey = np.asarray(alpha, np.float32)
     except DataError as error:
         raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
+    grey = _turned_back(grey, posed, width, height)
     if abs(grey.shape[1] * height - width * grey.shape[0]) > 0.01 * width * grey.shape[0]:
         raise DataError(f'{path}: no mask of the right size: expected {width} x {height} pixels '
                         f'or the same shape, got {grey.shape[1]} x {grey.shape[0]}')

@@ -62,4 +62,4 @@ def _part(occupancy: NDArray[np.float32], weight: NDArray[np.float32]) -> str:
         return 'the top' if z > 0 else 'the underside'
     if math.hypot(x, y) < 1 / (2 * side):
         return 'the whole object'
-    return f'the side towards azimuth {math.degrees(math.atan2(y, x)) % 360:.0f} degrees'
+    return f'the side towards azimuth {round(math.degrees(math.atan2(y, x))) % 360} degrees'

@@ -18,6 +18,7 @@ from scipy.ndimage import binary_erosion
 import trimesh
 
 _SAME_SIDE = 0.01  # of a binvox and of the run's cube, as a share
+_ROUNDING = 1e-6  # of a file's numbers, in cubes
 _SAMPLES = 10_000  # of a surface
 
 
@@ -44,20 +45,23 @@ class TruthFile:
     up: str | None = None
     front: str | None = None
 
-    def read(self, run: RecordedRun, object_size: float | None = None) -> Truth:
+    def read(self, run: RecordedRun, object_size: float | None = None,
+             object_yaw: float | None = None) -> Truth:
         """
-        Return the true cells of a run's object; `object_size` in metres, None: the run's.
+        Return the true cells of a run's object.
+
+        `object_size` in metres, `object_yaw` in radians; None: the run's.
 
         Raises MeshError, DataError if the mesh is outside of the run's cube, and ConfigError if a
         binvox has another resolution or size than the run.
         """
         size = object_size or _object_size(run)
         if self.path.suffix.lower() == '.binvox':
-            return self._of_binvox(run, size)
+            return self._of_binvox(run, size, object_yaw)
         ships = str(self.path) in shipped_objects()
         file = find_object(str(self.path))
         if self.fit or ships:
-            cells = _fitted(load_mesh(file, self.up, self.front), run)
+            cells = _fitted(load_mesh(file, self.up, self.front), run, object_yaw)
             return Truth(cells, f'The true shape is {file.name}, centred, and scaled so that its '
                                 "longest side is the cube's.")
         mesh = read_mesh(file, self.up, self.front)
@@ -77,15 +81,15 @@ class TruthFile:
         return Truth(cells, f'The true shape is {file.name}, in metres and in the '
                             f"object's frame.{outside if inside < 1 else ''}{hollow}")
 
-    def _of_binvox(self, run: RecordedRun, size: float) -> Truth:
+    def _of_binvox(self, run: RecordedRun, size: float, object_yaw: float | None) -> Truth:
         grid, resolution = read_binvox(self.path), _resolution(run)
         side = grid.occupancy.shape[0]
         if side != resolution:
             raise ConfigError(f'{self.path}: wrong resolution: expected {resolution} cells a side '
                               f'as in {run.path.name}, got {side}')
         if self.fit:
-            return Truth(_turned(grid, run), f'The true shape is {self.path.name}, its cells '
-                                             "taken as the cube's.")
+            return Truth(_turned(grid, run, object_yaw), f'The true shape is {self.path.name}, '
+                                                         "its cells taken as the cube's.")
         if abs(grid.size / size - 1) > _SAME_SIDE:
             raise ConfigError(f'{self.path}: wrong size: expected a cube of {size:g} m as in the '
                               f"run, got {grid.size:g} m; --fit uses its cells as the cube's, "
@@ -112,18 +116,19 @@ def known_truth(run: RecordedRun) -> Truth | None:
                         f"run's cube is {size:g} m.")
 
 
-def _fitted(mesh: trimesh.Trimesh, run: RecordedRun) -> NDArray[np.bool_]:
-    return _turned(voxelise(fit_to_grid(mesh), _resolution(run)), run)
+def _fitted(mesh: trimesh.Trimesh, run: RecordedRun, yaw: float | None) -> NDArray[np.bool_]:
+    return _turned(voxelise(fit_to_grid(mesh), _resolution(run)), run, yaw)
 
 
-def _turned(grid: VoxelGrid, run: RecordedRun) -> NDArray[np.bool_]:
-    yaw = node_parameters(run, 'reconstructor').get('object_yaw', 0.0)
+def _turned(grid: VoxelGrid, run: RecordedRun, yaw: float | None = None) -> NDArray[np.bool_]:
+    if yaw is None:
+        yaw = node_parameters(run, 'reconstructor').get('object_yaw', 0.0)
     return VoxelGrid(turned(grid.occupancy, yaw)).occupied(0.5)
 
 
 def _share_inside(mesh: trimesh.Trimesh) -> float:
     """Return the fraction of a mesh's surface in the unit cube about the origin."""
-    if np.abs(mesh.bounds).max() <= 0.5:
+    if np.abs(mesh.bounds).max() <= 0.5 + _ROUNDING:
         return 1.0
     points, _ = trimesh.sample.sample_surface(mesh, _SAMPLES, seed=0)
     return float((np.abs(points) <= 0.5).all(axis=1).mean())

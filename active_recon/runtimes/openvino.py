@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 import sys
+from threading import Lock
 from typing import Any
 
 from active_recon.errors import ConfigError, WeightsError
@@ -44,6 +45,7 @@ class OpenVinoGraph:
         self._names = [tuple(filter(str.isidentifier, port.get_names()))
                        for port in compiled.outputs]
         self.outputs = [name for names in self._names for name in names]
+        self._lock = Lock()
         self._request = compiled.create_infer_request()
         shapes = [port.get_partial_shape() for port in compiled.outputs]
         self._shapes = ([tuple(shape.to_shape()) for shape in shapes]
@@ -51,6 +53,10 @@ class OpenVinoGraph:
 
     def run(self, inputs: Arrays) -> dict[str, NDArray[np.float32]]:
         """Return the outputs by name; other inputs are left out."""
+        with self._lock:  # a request computes one thing at a time, and a segmenter is shared
+            return self._run(inputs)
+
+    def _run(self, inputs: Arrays) -> dict[str, NDArray[np.float32]]:
         from openvino import Tensor
 
         # What was read from a message cannot be written to, which OpenVINO does not share

@@ -29,9 +29,10 @@ class Turntable:
             raise ConfigError('turntable: speed or time scale out of range: expected both finite '
                               f'and above 0, got {speed} and {time_scale}')
         if self._way:
-            here = self.azimuth_at(now)
-            self._way -= float(azimuth_difference(here, self._start))
-            self._start, self._left_at = here, now
+            # What is left is not measured anew: half a turn might become one the other way
+            left = abs(self._way) - self._turned_at(now)
+            self._start, self._left_at = self.azimuth_at(now), now
+            self._way = math.copysign(left, self._way)
         self._rate = speed * time_scale
 
     def turn_to(self, azimuth: float, now: float) -> None:
@@ -44,5 +45,8 @@ class Turntable:
 
     def azimuth_at(self, now: float) -> float:
         """Return the camera's azimuth at a time, radians in [0, 2 pi)."""
-        turned = min(max(now - self._left_at, 0.0) * self._rate, abs(self._way))
-        return wrap_azimuth(self._start + math.copysign(turned, self._way))
+        return wrap_azimuth(self._start + math.copysign(self._turned_at(now), self._way))
+
+    def _turned_at(self, now: float) -> float:
+        """Return how far it has turned towards its goal, radians."""
+        return min(max(now - self._left_at, 0.0) * self._rate, abs(self._way))

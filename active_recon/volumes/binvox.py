@@ -49,7 +49,7 @@ def binvox_side(path: Path) -> float:
         side = [float(line.split()[1]) for line in header.split(b'\n')
                 if line.startswith(b'scale')][0]
         return VoxelGrid(np.zeros((1, 1, 1), np.float32), side).size
-    except (OSError, ValueError, IndexError) as error:
+    except (OSError, ValueError, IndexError, DataError) as error:
         raise DataError(f'{path}: no readable scale: expected a binvox file with one, got: '
                         f'{error}') from error
 

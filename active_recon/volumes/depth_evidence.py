@@ -34,7 +34,8 @@ def depth_evidence(depth: NDArray[np.float32], camera: Camera,
     column, row, beyond = _projected(camera, side)
     height, width = depth.shape
     inside = (beyond > _NEAREST) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    place = np.where(inside, row.astype(np.int32) * width + column.astype(np.int32), 0)
+    rows, columns = (np.where(inside, each, 0).astype(np.int32) for each in (row, column))
+    place = rows * width + columns
     measured = np.take(depth.astype(np.float32, copy=False).ravel(), place)
     known = inside & (measured > 0) & (measured < np.inf)
     # Along the ray, which is longer than along the optical axis

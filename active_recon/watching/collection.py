@@ -15,7 +15,7 @@ from active_recon.photos.files import open_photo, PhotoFile
 from active_recon.photos.reconstruct import from_views, Options
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import BoardCameras, posed_by, Source, TurntableCameras
-from active_recon.photos.views import load_views, PhotoView, with_camera
+from active_recon.photos.views import load_view, PhotoView, require_masks, with_camera
 from active_recon.reconstructor import load
 
 
@@ -111,6 +111,7 @@ class Collection:
                 unread.append(str(error))
         if not views:
             raise DataError(unread[0])
+        require_masks(views, self._options.masks)
         self.shape = from_views(views, file, self._options, [*left_out, *unread],
                                 reconstructor=self._reconstructor)
         self.metric, self.waiting = file.metric, ''
@@ -127,9 +128,8 @@ class Collection:
         path = posed.photo.path
         if path in self._views:
             return with_camera(self._views[path], posed)
-        views, _ = load_views([posed], self._options.masks)
-        self._views[path] = views[0]
-        return views[0]
+        self._views[path] = load_view(posed, self._options.masks)
+        return self._views[path]
 
     def _missing(self, error: ActiveReconError) -> str:
         """Return what is missing for a shape, in one line."""

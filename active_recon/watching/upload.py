@@ -126,7 +126,7 @@ def _format(photo: bytes) -> str:
             else:
                 image.draft('RGB', (_READ_SIDE, _READ_SIDE))  # at a fraction of its size
                 image.load()
-            return kind
+            return 'JPEG' if kind == 'MPO' else kind  # with a second image for HDR or depth
     except DataError:
         return ''
 

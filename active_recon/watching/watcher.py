@@ -88,6 +88,10 @@ class Watcher:
         for path in gone:
             self._left_out.pop(path.name, None)
             self._collection.remove(path)
+            for name in [name for name, why in self._left_out.items()
+                         if why.endswith(f': the same photo as {path.name}')]:
+                del self._left_out[name]
+                self._queue.append(path.with_name(name))  # it is the only one now
             self._say(f'{path.name}: gone from the folder')
         self._queue = [path for path in (*self._queue, *self._arrivals.arrived(now))
                        if path not in gone]

@@ -69,6 +69,7 @@ class CameraStream:
         self.is_unstamped = self.are_images_unstamped = False
         self._joints: set[str] = set()
         self._lenses: list[tuple[int, Intrinsics]] = []
+        self._unusable_lens = ''
         self._poses: list[tuple[int, NDArray[np.float64] | float]] = []
         self.transforms = (
             RecordedTransforms(topics.object_frame, topics.max_pose_gap)
@@ -145,6 +146,8 @@ class CameraStream:
                         self._lenses.append((stamp, intrinsics_from_msg(msg)))
                 except MessageError as error:
                     # Of an image there may be another camera info: the message is left out
+                    if role == INFO_ROLE:
+                        self._unusable_lens = self._unusable_lens or str(error)
                     yield error if role == POSE_ROLE else MessageError(
                         str(error), 'unusable_camera_info')
         self._require_one_joint()
@@ -194,6 +197,8 @@ class CameraStream:
         self._topics.reject_redundant(azimuth)
         scene.reject_redundant(azimuth.name, has_poses, has_poses and bool(self._lenses))
         self.assumed = scene.assumed(self._camera.image.name, has_poses, recorded)
+        if self._unusable_lens and not recorded:
+            self.assumed.append(f'of the recorded camera info nothing: {self._unusable_lens}')
 
     def _placed(self, known: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Return the pose, or one on the orbit if no lens is known; raises MessageError."""

@@ -54,7 +54,7 @@ def gated_views(stream: CameraStream, gate: ViewGate,
     """
     views = []
     counters: Counter[str] = Counter()
-    refusal = ''
+    refusal = early = ''
     for view in stream.views(wanted=lambda stamp: True):
         try:
             if isinstance(view, MessageError):
@@ -65,11 +65,16 @@ def gated_views(stream: CameraStream, gate: ViewGate,
                 continue
             views.append(_view(view, None, stream, None, scene))
         except ViewError as error:
+            if error.kind == NOT_BEGUN:  # no fault of the camera's
+                early = early or str(error)
+                counters['unjoined'] += 1
+                continue
             refusal = refusal or str(error)
-            counters['unjoined' if error.kind == NOT_BEGUN else f'refused/{error.kind}'] += 1
+            counters[f'refused/{error.kind}'] += 1
             continue
         counters['images'] += 1
         gate.took(view.camera)
+    refusal = refusal or early
     if not counters['images']:
         raise DataError(f'no image has a known camera: {refusal or "there is no image"}',
                         'no_views')

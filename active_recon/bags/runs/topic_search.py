@@ -80,8 +80,12 @@ class _Search:
         # Messages are read only if the names are not enough
         others = {} if usual else non_camera_topics(self._bag, fitting)
         cameras = usual or [topic for topic in fitting if topic.name not in others]
+        # The compressed form of images that are there raw is no other camera's
+        raw = {topic.name for topic in cameras if topic.type_name == IMAGE}
+        cameras = [topic for topic in cameras if topic.type_name == IMAGE
+                   or topic.name.removesuffix('/compressed') not in raw]
         if cameras:
-            return _only(cameras, IMAGE_TYPES, "a camera's images", '--image'), False
+            return _only(cameras, (IMAGE_TYPES,), "a camera's images", '--image'), False
         seen = [topic for topic in self._present
                 if topic.name.endswith('/view_image') and topic.type_name == IMAGE]
         if len(seen) == 1 and not name:
@@ -145,8 +149,10 @@ class _Search:
     def camera_info(self, name: str, image: TopicSummary) -> TopicSummary | None:
         """Return the topic of the camera info, None if there is none."""
         fitting = self._fitting(name, (CAMERA_INFO,))
-        found = (self._known_by_name(name, fitting, INFO_ROLE)
-                 or self._info_beside(image) or fitting)
+        usual, beside = self._known_by_name(name, fitting, INFO_ROLE), self._info_beside(image)
+        # Of a camera that was not a loop's, the name does not tell whose camera info it is
+        of_loop = name or IMAGE_ROLE in self._recorded_as or INFO_ROLE in self._recorded_as
+        found = (usual or beside if of_loop else beside or usual) or fitting
         if not found and name:
             raise DataError(f'no camera info on {name}: expected {CAMERA_INFO}; name the topic '
                             'with --camera-info', 'topics')
@@ -182,11 +188,12 @@ class _Search:
             '/compressed'))] or [topic for topic in fitting if topic.name.endswith(f'/{usual}')])
 
 
-def _only(topics: Sequence[TopicSummary], types: Sequence[str], what: str, option: str,
-          advice: str = '') -> TopicSummary:
-    """Return the topic of the first type present: types are in order of preference."""
+def _only(topics: Sequence[TopicSummary], types: Sequence[str | Sequence[str]], what: str,
+          option: str, advice: str = '') -> TopicSummary:
+    """Return the topic of the first type, or types, present: they are in order of preference."""
     for kind in types:
-        candidates = [topic for topic in topics if topic.type_name == kind]
+        alike = (kind,) if isinstance(kind, str) else kind
+        candidates = [topic for topic in topics if topic.type_name in alike]
         if len(candidates) == 1:
             return candidates[0]
         if candidates:

@@ -26,7 +26,7 @@ def numbered_files(folder: Path, suffix: str = '.mcap') -> list[Path]:
     """
     if packed := sorted(folder.glob(f'*{suffix}.zstd')):
         raise DataError(
-            f'{folder}: packed files in a folder without metadata.yaml to list them: expected '
+            f'{folder}: packed files, which are read only as metadata.yaml lists them: expected '
             f'{suffix} files, got {packed[0].name}; unpack it first, by `zstd -d --rm`',
             'compression')
     files = sorted(folder.glob(f'*{suffix}'), key=_name_and_number)

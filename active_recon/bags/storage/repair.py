@@ -158,9 +158,11 @@ def _repair_metadata(folder: Path, repairs: Sequence[Repair]) -> bool:
         information |= {'compression_format': 'zstd', 'compression_mode': 'MESSAGE'}
     if path.exists():
         before = _read_information(path)
-        if _essence(before) == _essence(information):
+        packed = str(before.get('compression_mode')).lower() == 'file'  # the files are not, now
+        if _essence(before) == _essence(information) and not packed:
             return False
-        information |= {key: before[key] for key in _OF_THE_RECORDER if key in before}
+        information |= {key: before[key] for key in _OF_THE_RECORDER if key in before
+                        and not (packed and key.startswith('compression_'))}
         path.rename(free_name(path, 'damaged'))
     write_atomically(path, metadata_yaml(information))
     return True

@@ -15,9 +15,14 @@ NAMES = 'names'
 def publish_topic_names(node: Node, names: Iterable[str]) -> None:
     """Set the parameter to the full names of topics after remapping, of every transport."""
     set_read_only_parameter(
-        node, NAMES, [f'{name}{suffix}:={node.resolve_topic_name(name)}{suffix}'
+        node, NAMES, [f'{name}{suffix}:={_full(node, name, suffix)}'
                       for name in names for suffix in TRANSPORT_SUFFIXES.get(name, ('',))],
         'full names of the topics, each as NAME:=TOPIC')
+
+
+def _full(node: Node, name: str, suffix: str) -> str:
+    """Return where a transport is: its own remapping follows that of the raw topic."""
+    return node.resolve_topic_name(f'{node.resolve_topic_name(name)}{suffix}')
 
 
 def full_names(parameters: Mapping[str, object]) -> dict[str, str]:
