@@ -15,8 +15,12 @@ from active_recon.batch.rows import COLUMNS, refusal_row
 from active_recon.batch.summary import MOST_SHOWN, Summary
 from active_recon.batch.table import read_table, write_table
 from active_recon.errors import ConfigError, DataError
+from active_recon.reconstructor import Reconstructor
 from command_line import command, refusal
+from foreign_recordings import images, joints
+from loop_bags import write_bag
 import pytest
+import trimesh
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -79,6 +83,31 @@ def test_a_bag_that_cannot_be_read_is_a_row_and_changes_no_other(
     assert without == [rows[0], *rows[2:]]
     assert all(row['views'] == 4 and row['stopped'] == 'max_views' and 0.5 < row['iou'] < 0.7
                for row in without)
+
+
+def test_a_match_that_is_gone_is_refused_by_itself(archive, tmp_path, monkeypatch):
+    (archive / 'gone.mcap').symlink_to('nowhere.mcap')
+    there, gone = batch(monkeypatch, 'measure', archive / '[cg]*', tmp_path / 'out')
+    assert bags_of([there, gone]) == ['c', 'gone.mcap']
+    assert there['views'] == 4
+    assert 'gone.mcap: no bag there' in gone['refused']
+
+
+def test_a_row_of_a_bag_without_shapes_names_the_weights_that_made_them(tmp_path, monkeypatch):
+    folder = write_bag(tmp_path / 'run', images() + joints())
+    (row,) = batch(monkeypatch, 'measure', folder, tmp_path / 'out')
+    assert row['weights_sha256'] == Reconstructor.load().provenance['weights_sha256']
+
+
+def test_a_truth_that_is_fitted_turns_with_the_yaw_that_is_told(tmp_path, monkeypatch):
+    folder = write_bag(tmp_path / 'run', images() + joints())
+    bar, turned_bar = tmp_path / 'bar.ply', tmp_path / 'turned.ply'
+    trimesh.creation.box((1, 0.1, 0.1)).export(bar)
+    trimesh.creation.box((0.1, 1, 0.1)).export(turned_bar)
+    turned, placed = (batch(monkeypatch, 'measure', folder, tmp_path / f'out-{truth[0].stem}',
+                            '--object-yaw-deg', 90, '--truth', *truth)[0]['iou']
+                      for truth in ((bar, '--fit'), (turned_bar,)))
+    assert turned == placed > 0
 
 
 def test_a_second_start_keeps_what_is_finished_and_unchanged(

@@ -43,12 +43,13 @@ def test_policies_are_measured_set_by_set_and_told_in_a_table(dataset, tmp_path,
 
 
 def test_a_sequence_whose_motion_costs_is_found_on_the_training_objects(
-        dataset, tmp_path, monkeypatch):
+        dataset, tmp_path, monkeypatch, capsys):
     assert command(monkeypatch, dataset, '--model', 'carving', '--policies', 'sequence@1e-6',
                    '--training', dataset, '--training-objects', 2, '--objects', 2, '--starts', 1,
                    '--views', 2, '--threads', 1, '--out', tmp_path) == 0
     result = json.loads((tmp_path / 'policies.json').read_text())
     assert list(result['sets'][0]['policies']) == ['sequence@1e-6']
+    assert 'warning: --training is measured, too' in capsys.readouterr().err
     assert len(result['sequence']['offsets_deg']) == 1
 
 

@@ -310,10 +310,18 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
 @pytest.mark.parametrize(('option', 'value', 'words'), [
     ('--volume-loss', 'mae', 'unknown volume loss: expected one of mse, bce'),
     ('--silhouette-weight', -1, 'invalid weights: expected 0 or more'),
-    ('--learning-rate', 0, 'number too small: expected numbers above 0')])
+    ('--learning-rate', 0, 'number too small: expected numbers above 0'),
+    ('--max-views', 1, 'nothing to choose: expected 2 or more'),
+    ('--group-size', 3, 'expected a divisor of the 2 episodes')])
 def test_settings_that_train_nothing_are_refused(
         dataset, tmp_path, monkeypatch, capsys, option, value, words):
     assert words in refusal(monkeypatch, capsys, *training(dataset, tmp_path, option, value))
+
+
+def test_a_size_beside_given_weights_is_refused(dataset, tmp_path, monkeypatch, capsys):
+    asked = training(dataset, tmp_path, '--model', '2d3d', '--size', 'small')
+    said = refusal(monkeypatch, capsys, *asked, '--init-from', '2d3d')
+    assert '--size: small with given weights' in said
 
 
 def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given(

@@ -64,6 +64,11 @@ def test_a_policy_is_learned_in_two_rounds_and_chooses(
     np.testing.assert_equal(load_file(made), written)
     assert command(monkeypatch, 'train-policy', *arguments, '--candidates', 5) == 2
     assert 'candidates: expected 4 as before, got 5; name another' in capsys.readouterr().err
+    # Their views would be chosen by another scorer
+    assert command(monkeypatch, 'train-policy', *arguments, '--init-from', made) == 2
+    assert "begun_with: expected '' as before" in capsys.readouterr().err
+    assert command(monkeypatch, 'train-policy', *arguments, '--epochs', 3) == 2
+    assert 'epochs: expected 2 as before, got 3' in capsys.readouterr().err
     assert command(monkeypatch, 'train-policy', *arguments, '--model', 'lifting') == 2
     assert 'network_sha256: expected' in capsys.readouterr().err
     assert command(monkeypatch, 'policies', dataset, '--model', weights, '--policies',

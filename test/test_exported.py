@@ -211,6 +211,15 @@ def test_another_network_is_not_quantised_nor_anything_without_nncf(
         quantize(exported[model], [])
 
 
+def test_integers_are_made_from_the_graphs_of_the_folder_that_is_named(
+        exported, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'nncf', ModuleType('nncf'))
+    for file in exported['lifting'].parent.glob('lifting.*'):
+        shutil.copy(file, tmp_path)
+    with pytest.raises(AttributeError, match='nncf'):  # all that comes before it was read
+        quantize(tmp_path / 'lifting.safetensors', [], exported['lifting'].parent)
+
+
 @pytest.mark.slow
 def test_integers_of_weights_that_are_not_exported_are_refused(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'nncf', ModuleType('nncf'))

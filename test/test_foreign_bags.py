@@ -112,6 +112,32 @@ def test_camera_info_of_no_calibrated_camera_is_as_good_as_none(tmp_path):
     assert found[0].camera.intrinsics.fy / 24 == pytest.approx(CANONICAL_INTRINSICS.fy / 137)
 
 
+def test_camera_info_of_an_unknown_lens_is_told_among_what_is_assumed(tmp_path):
+    messages = [*images(), *cameras()]
+    for _, topic, msg in messages:
+        if topic == '/info':
+            msg.distortion_model, msg.d = 'fisheye', [0.1, 0.0, 0.0, 0.0]
+    run = read_run(write_bag(tmp_path / 'run', messages))
+    assert run.assumed[-1].startswith(
+        'of the recorded camera info nothing: unknown distortion model')
+    assert "got 'fisheye'" in run.assumed[-1]
+
+
+def test_of_two_cameras_the_info_beside_the_chosen_images_is_theirs(tmp_path):
+    messages = [entry for entry in cameras() if entry[1] == '/tracker']
+    lenses = {'/camera': 30.0, '/camera2': 40.0}
+    for camera, focal in lenses.items():
+        messages += images(f'{camera}/image_raw')
+        for time, topic, msg in cameras():
+            if topic == '/info':
+                msg.k = [focal, 0.0, 16.0, 0.0, focal, 12.0, 0.0, 0.0, 1.0]
+                messages.append((time, f'{camera}/camera_info', msg))
+    folder = write_bag(tmp_path / 'run', messages)
+    for camera, focal in lenses.items():
+        (episode,) = read_run(folder, Topics(image=f'{camera}/image_raw')).episodes
+        assert episode.views[0].camera.intrinsics.fx == focal
+
+
 def test_a_pose_and_the_camera_info_are_the_camera_as_it_was(tmp_path):
     found = views(tmp_path / 'run', [*images(), *cameras()])
     assert azimuths(found) == AZIMUTHS
@@ -139,6 +165,11 @@ def test_a_pose_between_two_is_interpolated_within_the_gap(tmp_path):
         views(tmp_path / 'short', messages, max_pose_gap=0.01)
 
 
+def test_images_before_the_first_pose_are_not_the_reason_where_there_is_another(tmp_path):
+    with pytest.raises(DataError, match='no pose for the image of 1700000000.100 s'):
+        views(tmp_path / 'run', [*images(), *cameras(late=PERIOD // 2)], max_pose_gap=0.01)
+
+
 def test_without_camera_info_a_pose_tells_its_azimuth_alone(tmp_path):
     poses = [entry for entry in cameras() if entry[1] == '/tracker']
     found = views(tmp_path / 'run', images() + poses)
@@ -155,6 +186,16 @@ def test_topics_of_one_kind_are_told_apart_by_name_with_or_without_the_slash(tmp
         assert len(episode.views) == 3
     with pytest.raises(DataError, match='no camera images on /cam/none: expected'):
         read_run(folder, Topics(image='/cam/none'))
+
+
+def test_a_compressed_camera_is_not_passed_over_for_another_that_is_raw(tmp_path):
+    packed = images('/color/image_raw/compressed', png)
+    infrared = images('/infra1/image_rect_raw')
+    with pytest.raises(DataError, match='on several topics, /color/image_raw/compressed, '
+                                        '/infra1/image_rect_raw: choose one with --image'):
+        views(tmp_path / 'two', packed + infrared + joints())
+    found = views(tmp_path / 'one', packed + images('/color/image_raw') + joints())
+    assert azimuths(found) == AZIMUTHS  # compressed or raw, it is one camera
 
 
 def test_a_camera_that_never_stands_still_gives_no_view(tmp_path):

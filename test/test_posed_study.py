@@ -246,6 +246,12 @@ def test_what_was_turned_is_turned_back(yaw_deg):
     np.testing.assert_allclose(back[known], shape[known], atol=0.05)  # peaks, twice interpolated
 
 
+def test_disturbances_are_those_of_objects_of_every_category(dataset, carving):
+    scene = read_scene(list_objects(dataset), [Carving(0)])
+    rows = {found.row for found in disturbances(scene, carving, PLAN, 3, 2)}
+    assert sorted(scene.views.categories[sorted(rows)]) == ['lamp', 'table']
+
+
 def test_yaws_of_carving_hardly_differ(scene, carving):
     found = list(disturbances(scene, carving, PLAN, 3, 2))
     figures = robustness_figures(found)

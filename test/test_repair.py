@@ -241,6 +241,21 @@ def test_a_bag_of_packed_messages_is_described_as_such(cut_off):
     assert message.data == cdr(header(0))
 
 
+@pytest.mark.parametrize('listed', ['run_0.mcap.zstd', 'run_0.mcap'])
+def test_a_bag_whose_files_were_unpacked_is_no_longer_described_as_packed(tmp_path, listed):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    metadata = bag.folder / 'metadata.yaml'
+    right = metadata.read_text()
+    metadata.write_text(right.replace('run_0.mcap', listed).replace(
+        "compression_format: ''", 'compression_format: zstd').replace(
+        "compression_mode: ''", 'compression_mode: FILE'))
+    assert repair_bag(bag.folder)[1] and metadata.read_text() == right
+    heard = open_bag(bag.folder).messages(['/episode', '/camera/image_raw'])
+    assert [each.data for each in heard] == read(bag.folder)
+    assert_whole(bag.folder)
+
+
 @pytest.mark.parametrize('suffix', ['.mcap', '.db3'])
 def test_bags_beside_each_other_are_not_taken_for_one(tmp_path, suffix):
     for name in ('mug_0', 'mug_1', 'vase_0'):

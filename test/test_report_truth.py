@@ -86,6 +86,13 @@ def test_mesh_that_sticks_out_of_the_cube_is_cut_and_the_page_says_so(run, tmp_p
         TruthFile(tmp_path / 'far.ply').read(run)
 
 
+def test_mesh_that_fills_the_cube_up_to_rounding_is_inside(run, tmp_path):
+    trimesh.creation.box((0.3, 0.3, 0.3)).export(tmp_path / 'full.ply')  # in 32 bits: 0.30000001
+    truth = TruthFile(tmp_path / 'full.ply').read(run, object_size=0.3)
+    assert truth.cells.all()
+    assert 'outside' not in truth.placed
+
+
 def test_a_mesh_with_a_hole_is_a_shell_and_the_page_says_so(run, tmp_path):
     box = trimesh.creation.box((0.6, 0.6, 0.6))
     box.export(tmp_path / 'whole.ply')
@@ -108,6 +115,16 @@ def test_truth_turns_with_the_front_of_the_object_where_it_is_fitted(run):
     turned = replace(run, parameters={'reconstructor': {'object_yaw': math.pi / 2}})
     plain, quarter = (cells_of('chair', each) for each in (run, turned))
     assert (quarter == np.rot90(plain, 1, (0, 1))).all()
+
+
+def test_truth_that_is_fitted_turns_as_far_as_is_told_beside_the_run(run, tmp_path):
+    plain = cells_of('chair', run)
+    write_binvox(VoxelGrid(plain.astype(np.float32)), tmp_path / 'chair.binvox')
+    turned = replace(run, parameters={'reconstructor': {'object_yaw': 1.0}})
+    for path in ('chair', tmp_path / 'chair.binvox'):
+        quarter = cells_of(path, turned, True, object_yaw=math.pi / 2)
+        assert (quarter == np.rot90(plain, 1, (0, 1))).all()
+        assert (cells_of(path, turned, True, object_yaw=0.0) == plain).all()
 
 
 def test_truth_that_does_not_fit_is_refused(run, tmp_path):

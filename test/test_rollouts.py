@@ -1,6 +1,9 @@
 """What a frozen network is shown of a set of objects."""
 
-from active_recon.evaluation.rollouts import Observer
+from active_recon.errors import ViewError
+from active_recon.evaluation.rollouts import Observer, roll_out
+from active_recon.policies import Choice
+import numpy as np
 import pytest
 import torch
 from torch.testing import assert_close
@@ -24,6 +27,23 @@ def test_an_observer_knows_what_the_network_knows(network, views):
         logits, own = network(views.white(objects, chosen), views.cameras(objects, chosen), own)
         assert_close(state['latent'], own['latent'], rtol=0, atol=1e-3)
         assert_close(observer.decode(state), logits, rtol=0, atol=1e-2)
+
+
+class Undecided:
+    """A policy whose scores leave no order."""
+
+    wants_volume = False
+
+    def initial_state(self, batch):
+        return {}
+
+    def choose(self, seen, state):
+        return Choice(np.full((len(seen.latent), 24), np.nan)), state
+
+
+def test_a_policy_without_finite_scores_is_refused_where_it_is_measured(network, views):
+    with pytest.raises(ViewError, match='no usable scores: expected .* with 72 NaN'):
+        list(roll_out(network, Undecided(), views, torch.arange(3), torch.zeros(3).long(), 2))
 
 
 @torch.inference_mode()

@@ -90,6 +90,15 @@ def test_the_weights_that_ship_widen_to_the_large_size():
     assert torch.equal(after.reconstruction.calibration, before.reconstruction.calibration)
 
 
+def test_what_is_new_in_a_wider_network_is_the_same_each_time():
+    found = []
+    for begun in (1, 2):
+        torch.manual_seed(begun)  # of a process: torch begins elsewhere in each
+        found.append(widened(narrow(), replace(DOUBLED, encoder_depth=2)).reconstruction)
+    for name, tensor in found[0].state_dict().items():
+        assert torch.equal(tensor, found[1].state_dict()[name]), name
+
+
 @pytest.mark.parametrize('sizes, said', [
     (replace(WIDE, head_channels=2), '4 channels cannot be widened to 2'),
     (replace(WIDE, head_channels=9), '4 channels cannot be widened to 9'),

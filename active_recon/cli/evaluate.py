@@ -26,6 +26,7 @@ from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import Split
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
+from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.policies import POLICIES
 from active_recon.whole_files import whole_file, writable
 import typer
@@ -42,7 +43,8 @@ def evaluate(
         help="Folder of test objects in R2N2's layout, or of PASCAL3D+, whose photographs are "
              'reconstructed from a single view.')],
     model: Annotated[str | None, typer.Option(
-        help='Name of a model that ships, or a .safetensors file; default: lifting.')] = None,
+        help='Name of a model that ships, or a .safetensors file; default: '
+             f'{DEFAULT_MODEL}.')] = None,
     policy: Annotated[str | None, typer.Option(
         help=f'Policies, separated by commas: {", ".join(POLICIES)}, oracle (uses the true '
              'shape; takes ninety times as long). Default: those that use the cameras only, and '

@@ -95,6 +95,9 @@ def policies(
         'command': command_line(), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}
     if training is not None and has_sequence:
+        if any(training.resolve() == each.resolve() for each in data):
+            typer.echo('warning: --training is measured, too: what is told of the sequence is too '
+                       'good', err=True)
         result['sequence'] = _sequence(training, entrant, episodes,
                                        Extent(category, training_objects))
     for folder in data:

@@ -42,10 +42,10 @@ def train(
         help='Network: 2d3d-attention, 2d3d, 2d3d-posed, r2n2, ptn, ptn-combined, ogn, '
              'shape-basis, lifting, carving; the name of one in an installed package; or your own '
              'class, as my_file.py:Net.')] = '2d3d-attention',
-    size: Annotated[str, typer.Option(
-        help="Size of the network: 'small' (trains within an hour on two CPU cores) or "
+    size: Annotated[str | None, typer.Option(
+        help="Size of the network: 'small' (the default; an hour on two CPU cores) or "
              "'published' (as in its paper); for ogn also 'small-64' and 'published-64', for "
-             "lifting 'large' and 'small-visibility'.")] = 'small',
+             "lifting 'large' and 'small-visibility'.")] = None,
     scheme: Annotated[str, typer.Option(
         help="'two-stage': reconstruction on random views, then the policy with it frozen; "
              "'joint': both together on the policy's views, as in the paper.")] = 'two-stage',
@@ -175,7 +175,10 @@ def train(
     if view_separation_deg is None:
         view_separation_deg = 0 if joint else 60
     with_policy = entry.policy is not None and not joint and policy_steps > 0
-    plan = Plan(model, size, loss, first, second if with_policy else None,
+    if begun and size is not None:
+        raise ConfigError(f'--size: {size} with given weights: expected none, since it is that of '
+                          'the weights; --widen-to makes a lifting network larger')
+    plan = Plan(model, size or 'small', loss, first, second if with_policy else None,
                 RewardConfig(group_size=group_size), joint,
                 begun=_begun(find_weights(begun), model, widen_to) if begun else None,
                 frozen=init_from is None, view_separation=math.radians(view_separation_deg))

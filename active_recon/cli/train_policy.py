@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from active_recon.models.view_scorer import ViewScorer
     from active_recon.training.gain_files import Collecting
     from active_recon.training.looked import LookedStates
+    from active_recon.training.scorer import ScorerTraining
 
 
 def train_policy(
@@ -78,6 +79,7 @@ def train_policy(
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.models.scorer_weights import load_scorer_of_any_network, save_scorer
     from active_recon.models.view_scorer import ScorerConfig
+    from active_recon.models.weights import state_hash
     from active_recon.models.weights_files import find_weights, scorer_path
     from active_recon.training.gain_files import Collecting
     from active_recon.training.looked import joined
@@ -111,7 +113,7 @@ def train_policy(
     for number in range(1, rounds + 1):
         with workers_of(cluster, workers) as crew:
             source = _Source(entrant, collecting, config.patches, reachable(out, cluster), crew,
-                             counts)
+                             counts, training, state_hash(begun) if begun else '')
             learned += source.states(data, number, scorer)
             held_out += source.states(validation, number, scorer)
         train, test = joined(learned), joined(held_out)
@@ -137,9 +139,16 @@ class _Source:
     """Where states come from; `counts` gets the number of objects of each folder and round."""
 
     def __init__(self, entrant: 'Entrant', collecting: 'Collecting', patches: int, out: Path,
-                 crew: 'Crew', counts: dict[str, int]) -> None:
+                 crew: 'Crew', counts: dict[str, int], training: 'ScorerTraining',
+                 begun_with: str) -> None:
         self._entrant, self._collecting, self._patches = entrant, collecting, patches
         self._out, self._crew, self._counts = out, crew, counts
+        self._training, self._begun_with = training, begun_with
+
+    def _chosen_by(self, number: int) -> dict[str, Any]:
+        """Return what the choice of the views of a round depends on."""
+        return {'begun_with': self._begun_with,
+                **({'training': self._training.to_dict()} if number > 1 else {})}
 
     def states(self, folders: list[Path], number: int,
                scorer: 'ViewScorer | None') -> list['LookedStates']:
@@ -157,7 +166,7 @@ class _Source:
             drawn = drawn_objects(folder.absolute(), self._collecting.objects, number)
             with progress_bar(f'gains of {folder}, round {number}', len(drawn)) as advance:
                 files = collect_gains(drawn, self._entrant, self._collecting, kept, policy,
-                                      advance, self._crew)
+                                      advance, self._crew, self._chosen_by(number))
             self._counts[f'{folder}, round {number}'] = len(files)
             found += [looked_states(ViewGains.load(file), self._patches) for file in files]
         return found

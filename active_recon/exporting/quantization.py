@@ -53,8 +53,8 @@ def quantize(weights: Path, objects: Sequence[ObjectFolder], folder: Path | None
     nncf = _nncf()
     import onnx
 
-    runtime = load_network(weights, 'cpu', None, 'f32')  # refuses what is not exported
-    graph = _whole(onnx.load(graph_path(weights, DECODE_PART)))
+    runtime = load_network(weights, 'cpu', None, 'f32', folder)  # refuses what is not exported
+    graph = _whole(onnx.load(graph_path(weights, DECODE_PART, folder)))
     names = [each.name for each in graph.graph.input]
     given = [{name: state[name] for name in names} for state in _decoded(runtime, objects)]
     # One range for each channel, the same on both sides of 0: faster, and nearer to float

@@ -131,7 +131,9 @@ def widened(bundle: Bundle, sizes: LiftingConfig, seed: int = 0) -> Bundle:
         raise ConfigError('cannot be widened: expected no visibility, and an encoder at least as '
                           f'deep as before, got {sizes}')
     narrow = {name: tensor.float() for name, tensor in bundle.reconstruction.state_dict().items()}
-    network = Lifting.from_config(sizes)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)  # what is new is the same each time: trainings are resumed
+        network = Lifting.from_config(sizes)
     state = network.state_dict()
     given = _Widening(narrow, seed)
     coarse, fine = _widen_encoder(given, before, sizes)

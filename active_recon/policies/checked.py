@@ -8,9 +8,9 @@ from active_recon.policies.base import Choice
 import numpy as np
 
 
-def checked_choice(found: Any, count: int) -> tuple[Choice, Any]:
+def checked_choice(found: Any, count: int, batch: int = 1) -> tuple[Choice, Any]:
     """
-    Return what `choose` returned for one episode and `count` candidates: a Choice and a state.
+    Return what `choose` returned for so many episodes and candidates: a Choice, a state.
 
     Raises ViewError where it is no such pair, a score is not finite, or their number is another.
     """
@@ -23,11 +23,11 @@ def checked_choice(found: Any, count: int) -> tuple[Choice, Any]:
         raise ViewError('policy: no choice: expected a Choice of arrays, and a state, got: '
                         f'{error}', 'policy') from error
     # An infinite score leaves no order among candidates that motion is taken off from
-    if scores.shape != (1, count) or not np.isfinite(scores).all():
-        raise ViewError(f'policy: no usable scores: expected (1, {count}) finite numbers, got '
-                        f'{scores.shape} with {(~np.isfinite(scores)).sum()} NaN or '
+    if scores.shape != (batch, count) or not np.isfinite(scores).all():
+        raise ViewError(f'policy: no usable scores: expected ({batch}, {count}) finite numbers, '
+                        f'got {scores.shape} with {(~np.isfinite(scores)).sum()} NaN or '
                         'infinite', 'policy')
-    if azimuth is not None and (azimuth.shape != (1,) or np.isinf(azimuth).any()):
-        raise ViewError('policy: no usable azimuth: expected (1,), radians or NaN, got '
+    if azimuth is not None and (azimuth.shape != (batch,) or np.isinf(azimuth).any()):
+        raise ViewError(f'policy: no usable azimuth: expected ({batch},), radians or NaN, got '
                         f'{azimuth.shape}, {azimuth}', 'policy')
     return replace(choice, scores=scores, azimuth=azimuth), state

@@ -179,7 +179,7 @@ def first_state(described: Mapping[str, tuple[Sequence[int], float]], batch: int
 
 
 def open_network(weights: Path | None, open_graph: OpenGraph,
-                 int8: bool = False) -> ExportedRuntime:
+                 int8: bool = False, folder: Path | None = None) -> ExportedRuntime:
     """
     Return the exported network beside weights; None: of those that ship.
 
@@ -191,7 +191,7 @@ def open_network(weights: Path | None, open_graph: OpenGraph,
     def opened(part: str) -> tuple[Graph, GraphMetadata]:
         file = INT8_PART if int8 and part == DECODE_PART else part
         # The update adds up over views, which half precision is too coarse for
-        return _opened(weights, file, digest, open_graph, part != 'update')
+        return _opened(weights, file, digest, open_graph, part != 'update', folder)
 
     with ThreadPoolExecutor(len(NETWORK_PARTS)) as pool:  # a node's start waits for little else
         parts = dict(zip(NETWORK_PARTS, pool.map(opened, NETWORK_PARTS), strict=True))
@@ -243,8 +243,8 @@ def open_segmenter(weights: Path, open_graph: OpenGraph) -> ExportedSegmenterRun
 
 
 def _opened(weights: Path, part: str, digest: str, open_graph: OpenGraph,
-            half: bool) -> tuple[Graph, GraphMetadata]:
-    path = graph_path(weights, part)
+            half: bool, folder: Path | None = None) -> tuple[Graph, GraphMetadata]:
+    path = graph_path(weights, part, folder)
     if not path.is_file():
         if part == INT8_PART:
             raise WeightsError(f'{weights.name}: not quantised: expected {path.name} beside it, '

@@ -75,10 +75,10 @@ class OpenVinoGraph:
 
 
 def load_network(weights: Path | None, device: str, threads: int | None,
-                 precision: str) -> ExportedRuntime:
+                 precision: str, folder: Path | None = None) -> ExportedRuntime:
     """Return the network of exported weights; see `load_runtime`."""
     opener = _Opener(threads, chosen_precision(precision, device))
-    loaded = open_network(weights, opener, opener.is_int8)
+    loaded = open_network(weights, opener, opener.is_int8, folder)
     loaded.provenance = {**loaded.provenance, **opener.provenance}
     return loaded
 

@@ -1,6 +1,6 @@
 """Gains of a dataset's objects, measured once and kept in files."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 import hashlib
@@ -80,7 +80,8 @@ def drawn_objects(data: Path, most: int, number: int = 1) -> list[ObjectFolder]:
 def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting: Collecting,
                   out: Path, policy: Policy | None = None,
                   advance: Advance = lambda steps, note: None,
-                  crew: Crew | None = None) -> list[Path]:
+                  crew: Crew | None = None,
+                  chosen_by: Mapping[str, Any] | None = None) -> list[Path]:
     """
     Measure the gains of objects into files, one an object; return the files.
 
@@ -91,7 +92,8 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
     gains of another network, or collected otherwise, are there. `crew` does the work; None: this
     process.
     """
-    _keep_apart(out, {'network_sha256': entrant.weights, **collecting.to_dict()})
+    _keep_apart(out, {'network_sha256': entrant.weights, **collecting.to_dict(),
+                      **(chosen_by or {})})
     keep = partial(_keep, entrant, collecting, out, policy, torch.get_num_threads())
     workers = crew or LocalCrew(1)
     results = workers.map(keep, folders, out, sorted({folder.root for folder in folders}))
@@ -122,8 +124,9 @@ def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
     except (ValueError, TypeError) as error:
         raise DataError(f'{noted}: no readable note of how gains were collected: expected that of '
                         f'`train-policy`, got: {error}; name another folder with --out') from error
+    asked = {name: collected.get(name) for name in before}  # older notes tell less
     if differing := '; '.join(differences(*({**each, 'objects': None}
-                                            for each in (before, collected)))):
+                                            for each in (before, asked)))):
         raise ConfigError(f'{out}: gains that were measured otherwise are there: {differing}; '
                           'name another folder with --out')
 

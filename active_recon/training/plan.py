@@ -21,7 +21,7 @@ from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.training.calibration import calibrate, MOST_OBJECTS
 from active_recon.training.joint import train_jointly
 from active_recon.training.lifting import train_lifting
-from active_recon.training.loop import Measured, Run, TrainingConfig
+from active_recon.training.loop import Measured, Run, share_of_batch, TrainingConfig
 from active_recon.training.made_objects import MadeObjects
 from active_recon.training.policy_gradient import train_policy
 from active_recon.training.supervised import train_reconstruction
@@ -108,6 +108,14 @@ def train_plan(plan: Plan, training: ViewSet | MadeObjects, validation: ViewSet,
     network = plan.begun.reconstruction if plan.begun else entry.build(config)
     frozen = plan.begun is not None and plan.frozen
     begun_with = state_hash(network) if plan.begun else ''
+    acting = plan.reconstruction if plan.joint else plan.policy
+    if acting and acting.max_views < 2:
+        raise ConfigError('max_views: nothing to choose: expected 2 or more where a view policy '
+                          f'is trained, got {acting.max_views}')
+    if acting and (share := share_of_batch(acting, fabric)) % plan.rewards.group_size:
+        raise ConfigError('group_size: uneven groups: expected a divisor of the '
+                          f'{share} episodes that a process runs at once, got '
+                          f'{plan.rewards.group_size}')
     network.requires_grad_(not frozen)
     attention: Any = entry.policy(config) if entry.policy and (plan.joint or plan.policy) else None
 

@@ -7,6 +7,7 @@ import resource
 import signal
 
 from active_recon.nodes.recording.sequence_gaps import SequenceGaps
+from active_recon.nodes.runtime.topic_names import full_names, NAMES, publish_topic_names
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from mcap.exceptions import EndOfFile, McapError
@@ -15,6 +16,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 import numpy as np
 import pytest
+import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -321,6 +323,24 @@ def test_a_remapped_camera_is_found_by_what_the_reconstructor_hears(
         'camera/image_raw': '/usb_cam/image', 'camera/pose': '/arm/pose', 'view': '/seen'}
     assert 'occupancy' not in record  # it has its usual name
     assert not recorder.log('Traceback')
+
+
+@pytest.mark.parametrize(('remapped', 'raw', 'compressed'), [
+    ({'camera/image_raw/compressed': '/usb_cam/packed'},
+     '/camera/image_raw', '/usb_cam/packed'),
+    ({'camera/image_raw': '/usb_cam/image'}, '/usb_cam/image', '/usb_cam/image/compressed'),
+    ({'camera/image_raw': '/usb_cam/image', '/usb_cam/image/compressed': '/packed'},
+     '/usb_cam/image', '/packed')])
+def test_the_names_that_a_node_tells_follow_the_remappings_of_each_transport(
+        ros, remapped, raw, compressed):
+    rules = [each for name, to in remapped.items() for each in ('-r', f'{name}:={to}')]
+    node = rclpy.create_node('told', cli_args=['--ros-args', *rules])
+    try:
+        publish_topic_names(node, ['camera/image_raw'])
+        names = full_names({NAMES: node.get_parameter(NAMES).value})
+    finally:
+        node.destroy_node()
+    assert names == {'camera/image_raw': raw, 'camera/image_raw/compressed': compressed}
 
 
 def test_what_has_no_publisher_is_told_until_it_has_one(bench, start_node, tmp_path):

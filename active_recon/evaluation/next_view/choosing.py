@@ -8,6 +8,7 @@ from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
 from active_recon.evaluation.next_view.watching import Ahead, Walk, WatchedObject
 from active_recon.geometry.cameras import Camera
 from active_recon.policies import Policy
+from active_recon.policies.checked import checked_choice
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,7 +29,8 @@ def chosen_by(policy: Policy, watched: WatchedObject, start: int, count: int,
     cost = MotionCost(timed=TimedMotion(motion_cost=motion_cost))
     cameras = cameras_of(watched)
     while len(walk.taken) < min(count, watched.count):
-        choice, memory = policy.choose(watched.observation(walk, policy.wants_volume), memory)
+        choice, memory = checked_choice(policy.choose(
+            watched.observation(walk, policy.wants_volume), memory), watched.count)
         scores = choice.scores[0]
         if motion_cost:
             scores = cost.utility(scores, choice.is_gain, cameras[walk.taken[-1]], cameras,
