@@ -44,6 +44,14 @@ def test_a_goal_is_taken_once_and_only_near_it():
     assert offer(gate, [0.83, 0.83, 0.85, 0.85, 0.85, 1.0, 1.0], start=10 * PERIOD) == [3]
 
 
+@pytest.mark.parametrize(('take_views', 'awaits'), [
+    ('at_goal', True), ('auto', True), ('by_separation', False), ('all', False)])
+def test_a_goal_awaits_a_view_only_where_views_are_taken_for_goals(take_views, awaits):
+    gate = ViewGate(take_views)
+    gate.set_goal(orbit_camera(1.0), stamp=1)
+    assert (gate.open_goal is not None) is awaits
+
+
 @pytest.mark.parametrize(('elevation_off', 'azimuth_off', 'taken'), [
     (0.13, 0.0, True), (-0.13, 0.0, True), (0.15, 0.0, False), (-0.15, 0.0, False),
     (0.12, 0.12, False), (0.08, 0.08, True)])

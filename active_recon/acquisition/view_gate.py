@@ -49,8 +49,9 @@ class ViewGate:
 
     @property
     def open_goal(self) -> Camera | None:
-        """The camera of the goal that has no view yet, None where there is none."""
-        return None if self._goal is None or self._goal_taken else self._goal.camera
+        """The camera of the goal that awaits a view, None where there is none."""
+        ignored = self._goal_taken or self.take_views in ('by_separation', 'all')
+        return None if self._goal is None or ignored else self._goal.camera
 
     def set_goal(self, camera: Camera, stamp: int) -> None:
         """Set the camera of the goal; its stamp in nanoseconds identifies it."""

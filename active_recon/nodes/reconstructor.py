@@ -7,7 +7,7 @@ from pathlib import Path
 import uuid
 
 from active_recon.acquisition.view_gate import ViewGate
-from active_recon.errors import DataError
+from active_recon.errors import DataError, MessageError
 from active_recon.freed_memory import give_back_freed_memory
 from active_recon.geometry.cameras import Camera
 from active_recon.models.weights_files import find_weights
@@ -183,6 +183,9 @@ class ReconstructorNode(ManagedNode):
     def _on_goal(self, msg: PoseStamped) -> None:
         with self._diagnostics.rejecting():
             stamp = nanoseconds_from_stamp(msg.header.stamp)
+            if stamp == 0 < self._episode.begin:
+                raise MessageError('goal without a stamp: expected that of when it was published, '
+                                   'got 0; let its publisher fill in header.stamp', 'no_stamp')
             if stamp < self._episode.begin or self.clock_monitor.is_ahead(stamp):
                 self._diagnostics.count('goals_unused')
                 return

@@ -24,6 +24,7 @@ from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.view_planner import ViewPlannerParameters
 from active_recon.planner import Decision, Planner
 from active_recon.policies import Policy
+from active_recon.policies.automatic import SWEEP
 from active_recon.policies.planner_views import PlannerView
 from msg_tools.episodes import done_to_msg, Episode, episode_from_msg
 from std_msgs.msg import Header
@@ -200,7 +201,8 @@ class ViewPlannerNode(ManagedNode):
         self._diagnostics.count('views')
         name = self._loaded.in_use.name
         self._diagnostics.set_value('Policy', (
-            f'even sweep instead of {name}: unusual views' if self._planner.sweeps else name))
+            f'even sweep instead of {name}: unusual views'
+            if self._planner.sweeps and name != SWEEP else name))
         self._tell_min_gain(self._params.values.min_gain)
         self._follow(decision, stamp)
         if decision.goal is not None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 FALSE_ALARMS = 0.05
 """The p-value up to which views are flagged: as often as this where nothing is wrong."""
 SUSPECTS: Mapping[str, str] = {
-    'pose': "the views do not agree with each other: are the camera's poses right?",
+    'pose': "what the views show does not fit together: are the camera's poses right?",
     'object_size': 'the object does not fit its cube: is object_size right?',
     'mask': 'silhouettes are cut off or have something added: is the mask, or the background that '
             'is removed, right?',

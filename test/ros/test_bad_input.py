@@ -4,11 +4,14 @@ from array import array
 import math
 import re
 
+from active_recon.geometry.cameras import orbit_camera
 from geometry_msgs.msg import PoseStamped
+from msg_tools.cameras import camera_to_msgs
 from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from .conftest import FakeCamera
 
@@ -157,6 +160,17 @@ def test_what_is_late_of_the_last_episode_never_reaches_the_new_one(
         'one view in the new episode')
     assert late not in [nanoseconds_from_stamp(msg.header.stamp) for msg in camera.occupancy]
     assert taken > late
+
+
+def test_a_goal_without_a_stamp_is_refused(start_node, bench):
+    node = start_node('reconstructor')
+    goals = bench.advertise(PoseStamped, 'next_view')
+    _, pose = camera_to_msgs(orbit_camera(0.5), Header())
+    goals.publish(pose)
+    said = 'refused: goal without a stamp: expected that of when it was published, got 0'
+    bench.until(lambda: node.log(said), 'the refusal')
+    assert bench.counts('reconstructor').get('refused/no_stamp', 1) == 1
+    assert 'goals_unused' not in bench.counts('reconstructor')
 
 
 @pytest.fixture

@@ -86,6 +86,30 @@ def test_a_reconstructor_that_hears_no_clock_of_its_simulation_says_so(start_nod
                      r'an image of \d+\.\d{3} s; start what publishes /clock', line)
 
 
+def test_a_camera_that_waits_for_the_same_clock_is_told_of_it_too(start_node, bench):
+    start_node('reconstructor', take_views='all', use_sim_time=True)
+    camera = FakeCamera(bench)
+
+    def warned():
+        camera.send(*camera.messages(0))
+        return bench.counts('reconstructor').get('warned/no_clock')
+
+    bench.until(warned, 'the warning')
+    bench.until(lambda: 'no /clock has been received' in bench.state('reconstructor').problem,
+                'the warning beside what is refused')
+
+
+def test_a_goal_of_before_the_clock_began_is_open_since_the_clock_began(start_node, bench):
+    node = start_node('view_planner', policy='farthest', start_azimuth=1.0, goal_timeout=30.0,
+                      use_sim_time=True)
+    clock, fake = FakeClock(bench), FakeReconstructor(bench)
+    fake.begin('of no time', 0)
+    bench.until(lambda: fake.goals, 'the first goal')
+    clock.until(lambda: len(within(fake.goals, 0, 1)) >= 3, 'the goal to be repeated', 1000.0)
+    assert not node.log('left out of this episode')
+    clock.until(lambda: node.log('left out of this episode'), 'its end after 30 s', 1031.0)
+
+
 def test_a_node_that_changes_to_the_clock_of_a_simulation_begins_an_episode(start_node, bench):
     start_node('reconstructor')
     episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)

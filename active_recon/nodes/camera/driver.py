@@ -82,7 +82,7 @@ class CameraNode(ManagedNode):
                 self._diagnostics.clear_warning(_GONE)
                 self._send(come)
             elif come.problem is None:
-                self.get_logger().info('the end: every image was published')
+                self.get_logger().info('the end of the source: no more images come')
             elif come.lasting:
                 self._diagnostics.raise_warning(
                     _GONE, f'{one_line(come.problem)}; it is searched for every second')

@@ -112,9 +112,9 @@ class ViewInputs:
         """Warn of a stamp far ahead of the node's clock: images in time are refused after it."""
         now = self._node.get_clock().now().nanoseconds
         ahead_s = (stamp - now) / 1e9
-        if ahead_s <= CLOCK_AHEAD_S:
+        if ahead_s <= CLOCK_AHEAD_S and (stamp or now):
             return
-        if now == 0:  # before the first message of a simulation's clock
+        if now == 0:  # before the first message of a simulation's clock; the camera's may be too
             self._diagnostics.warn('no_clock', (
                 'use_sim_time is set and no /clock has been received: expected the time of a '
                 f'simulation or of a bag, got an image of {stamp / 1e9:.3f} s; start what '

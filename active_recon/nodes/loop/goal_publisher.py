@@ -41,7 +41,9 @@ class GoalPublisher:
         """Seconds for which the goal has been open, by the node's clock; NaN if none is."""
         if self.camera is None:
             return math.nan
-        return (self._node.get_clock().now().nanoseconds - self._since) / 1e9
+        now = self._node.get_clock().now().nanoseconds
+        self._since = self._since or now  # open before a simulation's clock began
+        return (now - self._since) / 1e9
 
     def publish(self, goal: Goal, begin: int) -> None:
         """Publish a goal of an episode, by its begin, with a unique stamp, its identity."""

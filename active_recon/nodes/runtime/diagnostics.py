@@ -70,7 +70,7 @@ class Diagnostics:
         self._latency = Durations()
         self._warnings: dict[str, str] = {}
         self._logged_warnings: set[str] = set()
-        self._last_problem = '', '', -math.inf  # its key, its message and when it was
+        self._problems: dict[str, tuple[str, float]] = {}  # by key: the last message, and when
         self._unlogged: Counter[str] = Counter()
         self._logged_at: dict[str, float] = {}
 
@@ -158,7 +158,7 @@ class Diagnostics:
 
     def _notice(self, key: str, message: str) -> None:
         self._counts[key] += 1
-        self._last_problem = key, message, time.monotonic()
+        self._problems[key] = message, time.monotonic()
         self._note_change()
 
     def _log(self, key: str, message: str) -> bool:
@@ -206,10 +206,11 @@ class Diagnostics:
             latency = self._latency.percentile(percent)
             if not math.isnan(latency):
                 values[f'Latency p{percent} (ms)'] = f'{1e3 * latency:.1f}'
-        key, last, at = self._last_problem
+        self._problems = {key: (message, at) for key, (message, at) in self._problems.items()
+                          if now - at <= PROBLEM_FOR_S}
         # What still holds stands among the warnings, perhaps in newer words
-        if key.removeprefix('warned/') in self._warnings or now - at > PROBLEM_FOR_S:
-            last = ''
-        problems = dict.fromkeys(filter(None, [*self._warnings.values(), last]))
+        problems = dict.fromkeys([*self._warnings.values(), *(
+            message for key, (message, _) in self._problems.items()
+            if key.removeprefix('warned/') not in self._warnings)])
         return NodeStatus(self._node.get_fully_qualified_name(), self._counts, values,
                           '; '.join(problems), self._failure, self._host)
