@@ -111,6 +111,7 @@ def test_a_machine_that_does_not_see_a_path_says_which(crews, tmp_path):
     assert not list((tmp_path / 'out').iterdir())
 
 
+@pytest.mark.slow
 def test_a_batch_of_bags_is_the_same_on_a_cluster_and_a_bag_that_is_none_is_refused(
         cluster, tmp_path, monkeypatch, capsys):
     archive = tmp_path / 'archive'

@@ -149,7 +149,7 @@ def suspected(run, *suspects, **changes):
 
 def test_equal_warnings_of_several_views_are_one_line(run):
     [warning] = said(suspected(run, 'pose', 'pose', 'pose'))
-    assert warning.startswith('After views 1 to 3: unusual views (p = 0.010): the views do not')
+    assert warning.startswith('After views 1 to 3: unusual views (p = 0.010): what the ')
     first, second = said(suspected(run, 'pose', 'mask', 'pose'))
     assert first.startswith('After views 1, 3: ') and 'poses right?' in first
     assert second.startswith('After view 2: ') and 'mask' in second

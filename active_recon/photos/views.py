@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera, Intrinsics
@@ -118,14 +120,14 @@ def _view(posed: PosedPhoto, masks: dict[str, Path]) -> PhotoView:
     if path is None:
         return view
     try:
-        mask = _mask(path, width, height, posed)
+        mask = _mask(path, width, height, partial(_turned_back, posed, width, height))
     except DataError as error:
         raise DataError(f'{name}: {error}') from error
     return PhotoView(name, view.image, camera, mask, 'masks')
 
 
-def _turned_back(values: NDArray[np.float32], posed: PosedPhoto, width: int,
-                 height: int) -> NDArray[np.float32]:
+def _turned_back(posed: PosedPhoto, width: int, height: int,
+                 values: NDArray[Any]) -> NDArray[Any]:
     """
     Return a mask or depth, (H, W), turned as its photo of `width` x `height` was read.
 
@@ -144,7 +146,7 @@ def _with_depth(view: PhotoView, path: Path | None, posed: PosedPhoto) -> PhotoV
     height, width = view.image.shape[:2]
     try:
         return replace(view, depth=read_depth(
-            path, width, height, lambda stored: _turned_back(stored, posed, width, height)))
+            path, width, height, partial(_turned_back, posed, width, height)))
     except DataError as error:
         return replace(view, depth_refusal=str(error))
 
@@ -164,7 +166,9 @@ def _masks_by_stem(folder: Path | None) -> dict[str, Path]:
             for path in sorted(folder.iterdir()) if path.suffix.lower() in ENDINGS}
 
 
-def _mask(path: Path, width: int, height: int, posed: PosedPhoto) -> NDArray[np.bool_]:
+def _mask(path: Path, width: int, height: int,
+          turned: Callable[[NDArray[Any]], NDArray[Any]] = lambda stored: stored
+          ) -> NDArray[np.bool_]:
     try:
         with opened(path) as image:
             alpha = image.getchannel('A') if image.mode in ('RGBA', 'LA') else None
@@ -173,7 +177,7 @@ def _mask(path: Path, width: int, height: int, posed: PosedPhoto) -> NDArray[np.
             grey = np.asarray(alpha, np.float32)
     except DataError as error:
         raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
-    grey = _turned_back(grey, posed, width, height)
+    grey = turned(grey)
     if abs(grey.shape[1] * height - width * grey.shape[0]) > 0.01 * width * grey.shape[0]:
         raise DataError(f'{path}: no mask of the right size: expected {width} x {height} pixels '
                         f'or the same shape, got {grey.shape[1]} x {grey.shape[0]}')

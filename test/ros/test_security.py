@@ -23,6 +23,7 @@ NODES = {path.name for path in (ROOT / 'scripts').iterdir()
          if path.name not in ('active-recon', 'composed')}
 
 
+@pytest.mark.slow
 def test_the_policies_name_what_the_live_nodes_have_and_no_more():
     done = subprocess.run(
         [sys.executable, 'security/generate.py', '--check'], cwd=ROOT, text=True,

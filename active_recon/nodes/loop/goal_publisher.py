@@ -38,11 +38,15 @@ class GoalPublisher:
 
     @property
     def open_for(self) -> float:
-        """Seconds for which the goal has been open, by the node's clock; NaN if none is."""
+        """
+        Seconds for which the goal has been open, by the node's clock; NaN if none is.
+
+        A goal from before a simulation's clock began is open since it began.
+        """
         if self.camera is None:
             return math.nan
         now = self._node.get_clock().now().nanoseconds
-        self._since = self._since or now  # open before a simulation's clock began
+        self._since = self._since or now
         return (now - self._since) / 1e9
 
     def publish(self, goal: Goal, begin: int) -> None:
