@@ -53,8 +53,7 @@ def find_roots(named: Sequence[str]) -> list[Place]:
     found: set[Place] = set()
     for text in named:
         place = place_of(text)
-        exists = place.exists()
-        matches = _matches(place) if not exists and has_magic(str(place)) else [place] * exists
+        matches = [place] if place.exists() else _matches(place) if has_magic(str(place)) else []
         if not matches:  # what is gone of those that match is refused by itself
             raise DataError(f'{text}: no bags there: expected a bag, a folder of bags, or a '
                             'pattern that matches some')

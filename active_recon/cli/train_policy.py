@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from active_recon.models.view_scorer import ViewScorer
     from active_recon.training.gain_files import Collecting
     from active_recon.training.looked import LookedStates
-    from active_recon.training.scorer import ScorerTraining
 
 
 def train_policy(
@@ -110,15 +109,18 @@ def train_policy(
     warn_of_shared_objects(trained, tested, 'the expected gains are biased')
     scorer = begun
     told: list[dict[str, Any]] = []
+    # What the views that gains are measured after were chosen by
+    chosen_by: dict[str, Any] = {'begun_with': state_hash(begun) if begun else ''}
     for number in range(1, rounds + 1):
         with workers_of(cluster, workers) as crew:
             source = _Source(entrant, collecting, config.patches, reachable(out, cluster), crew,
-                             counts, training, state_hash(begun) if begun else '')
+                             counts, chosen_by)
             learned += source.states(data, number, scorer)
             held_out += source.states(validation, number, scorer)
         train, test = joined(learned), joined(held_out)
         with progress_bar(f'training, round {number}', epochs) as advance:
             scorer = train_scorer(train, config, training, partial(advance, 1), begun)
+        chosen_by['training'] = training.to_dict()
         calibrate(scorer, test)
         shares = gap_shares(scorer, test)
         told.append({'train_states': sum(map(len, train)),
@@ -139,16 +141,10 @@ class _Source:
     """Where states come from; `counts` gets the number of objects of each folder and round."""
 
     def __init__(self, entrant: 'Entrant', collecting: 'Collecting', patches: int, out: Path,
-                 crew: 'Crew', counts: dict[str, int], training: 'ScorerTraining',
-                 begun_with: str) -> None:
+                 crew: 'Crew', counts: dict[str, int], chosen_by: dict[str, Any]) -> None:
         self._entrant, self._collecting, self._patches = entrant, collecting, patches
         self._out, self._crew, self._counts = out, crew, counts
-        self._training, self._begun_with = training, begun_with
-
-    def _chosen_by(self, number: int) -> dict[str, Any]:
-        """Return what the choice of the views of a round depends on."""
-        return {'begun_with': self._begun_with,
-                **({'training': self._training.to_dict()} if number > 1 else {})}
+        self._chosen_by = chosen_by
 
     def states(self, folders: list[Path], number: int,
                scorer: 'ViewScorer | None') -> list['LookedStates']:
@@ -166,7 +162,7 @@ class _Source:
             drawn = drawn_objects(folder.absolute(), self._collecting.objects, number)
             with progress_bar(f'gains of {folder}, round {number}', len(drawn)) as advance:
                 files = collect_gains(drawn, self._entrant, self._collecting, kept, policy,
-                                      advance, self._crew, self._chosen_by(number))
+                                      advance, self._crew, self._chosen_by)
             self._counts[f'{folder}, round {number}'] = len(files)
             found += [looked_states(ViewGains.load(file), self._patches) for file in files]
         return found

@@ -134,10 +134,15 @@ def _turned_back(posed: PosedPhoto, width: int, height: int,
     It belongs to the photo as EXIF turns it, unless only the photo as stored has its shape.
     """
     turns = 0 if posed.upright else _QUARTER_TURNS.get(posed.photo.orientation, 0)
-    rows, columns = values.shape
-    if turns % 2 and abs(rows * height - width * columns) > 0.01 * width * columns:
+    if turns % 2 and not _has_shape(values, height, width):
         return values
     return np.rot90(values, turns)
+
+
+def _has_shape(values: NDArray[Any], width: int, height: int) -> bool:
+    """Return whether values, (H, W), are as high for their width as a photo of that size."""
+    rows, columns = values.shape
+    return bool(abs(columns * height - width * rows) <= 0.01 * width * rows)
 
 
 def _with_depth(view: PhotoView, path: Path | None, posed: PosedPhoto) -> PhotoView:
@@ -178,7 +183,7 @@ def _mask(path: Path, width: int, height: int,
     except DataError as error:
         raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
     grey = turned(grey)
-    if abs(grey.shape[1] * height - width * grey.shape[0]) > 0.01 * width * grey.shape[0]:
+    if not _has_shape(grey, width, height):
         raise DataError(f'{path}: no mask of the right size: expected {width} x {height} pixels '
                         f'or the same shape, got {grey.shape[1]} x {grey.shape[0]}')
     full = next((most for most in _FULL if grey.max() <= most), _FULL[-1])

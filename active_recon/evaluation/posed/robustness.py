@@ -11,7 +11,7 @@ from active_recon.evaluation.posed.measuring import orders_of, Plan, targets_of
 from active_recon.evaluation.posed.scene import Scene
 from active_recon.evaluation.posed.scoring import iou_scores, pooled, Scores, Target
 from active_recon.evaluation.posed.walking import some_objects, walk
-from active_recon.evaluation.rollouts import Observer
+from active_recon.evaluation.rollouts import batches, Observer
 from active_recon.evaluation.subsets import drawn_over_categories
 from active_recon.geometry.cameras import TURN
 from active_recon.geometry.view_distance import pose_directions
@@ -67,9 +67,9 @@ def disturbances(scene: Scene, entrant: Entrant, plan: Plan, count: int, most: i
     if shown is None:
         return
     orders = orders_of(scene, replace(plan, counts=(min(count, scene.view_count),)))['random'][0]
-    some = drawn_over_categories(scene.views.categories, most, plan.seed)
-    for begin in range(0, len(some), _BATCH):
-        rows = torch.from_numpy(some[begin:begin + _BATCH])
+    some = torch.from_numpy(drawn_over_categories(scene.views.categories, most, plan.seed))
+    for part in batches(len(some), _BATCH):
+        rows = some[part]
         block = Block(some_objects(shown, rows), targets_of(scene, rows, surface=False),
                       orders[rows.numpy()])
         for kind in (_turned, _off, _cut, _bands):
