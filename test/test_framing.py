@@ -84,7 +84,7 @@ def test_a_camera_that_looks_away_or_past_is_refused(camera):
 
 @pytest.mark.parametrize('camera', [
     Camera(np.eye(4)), orbit_camera(0.0, 0.5, 1e-3), aimed(distance=0.7, turn_deg=(0, 90, 0)),
-    orbit_camera(0.0, 0.0, 0.5)])
+    orbit_camera(0.0, 0.0, 0.5), orbit_camera(math.pi / 4, math.atan(0.5**0.5), 0.9)])
 def test_a_camera_in_the_cube_or_beside_it_is_refused(camera):
     assert "camera in the object's cube or beside it: expected a distance" in refusal(camera)
 

@@ -10,6 +10,8 @@ TOLERATED_OUTSIDE = 0.02
 """Fraction of the cube's silhouette that may be outside of the image, since poses are inexact."""
 _FEWEST_PIXELS = 4
 """Width of the cube's silhouette below which an image shows nothing of the object."""
+_NEAREST = 0.05
+"""Sides of the cube that a camera has to be in front of its nearest corner, to see it framed."""
 _ALONG = np.linspace(-0.5, 0.5, 9)  # points along an edge, which a lens distorts
 
 
@@ -27,10 +29,11 @@ def require_in_image(camera: Camera, object_size: float,
         raise ViewError('camera looks away from the object: expected one that looks at it; check '
                         'that the pose is that of the optical frame (z forward, y down)',
                         'out_of_image')
-    # Networks get the image of a camera that is aimed at the cube's centre: it is in front of that
+    # Networks get the image of a camera that is aimed at the cube's centre, where the object is
+    # too small if a corner is nearly at the camera
     aimed = 0.0 if camera.distance == 0 else (
         camera.distance - float((_EDGES @ camera.direction).max()) * object_size)
-    if min(float(depth.min()), aimed) <= at_plane:
+    if depth.min() <= at_plane or aimed < _NEAREST * object_size:
         raise ViewError(
             "camera in the object's cube or beside it: expected a distance at which the whole "
             f'cube of {object_size:g} m is in front of the camera, got {camera.distance:.3g} m; '
