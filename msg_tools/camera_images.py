@@ -82,7 +82,7 @@ def _open(msg: CompressedImage) -> PIL.Image.Image:
         raise _decoding_error(msg, str(error)) from error
     if image.width * image.height > MAX_PIXELS:
         raise MessageError(f'image too large: expected at most {MAX_PIXELS} pixels, got '
-                           f'{image.height} x {image.width}', 'image_size')
+                           f'{image.width} x {image.height}', 'image_size')
     return image
 
 

@@ -32,15 +32,15 @@ def intrinsics_from_msg(msg: CameraInfo) -> Intrinsics:
     fx, cx, fy, cy = (float(msg.k[index]) for index in (0, 2, 4, 5))
     if msg.width == 0 or msg.height == 0:
         raise MessageError('invalid camera info: expected an image size above 0, '
-                           f'got {msg.height} x {msg.width}', 'camera_info')
+                           f'got {msg.width} x {msg.height}', 'camera_info')
     if not _sensible(fx, fy, cx, cy) or fx <= 0 or fy <= 0:
         raise MessageError('uncalibrated camera info: expected finite focal lengths above 0, '
                            f'got fx {fx}, fy {fy}, cx {cx}, cy {cy}', 'camera_info')
     left, top, width, height = _region(msg)
     across, down = max(int(msg.binning_x), 1), max(int(msg.binning_y), 1)
     if width < across or height < down:
-        raise MessageError(f'invalid binning: expected at most {height} x {width}, got '
-                           f'binning_y {down}, binning_x {across}', 'camera_info')
+        raise MessageError(f'invalid binning: expected at most {width} x {height}, got '
+                           f'binning_x {across}, binning_y {down}', 'camera_info')
     return Intrinsics(fx / across, fy / down, (cx + 0.5 - left) / across, (cy + 0.5 - top) / down,
                       width // across, height // down, _distortion(msg))
 
@@ -66,8 +66,8 @@ def _region(msg: CameraInfo) -> tuple[int, int, int, int]:
     height = int(roi.height) or int(msg.height) - top
     if min(width, height) <= 0 or left + width > msg.width or top + height > msg.height:
         raise MessageError(
-            f'invalid region of interest: expected one within {msg.height} x {msg.width}, got '
-            f'{roi.height} x {roi.width} at {top}, {left}', 'camera_info')
+            f'invalid region of interest: expected one within {msg.width} x {msg.height}, got '
+            f'{roi.width} x {roi.height} at {left}, {top}', 'camera_info')
     return left, top, width, height
 
 

@@ -153,14 +153,14 @@ def _layout(msg: Image) -> tuple[np.dtype[Any], int]:
 
 def _check_size(msg: Image, dtype: np.dtype[Any], channels: int) -> None:
     if msg.height == 0 or msg.width == 0:
-        raise MessageError('empty image: expected a height and a width above 0, '
-                           f'got {msg.height} x {msg.width}', 'image_size')
+        raise MessageError('empty image: expected a width and a height above 0, '
+                           f'got {msg.width} x {msg.height}', 'image_size')
     if (dtype, channels) == (_BYTE, 2) and msg.width % 2:  # YUV: two pixels share their colours
         raise MessageError(f'invalid image width: expected an even one for {msg.encoding}, got '
                            f'{msg.width}', 'image_size')
     if msg.encoding.startswith('bayer_') and min(msg.height, msg.width) < _LEAST_BAYER:
         raise MessageError(f'image too small: expected {_LEAST_BAYER} pixels a side or more for '
-                           f'{msg.encoding}, got {msg.height} x {msg.width}', 'image_size')
+                           f'{msg.encoding}, got {msg.width} x {msg.height}', 'image_size')
     row = msg.width * channels * dtype.itemsize
     if msg.step < row:
         raise MessageError(f'invalid image rows: expected at least {row} bytes for {msg.width} '

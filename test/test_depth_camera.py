@@ -179,7 +179,7 @@ def test_depth_with_a_camera_of_its_own_is_of_that_one_s_size():
 
 
 @pytest.mark.parametrize(('metres', 'said'), [
-    (BALL[:100] * SIZE, 'wrong depth image: expected 128 x 128 pixels.*got 100 x 128'),
+    (BALL[:100] * SIZE, 'wrong depth image: expected 128 x 128 pixels.*got 128 x 100'),
     (BALL * 0, 'empty depth image'),
     (np.full_like(BALL, math.nan), 'empty depth image'),
     (-BALL, 'empty depth image'),

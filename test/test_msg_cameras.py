@@ -132,7 +132,7 @@ def test_a_region_that_says_no_size_and_binning_of_0_or_1_are_the_whole_image():
 
 
 @pytest.mark.parametrize(('info', 'said'), [
-    (cropped(RegionOfInterest(x_offset=600, width=100, height=10)), 'region.*480 x 640.*10 x 100'),
+    (cropped(RegionOfInterest(x_offset=600, width=100, height=10)), 'region.*640 x 480.*100 x 10'),
     (cropped(RegionOfInterest(x_offset=2**32 - 1, y_offset=2**32 - 1)), 'region of interest'),
     (cropped(RegionOfInterest(width=2**32 - 1, height=2**32 - 1)), 'region of interest'),
     (cropped(RegionOfInterest(), (2**32 - 1, 1)), 'binning_x 4294967295')])

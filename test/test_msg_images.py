@@ -148,7 +148,7 @@ FLOAT = np.full((2, 2, 3), 0.5, np.float32)
     (short(message(RGB, 'rgb8')), 'image_bytes', 'expected 72 bytes.*got 71'),
     (message(RGB[..., :1], 'rgb8'), 'image_bytes', 'at least 18 bytes.*step of 6'),
     (message(RGB[:, :5, :2], 'yuyv'), 'image_size', 'even one for yuyv, got 5'),
-    (message(RGB[:2, :, :1], 'bayer_rggb8'), 'image_size', '3 pixels a side.*got 2 x 6'),
+    (message(RGB[:2, :, :1], 'bayer_rggb8'), 'image_size', '3 pixels a side.*got 6 x 2'),
     (message(FLOAT * np.nan, '32FC3'), 'image_values', r'in \[0, 1\], got nan to nan'),
     (message(FLOAT * 4, '32FC3'), 'image_values', 'got 2.0 to 2.0'),
     (message(-FLOAT, '32FC3'), 'image_values', 'got -0.5 to -0.5')])

@@ -62,10 +62,10 @@ def usable_depth(image: DepthImage, view: Camera,
     camera = image.camera or view
     lens, metres = camera.intrinsics, image.metres
     if metres.shape != (lens.height, lens.width):
-        raise ViewError(f'wrong depth image: expected {lens.height} x {lens.width} pixels, as its '
+        raise ViewError(f'wrong depth image: expected {lens.width} x {lens.height} pixels, as its '
                         'camera says, got '
-                        f'{" x ".join(map(str, metres.shape)) or "a number"}; register it to the '
-                        'image, or give its own camera', 'depth')
+                        f'{" x ".join(map(str, metres.shape[::-1])) or "a number"}; register it '
+                        'to the image, or give its own camera', 'depth')
     depth = np.where(_has_value(metres), metres, 0).astype(np.float32) / np.float32(object_size)
     placed = camera.scaled(1 / object_size)
     _require_fitting(depth, placed, object_size)

@@ -112,7 +112,7 @@ def image_without_a_stamp(camera):
 
 
 @pytest.mark.parametrize(('spoil', 'kind', 'said'), [
-    (image_of_no_size, 'image_size', 'height and a width above 0, got 0 x 0'),
+    (image_of_no_size, 'image_size', 'width and a height above 0, got 0 x 0'),
     (image_of_unknown_encoding, 'encoding', "expected one of rgb8.*, got 'yuv9'"),
     (image_of_too_few_bytes, 'image_bytes', 'expected 56307 bytes.*, got 1000'),
     (image_of_nan, 'image_values', r'out of range: expected 32FC3 in \[0, 1\], got nan'),

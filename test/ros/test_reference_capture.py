@@ -33,7 +33,7 @@ def test_an_image_from_before_the_call_is_not_taken_and_one_from_after_it_is(
     assert not asked.done() and capture.reference is None
     bench.until(lambda: capture.on_image(bench.now(), lambda: NEW) or asked.done(), 'the answer')
     assert asked.result().success
-    assert asked.result().message == 'captured 4 x 5 pixels'
+    assert asked.result().message == 'captured 5 x 4 pixels'
     assert capture.reference is NEW
     capture.on_image(bench.now(), lambda: OLD)
     assert capture.reference is NEW

@@ -61,5 +61,5 @@ class ReferenceCapture:
             return response
         self.reference = captured
         response.success = True
-        response.message = f'captured {captured.shape[0]} x {captured.shape[1]} pixels'
+        response.message = f'captured {captured.shape[1]} x {captured.shape[0]} pixels'
         return response
