@@ -114,7 +114,7 @@ def test_a_binvox_file_without_a_side_is_refused(tmp_path):
 def test_training_frames_an_image_as_the_robot_does(number):
     """But for what lies beyond the image, which the robot's repeats."""
     renderer = Renderer(make_shape('chair', 3))
-    inside = [camera for camera in DRAWN if share_outside(camera, 1.0) == 0]
+    inside = [camera for camera in DRAWN if share_outside(camera, 1.1) == 0]
     camera = inside[number]
     rgba = renderer.render(camera)
     robot, robot_camera = framed_image(composite(rgba, 0), camera, 1.0, 128)
@@ -140,6 +140,13 @@ def test_where_the_image_ends_nothing_is_seen():
     left_end = target.intrinsics.cx - 30 / 150 * target.intrinsics.fx
     np.testing.assert_array_equal(seen.any(axis=0), np.arange(128) + 0.5 > left_end)
     assert not framed[:, 0].any() and (framed[20:108, 100] == 255).all()
+
+
+def test_what_is_behind_the_camera_is_not_seen():
+    camera = orbit_camera(0.0, 0.0, 2.5, Intrinsics(150, 150, 80, 80, 160, 160))
+    away = Camera(camera.pose @ np.diag([1.0, -1, -1, 1]), camera.intrinsics)
+    layers, seen, _ = framed_layers(np.full((160, 160, 4), 255, np.uint8), away, 1.0, 128)
+    assert not layers.any() and not seen.any()
 
 
 def test_the_robot_is_told_where_its_image_ends():

@@ -53,6 +53,14 @@ def uneven(color, side=SIDE):
     return np.clip(np.asarray(color) * light[..., None], 0, 255).astype(np.uint8)
 
 
+@pytest.mark.parametrize('turn', [1, 2])
+def test_an_image_that_was_turned_by_numpy_is_as_any_other(turn):
+    image = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
+    mask = image[..., 0] > 99
+    np.testing.assert_array_equal(on_white(np.rot90(image, turn), np.rot90(mask, turn)),
+                                  np.rot90(on_white(image, mask), turn))
+
+
 @pytest.mark.parametrize('seed', range(2))
 def test_an_object_before_clutter_is_found_by_an_image_of_the_clutter_alone(shown, seed):
     rng = np.random.default_rng(seed)

@@ -1,6 +1,7 @@
 """What a calibration reads beside its images: their order, angles and poses."""
 
 import math
+import unicodedata
 
 from active_recon.calibration.files import image_paths, read_angles, read_image, read_poses
 from active_recon.errors import DataError
@@ -57,6 +58,12 @@ def test_an_image_is_read_as_the_camera_took_it_whatever_exif_says(tmp_path):
 def test_angles_belong_to_their_images(tmp_path, text):
     angles = read_angles(write(tmp_path / 'angles.csv', text), NAMES)
     assert angles == pytest.approx({'a2.png': math.pi / 4, 'a10.png': math.pi / 2})
+
+
+def test_an_umlaut_of_two_characters_is_that_of_one(tmp_path):
+    written, stored = (unicodedata.normalize(form, 'Schüssel.png') for form in ('NFC', 'NFD'))
+    assert read_angles(write(tmp_path / 'angles.csv', f'{written},180\n'),
+                       [stored]) == {stored: math.pi}
 
 
 @pytest.mark.parametrize(('text', 'said'), [

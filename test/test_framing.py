@@ -55,6 +55,20 @@ def test_an_object_that_goes_out_of_the_image_is_more_and_more_outside():
     assert (shares[0], shares[-1]) == pytest.approx((0, 1))
 
 
+@pytest.mark.parametrize(('azimuth_deg', 'elevation_deg', 'focal'), [(0, 45, 800), (75, 10, 384)])
+def test_so_it_is_on_round_angles_too(azimuth_deg, elevation_deg, focal):
+    """For some of them OpenCV's area of an intersection is wrong."""
+    camera = orbit_camera(math.radians(azimuth_deg), math.radians(elevation_deg), 3.0,
+                          Intrinsics(focal, focal, 320, 240, 640, 480))
+    shares = []
+    for pan_deg in np.arange(0, 56, 0.5):
+        pose = camera.pose.copy()
+        pose[:3, :3] = pose[:3, :3] @ Rotation.from_euler('y', pan_deg, degrees=True).as_matrix()
+        shares.append(share_outside(replace(camera, pose=pose), 1.0))
+    assert (np.diff(shares) > -1e-6).all()
+    assert (shares[0], shares[-1]) == pytest.approx((0, 1))
+
+
 def test_a_part_outside_is_refused_with_its_share_and_what_to_do():
     said = refusal(aimed(turn_deg=(0, 31, 0)))
     assert 'got 43 % of it outside' in said

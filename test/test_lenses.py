@@ -41,6 +41,15 @@ def test_undistortion_inverts_distortion(lens):
     np.testing.assert_allclose(lens.undistort(lens.distort(points())), points(), atol=1e-9)
 
 
+def test_undistortion_ends_where_a_wide_lens_hardly_moves_any_more():
+    # Beyond some 39 degrees the model folds, which its image's corners are near
+    lens = Distortion('plumb_bob', (-0.42, 0.22, -0.001, 0.002, -0.07))
+    x, y = ((np.arange(count) + 0.5 - count / 2) / 330 for count in (640, 480))
+    image = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    apart = np.abs(lens.distort(lens.undistort(image)) - image).max(axis=1)
+    assert apart.max() < 1e-3 and (apart < 1e-6).mean() > 0.999
+
+
 def test_beside_a_nearly_cancelled_pole_hardly_anything_moves():
     # Calibrated for a TurtleBot 4: numerator and denominator nearly share a root, at 0.67
     lens, beyond = Distortion('rational_polynomial', (

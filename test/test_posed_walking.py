@@ -37,6 +37,11 @@ def test_views_of_a_turntable_are_as_many_steps_apart(count, expected):
     np.testing.assert_array_equal(order, [expected])
 
 
+def test_a_turntable_may_turn_clockwise():
+    order = even_orders(ring(24)[None, ::-1], 5, np.array([18]))
+    np.testing.assert_array_equal(order, [[18, 23, 4, 8, 13]])
+
+
 def test_views_from_anywhere_are_each_the_farthest_from_those_before():
     first = np.array([2, 7])
     order = even_orders(np.stack([SCATTERED] * 2), 6, first)

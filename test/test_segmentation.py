@@ -11,6 +11,7 @@ from active_recon.segmentation import FramedShares, Segmentation
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 LENS = Intrinsics(400, 400, 160, 120, 320, 240)
 BENT = Intrinsics(400, 400, 160, 120, 320, 240,
@@ -49,6 +50,19 @@ def test_what_is_framed_and_carried_back_is_the_image_where_the_frame_is(lens):
     inside = cv2.erode(shown[..., 0], np.ones((9, 9))) > 0
     outside = cv2.dilate(shown[..., 0], np.ones((9, 9))) == 0
     assert (back[inside] > 250).all() and (back[outside] < 5).all()
+
+
+def test_nothing_is_carried_behind_the_frame():
+    wide = orbit_camera(0.4, 0.5, 1.5, Intrinsics(31, 31, 160, 120, 320, 240))
+    pose = wide.pose.copy()
+    pose[:3, :3] = pose[:3, :3] @ Rotation.from_euler('yx', (-65, 15), degrees=True).as_matrix()
+    turned = Camera(pose, wide.intrinsics)
+    target = framing_camera(turned, 1.0, 128)
+    back = carried_back(np.ones((128, 128), np.float32), target, turned)
+    pixels, depth = target.project((turned.position + turned.ray_directions()).reshape(-1, 3))
+    there = (depth > 0) & (pixels > 0).all(axis=1) & (pixels < 128).all(axis=1)
+    assert (depth < 0).any() and 0 < there.mean() < 0.5
+    assert np.abs(back.ravel() - there).mean() < 0.005
 
 
 def test_a_lens_whose_distortion_is_nothing_is_a_pinhole():

@@ -127,6 +127,15 @@ def test_a_run_with_overrides_says_so_and_replays_to_the_same_bits(
                    0.12).verdict == SAME_BITS
 
 
+def test_other_weights_are_computed_as_they_can_be_and_not_as_those_of_the_recording(
+        sweep, weights):
+    run = replace(run_of([sweep]), provenance={
+        'weights_sha256': weights_hash(weights[0]),
+        'computed_by': 'openvino 2026.4, bf16, a CPU, 2 threads'})
+    assert recorded_setup(run, weights[0]).precision == 'bf16'
+    assert recorded_setup(run, weights[1], any_weights=True).precision == 'auto'
+
+
 def test_the_views_of_several_episodes_stay_apart_and_one_without_views_stays_so(
         weights, sweep, tmp_path):
     soon = replace(sweep, id='soon', begin=2 * SECOND)  # its views are a second apart

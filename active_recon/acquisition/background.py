@@ -117,7 +117,7 @@ def on_white(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.ui
     if not mask.any():
         raise ViewError('empty mask: expected a mask with an object, got one that is all '
                         'background', 'no_object')
-    white = np.full_like(image, 255)
+    white = np.full(image.shape, 255, np.uint8)  # OpenCV writes into no other layout
     return np.asarray(cv2.copyTo(image, mask.view(np.uint8), white), np.uint8)
 
 

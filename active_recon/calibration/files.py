@@ -5,6 +5,7 @@ from pathlib import Path
 import re
 
 from active_recon.errors import DataError
+from active_recon.file_names import comparable
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -99,9 +100,9 @@ def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
             raise DataError(f'{path}, line {number}: wrong row: expected {count} numbers, or an '
                             f'image and {count} numbers, got {", ".join(row)}')
         if len(row) > count:
-            if (name := Path(row[0]).name) in named:
-                raise DataError(f'{path}, line {number}: a second row for {name}: expected one '
-                                'for each image')
+            if (name := comparable(Path(row[0]).name)) in named:
+                raise DataError(f'{path}, line {number}: a second row for {Path(row[0]).name}: '
+                                'expected one for each image')
             named[name] = values
         else:
             unnamed.append(values)
@@ -109,11 +110,12 @@ def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
         raise DataError(f'{path}: rows do not match the images: expected one for each of the '
                         f'{len(names)} images, or rows that begin with their names, got '
                         f'{len(unnamed)} without a name')
-    found = dict(zip(names, unnamed, strict=True)) if unnamed else named
-    if missing := [name for name in names if name not in found]:
+    if unnamed:
+        return dict(zip(names, unnamed, strict=True))
+    if missing := [name for name in names if comparable(name) not in named]:
         raise DataError(f'{path}: rows missing: expected one for every image, found none for '
                         f'{", ".join(missing)}')
-    return {name: found[name] for name in names}
+    return {name: named[comparable(name)] for name in names}
 
 
 def _numbers(cells: list[str]) -> list[float] | None:

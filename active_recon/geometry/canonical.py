@@ -13,6 +13,7 @@ from active_recon.geometry.cameras import (
 )
 from active_recon.geometry.framing import cube_corners, require_in_image
 from active_recon.geometry.resampling import (
+    is_ahead,
     opencv_turn,
     reduction,
     SAMPLE_EVERY,
@@ -121,7 +122,8 @@ def framed_layers(
     """
     target = framing_camera(camera, object_size, image_size)
     lens, size = camera.intrinsics, (image_size, image_size)
-    if lens.distortion is None and lens.fx < SAMPLE_EVERY * target.intrinsics.fx:
+    if lens.distortion is None and is_ahead(target, camera) and (
+            lens.fx < SAMPLE_EVERY * target.intrinsics.fx):
         to_source = opencv_turn(camera, target)
         whole = np.full(layers.shape[:2], 255, np.uint8)
         carried, there = (cv2.warpPerspective(each, to_source, size,

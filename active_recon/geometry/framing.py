@@ -64,12 +64,29 @@ def share_outside(camera: Camera, object_size: float) -> float:
     # In units of the image's sides, because float32 is too coarse for large images in pixels
     silhouette = cv2.convexHull(
         (seen / [camera.intrinsics.width, camera.intrinsics.height]).astype(np.float32))
-    image = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
     whole = cv2.contourArea(silhouette)
     if whole == 0:  # so far away that it is a single point
         return 1.0
-    inside, _ = cv2.intersectConvexConvex(silhouette, image)
+    inside = cv2.contourArea(
+        _in_unit_square(silhouette[:, 0].astype(np.float64)).astype(np.float32))
     return float(np.clip(1 - inside / whole, 0, 1))
+
+
+def _in_unit_square(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    Return the part of a convex polygon, corners (N, 2), that is in the unit square, (M, 2).
+
+    It is clipped at one side after the other (Sutherland and Hodgman, Reentrant polygon clipping,
+    1974); of some polygons outside OpenCV's intersectConvexConvex says that they are inside.
+    """
+    for axis, end, inwards in ((0, 0, 1), (0, 1, -1), (1, 0, 1), (1, 1, -1)):
+        within = inwards * (corners[:, axis] - end)
+        before, within_before = np.roll(corners, 1, axis=0), np.roll(within, 1)
+        crosses = (within >= 0) != (within_before >= 0)
+        share = within_before / np.where(crosses, within_before - within, 1)
+        cuts = before + share[:, None] * (corners - before)
+        corners = np.stack([cuts, corners], 1)[np.stack([crosses, within >= 0], 1)]
+    return corners
 
 
 def cube_corners() -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ MODELS = {'plumb_bob': (4, 5), 'rational_polynomial': (8, 12), 'equidistant': (4
 """The allowed numbers of coefficients of each model, in OpenCV's order: k1, k2, p1, p2, k3, ..."""
 _LARGEST = 1e6  # larger than in any lens, and its sixth power does not overflow
 _STEP = 1e-6
+_HALVINGS = 6  # of a step of Newton's that leads away
 _STEEPEST = 3.0  # of any lens: beyond, a model is beside a pole, as fits of 8 coefficients have
 _WITHIN = 0.9999  # at the maximum radius itself a model may divide by 0
 
@@ -74,9 +75,16 @@ class Distortion:
             across, down = ((self.distort(near + step) - self.distort(near - step)) / (2 * _STEP)
                             for step in np.eye(2) * _STEP)
             determinant = across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0]
-            found[open_ones] -= np.column_stack([
+            step = np.column_stack([
                 wrong[:, 0] * down[:, 1] - wrong[:, 1] * down[:, 0],
                 wrong[:, 1] * across[:, 0] - wrong[:, 0] * across[:, 1]]) / determinant[:, None]
+            for _ in range(_HALVINGS):  # near its fold the model is flat, and steps are long
+                left = self.distort(near - step) - points[open_ones]
+                away = np.linalg.norm(left, axis=1) > np.linalg.norm(wrong, axis=1)
+                if not away.any():
+                    break
+                step[away] /= 2
+            found[open_ones] = near - step
             open_ones = open_ones[np.abs(wrong).max(axis=1) > 1e-6]  # their last step was enough
             if not len(open_ones):
                 break

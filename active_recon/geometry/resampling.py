@@ -101,7 +101,7 @@ def carried_back(framed: NDArray[np.float32], target: Camera,
     It is 0 outside of the target's image.
     """
     lens = camera.intrinsics
-    if lens.distortion is None:
+    if lens.distortion is None and is_ahead(camera, target):
         return np.asarray(cv2.warpPerspective(framed, opencv_turn(camera, target),
                                               (lens.width, lens.height)))
     by = max(1.0, max(lens.width, lens.height) / _CARRIED_SIDE)
@@ -167,6 +167,17 @@ def turn_between(camera: Camera, target: Camera) -> NDArray[np.float64]:
     """Return the homography, (3, 3), from the target's pixels to those of a camera beside it."""
     return np.asarray(camera.intrinsics.matrix @ camera.pose[:3, :3].T @ target.pose[:3, :3]
                       @ np.linalg.inv(target.intrinsics.matrix))
+
+
+def is_ahead(shown: Camera, camera: Camera) -> bool:
+    """
+    Return whether all rays of one camera's image go ahead of another at the same position.
+
+    Behind it `opencv_turn` would show what is ahead, mirrored.
+    """
+    width, height = shown.intrinsics.width, shown.intrinsics.height
+    ends = np.array([[0, width, 0, width], [0, 0, height, height], [1, 1, 1, 1]])
+    return bool((opencv_turn(camera, shown)[2] @ ends).min() > 0)
 
 
 def opencv_turn(camera: Camera, target: Camera) -> NDArray[np.float64]:

@@ -6,9 +6,9 @@ from pathlib import Path, PurePosixPath
 
 from active_recon.calibration.board import Board
 from active_recon.errors import DataError, ViewError
+from active_recon.file_names import comparable
 from active_recon.geometry.cameras import Intrinsics
 from active_recon.photos.files import PhotoFile
-from active_recon.photos.names import comparable
 import numpy as np
 from numpy.typing import NDArray
 

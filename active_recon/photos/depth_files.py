@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import DataError
-from active_recon.photos.names import comparable
+from active_recon.file_names import comparable
 from active_recon.volumes.depth_images import MM_PER_METRE
 import cv2
 import numpy as np

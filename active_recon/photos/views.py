@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import DataError
+from active_recon.file_names import comparable
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.photos.camera_file import PosedPhoto
 from active_recon.photos.depth_files import depth_files, read_depth
 from active_recon.photos.files import ENDINGS, read_photo
 from active_recon.photos.large_images import opened
-from active_recon.photos.names import comparable
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -31,7 +31,8 @@ class Arrivals:
 
     def __init__(self, folder: Path) -> None:
         if not folder.is_dir():
-            raise DataError(f'{folder}: no such folder: expected one where photos will arrive',
+            raise DataError(f'{folder}: no such folder: expected one where photos will '
+                            'arrive; mkdir makes it',
                             'no_photos')
         self._folder = folder
         self.away = ''

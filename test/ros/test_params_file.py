@@ -155,7 +155,7 @@ def test_a_node_asked_for_help_lists_its_parameters_and_ends(node):
                            cwd=ROOT, capture_output=True, text=True, timeout=600)
     assert asked.returncode == 0 and not asked.stderr
     lines = asked.stdout.splitlines()
-    assert lines[0].startswith(f'usage: {node} ')
+    assert lines[0].startswith(f'usage: {node} ') and lines[2]
     assert max(map(len, lines)) <= 80
     for each in declared(NODE_PARAMETERS[node]):
         assert any(line.startswith(f'  {each.name} (default: ') for line in lines)

@@ -30,6 +30,13 @@ def test_rviz_finds_what_is_latched_and_asks_a_stream_for_no_more_than_it_has(na
     assert topic['Reliability Policy'] == ('Best Effort' if streamed else 'Reliable')
 
 
+def test_boxes_are_as_wide_as_the_cells_of_the_default_network():
+    boxes = [display['Size (m)'] for display in CONFIG['Displays']
+             if display.get('Style') == 'Boxes']
+    assert len(boxes) == 2
+    assert all(0.9 / 64 < size <= 1 / 64 for size in boxes)
+
+
 def test_rviz_stands_in_the_objects_frame_and_needs_no_other():
     assert CONFIG['Global Options']['Fixed Frame'] == OBJECT_FRAME
     assert not [display for display in CONFIG['Displays'] if display['Class'].endswith('/TF')]

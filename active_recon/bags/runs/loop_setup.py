@@ -119,9 +119,11 @@ def recorded_setup(run: RecordedRun, weights: Path | None = None, any_weights: b
         own = of_planner.get('weights', '')
         same = own == of_reconstructor.get('weights', '')
         planner['weights'] = found if same else find_weights(own or None)
+    precision = _precision(run, of_reconstructor)
+    if weights and any_weights and precision != 'f32':
+        precision = 'auto'  # other weights need not be exported, and torch computes in f32 alone
     return LoopSetup(found, _given(of_reconstructor, _OF_RECONSTRUCTOR), planner,
-                    of_reconstructor.get('threads', 1), _runtime(of_reconstructor),
-                    _precision(run, of_reconstructor))
+                    of_reconstructor.get('threads', 1), _runtime(of_reconstructor), precision)
 
 
 def _precision(run: RecordedRun, parameters: Mapping[str, Any]) -> str:

@@ -51,7 +51,7 @@ def even_orders(directions: NDArray[np.float64], count: int, first: NDArray[np.i
     objects, views = directions.shape[:2]
     azimuths = np.arctan2(directions[..., 1], directions[..., 0])
     steps = np.diff(azimuths, axis=1, append=azimuths[:, :1]) % TURN
-    if np.abs(steps - TURN / views).max(initial=0) < _EVEN:
+    if min(np.abs(way * steps % TURN - TURN / views).max(initial=0) for way in (1, -1)) < _EVEN:
         steps_apart = np.round(np.arange(count) * views / count).astype(np.int64)
         return np.asarray((first[:, None] + steps_apart) % views)
     rows, order = np.arange(objects), first[:, None]

@@ -20,7 +20,7 @@ def usage(node: str) -> str:
     # All nodes' parameters, and all policies with them: only who asks waits for them
     from active_recon.parameters.node_parameters import NODE_PARAMETERS
 
-    about = (import_module(f'active_recon.nodes.{node}').__doc__ or '').partition('\n')[0]
+    about = (import_module(f'active_recon.nodes.{node}').__doc__ or '').strip().partition('\n')[0]
     lines = [
         f'usage: {node} [--ros-args [-p NAME:=VALUE] [-r OLD:=NEW] ...]',
         '', *textwrap.wrap(about, _WIDTH), '', 'parameters:']
