@@ -18,7 +18,7 @@ from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import safe_open, SafetensorError
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 
 SUFFIX = '.state.safetensors'
 _FORMAT = '1'
@@ -68,9 +68,10 @@ def write_state(saved: SavedState, reconstructor: Reconstructor, path: Path) -> 
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as unfinished:
         try:
-            save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()},
-                      unfinished, facts)
-        except SafetensorError as error:  # where the disk is full, too: it is no OSError
+            # Not by `save_file`: what it writes only its owner can read
+            unfinished.write_bytes(save(
+                {name: np.ascontiguousarray(array) for name, array in arrays.items()}, facts))
+        except (OSError, SafetensorError) as error:
             raise DataError(str(error)) from error
 
 

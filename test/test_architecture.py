@@ -12,8 +12,8 @@ PACKAGES = ('active_recon', 'msg_tools')
 # A subpackage imports itself and what stands in the rows above its own
 ROWS: tuple[set[str], ...] = (
     {'errors'},
-    {'config', 'freed_memory', 'geometry', 'interrupts', 'objects', 'plugins', 'reporting',
-     'view_colors', 'whole_files'},
+    {'config', 'file_names', 'freed_memory', 'geometry', 'interrupts', 'objects', 'plugins',
+     'reporting', 'view_colors', 'whole_files'},
     {'cluster', 'volumes'},
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},

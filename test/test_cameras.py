@@ -14,6 +14,7 @@ from active_recon.geometry.cameras import (
     orbit_camera,
     pose_azimuths,
     TURN,
+    whole_degrees,
     wrap_azimuth,
 )
 from active_recon.geometry.lenses import Distortion
@@ -42,6 +43,12 @@ def test_azimuths_of_poses_are_those_of_their_cameras_in_the_turn():
     assert (found < TURN).all()
     np.testing.assert_allclose(
         azimuth_difference(found, [camera.azimuth for camera in cameras]), 0, atol=1e-15)
+
+
+@pytest.mark.parametrize(('azimuth_deg', 'told'), [
+    (0, 0), (-0.3, 0), (359.7, 0), (0.6, 1), (-90, 270), (720, 0)])
+def test_whole_degrees_are_those_of_one_turn(azimuth_deg, told):
+    assert whole_degrees(math.radians(azimuth_deg)) == told
 
 
 def test_a_difference_of_azimuths_goes_the_short_way_round():

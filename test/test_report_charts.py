@@ -44,6 +44,14 @@ def test_curves_are_what_was_recorded_and_have_holes_where_nothing_was(subject):
     assert all(0 < value < 1 for value in curve['y'])
 
 
+def test_one_view_alone_is_drawn_on_an_axis_that_can_be_read(subject):
+    run = changed(subject.run, views=subject.views[:1])
+    for draw in (entropy_chart, iou_chart):
+        alone = draw([Subject('A', run, run.episodes[0], subject.truth)])['layout']['yaxis']
+        several = draw([subject])['layout']['yaxis']
+        assert (alone['rangemode'], several.get('rangemode')) == ('tozero', None)
+
+
 def test_runs_side_by_side_have_a_curve_each_under_their_letter(subject):
     other = replace(subject, letter='B')
     curves = entropy_chart([subject, other])['data']

@@ -170,8 +170,9 @@ def test_a_page_of_photos_says_what_they_are_and_tells_of_no_planner(run, page):
     assert 'This run was made of 5 photos with known cameras.' in told
     assert 'An object, rebuilt from 5 views' in told
     assert 'It ended with the last photo.' in told
-    for word in ('planner', 'goals', 'stopped'):
+    for word in ('planner', 'goals', 'stopped', 'receive times'):
         assert word not in told
+    assert 'Not recorded: the bag is without the loop’s times.' in told
     assert 'This run was made of 1 photo with a known camera.' in Elements(
         page_of(of_photos(run, 1))).text
     other = Elements(page).text
@@ -186,6 +187,16 @@ def test_a_page_of_several_runs_tells_which_of_them_are_of_photos(run):
     mixed = Elements(page_of(run, photos, photos)).text
     assert 'Each letter below is one such run, but B, C were made of photos' in mixed
     assert 'Each letter below is one such run.' in Elements(page_of(run, run)).text
+
+
+def test_a_page_of_a_sweep_tells_of_no_planner_that_chose_or_stopped(run):
+    views = [replace(view, goal=None) for view in run.episodes[0].views]
+    sweep = changed(run, views=views, first_goal=None, done='')
+    told = Elements(page_of(sweep)).text
+    assert 'No planner was recorded' in told
+    assert 'a planner chose' not in told
+    compared = Elements(page_of(run, sweep)).text
+    assert 'no planner' in compared and 'no end recorded' not in compared
 
 
 def test_bag_with_hardly_anything_in_it_still_gives_a_page(run):

@@ -126,6 +126,13 @@ def test_a_file_that_is_not_there_is_refused(reconstructor, tmp_path):
         read_state(tmp_path / 'none', reconstructor)
 
 
+def test_a_state_may_be_read_by_whoever_may_read_a_new_file(reconstructor, tmp_path):
+    write_state(episode(reconstructor, 1), reconstructor, tmp_path / 'mug.state.safetensors')
+    (tmp_path / 'new').touch()
+    modes = {path.stat().st_mode for path in tmp_path.iterdir()}
+    assert len(modes) == 1
+
+
 def test_a_state_that_cannot_be_written_is_refused_as_data(reconstructor):
     with pytest.raises(DataError):
         write_state(episode(reconstructor, 1), reconstructor, Path('/proc/mug.state.safetensors'))

@@ -1,7 +1,6 @@
 """`active-recon bag info`: the content of a bag, and whether it can be replayed."""
 
 from collections.abc import Sequence
-import math
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
@@ -70,11 +69,12 @@ def told_depth(views: 'Sequence[RecordedView]') -> str:
 
 def _print_run(run: 'RecordedRun', replays: bool) -> None:
     from active_recon.bags.runs.missing import describe_missing
+    from active_recon.geometry.cameras import whole_degrees
 
     chosen = 'that its view gate accepts' if 'bag' in run.counters else 'that the loop took'
     typer.echo(f'{"can be replayed, with " if replays else ""}the views {chosen}:')
     for number, episode in enumerate(run.episodes, 1):
-        azimuths = ', '.join(f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
+        azimuths = ', '.join(str(whole_degrees(view.camera.azimuth)) for view in episode.views)
         end = f', done: {episode.done}' if episode.done else ''
         taken = (f'{len(episode.views)} views at azimuths {azimuths} degrees'
                  f'{told_depth(episode.views)}')

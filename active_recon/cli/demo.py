@@ -34,7 +34,7 @@ def demo(
     """Reconstruct an object with a simulated camera that chooses its own next view."""
     from rich.console import Console
 
-    console = Console()
+    console = Console(markup=False, emoji=False)  # names of files may have brackets
     try:
         with held_interrupts():  # some libraries swallow an interrupt of their import
             from active_recon.demo.run import Demo, run_demo

@@ -38,8 +38,11 @@ def progress_bar(title: str, total: int) -> Iterator[Callable[[int, str], None]]
     if not console.is_terminal:
         yield _log_lines(title, total)
         return
-    columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
-               TimeElapsedColumn(), TimeRemainingColumn(), TextColumn('{task.fields[note]}'))
+    # Names of files in a title or note may have brackets
+    words, note = (TextColumn(shown, markup=False)
+                   for shown in ('{task.description}', '{task.fields[note]}'))
+    columns = (words, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+               TimeRemainingColumn(), note)
     with Progress(*columns, console=console) as bar:
         task = bar.add_task(title, total=total, note='')
 

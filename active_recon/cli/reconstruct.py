@@ -185,6 +185,8 @@ def reconstruct(
 
 
 def _print(shape: 'Shape') -> None:
+    from active_recon.report.words import counted
+
     for reason in shape.left_out:
         typer.echo(f'left out: {reason}', err=True)
     for warning in shape.warnings:
@@ -192,7 +194,7 @@ def _print(shape: 'Shape') -> None:
     side = shape.cube
     stands = '' if shape.ground is None else ', on the ground that was found'
     deep = sum(view.depth is not None for view in shape.views)
-    typer.echo(f'{len(shape.views)} photos{f", {deep} with depth" if deep else ""}; '
+    typer.echo(f'{counted(len(shape.views), "photo")}{f", {deep} with depth" if deep else ""}; '
                f'silhouettes: {shape.background}; cube of {shape.size:.4g} m about '
                f'{", ".join(f"{value:.4g}" for value in side.centre)}{stands}')
     if shape.quality is not None:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
-import math
 from pathlib import Path
 import time
 from typing import Annotated, TYPE_CHECKING
@@ -187,6 +186,7 @@ def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Ov
                           out: Path | None, files: ShapeFiles) -> None:
     from active_recon.bags.replay.what_if import default_folder, run_with_overrides
     from active_recon.bags.runs.run_writing import write_run
+    from active_recon.geometry.cameras import whole_degrees
 
     with _bar('replaying', run) as advance:
         other = run_with_overrides(run, setup, overrides, lambda: advance(1, ''))
@@ -199,8 +199,7 @@ def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Ov
     _print_input(run)
     for episode in other.episodes:
         entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)
-        azimuths = ', '.join(
-            f'{math.degrees(view.camera.azimuth):.0f}' for view in episode.views)
+        azimuths = ', '.join(str(whole_degrees(view.camera.azimuth)) for view in episode.views)
         typer.echo(f'views from {azimuths} degrees; entropy {entropies} nats')
         _print_refused_depth([view.depth_refusal for view in episode.views])
     typer.echo(f'wrote {folder}')

@@ -10,6 +10,7 @@ from active_recon.geometry.cameras import (
     Camera,
     CANONICAL_INTRINSICS,
     orbit_camera,
+    whole_degrees,
 )
 from active_recon.view_colors import view_color
 from active_recon.viewer.view_result import ViewResult
@@ -114,7 +115,7 @@ def _draw_view(picture: NDArray[np.uint8], left: int, top: int, number: int, vie
         paste(picture, np.asarray(image, np.uint8), left + 10, top + 10)
     cv2.rectangle(picture, (left + 10, top + 10), (left + TILE - 10, top + TILE - 10),
                   view_color(number), 3, cv2.LINE_AA)
-    caption = f'{number}   {math.degrees(view.camera.azimuth):.0f}°'
+    caption = f'{number}   {whole_degrees(view.camera.azimuth)}°'
     centred(picture, caption, middle, top + TILE + 18, 19, view_color(number))
     if view.occupied is not None:
         paste(picture, draw(view.occupied, heights), left, top + TILE + 26)

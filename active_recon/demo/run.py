@@ -17,6 +17,7 @@ from active_recon.launching.demo_monitor import demo_monitor, DemoMonitor
 from active_recon.launching.processes import NodeProcesses, private_environment
 from active_recon.models.weights_files import find_weights
 from active_recon.policies import AUTO_POLICY, policy_in_use
+from active_recon.report.words import counted
 from active_recon.runtimes.precision import require_precision
 from active_recon.viewer.address import free_port, HOST, is_served
 from active_recon.viewer.view_result import ViewResult
@@ -65,7 +66,8 @@ def run_demo(demo: Demo, console: Console) -> Path:
     demo = replace(demo, policy=in_use.name)
     environment = private_environment()
     os.environ.update(environment)  # for the observer in this process
-    title = f'{demo.mesh.stem}: {demo.views} views, policy {demo.policy}'
+    # A name that is longer would leave the picture
+    title = f'{demo.mesh.stem:.40}: {counted(demo.views, "view")}, policy {demo.policy}'
     network = {'precision': demo.precision, **({'weights': demo.model} if demo.model else {})}
     with (held_interrupts() as raise_if_asked, TemporaryDirectory() as logs,
           NodeProcesses(Path(logs), environment) as nodes):
@@ -153,15 +155,17 @@ def follow_loop(monitor: DemoMonitor, demo: Demo, title: str, console: Console,
     def has_ended_or(number: int) -> bool:
         return monitor.is_done() or monitor.has_views(number)
 
-    with Live(console=console, get_renderable=table, refresh_per_second=10):
-        for number in range(1, demo.views + 1):
-            monitor.until(partial(has_ended_or, number), _VIEW_S, f'view {number}', check)
-            for view in monitor.state.views[number - 1:number]:
-                on_view(view)
-        monitor.until(monitor.is_done, _ANSWER_S, 'the planner to be done', check)
-        monitor.within(partial(monitor.has_views, demo.views), _LATE_S, check)
-    if not console.is_terminal:  # there `Live` does not end its last line
-        console.line()
+    try:
+        with Live(console=console, get_renderable=table, refresh_per_second=10):
+            for number in range(1, demo.views + 1):
+                monitor.until(partial(has_ended_or, number), _VIEW_S, f'view {number}', check)
+                for view in monitor.state.views[number - 1:number]:
+                    on_view(view)
+            monitor.until(monitor.is_done, _ANSWER_S, 'the planner to be done', check)
+            monitor.within(partial(monitor.has_views, demo.views), _LATE_S, check)
+    finally:
+        if not console.is_terminal:  # there `Live` does not end its last line
+            console.line()
     received = len(monitor.state.views)
     if monitor.state.done == 'max_views' and received < demo.views:
         console.print(f'{demo.views - received} of the {demo.views} views did not reach the '

@@ -1,9 +1,8 @@
 """The loop in the terminal: one row for each view, and a line with the camera's motion."""
 
 from collections.abc import Sequence
-import math
 
-from active_recon.geometry.cameras import Camera
+from active_recon.geometry.cameras import Camera, whole_degrees
 from active_recon.viewer.view_result import ViewResult
 from rich.console import Group
 from rich.table import Table
@@ -17,7 +16,7 @@ def loop_table(title: str, views: Sequence[ViewResult], now: str) -> Group:
                     'IoU', 'image to occupancy, ms'):
         table.add_column(heading, justify='right')
     for number, view in enumerate(views, 1):
-        table.add_row(str(number), f'{math.degrees(view.camera.azimuth):.0f}',
+        table.add_row(str(number), str(whole_degrees(view.camera.azimuth)),
                       _figure(view.entropy, '.0f'),
                       *(_figure(share, '.2f') for share in _judged(view)),
                       _figure(view.iou, '.3f'),
@@ -29,8 +28,8 @@ def motion_line(camera: Camera | None, goal: Camera | None) -> str:
     """Return a line that says where the camera is and where its goal is."""
     if camera is None:
         return 'waiting for the camera'
-    here = f'the camera is at {math.degrees(camera.azimuth):.0f} deg'
-    return here if goal is None else f'{here}, its goal is {math.degrees(goal.azimuth):.0f} deg'
+    here = f'the camera is at {whole_degrees(camera.azimuth)} deg'
+    return here if goal is None else f'{here}, its goal is {whole_degrees(goal.azimuth)} deg'
 
 
 def _judged(view: ViewResult) -> tuple[float | None, float | None]:

@@ -35,6 +35,11 @@ def wrap_azimuth(azimuth: _Azimuth) -> _Azimuth:
     return azimuth % TURN % TURN  # -1e-20 % TURN rounds up to TURN itself
 
 
+def whole_degrees(azimuth: float) -> int:
+    """Return an azimuth in radians as whole degrees, in [0, 360)."""
+    return round(math.degrees(azimuth)) % 360
+
+
 def azimuth_difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     """Return a minus b, the short way round, in [-pi, pi); shapes broadcast."""
     apart = np.asarray(a, np.float64) - np.asarray(b, np.float64)

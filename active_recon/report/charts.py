@@ -72,6 +72,7 @@ def _progress(subjects: Sequence[Subject], title: str,
             'legend': {'orientation': 'h', 'x': 0, 'y': 1, 'yanchor': 'bottom'},
             'xaxis': {'title': {'text': 'after view'}, 'fixedrange': True, 'showgrid': False,
                       'tick0': 1, 'dtick': math.ceil(longest / 12), 'range': [0.6, longest + 0.4]},
-            'yaxis': {'title': {'text': title}, 'fixedrange': True},
+            'yaxis': {'title': {'text': title}, 'fixedrange': True, 'automargin': True,
+                      **({} if longest > 1 else {'rangemode': 'tozero'})},
         },
     }

@@ -8,10 +8,10 @@ from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.bags.runs.missing import describe_lost
 from active_recon.bags.runs.parameters import node_parameters
 from active_recon.bags.runs.run import PHOTOS
-from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE
+from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, whole_degrees
 from active_recon.geometry.view_distance import view_distance
 from active_recon.report.stages import two_clocks
-from active_recon.report.subject import degrees, Subject
+from active_recon.report.subject import Subject
 from active_recon.report.words import counted, refusals, times, view_numbers, warned
 
 _STOPPED = {
@@ -28,8 +28,8 @@ _STOPPED = {
                                                   'any of the remaining azimuths.'),
     'stopped': ('stopped', 'It was stopped by a service call.'),
     PHOTOS: ('last photo', 'It ended with the last photo.'),
-    '': ('incomplete', 'The episode is incomplete: the recording ends, or a new episode begins, '
-                       'before it was done.'),
+    '': ('no end recorded', 'The episode is incomplete: the recording ends, or a new episode '
+                            'begins, before it was done.'),
 }
 
 
@@ -64,7 +64,7 @@ def _beginning(subject: Subject) -> Iterator[tuple[str, str]]:
 
 def _stop(subject: Subject) -> Iterator[tuple[str, str]]:
     reason = subject.episode.done
-    if not reason and not any(subject.goals):
+    if not subject.planned and not subject.of_photos:
         yield 'note', 'No planner was recorded: the views are those that the camera passed.'
         return
     _, sentence = _STOPPED.get(reason, ('', f'It stopped for the reason “{reason}”.'))
@@ -138,8 +138,8 @@ def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:
                            for number, elevation in off)
         views = 'view' if len(off) == 1 else 'views'
         yield 'warning', (
-            f'The camera was not at the elevation of {degrees(CANONICAL_ELEVATION)}° that the '
-            f'network was trained with, in {views} {listed}: the shape will be worse.')
+            f'The camera was not at the elevation of {whole_degrees(CANONICAL_ELEVATION)}° that '
+            f'the network was trained with, in {views} {listed}: the shape will be worse.')
 
 
 def _estimate(subject: Subject) -> Iterator[tuple[str, str]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import ConfigError, DataError
+from active_recon.geometry.cameras import whole_degrees
 from active_recon.report.charts import entropy_chart, iou_chart, stage_chart
 from active_recon.report.embedding import compressed, plotly_script
 from active_recon.report.findings import findings, stopped
@@ -15,7 +16,7 @@ from active_recon.report.images import data_uri
 from active_recon.report.introduction import introduction
 from active_recon.report.scene import scene
 from active_recon.report.stages import median, STAGES, timings
-from active_recon.report.subject import degrees, elevation_degrees, Subject
+from active_recon.report.subject import elevation_degrees, Subject
 from active_recon.report.surface import colored_surface
 from active_recon.report.turntable_map import turntable_map
 from active_recon.report.words import key_words
@@ -52,8 +53,8 @@ def report_page(subjects: Sequence[Subject]) -> str:
     environment = Environment(
         loader=PackageLoader('active_recon.report', 'templates'), autoescape=True,
         trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
-    environment.filters |= {'number': _number, 'degrees': degrees, 'elevation': elevation_degrees,
-                            'words': key_words}
+    environment.filters |= {'number': _number, 'degrees': whole_degrees,
+                            'elevation': elevation_degrees, 'words': key_words}
     return environment.get_template('page.html').render(
         panels=panels, several=several, known_truth=known_truth, stages=STAGES,
         introduction=introduction(subjects),
@@ -90,7 +91,8 @@ def _panel(subject: Subject) -> dict[str, Any]:
         'timed': any(stage is not None for timing in times for stage in timing.stages[1:]),
         'image_to_goal_ms': median([timing.total for timing in times]),
         'travel_deg': math.degrees(subject.travel),
-        'stopped': stopped(subject.episode.done),
+        'stopped': (stopped(subject.episode.done) if subject.planned or subject.of_photos
+                    else 'no planner'),
         'others': len(run.episodes) - 1,
     }
 

@@ -46,9 +46,15 @@ class Subject:
         return self.episode.done == PHOTOS
 
     @property
+    def planned(self) -> bool:
+        """Whether a planner asked for views, or ended the episode."""
+        return not self.of_photos and (bool(self.episode.done) or any(
+            goal is not None for goal in self.goals))
+
+    @property
     def timed(self) -> bool:
-        """Whether the times of its messages are a loop's: a replay gives them stamps alone."""
-        return 'replay_of' not in self.run.provenance
+        """Whether the times of its messages are a loop's: replays and photos have stamps alone."""
+        return not self.of_photos and 'replay_of' not in self.run.provenance
 
     @property
     def goals(self) -> list[RecordedGoal | None]:
@@ -102,11 +108,6 @@ def letters() -> Iterator[str]:
     for number in range(26 ** 2 + 26):
         high, low = divmod(number, 26)
         yield (chr(64 + high) if high else '') + chr(65 + low)
-
-
-def degrees(radians: float) -> int:
-    """Return an azimuth as whole degrees in [0, 360)."""
-    return round(math.degrees(radians)) % 360
 
 
 def elevation_degrees(radians: float) -> int:

@@ -16,11 +16,12 @@ from active_recon.geometry.cameras import (
     Camera,
     TURN,
     VIEW_COUNT,
+    whole_degrees,
 )
 from active_recon.geometry.view_distance import at_one_elevation, directions_of
 from active_recon.report.charts import Figure, view_color
 from active_recon.report.images import data_uri
-from active_recon.report.subject import degrees, elevation_degrees, shown_grid, Subject
+from active_recon.report.subject import elevation_degrees, shown_grid, Subject
 import numpy as np
 from numpy.typing import NDArray
 
@@ -153,7 +154,7 @@ def _best_of_sectors(azimuths: NDArray[np.float64], scores: NDArray[np.float64]
 
 
 def _words(azimuth: float, elevation: float) -> str:
-    return f'{degrees(azimuth)}°, elevation {elevation_degrees(elevation)}°'
+    return f'{whole_degrees(azimuth)}°, elevation {elevation_degrees(elevation)}°'
 
 
 def _path(azimuths: Sequence[float]) -> list[dict[str, Any]]:

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-import math
 
+from active_recon.geometry.cameras import whole_degrees
 from active_recon.viewer.state import LoopState
 
 _SILENT_S = 2.0
@@ -57,7 +57,7 @@ def goal_lines(state: LoopState) -> list[str]:
     """Return why the next view is worth taking; none if that is not known."""
     if state.goal is None or state.goal_reason is None:
         return []
-    return [f'Next view, {math.degrees(state.goal.azimuth):.0f}°: {state.goal_reason.sentence}.']
+    return [f'Next view, {whole_degrees(state.goal.azimuth)}°: {state.goal_reason.sentence}.']
 
 
 def ago(seconds: float) -> str:

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from active_recon.geometry.cameras import Camera
+from active_recon.geometry.cameras import Camera, whole_degrees
 from active_recon.geometry.view_distance import at_one_elevation, directions_of, view_distance
 from active_recon.meshes.files import glb
 from active_recon.policies.reasons import GoalReason
@@ -124,7 +124,7 @@ class Scene:
             name, color = f'/views/{number}', view_color(number)
             again = _at_same_place(view, views[:number - 1])
             self._views.append(self._frustum(name, view.camera, color, view.image))
-            self._label(f'{name}/label', f'{number} · {math.degrees(view.camera.azimuth):.0f}°',
+            self._label(f'{name}/label', f'{number} · {whole_degrees(view.camera.azimuth)}°',
                         again)
 
     def _draw_goal(self, goal: Camera | None, reason: GoalReason | None) -> None:
@@ -132,7 +132,7 @@ class Scene:
             self._remove('/goal/label')
             self._remove('/goal')
             return
-        words = f'next · {math.degrees(goal.azimuth):.0f}°'
+        words = f'next · {whole_degrees(goal.azimuth)}°'
         if reason is not None and reason.gain is not None:
             words += f' · IoU +{reason.gain:.3f}'
         if '/goal' in self._objects:
