@@ -62,8 +62,8 @@ class Planner:
     needs it thinks relative to the front. A goal is what the policy chooses, or the best of the
     candidates where the camera cannot go there, was there already, or has too long a way:
     `motion_weight` is what half a turn costs, beside 1 for what lies between the policy's worst
-    and best candidate, and `motion` what a second costs instead. A view is asked for again only
-    when no other is left.
+    and best candidate, and `motion` what a second costs instead. No view is asked for again: the
+    episode ends when none is left.
 
     `max_views`, `entropy_tolerance`, `target_quality` and `min_gain` end an episode: see
     `StoppingRule`. While views are flagged as unusual, their quality ends nothing, and an even
@@ -264,7 +264,7 @@ class Planner:
         """Return the goal after the views so far, whether or not the episode is done."""
         if self._goal is None:
             raise ViewError(
-                'no azimuth can be reached: every one was given up in this episode'
+                'no view is left: every one that can be reached was taken or given up'
                 if self._wanted else
                 'no view in this episode yet: expected one before a plan', 'plan')
         return self._goal

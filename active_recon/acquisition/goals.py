@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+import math
 
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost
-from active_recon.geometry.cameras import Camera
-from active_recon.geometry.view_distance import nearest_camera, nearest_cameras
+from active_recon.geometry.cameras import Camera, VIEW_COUNT
+from active_recon.geometry.view_distance import nearest_camera, nearest_cameras, view_distance
 import numpy as np
 from numpy.typing import NDArray
+
+_SAME_VIEW = math.pi / VIEW_COUNT  # half of the way between two azimuths of a turntable
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +53,9 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
     Return the best goal for a camera that is somewhere; None where none is left.
 
     What is wanted between the candidates is worth as much as the best of them. The views `taken`
-    are asked for again only where no other is left, those that `failed` never; `cost` is that of
-    the way to a goal.
+    and those that `failed` are not asked for again: the same view once more brings nothing. A
+    candidate without a view is left out for one of its neighbourhood as long as there are others.
+    `cost` is that of the way to a goal.
     """
     scores, options = wanted.scores, list(candidates)
     nearest = np.arange(len(candidates))
@@ -65,10 +69,12 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
     is_failed, is_taken = (np.isin(nearest, nearest_cameras(cameras, candidates))
                            for cameras in (failed, taken))
     is_open = limits.allows(azimuths) & ~is_failed
-    if not is_open.any():
+    eligible = is_open & ~is_taken
+    if not eligible.any():  # the nearest to a view need not be where that was taken
+        eligible = is_open & ~np.array([any(view_distance(option, view) < _SAME_VIEW
+                                            for view in taken) for option in options])
+    if not eligible.any():
         return None
-    fresh = is_open & ~is_taken
-    eligible = fresh if fresh.any() else is_open
     value = cost.utility(scores, wanted.is_gain, camera, options, limits)
     best = int(np.flatnonzero(eligible)[value[eligible].argmax()])
     own = slice(len(options) - len(candidates), None)

@@ -24,8 +24,8 @@ _STOPPED = {
     'target_out_of_reach': ('target out of reach', 'It stopped because the IoU that was asked for '
                                                    'is out of reach for this object.'),
     'gain_too_small': ('gain too small', 'It stopped because no further view was worth taking.'),
-    'no_reachable_azimuth': ('no reachable goal', 'It stopped because the camera could not reach '
-                                                  'any of the remaining azimuths.'),
+    'no_reachable_azimuth': ('no reachable goal', 'It stopped because no view was left that the '
+                                                  'camera can reach.'),
     'stopped': ('stopped', 'It was stopped by a service call.'),
     PHOTOS: ('last photo', 'It ended with the last photo.'),
     '': ('no end recorded', 'The episode is incomplete: the recording ends, or a new episode '
