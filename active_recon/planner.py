@@ -22,7 +22,7 @@ from active_recon.policies import (
     PolicyOptions,
 )
 from active_recon.policies.automatic import SWEEP
-from active_recon.policies.checked import checked_choice
+from active_recon.policies.checked import chosen
 from active_recon.policies.planner_views import (
     cameras_of,
     observation,
@@ -197,8 +197,8 @@ class Planner:
         view = PlannerView(latent, camera, math.nan, volume)
         try:
             candidates = self._places.candidates(camera)
-            choice, state = checked_choice(self._policy.choose(
-                self._observed([*self._views, view], candidates), self._state), len(candidates))
+            choice, state = chosen(
+                self._policy, self._observed([*self._views, view], candidates), self._state)
         except ViewError:
             return  # which `add_view` tells
         self._early = view, choice, state
@@ -313,8 +313,7 @@ class Planner:
         if early is not None and early[0].is_of(last):
             _, self._choice, self._state = early
         else:
-            self._choice, self._state = checked_choice(
-                self._policy.choose(seen, self._state), len(self._candidates))
+            self._choice, self._state = chosen(self._policy, seen, self._state)
         if last.quality is not None and last.quality.suspect:
             self._choice, _ = self._sweep.choose(seen, {})
 

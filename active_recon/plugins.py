@@ -6,7 +6,6 @@ from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 import sys
-from types import ModuleType
 from typing import Any
 
 from active_recon.errors import ConfigError
@@ -61,8 +60,11 @@ def load_from_file(reference: str) -> Any:
 
 def code_hash(made: object) -> str:
     """Return the SHA-256 of the file that an object's class is in; '' where that is ours."""
-    module: ModuleType | None = sys.modules.get(type(made).__module__)
-    path = getattr(module, '__file__', None)
-    if path is None or type(made).__module__.partition('.')[0] == __package__:
-        return ''
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    name = type(made).__module__
+    return '' if name.partition('.')[0] == __package__ else file_hash(name)
+
+
+def file_hash(module: str) -> str:
+    """Return the SHA-256 of the file of an imported module; '' where it has none."""
+    path = getattr(sys.modules.get(module), '__file__', None)
+    return '' if path is None else hashlib.sha256(Path(path).read_bytes()).hexdigest()

@@ -32,6 +32,12 @@ def slowly(folder, number):
     return os.getpid()
 
 
+def quick_at_first(number):
+    """Take no time before 40, and then a fifth of a second; return what was given."""
+    time.sleep(0.2 * (number >= 40))
+    return number
+
+
 def without_room(number):
     """Fail as on a full disk."""
     raise OSError(28, 'No space left on device', f'/full/{number}')

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from functools import partial
+import gc
 import shutil
 import sys
 
-from active_recon.cluster import crew_of, Result
+from active_recon.cluster import bundles, crew_of, Result
+from active_recon.cluster.bundles import attempt_all, Bundles
 from active_recon.cluster.local import LocalCrew
 from active_recon.cluster.storage import SharedFolder, Storage
 from active_recon.cluster.telling import told
@@ -89,6 +91,33 @@ def test_items_are_drawn_as_workers_have_room_for_them(crews, kind):
             done += 1
     assert done == 3000
     assert most <= 64 * 2 * 4
+
+
+def test_a_bundle_of_items_that_take_longer_than_those_before_is_given_back(monkeypatch):
+    monkeypatch.setattr(bundles, '_LONGEST', 0.0)
+    done = attempt_all(cluster_items.quick_at_first, [40, 41, 42])
+    assert [outcome.value for outcome in done.outcomes] == [40]
+    left = Bundles(range(100))
+    left.learn(done)
+    left.separate([(1, 41), (2, 42)])
+    assert [left.draw(), left.draw()] == [[(1, 41)], [(2, 42)]]
+
+
+@pytest.mark.parametrize('kind', ['local', 'ray'])
+def test_no_item_of_a_bundle_that_is_given_back_is_lost_or_doubled(crews, kind):
+    with crews[kind]() as crew:
+        found = results(crew, cluster_items.quick_at_first, range(48))
+    assert [result.value for result in found] == list(range(48))
+
+
+def test_an_error_in_the_middle_of_the_work_starts_no_other_ray(crews):
+    import ray
+
+    with pytest.raises(RuntimeError, match='in the middle'), crews['ray']() as crew:
+        for _ in crew.map(cluster_items.quick_at_first, range(60)):
+            raise RuntimeError('in the middle')
+    gc.collect()
+    assert not ray.is_initialized()
 
 
 @pytest.mark.parametrize('kind', ['local', 'ray'])

@@ -1,8 +1,11 @@
 """Depth beside a dataset's images: written, read, framed, turned with them, and learned from."""
 
 from dataclasses import replace
+import errno
 import math
+from pathlib import Path
 
+from active_recon.cluster.results import is_no_room
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.layout import list_objects, ObjectFolder, write_depths
 from active_recon.datasets.making import make_object, shape_jobs
@@ -67,6 +70,29 @@ def test_a_missing_or_other_depth_image_is_refused(deep, tmp_path):
     folder.depth_path(0).write_bytes(image.read_bytes())
     with pytest.raises(DataError, match='expected a PNG of one channel of 16 bits'):
         folder.depth(0)
+
+
+def test_depth_that_a_full_disk_does_not_hold_is_told_and_not_taken_for_whole(
+        tmp_path, monkeypatch):
+    def full(path, data):
+        raise OSError(errno.ENOSPC, 'No space left on device', str(path))
+
+    folder = ObjectFolder(tmp_path, 'table', 'one')
+    folder.images_folder.mkdir(parents=True)
+    monkeypatch.setattr(Path, 'write_bytes', full)
+    with pytest.raises(DataError, match=r'_depth.png: cannot be written: No space') as told:
+        write_depths(folder, [np.ones((20, 30), np.float32)])
+    assert is_no_room(told.value)
+    assert not folder.has_depth and not contents(tmp_path)
+
+
+def test_an_object_that_is_made_anew_gets_its_depth_and_fine_voxels_again(tmp_path):
+    job, = shape_jobs('lamp', range(1), tmp_path)
+    assert not make_object(job, 1, fine=True, viewing=ANY, depth=True).refusal
+    before = contents(tmp_path)
+    job.folder.voxels_path(32).unlink()
+    assert not make_object(job, 1, fine=True, viewing=ANY, depth=True).refusal
+    assert contents(tmp_path) == before
 
 
 def test_a_finished_object_gets_only_its_depth(tmp_path):

@@ -5,7 +5,7 @@ import re
 import sys
 
 from active_recon.errors import ConfigError, WeightsError
-from active_recon.evaluation.contenders import contenders
+from active_recon.evaluation.contenders import contenders, heuristic_names
 from active_recon.evaluation.posed.entrants import load_entrants
 from active_recon.evaluation.trial import Trial
 from active_recon.geometry.cameras import orbit_camera
@@ -21,8 +21,10 @@ from active_recon.models.trial import try_network
 from active_recon.models.weights import Bundle, load_weights, save_weights
 from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLICIES_GROUP
 from active_recon.policies import POLICIES
+from active_recon.policies.geometric import FarthestPolicy
 from active_recon.policies.registry import _installed, PolicyEntry, PolicyOptions
 from command_line import command, refusal
+import numpy as np
 import pytest
 import torch
 
@@ -114,22 +116,35 @@ def test_what_an_installed_package_offers_as_a_policy_and_is_none_is_refused(pac
 
 def test_what_is_kept_of_a_network_or_policy_of_one_s_own_is_that_of_its_code(
         package, views, tmp_path, monkeypatch):
-    monkeypatch.setitem(POLICIES, 'near', PolicyEntry(_installed('near'), ('seed',)))
+    for name in ('near', 'far'):  # `far` is a class of ours that the package makes
+        monkeypatch.setitem(POLICIES, name, PolicyEntry(_installed(name), ('seed',)))
 
     def kept():
         monkeypatch.delitem(sys.modules, 'mine', raising=False)
         entry = network_entry('mine')
         torch.manual_seed(0)
         trial = Trial(entry.build(entry.sizes['small']), 0.5, views, cache=tmp_path)
-        (own,), (ours,) = (contenders([name], seeds=1) for name in ('near', 'random'))
-        return trial.folder, trial.cached(own, 0).name, trial.cached(ours, 0).name
+        return trial.folder, *(trial.cached(*contenders([name], seeds=1), 0).name
+                               for name in ('near', 'far', 'random'))
 
     before = kept()
     assert kept() == before
     with (tmp_path / 'mine.py').open('a') as file:
         file.write('# another version\n')
-    folder, own, ours = kept()
-    assert folder != before[0] and own != before[1] and ours == before[2]
+    changed = [name != other for name, other in zip(kept(), before, strict=True)]
+    assert changed == [True, True, True, False]
+
+
+def test_a_policy_of_an_installed_package_is_measured_with_the_weights_where_it_is_named(
+        package, monkeypatch, tmp_path):
+    given = []
+    monkeypatch.setitem(POLICIES, 'near', PolicyEntry(
+        lambda options: given.append(options.weights) or FarthestPolicy()))
+    assert 'near' not in heuristic_names()
+    assert {'random', 'uniform', 'farthest'} <= set(heuristic_names())
+    [own] = contenders(['near'], weights=tmp_path / 'weights.safetensors')
+    own.make(np.random.default_rng(0))
+    assert given == [tmp_path / 'weights.safetensors']
 
 
 OWN = """

@@ -142,6 +142,20 @@ def test_a_view_that_is_refused_changes_nothing(attention, wrong):
     np.testing.assert_array_equal(one.camera.pose, other.camera.pose)
 
 
+def test_a_policy_that_fails_is_told_and_nothing_has_changed():
+    class Fails(FarthestPolicy):
+        def choose(self, seen, state):
+            if seen.taken.shape[1] == 2:
+                raise RuntimeError('a fault of its own')
+            return super().choose(seen, state)
+
+    planner = Planner(Fails(), 5, 0.0)
+    asked = planner.add_view(LATENT, orbit_camera(0.0), 10.0).goal
+    with pytest.raises(ViewError, match='policy: fails with RuntimeError: a fault of its own'):
+        planner.add_view(LATENT, asked.camera, 9.0)
+    assert planner.plan() is asked
+
+
 @pytest.mark.parametrize('azimuth', [math.nan, math.inf, -math.inf])
 def test_a_camera_that_is_not_finite_is_none(azimuth):
     with pytest.raises(ViewError, match='expected finite angles'):

@@ -77,7 +77,8 @@ def _print_run(run: 'RecordedRun', replays: bool) -> None:
         azimuths = ', '.join(str(whole_degrees(view.camera.azimuth)) for view in episode.views)
         end = f', done: {episode.done}' if episode.done else ''
         taken = (f'{len(episode.views)} views at azimuths {azimuths} degrees'
-                 f'{told_depth(episode.views)}')
+                 f'{told_depth(episode.views)}'
+                 f'{", after others without an image" if episode.begun_before else ""}')
         typer.echo(f'  episode {number}: {taken if azimuths else "no view"}{end}')
         if missing := describe_missing(episode):
             typer.echo(f'    not recorded, so not compared: {", ".join(missing)}')

@@ -46,7 +46,8 @@ class EvaluationPlan:
             typer.echo(f'views per object: {shown}; measured views: {count}; starts: {starts}',
                        err=True)
         every = contenders(self.policies or contender_names(bool(attentions), oracle=False),
-                           attentions, count, self.seeds, self.seed, bundle.model)
+                           attentions, count, self.seeds, self.seed, bundle.model,
+                           weights)
         network = network_in(self.runtime, weights, bundle, self.bf16, self.threads)
         return bundle, Trial(network, bundle.threshold, held_out, starts, count,
                              self.seed, self.bf16, cache), every

@@ -124,12 +124,15 @@ def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
             continue
         first, last = (step.reconstruction.grid for step in (episode.steps[0], episode.steps[-1]))
         count = int(last.occupied(reconstructor.threshold).sum())
+        uncompared = ('not compared, since views before them have no image in the bag'
+                      if episode.recorded.begun_before else
+                      'the bag has no record to compare with')
         typer.echo(
             f'reconstructed from {len(episode.steps)} views'
             f'{told_depth([step.recorded for step in episode.steps])}: '
             f'{count} of {last.occupancy.size} '
             f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():.0f} to '
-            f'{last.entropy():.0f} nats; the bag has no record to compare with')
+            f'{last.entropy():.0f} nats; {uncompared}')
         _print_quality(episode)
         _print_refused_depth([step.reconstruction.depth_refusal for step in episode.steps])
     typer.echo(f'hash {verified.hash}')
@@ -170,7 +173,8 @@ def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: floa
         typer.echo(f'  {name:<14}{found.compared:>4} compared  {found.verdict:<17} {gap}'.rstrip())
     for number, episode in enumerate(run.episodes, 1):
         if episode.begun_before:
-            typer.echo(f'episode {number} began before the recording: it is not compared')
+            typer.echo(f'episode {number} had views of which the bag has no image, from before '
+                       'the camera or the episode was recorded: it is not compared')
     for replayed in verified.episodes:
         _print_quality(replayed)
     if not verified.knows_policy:

@@ -10,6 +10,7 @@ from typing import Any
 from active_recon.cluster.results import attempt, Outcome
 
 _WORTH = 0.05  # seconds that a bundle is to take
+_LONGEST = 0.5  # seconds after which the rest of a bundle is given back
 _MOST = 64
 _FORGETTING = 0.3  # weight of the newest bundle in the mean time of an item
 
@@ -19,16 +20,20 @@ Bundle = list[tuple[int, Any]]
 
 @dataclass(frozen=True)
 class Done:
-    """The outcomes of a bundle's items in their order, and the seconds they took."""
+    """The outcomes of a bundle's first items in their order, and the seconds they took."""
 
     outcomes: list[Outcome]
     seconds: float
 
 
 def attempt_all(function: Callable[[Any], Any], items: list[Any]) -> Done:
-    """Call the function for each item of a bundle."""
+    """Call the function for each item of a bundle, until they have taken longer than thought."""
     begun = time.perf_counter()
-    outcomes = [attempt(function, item) for item in items]
+    outcomes: list[Outcome] = []
+    for item in items:
+        outcomes.append(attempt(function, item))
+        if time.perf_counter() - begun > _LONGEST:
+            break
     return Done(outcomes, time.perf_counter() - begun)
 
 
@@ -54,5 +59,5 @@ class Bundles:
             self._each + _FORGETTING * (each - self._each))
 
     def separate(self, bundle: Bundle) -> None:
-        """Take back the items of a bundle whose worker died, to be given out one by one."""
+        """Take back items of a bundle that was not finished, to be given out one by one."""
         self._alone.extend(bundle)

@@ -53,7 +53,8 @@ class LocalCrew:
                     done = errand.done(future)
                     if done is not None:
                         bundles.learn(done)
-                        for (index, _), outcome in zip(errand.bundle, done.outcomes, strict=True):
+                        bundles.separate(errand.bundle[len(done.outcomes):])
+                        for (index, _), outcome in zip(errand.bundle, done.outcomes, strict=False):
                             yield outcome.result(index)
                     elif len(errand.bundle) > 1:
                         bundles.separate(errand.bundle)

@@ -69,7 +69,7 @@ def _require_listener(address: str) -> None:
 
 def _nobody(address: str, reason: str) -> str:
     return (f'--cluster: no cluster at {address}: expected a Ray that runs there (`ray start '
-            f'--head`), got: {reason}')
+            f'--head`; with RAY_AUTH_MODE=token, if it asks for a token), got: {reason}')
 
 
 class RayCrew:
@@ -118,15 +118,17 @@ class RayCrew:
                     done, bundle = self._done(ref), pending.pop(ref)
                     if done is not None:
                         bundles.learn(done)
-                        for (index, _), outcome in zip(bundle, done.outcomes, strict=True):
+                        bundles.separate(bundle[len(done.outcomes):])
+                        for (index, _), outcome in zip(bundle, done.outcomes, strict=False):
                             yield outcome.result(index)
                     elif len(bundle) > 1:
                         bundles.separate(bundle)
                     else:
                         yield DIED.result(bundle[0][0])
         finally:
-            for ref in pending:
-                ray.cancel(ref, force=True)
+            if ray.is_initialized():  # else an error of the caller's has ended the crew before
+                for ref in pending:
+                    ray.cancel(ref, force=True)
             if folder is not None:
                 folder.forget()
 

@@ -194,9 +194,8 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
     for index, (image, camera) in enumerate(zip(images, cameras, strict=True)):
         names.append(f'{index:02d}.png')
         path = folder.images_folder / names[-1]
-        if not cv2.imwrite(str(path), cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA),
-                           [cv2.IMWRITE_PNG_COMPRESSION, 4]):
-            raise DataError(f'{path}: cannot be written; is the disk full?')
+        _write_png(path, cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA),
+                   [cv2.IMWRITE_PNG_COMPRESSION, 4])
         azimuth_deg = math.degrees(-camera.azimuth) % 360
         rows.append(f'{azimuth_deg:.9g} {math.degrees(camera.elevation):.9g} 0 '
                     f'{camera.distance / _DISTANCE_UNIT:.9g} {_FIELD_OF_VIEW_COLUMN:g}')
@@ -218,8 +217,16 @@ def write_depths(folder: ObjectFolder, depths: Sequence[NDArray[np.float32]]) ->
     for index, depth in reversed(list(enumerate(depths))):
         path = folder.depth_path(index)
         stored = np.rint(np.where(depth <= _FARTHEST, depth, 0) * _STEPS).astype(np.uint16)
-        if not cv2.imwrite(str(path), stored):
-            raise DataError(f'{path}: cannot be written; is the disk full?')
+        _write_png(path, stored)
+
+
+def _write_png(path: Path, image: 'cv2.typing.MatLike', options: Sequence[int] = ()) -> None:
+    """Write an image whole or not at all; cv2.imwrite tells nothing of a full disk."""
+    try:
+        with whole_file(path) as unfinished:
+            unfinished.write_bytes(cv2.imencode('.png', image, options)[1].tobytes())
+    except OSError as error:
+        raise DataError(f'{path}: cannot be written: {error.strerror}') from error
 
 
 def _is_r2n2(camera: Camera) -> bool:

@@ -117,10 +117,11 @@ def make_object(job: Job, samples: int, fine: bool = False, viewing: Viewing = T
     where some are lacking, of the same shape, too. Errors become the outcome's `refusal`; raises
     OSError where there is no room to write.
     """
-    lacks_fine = fine and not job.folder.voxels_path(FINE_RESOLUTION).is_file()
-    lacks_depth = depth and not job.folder.has_depth
     try:
         finished = job.folder.complete
+        # What lies beside one that is not finished is made anew
+        lacks_fine = fine and not (finished and job.folder.voxels_path(FINE_RESOLUTION).is_file())
+        lacks_depth = depth and not (finished and job.folder.has_depth)
         if finished:
             _check_cameras(job.folder, viewing)
             if not (lacks_fine or lacks_depth):

@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from functools import partial
 import hashlib
+from pathlib import Path
 
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.evaluation.trial import Contender
 from active_recon.models.weights import state_hash
 from active_recon.models.weights_files import PAPER_MODEL
-from active_recon.plugins import code_hash, installed, POLICIES_GROUP
+from active_recon.plugins import code_hash, file_hash, installed, POLICIES_GROUP
 from active_recon.policies import learned_policy, load_policy, POLICIES, Policy, PolicyOptions
 from active_recon.runtimes.torch import TorchPolicyRuntime
 import numpy as np
@@ -17,7 +18,9 @@ from torch import nn
 
 def heuristic_names() -> list[str]:
     """Return the names of the policies that are not learned and use the cameras only."""
-    return [name for name, entry in POLICIES.items() if not (entry.is_learned or entry.looks)]
+    own = installed(POLICIES_GROUP)  # whose own entry is not known before they are imported
+    return [name for name, entry in POLICIES.items()
+            if not (entry.is_learned or entry.looks or name in own)]
 
 
 def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
@@ -27,12 +30,14 @@ def contender_names(learned: bool = True, oracle: bool = True) -> list[str]:
 
 
 def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count: int = 5,
-               seeds: int = 5, seed: int = 0, model: str = PAPER_MODEL) -> list[Contender]:
+               seeds: int = 5, seed: int = 0, model: str = PAPER_MODEL,
+               weights: Path | None = None) -> list[Contender]:
     """
     Return the policies of these names, each with all of its seeds.
 
     - attentions: the learned policy's modules, one for each training seed
-    - model: name of the network that they were trained with
+    - model: name of the network that they were trained with; weights: its file, for policies of
+      installed packages
     - count: number of views of an episode, used by uniform
     - seeds: number of runs of random, with seeds from `seed` on
 
@@ -54,22 +59,26 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
             made += [Contender(name, f'{name}-{_model_hash(each)}', partial(_learned, model, each))
                      for each in attentions]
         elif POLICIES[name].draws:
-            code = _own_code(name, count)
-            made += [Contender(name, f'{name}-{each}', partial(_heuristic, name, count), code)
+            code = _own_code(name, count, weights)
+            made += [Contender(name, f'{name}-{each}',
+                               partial(_heuristic, name, count, weights), code)
                      for each in range(seed, seed + seeds)]
         else:
-            made.append(Contender(name, name, partial(_heuristic, name, count)))
+            made.append(Contender(name, name, partial(_heuristic, name, count, weights)))
     return made
 
 
-def _heuristic(name: str, count: int, rng: np.random.Generator) -> Policy:
-    return load_policy(name, PolicyOptions(rng, count))
+def _heuristic(name: str, count: int, weights: Path | None, rng: np.random.Generator) -> Policy:
+    return load_policy(name, PolicyOptions(rng, count, weights))
 
 
-def _own_code(name: str, count: int) -> str:
+def _own_code(name: str, count: int, weights: Path | None) -> str:
     """Return the hash of the code of an installed package's policy, '' for one of ours."""
-    return (code_hash(_heuristic(name, count, np.random.default_rng(0)))
-            if name in installed(POLICIES_GROUP) else '')
+    if name not in installed(POLICIES_GROUP):
+        return ''
+    made = _heuristic(name, count, weights, np.random.default_rng(0))
+    # Its class may be one of ours, made of the package's functions
+    return code_hash(made) or file_hash(installed(POLICIES_GROUP)[name].module)
 
 
 def _learned(model: str, module: nn.Module, rng: np.random.Generator) -> Policy:

@@ -34,7 +34,7 @@ def objects(study: Study) -> dict[str, Objects]:
     root = study.models / 'table2' / f'{CATEGORY}-{generators_hash()[:12]}'
     jobs = [job for part, count in COUNTS.items()
             for job in shape_jobs(CATEGORY, range(_SEEDS[part], _SEEDS[part] + count),
-                                  root / part)]
+                                  root.absolute() / part)]  # workers begin elsewhere
     if not all(job.folder.complete for job in jobs):
         with study.progress(f'making {CATEGORY}', len(jobs)) as advance:
             for outcome in make_dataset(jobs, workers=study.threads,

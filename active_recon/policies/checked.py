@@ -3,8 +3,8 @@
 from dataclasses import replace
 from typing import Any
 
-from active_recon.errors import ViewError
-from active_recon.policies.base import Choice
+from active_recon.errors import ActiveReconError, ViewError
+from active_recon.policies.base import Choice, Observation, Policy
 import numpy as np
 
 
@@ -31,3 +31,14 @@ def checked_choice(found: Any, count: int, batch: int = 1) -> tuple[Choice, Any]
         raise ViewError(f'policy: no usable azimuth: expected ({batch},), radians or NaN, got '
                         f'{azimuth.shape}, {azimuth}', 'policy')
     return replace(choice, scores=scores, azimuth=azimuth), state
+
+
+def chosen(policy: Policy, seen: Observation, state: Any) -> tuple[Choice, Any]:
+    """Return what a policy chooses for one episode; raises ViewError where it fails, too."""
+    try:
+        found = policy.choose(seen, state)
+    except ActiveReconError:
+        raise
+    except Exception as error:  # whatever somebody's own raises
+        raise ViewError(f'policy: fails with {type(error).__name__}: {error}', 'policy') from error
+    return checked_choice(found, seen.candidates.shape[1])

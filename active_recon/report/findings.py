@@ -58,8 +58,8 @@ def stopped(reason: str) -> str:
 
 def _beginning(subject: Subject) -> Iterator[tuple[str, str]]:
     if subject.episode.begun_before:
-        yield 'warning', ('The recording begins in the middle of the episode: earlier views are '
-                          'missing.')
+        yield 'warning', ('Earlier views are missing: the bag has no image of them, from before '
+                          'the camera or the episode was recorded.')
 
 
 def _stop(subject: Subject) -> Iterator[tuple[str, str]]:

@@ -9,6 +9,9 @@
 set -euo pipefail
 
 export RAY_USAGE_STATS_ENABLED=0
+# Only who has ~/.ray/auth_token is let in: the nodes share your home
+export RAY_AUTH_MODE=token
+ray get-auth-token --generate > /dev/null
 port=6379
 head=$(scontrol show hostnames "$SLURM_JOB_NODELIST" | head -n 1)
 address=$(srun --nodes=1 --ntasks=1 --nodelist="$head" hostname --ip-address | cut -d ' ' -f 1)

@@ -153,12 +153,13 @@ def _nearest(views: Sequence[RecordedView], goal: Camera, tolerance: float,
     view = views[nearest_camera(goal, [view.camera for view in views])]
     away = view_distance(view.camera, goal)
     if away > tolerance:
+        advice = '' if abs(goal.elevation - view.camera.elevation) > tolerance else (
+            '. Record all azimuths by `active-recon record-sweep`')
         raise DataError(
             f'no recorded view at the goal after view {taken}, azimuth '
             f'{np.degrees(goal.azimuth):.1f} degrees, elevation {np.degrees(goal.elevation):.1f}: '
             f'expected one within {np.degrees(tolerance):.1f} degrees among {len(views)}, the '
-            f'nearest is {np.degrees(away):.1f} off. Record all azimuths by '
-            '`active-recon record-sweep`', 'missing_view')
+            f'nearest is {np.degrees(away):.1f} off{advice}', 'missing_view')
     return view
 
 
