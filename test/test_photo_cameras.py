@@ -8,6 +8,7 @@ import unicodedata
 
 from active_recon.errors import ConfigError, DataError, ViewError
 from active_recon.geometry.cameras import Intrinsics
+from active_recon.geometry.lenses import Distortion
 from active_recon.photos.camera_file import CameraFile, Entry, posed_photos, sized
 from active_recon.photos.colmap import read_colmap
 from active_recon.photos.cube import upward
@@ -88,6 +89,17 @@ def test_what_opencv_writes_has_the_cameras_it_was_written_from(named, suffix, p
     assert_same(write_opencv(tmp_path / f'cameras.{suffix}', rig(), named), photos, rig())
 
 
+def test_a_fisheye_of_opencv_is_one_and_a_tilted_sensor_is_refused_by_its_count(photos, tmp_path):
+    fisheye = replace(LENS, distortion=Distortion('equidistant', (0.1, -0.05, 0.02, -0.01)))
+    path = write_opencv(tmp_path / 'cameras.yml', rig(fisheye))
+    path.write_text(path.read_text() + 'fisheye_model: 1\n')
+    assert_same(path, photos, rig(fisheye))
+    tilted = replace(LENS, distortion=Distortion('rational_polynomial', (0.1,) * 12))
+    object.__setattr__(tilted.distortion, 'coefficients', (0.1,) * 14)
+    with pytest.raises(DataError, match='expected 8 or 12 of rational_polynomial, got 14'):
+        read_cameras(write_opencv(tmp_path / 'tilted.yml', rig(tilted)), photos)
+
+
 def test_middlebury_s_file_has_the_cameras_it_was_written_from(photos, tmp_path):
     assert_same(write_middlebury(tmp_path / 'it_par.txt', rig(PINHOLE)), photos, rig(PINHOLE))
 
@@ -98,6 +110,29 @@ def test_a_field_of_view_is_a_focal_length(photos, tmp_path):
     angle = 2 * np.arctan(PINHOLE.width / 2 / PINHOLE.fx)
     path.write_text(json.dumps({'camera_angle_x': angle, 'frames': content['frames']}))
     assert_same(path, photos, rig(PINHOLE))
+
+
+def test_a_field_of_view_of_a_photo_whose_size_is_told_is_that_of_a_smaller_one(photos, tmp_path):
+    twice = PINHOLE.resized(2 * PINHOLE.width, 2 * PINHOLE.height)
+    path = tmp_path / 'transforms.json'
+    path.write_text(json.dumps({
+        'camera_angle_x': 2 * np.arctan(PINHOLE.width / 2 / PINHOLE.fx), 'w': twice.width,
+        'h': twice.height, 'cx': twice.cx, 'cy': twice.cy,
+        'frames': transforms(rig(PINHOLE))['frames']}))
+    assert_same(path, photos, rig(PINHOLE))
+
+
+def test_photos_of_one_name_are_told_by_their_folders(tmp_path):
+    entries, paths = [], []
+    for number, camera in enumerate(rig(PINHOLE)):
+        blank_photos(tmp_path / f'cam{number}', [camera], 90 + number)
+        paths.append(tmp_path / f'cam{number}' / names([camera])[0])
+        entries.append(Entry(f'cam{number}/photo0.png', camera.pose, sized(PINHOLE)))
+    posed, left_out = posed_photos(CameraFile('it', entries[::-1]), open_photos(paths)[0])
+    assert len(posed) == 4 and not left_out
+    for each, path, camera in zip(posed, paths, rig(PINHOLE), strict=True):
+        assert each.photo.path == path
+        np.testing.assert_array_equal(each.pose, camera.pose)
 
 
 def test_a_scaled_photo_has_a_scaled_lens_and_another_shape_none(tmp_path):

@@ -61,6 +61,38 @@ def test_the_lens_decides_whether_a_photo_is_taken_as_stored(tmp_path):
         assert load_views(posed)[0][0].image.shape == (height, width, 3)
 
 
+@pytest.mark.parametrize('orientation', [3, 6, 8])
+def test_cameras_of_colmap_are_of_photos_as_stored_and_tell_what_was_up_when_they_were_taken(
+        orientation, tmp_path):
+    from active_recon.photos.camera_file import CameraFile, Entry, posed_photos, sized
+    square = drawn()[:30, :30]
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = orientation
+    Image.fromarray(square).save(tmp_path / 'photo.png', exif=exif)
+    photo = opened(tmp_path / 'photo.png')
+    # As the camera is held the photo has to be turned by EXIF: down and right of what is seen
+    rows, columns = (ImageOps.exif_transpose(_with_orientation(Image.fromarray(
+        each.astype(np.uint8)), orientation)) for each in np.mgrid[:30, :30])
+    right = np.array([int(np.asarray(each)[5, 6]) - int(np.asarray(each)[5, 5])
+                      for each in (columns, rows)])
+    down = np.array([int(np.asarray(each)[6, 5]) - int(np.asarray(each)[5, 5])
+                     for each in (columns, rows)])
+    pose = orbit_camera(0.7, 0.4).pose
+    lens = sized(Intrinsics(50, 50, 15, 15, 30, 30))
+    for stored in (True, False):
+        [posed], _ = posed_photos(CameraFile('it', [Entry('photo', pose, lens)], stored=stored),
+                                  [photo])
+        assert posed.upright is not stored
+        expected = pose[:3, :2] @ np.column_stack([right, down]) if stored else pose[:3, :2]
+        np.testing.assert_allclose(posed.as_seen[:3, :2], expected, atol=1e-12)
+        np.testing.assert_array_equal(posed.as_seen[:, 2:], pose[:, 2:])
+
+
+def _with_orientation(image, orientation):
+    image.getexif()[ExifTags.Base.Orientation] = orientation
+    return image
+
+
 @pytest.mark.parametrize('orientation', [1, 3, 6, 8])
 def test_masks_and_depth_of_a_photo_as_it_is_seen_fit_it_as_it_is_stored(orientation, tmp_path):
     exif = Image.Exif()
@@ -203,6 +235,17 @@ def test_exif_gives_a_first_focal_length(tag, value, expected, tmp_path):
     Image.fromarray(drawn()).save(tmp_path / 'photo.jpg', exif=exif)
     found = opened(tmp_path / 'photo.jpg').focal
     assert found == (None if expected is None else pytest.approx(expected, rel=1e-4))
+
+
+def test_the_focal_length_of_a_photo_that_was_made_smaller_is_smaller(tmp_path):
+    exif = Image.Exif()
+    exif.get_ifd(ExifTags.IFD.Exif).update({
+        ExifTags.Base.FocalLength: 24.0, ExifTags.Base.FocalPlaneXResolution: 5000.0,
+        ExifTags.Base.FocalPlaneResolutionUnit: 2, ExifTags.Base.ExifImageWidth: 4000,
+        ExifTags.Base.ExifImageHeight: 3000})
+    for side, by in ((40, 100), (400, 10)):
+        Image.new('RGB', (side, 3 * side // 4)).save(tmp_path / 'photo.jpg', exif=exif)
+        assert opened(tmp_path / 'photo.jpg').focal == pytest.approx(24 * 5000 / 25.4 / by)
 
 
 def test_alpha_is_a_mask_only_where_something_is_see_through():

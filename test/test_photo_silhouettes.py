@@ -91,6 +91,14 @@ def test_only_what_half_of_the_cameras_have_in_their_photos_counts_as_seen(views
     assert not seen_cells(aside, 8).any()
 
 
+def test_of_two_cameras_both_must_have_a_cell_in_their_photo_and_of_one_that_one(views):
+    one = placed(views)[0]
+    elsewhere = Camera(one.pose @ np.diag([1.0, -1, -1, 1]), one.intrinsics)
+    assert seen_cells([one], 8).all() and seen_cells([one, one], 8).all()
+    assert not seen_cells([one, elsewhere], 8).any()
+    assert seen_cells([one, one, elsewhere], 8).all()
+
+
 def test_the_box_of_the_largest_part_is_found():
     cells = np.zeros((10, 10, 10), bool)
     cells[2:5, 3:9, 4:6] = cells[9, 9, 9] = True

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 Lens = Callable[[tuple[int, int]], Intrinsics]
 """Gives the intrinsics by a photo's width and height; raises ViewError where these do not fit."""
 _SHAPE_OFF = 0.01
+_AS_SEEN = {3: [[-1, 0], [0, -1]], 6: [[0, 1], [-1, 0]], 8: [[0, -1], [1, 0]]}
+"""By EXIF's orientation: x and y of a photo as it is seen in those of the stored one, (2, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,8 @@ class CameraFile:
     - looks: 'opencv' or 'opengl', the camera axes that the file was read with
     - metric: whether the units are metres for certain
     - board: the printed board that lies in the world's plane z = 0, under or beside the object
+    - stored: whether the cameras are those of photos as stored, which EXIF has not turned
+    - as_seen: poses, (4, 4), of its photos turned as EXIF says
     """
 
     source: str
@@ -52,6 +56,8 @@ class CameraFile:
     looks: str = 'opencv'
     metric: bool = False
     board: Board | None = None
+    stored: bool = False
+    as_seen: Sequence[NDArray[np.float64]] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +75,14 @@ class PosedPhoto:
     intrinsics: Intrinsics
     upright: bool = True
     depth: Path | None = None
+
+    @property
+    def as_seen(self) -> NDArray[np.float64]:
+        """The pose, (4, 4), of the photo turned as EXIF says."""
+        pose = self.pose.copy()
+        if not self.upright and self.photo.orientation in _AS_SEEN:
+            pose[:3, :2] = pose[:3, :2] @ _AS_SEEN[self.photo.orientation]
+        return pose
 
 
 def sized(lens: Intrinsics) -> Lens:
@@ -105,7 +119,7 @@ def posed_photos(cameras: CameraFile, photos: Sequence[PhotoFile]
                             f'{entries[1].name}')
             continue
         try:
-            found.append(_posed(entries[0], photo))
+            found.append(_posed(entries[0], photo, cameras.stored))
         except ViewError as error:
             left_out.append(f'{photo.name}: {error}')
     if not by_photo:
@@ -117,15 +131,18 @@ def posed_photos(cameras: CameraFile, photos: Sequence[PhotoFile]
     return found, left_out
 
 
-def _posed(entry: Entry, photo: PhotoFile) -> PosedPhoto:
-    """Return a photo turned by EXIF, or as stored where only that has its camera's size."""
+def _posed(entry: Entry, photo: PhotoFile, stored: bool) -> PosedPhoto:
+    """Return a photo turned by EXIF, or if `stored` as stored; the other way if only that fits."""
+    def taken(upright: bool) -> PosedPhoto:
+        size = photo.upright_size if upright else photo.size
+        return PosedPhoto(photo, entry.pose, entry.lens(size), upright, entry.depth)
+
     try:
-        return PosedPhoto(photo, entry.pose, entry.lens(photo.upright_size), depth=entry.depth)
+        return taken(not stored)
     except ViewError:
         if photo.upright_size == photo.size:
             raise
-        return PosedPhoto(photo, entry.pose, entry.lens(photo.size), upright=False,
-                          depth=entry.depth)
+        return taken(stored)
 
 
 def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]
@@ -141,10 +158,12 @@ def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]
     found: dict[Path, dict[tuple[int, int], list[Entry]]] = {}
     for entry in entries:
         for rank, ((of_camera, _), table) in enumerate(zip(ways, tables, strict=True)):
-            fitting = table.get(of_camera(entry.name), [])
-            if len(fitting) == 1:
-                fit = -rank, _folders_alike(entry.name, fitting[0])
-                found.setdefault(fitting[0], {}).setdefault(fit, []).append(entry)
+            fitting = [(_folders_alike(entry.name, path), path)
+                       for path in table.get(of_camera(entry.name), [])]
+            alike = max((same for same, _ in fitting), default=0)
+            best = [path for same, path in fitting if same == alike]
+            if len(best) == 1:
+                found.setdefault(best[0], {}).setdefault((-rank, alike), []).append(entry)
                 break
     return {path: fits[max(fits)] for path, fits in found.items()}
 

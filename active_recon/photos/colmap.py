@@ -52,7 +52,7 @@ def read_colmap(folder: Path) -> CameraFile:
     entries = [_entry(image, lenses, images_file) for image in images]
     if not entries:
         raise DataError(f'{images_file}: no cameras: expected a pose for each image, got none')
-    return CameraFile(str(folder), entries)
+    return CameraFile(str(folder), entries, stored=True)  # COLMAP does not turn photos by EXIF
 
 
 def _entry(image: _Image, lenses: Mapping[int, Lens], path: Path) -> Entry:

@@ -195,7 +195,10 @@ def _focal(exif: Image.Exif, size: tuple[int, int]) -> float | None:
         focal = float(found[ExifTags.Base.FocalLength])
         per_unit = float(found[ExifTags.Base.FocalPlaneXResolution])
         unit = {2: 25.4, 3: 10.0, 4: 1.0}[found.get(ExifTags.Base.FocalPlaneResolutionUnit, 2)]
-        pixels = focal * per_unit / unit
+        # That is of the photo as it was taken, which may have been made smaller since
+        taken = float(found.get(ExifTags.Base.ExifImageWidth, 0)) or max(size)
+        taken = max(taken, float(found.get(ExifTags.Base.ExifImageHeight, 0)))
+        pixels = focal * per_unit / unit * max(size) / taken
         return pixels if 0 < pixels < math.inf else None
     except (KeyError, TypeError, ValueError, ZeroDivisionError):
         return None

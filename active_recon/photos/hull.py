@@ -96,7 +96,7 @@ def seen_cells(cameras: Sequence[Camera], side: int) -> NDArray[np.bool_]:
         with np.errstate(invalid='ignore'):
             count += ((pixels >= 0) & (pixels < [lens.width, lens.height])).all(axis=1) & (
                 depth > 0)
-    return (2 * count >= len(cameras)).reshape(side, side, side)
+    return (count >= max(min(2, len(cameras)), len(cameras) / 2)).reshape(side, side, side)
 
 
 def coverage(cells: NDArray[np.bool_], views: Sequence[PhotoView],

@@ -57,18 +57,22 @@ def _lens(storage: Any, path: Path) -> Lens:
             or min(width, height, *matrix.diagonal()) <= 0):
         raise DataError(f'{path}: no lens: expected camera_matrix (3 x 3), image_width and '
                         f'image_height, got {matrix} and {width} x {height}')
+    fisheye = storage.getNode('fisheye_model').real() > 0
     try:
-        distortion = None if given is None or not given.any() else _distortion(given.ravel())
+        distortion = None if given is None or not (given.any() or fisheye) else _distortion(
+            given.ravel(), fisheye)
     except ViewError as error:
         raise DataError(f'{path}: {error}') from error
     return sized(Intrinsics(matrix[0, 0], matrix[1, 1], matrix[0, 2] + 0.5, matrix[1, 2] + 0.5,
                             width, height, distortion))
 
 
-def _distortion(given: NDArray[np.float64]) -> Distortion:
-    """Return OpenCV's model: of 4 or 5 coefficients, of 8, or of 12 with the thin prism's."""
+def _distortion(given: NDArray[np.float64], fisheye: bool) -> Distortion:
+    """Return OpenCV's model: its fisheye's, or of 4, 5 or 8 coefficients, or 12 with a prism's."""
+    if fisheye:
+        return Distortion('equidistant', tuple(given.tolist()))
     kept = np.trim_zeros(given, 'b').size
-    size = next(size for size in (5, 8, 12, 99) if kept <= size)
+    size = next(size for size in (5, 8, 12, kept) if kept <= size)
     values = np.pad(given, (0, max(0, size - given.size)))[:size]
     return Distortion('plumb_bob' if size == 5 else 'rational_polynomial', tuple(values.tolist()))
 

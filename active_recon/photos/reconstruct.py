@@ -172,7 +172,8 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
     poses = [view.camera for view in views]
     told = axis_direction(options.up) if options.up else file.up
     up = told if told is not None else upward(
-        [entry.pose for entry in file.entries] or [camera.pose for camera in poses])
+        file.as_seen or [entry.pose for entry in file.entries]
+        or [camera.pose for camera in poses])
     cube = _told_cube(options, file, up)
     wrong = misreading(poses, None if cube is None else cube.centre, file.looks)
     if wrong:

@@ -1,7 +1,7 @@
 """Where the cameras of photos come from: a file, a board in the photos, or a turntable's steps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from active_recon.calibration.board import Board
@@ -63,4 +63,5 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
         raise DataError(f'{folder}: no cameras beside the photos: expected {FORMATS}; name the '
                         'file by --cameras', 'no_cameras')
     file = read_cameras(path, photos, axes)
-    return file, *posed_photos(file, photos)
+    posed, left_out = posed_photos(file, photos)
+    return replace(file, as_seen=[each.as_seen for each in posed]), posed, left_out

@@ -79,6 +79,8 @@ def _lens(values: Mapping[str, Any]) -> Lens:
                 else height / 2 / math.tan(_positive(values, 'camera_angle_y') / 2)
                 if 'camera_angle_y' in values else across)
         return Intrinsics(across, down, *_centre(values, width, height), width, height, distortion)
+    if {'w', 'h'} <= values.keys():
+        return sized(of_size((int(_positive(values, 'w')), int(_positive(values, 'h')))))
     return of_size
 
 
