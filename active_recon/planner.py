@@ -1,7 +1,6 @@
 """A policy and the state of one episode: the core of the view planner's node."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
@@ -178,9 +177,14 @@ class Planner:
         prepare = getattr(self._policy, 'prepare', None)
         if prepare is None:
             return
-        with suppress(ViewError):  # which `add_view` tells
+        try:
             prepare(policy_poses([camera], self._yaw, 1 / size)[0],
                     policy_poses(self._places.candidates(camera), self._yaw, 1 / size))
+        except ViewError:
+            pass  # which `add_view` tells
+        except Exception as error:  # whatever somebody's own raises
+            raise ViewError(f'policy: prepare fails with {type(error).__name__}: {error}',
+                            'policy') from error
 
     def expect_view(self, latent: NDArray[np.float32], camera: Camera,
                     volume: VoxelGrid | None = None) -> None:

@@ -116,7 +116,8 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
              if name.startswith('state/')}
     shapes, expected = ({name: array.shape for name, array in each.items()}
                         for each in (state, reconstructor.initial_state()))
-    if shapes != expected:
+    if shapes.keys() != expected.keys() or not all(
+            _is_as(shapes[name], first) for name, first in expected.items()):
         raise ValueError(f'expected arrays {expected}, got {shapes}')
     seen = [SeenView(camera, arrays[f'foreground/{number}'], arrays[f'known/{number}'])
             for number, camera in enumerate(_read_cameras('seen', arrays))]
@@ -136,6 +137,12 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
         Reconstruction(VoxelGrid(occupancy, reconstructor.object_size), arrays['latent'], None,
                        judge=lambda: quality),
         photos, Camera(arrays['last_pose']))
+
+
+def _is_as(shape: Sequence[int], first: Sequence[int]) -> bool:
+    """Return whether a state's shape is that before any view, or grew with the views from 0."""
+    return len(shape) == len(first) and all(
+        length == own or own == 0 for length, own in zip(shape, first, strict=True))
 
 
 def _written_cameras(name: str, cameras: Sequence[Camera]) -> dict[str, NDArray[np.float64]]:

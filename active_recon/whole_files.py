@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 import tempfile
 
 from active_recon.errors import ConfigError
@@ -15,7 +16,8 @@ def whole_file(path: Path) -> Iterator[Path]:
 
     If the block raises, what stood at `path` stays, and nothing is left beside it.
     """
-    unfinished = path.with_name(f'.{path.name}.part')
+    # A name of its own: two processes may write the same file at once
+    unfinished = path.with_name(f'.{path.name}.{token_hex(4)}.part')
     try:
         yield unfinished
         unfinished.replace(path)

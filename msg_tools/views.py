@@ -105,6 +105,7 @@ class ViewJoiner:
         self._masks: deque[tuple[int, Image]] = deque(maxlen=_MAX_WAITING)
         self._depths: deque[tuple[int, Image | CompressedImage]] = deque(maxlen=_MAX_WAITING)
         self._poses: list[tuple[int, NDArray[np.float64]]] = []
+        self._last_pose = earliest - 1
         self._first_intrinsics: float = math.inf
         self._first_pose: float = math.inf
         self._ignored_intrinsics: int | None = None
@@ -151,6 +152,7 @@ class ViewJoiner:
         if stamp < self._earliest:
             self._ignored_poses = [stamp]
             return
+        self._last_pose = stamp
         bisect.insort(self._poses, (stamp, pose), key=lambda entry: entry[0])
         del self._poses[:-_MAX_POSES]
         self._first_pose = min(self._first_pose, stamp)
@@ -229,7 +231,8 @@ class ViewJoiner:
                 earlier, pose_before = self._poses[after - 1]
                 if max(later - stamp, stamp - earlier) <= round(self.max_pose_gap * 1e9):
                     return pose_between(pose_before, pose, (stamp - earlier) / (later - earlier))
-            late = True
+            # The last to come, not the latest: one stamped far ahead would let no image wait
+            late |= self._last_pose > stamp
         if not late:
             return None
         nearby = [known for known, _ in self._poses[max(after - 1, 0):after + 1]]

@@ -50,7 +50,7 @@ def test_one_joint_of_several_is_chosen_by_its_name(tmp_path):
     assert azimuths(episode.views) == AZIMUTHS
     with pytest.raises(DataError, match='on /table, lift, turn: choose one with --joint'):
         read_run(folder)
-    with pytest.raises(DataError, match='expected one of tilt'):
+    with pytest.raises(DataError, match='no joint tilt on /table: expected one of lift, turn'):
         read_run(folder, Topics(joint='tilt'))
 
 

@@ -179,6 +179,9 @@ def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: floa
         _print_quality(replayed)
     if not verified.knows_policy:
         typer.echo('the bag does not name its policy: goals and stop are not compared')
+    if 'weights_sha256' not in run.provenance:
+        typer.echo('the bag does not name its network: that of the options, else the default, '
+                   'was compared (--weights, --precision)')
     typer.echo(f'hash {verified.hash}')
     verdict = verified.comparison.verdict
     typer.echo(f'{verdict}: recording and replay')

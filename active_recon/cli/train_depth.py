@@ -85,7 +85,7 @@ def train_depth(
         train_depth(refiner, network, views, training,
                     Run(fabric, checkpoint, report, resume, begun_with=begun_with),
                     {'network_sha256': digest})
-    scale, bias = calibrate_depth(refiner, network, held_out)
+    scale, bias = calibrate_depth(refiner.cpu(), network, held_out)
     typer.echo(f'calibrated on validation: {scale:.3f} logit {bias:+.3f}')
     written = out / depth_path(path).name
     save_refiner(written, refiner, config, digest, {

@@ -81,7 +81,7 @@ def train_segmenter(
             fabric, checkpoint, report, resume, begun_with=begun_with))
     if not fabric.is_global_zero:
         return
-    figures = silhouette_figures(segmenter.eval(), held_out)
+    figures = silhouette_figures(segmenter.cpu().eval(), held_out)
     typer.echo('IoU of silhouettes on validation: '
                + ', '.join(f'{kind} {value:.3f}' for kind, value in figures.items()))
     written = out / 'segmenter.safetensors'

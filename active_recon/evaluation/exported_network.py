@@ -7,8 +7,9 @@ from typing import Any
 
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.weights import Bundle
-from active_recon.runtimes import load_runtime
+from active_recon.runtimes import AUTO, load_runtime
 from active_recon.runtimes.exported import ExportedRuntime
+from active_recon.runtimes.graph_files import is_exported
 from active_recon.runtimes.precision import has_bf16
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,7 @@ def network_in(runtime: str, weights: Path, bundle: Bundle, bfloat16: bool,
     precision where the processor has it. Raises WeightsError where it was not exported, and
     ConfigError where the runtime is not available.
     """
-    if runtime == 'torch':
+    if runtime == 'torch' or runtime == AUTO and not is_exported(weights):
         return bundle.reconstruction
     half = bfloat16 and has_bf16() and runtime != 'onnxruntime'
     found = _exported(weights, runtime, threads, 'bf16' if half else 'f32')

@@ -19,11 +19,12 @@ def episodes(views: ViewSet, starts: int, seed: int = 0) -> tuple[Tensor, Tensor
     """
     Return the objects and the first views of the episodes to measure, (N x starts,) each.
 
-    Each object has episodes from `starts` different views, drawn by the seed.
+    Each object has episodes from `starts` different views, drawn by the seed; at most all.
     """
     order = np.random.default_rng(seed).random(views.azimuths.shape).argsort(axis=1)
-    objects = np.repeat(np.arange(len(views)), starts)
-    return torch.from_numpy(objects), torch.from_numpy(order[:, :starts].reshape(-1))
+    chosen = order[:, :starts]
+    objects = np.repeat(np.arange(len(views)), chosen.shape[1])
+    return torch.from_numpy(objects), torch.from_numpy(chosen.reshape(-1))
 
 
 def iou_per_view(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
+import json
 import os
 from pathlib import Path
 import random
@@ -135,4 +136,5 @@ def _as_yaml(value: object) -> str:
     """Return a parameter's value as the command line takes it."""
     if isinstance(value, bool):
         return str(value).lower()
-    return f'"{value}"' if isinstance(value, str | Path) else str(value)
+    return (json.dumps(str(value), ensure_ascii=False) if isinstance(value, str | Path)
+            else str(value))

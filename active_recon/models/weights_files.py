@@ -86,7 +86,11 @@ def depth_path(weights: Path | None = None) -> Path:
 def read_card(path: Path) -> dict[str, Any]:
     """Return the card beside weights, with current keys; empty where there is none."""
     beside = path.with_suffix('.json')
-    return with_current_keys(json.loads(beside.read_text())) if beside.is_file() else {}
+    try:
+        return with_current_keys(dict(json.loads(beside.read_text()))) if beside.is_file() else {}
+    except (OSError, ValueError, TypeError) as error:
+        raise WeightsError(f'{beside}: no readable card: expected the JSON that was written '
+                           f'beside {path.name}, got: {error}') from error
 
 
 def weights_hash(path: Path | None = None) -> str:

@@ -45,7 +45,7 @@ class PlayerNode(Node):
                                   'topics') from error
             profile = common_profile(topic.qos, _QUEUE)
             if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
-                profile.depth = 1
+                profile.depth = max(len(topic.qos), 1)  # the last of each publisher
             self._out[topic.name] = self.create_publisher(kind, topic.name, profile)
         self._clock_pub = None if CLOCK in self._out else self.create_publisher(Clock, CLOCK, 10)
         self._messages = playing.messages()

@@ -6,10 +6,18 @@ from active_recon.errors import ConfigError
 import yaml
 
 
+class _RosLoader(yaml.SafeLoader):
+    """As ROS reads it, a date is text."""
+
+    yaml_implicit_resolvers = {
+        first: [(tag, rule) for tag, rule in rules if not tag.endswith(':timestamp')]
+        for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+
+
 def read_yaml(path: Path) -> object:
     """Return what a file holds; ConfigError, with line and reason, where it is no YAML."""
     try:
-        return yaml.safe_load(path.read_text())
+        return yaml.load(path.read_text(), _RosLoader)  # noqa: S506
     except FileNotFoundError as error:
         raise ConfigError(f'{path}: no such file: expected a ROS parameters file in YAML'
                           ) from error

@@ -92,7 +92,7 @@ class CameraFaults:
         self._waiting: deque[tuple[float, Sent]] = deque()
         self._drawn: dict[str, tuple[tuple[int, float], bool]] = {}
         self._stood = 0.0
-        self._last = -math.inf
+        self._last = self._sent_at = -math.inf
         self.change(amounts)
 
     def change(self, amounts: Mapping[str, float]) -> None:
@@ -121,6 +121,10 @@ class CameraFaults:
             parts.append(Sent('pose', self._with_noise(shot)))
         if not self._happens('drop_camera_info'):
             parts.append(Sent('camera_info', self._of_another_size(shot)))
+        if now < self._sent_at:  # the clock went back: what waits is of the time before
+            self._held = None
+            self._waiting.clear()
+        self._sent_at = now
         due = now + self._amounts.get('delay_images', 0.0)
         self._waiting.extend((due, image) for image in self._images(shot))
         while self._waiting and self._waiting[0][0] <= now:

@@ -39,11 +39,12 @@ def calibrate(network: Lifting, validation: ViewSet,
         for count in counts:
             view = order[:, count - 1]
             with torch.autocast('cpu', torch.bfloat16, enabled=network.device.type == 'cpu'):
-                state = network.step(validation.white(objects, view),
-                                     validation.cameras(objects, view), state)
+                state = network.step(
+                    validation.white(objects, view).to(network.device),
+                    validation.cameras(objects, view).to(network.device), state)
                 found = network.logits(state)
             inputs[count].append(np.stack([
-                np.take_along_axis(depth_to_space(each.float()).flatten(1).numpy(), cells,
+                np.take_along_axis(depth_to_space(each.float()).flatten(1).cpu().numpy(), cells,
                                    1).ravel()
                 for each in (found.logits, found.evidence)], axis=1))
         advance(min(len(truth) * _BATCH, len(chosen)))

@@ -30,6 +30,7 @@ from active_recon.training.view_gains import (
     spread_views,
     ViewGains,
 )
+from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
 from active_recon.whole_files import whole_file
 import numpy as np
 import torch
@@ -132,7 +133,13 @@ def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
 
 
 def _file(out: Path, folder: ObjectFolder) -> Path:
-    return out / f'{folder.category}__{folder.name}.npz'
+    """Return where an object's gains are kept: by what it shows, as a dataset may be made anew."""
+    shown = hashlib.sha256()
+    for path in (*sorted(folder.images_folder.glob('*')),
+                 *(folder.voxels_path(side) for side in (RESOLUTION, FINE_RESOLUTION))):
+        if path.is_file() and not path.name.endswith('_depth.png'):
+            shown.update(path.read_bytes())
+    return out / f'{folder.category}__{folder.name}-{shown.hexdigest()[:12]}.npz'
 
 
 def _keep(entrant: Entrant, collecting: Collecting, out: Path, policy: Policy | None,

@@ -44,7 +44,9 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
     """
     setup = recorded.with_overrides(overrides)
     reconstructor = setup.load_reconstructor()
-    before = sorted(run.episodes, key=lambda episode: episode.begin)
+    # The new bag has the whole images: a replay of it has no reduced ones
+    before = [replace(episode, views=[replace(view, reduced=None) for view in episode.views])
+              for episode in sorted(run.episodes, key=lambda episode: episode.begin)]
     if overrides.policy is None:
         episodes = [reconstruct_episode(episode, reconstructor, advance) for episode in before]
     else:

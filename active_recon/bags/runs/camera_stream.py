@@ -3,7 +3,6 @@
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import islice
 import math
 from typing import Any
 
@@ -67,6 +66,7 @@ class CameraStream:
         self._scene = scene
         self._reporting = reporting
         self.is_unstamped = self.are_images_unstamped = False
+        self._image_frames: set[str] = set()
         self._joints: set[str] = set()
         self._lenses: list[tuple[int, Intrinsics]] = []
         self._unusable_lens = ''
@@ -79,11 +79,23 @@ class CameraStream:
         self.received: dict[str, dict[int, int]] = {
             IMAGE_ROLE: {}, INFO_ROLE: {}, POSE_ROLE: {}}
 
-    def views(self, wanted: Callable[[int], bool]) -> Iterator[View | MessageError]:
-        """Yield the wanted images with their cameras, or the errors that reject them."""
+    def views(self, wanted: Callable[[int], bool],
+              in_order: bool = True) -> Iterator[View | MessageError]:
+        """
+        Yield the wanted images with their cameras, or the errors that reject them.
+
+        Without `in_order` stamps may go back, as those of a loop do whose clock was reset.
+        """
         yield from self._read_cameras()
         with self._reporting('reading the images', self._camera.image.count) as advance:
-            yield from self._joined(wanted, advance)
+            yield from self._joined(wanted, in_order, advance)
+
+    def transformed(self, frame: str, time: int) -> NDArray[np.float64]:
+        """Return by transforms the pose of a frame, where that of the images is the camera's."""
+        assert self.transforms is not None
+        if frame in self._image_frames:
+            frame = self._topics.camera_frame or frame
+        return self._scene.about_object(self.transforms.pose(frame, time))
 
     def begins_after(self, stamp: int) -> bool:
         """Return whether an image of that stamp, or its camera, is from before the recording."""
@@ -91,20 +103,25 @@ class CameraStream:
                   if entries and not self.is_unstamped]
         return stamp < max(min(self.images)[0] if self.images else math.inf, *firsts)
 
-    def _joined(self, wanted: Callable[[int], bool], advance: Advance
+    def _joined(self, wanted: Callable[[int], bool], in_order: bool, advance: Advance
                 ) -> Iterator[View | MessageError]:
         joiner = ViewJoiner(self._topics.max_pose_gap)
-        fed = 0
+        fed = last = 0
         for message in self._bag.messages({self._camera.image.name}):
             advance(1, '')
             msg = read_message(message)
             stamp = (message.received if self.are_images_unstamped
                      else nanoseconds_from_stamp(msg.header.stamp))
             self.images.append((stamp, message.received))
+            self._image_frames.add(msg.header.frame_id)
             if not wanted(stamp):
                 continue
             self.received[IMAGE_ROLE].setdefault(stamp, message.received)
             time = message.received if self.is_unstamped else stamp
+            if time < last and not in_order:
+                joiner.clear()
+                fed = 0
+            last = time
             # Of a fast tracker's poses only those around an image are of use
             fed = max(fed, bisect_left(self._poses, time, key=_stamp) - 1)
             try:
@@ -128,6 +145,7 @@ class CameraStream:
                                  self._camera.static)
         read = [topic for topic in (azimuth, static, info) if topic]
         poses: list[tuple[int, int, NDArray[np.float64] | float]] = []
+        lenses: list[tuple[int, int, Intrinsics]] = []
         with self._reporting('reading the cameras', sum(each.count for each in read)) as advance:
             for message in self._bag.messages({topic.name for topic in read}):
                 advance(1, '')
@@ -138,12 +156,14 @@ class CameraStream:
                 stamp = (0 if message.type_name == FLOAT
                          else nanoseconds_from_stamp(msg.header.stamp))
                 role = POSE_ROLE if message.topic == azimuth.name else INFO_ROLE
+                if message.type_name == JOINT_STATE and self._is_of_others(msg):
+                    continue
                 self.received[role].setdefault(stamp, message.received)
                 try:
                     if role == POSE_ROLE:
                         poses.append((stamp, message.received, self._pose(msg)))
                     else:
-                        self._lenses.append((stamp, intrinsics_from_msg(msg)))
+                        lenses.append((stamp, message.received, intrinsics_from_msg(msg)))
                 except MessageError as error:
                     # Of an image there may be another camera info: the message is left out
                     if role == INFO_ROLE:
@@ -151,15 +171,17 @@ class CameraStream:
                     yield error if role == POSE_ROLE else MessageError(
                         str(error), 'unusable_camera_info')
         self._require_one_joint()
-        self._place()
         self.are_images_unstamped = not any(
             nanoseconds_from_stamp(read_message(message).header.stamp)
-            for message in islice(self._bag.messages({self._camera.image.name}), 2))
+            for message in self._bag.messages({self._camera.image.name}))
         stamps = (self.transforms.stamps if self.transforms
                   else [stamp for stamp, *_ in poses])
         self.is_unstamped = self.are_images_unstamped or bool(stamps) and not any(stamps)
         self._poses = [(received if self.is_unstamped else stamp, pose)
                        for stamp, received, pose in poses]
+        self._lenses = [(received if self.is_unstamped else stamp, lens)
+                        for stamp, received, lens in lenses]
+        self._place()
         if self.transforms:
             self.transforms.finish(by_receive_time=self.is_unstamped)
         self._poses.sort(key=_stamp)
@@ -173,7 +195,6 @@ class CameraStream:
                 msg, self._topics.object_frame, 'name it with --object-frame, and with '
                 '--object-position where the object is in it')
         if kind == JOINT_STATE:
-            self._joints.update(msg.name)
             angle = joint_position_from_msg(msg, self._topics.joint)
         else:
             angle = float(msg.data)
@@ -181,8 +202,16 @@ class CameraStream:
             raise MessageError(f'azimuth not finite: got {angle}', 'azimuth')
         return angle
 
+    def _is_of_others(self, msg: Any) -> bool:
+        """Return whether a JointState is of another publisher's joints, as an arm's."""
+        self._joints.update(msg.name)
+        return bool(self._topics.joint and msg.name) and self._topics.joint not in msg.name
+
     def _require_one_joint(self) -> None:
         """Raise DataError where it is open which of several joints, of any message, is meant."""
+        if self._topics.joint and self._joints and self._topics.joint not in self._joints:
+            raise DataError(f'no joint {self._topics.joint} on {self._camera.azimuth.name}: '
+                            f'expected one of {", ".join(sorted(self._joints))}', 'joint')
         if len(self._joints) > 1 and not self._topics.joint:
             raise DataError(f'several joints on {self._camera.azimuth.name}, '
                             f'{", ".join(sorted(self._joints))}: choose one with --joint'

@@ -71,13 +71,12 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
         if given and namespace is not None:
             raise ConfigError(f'{option}: not needed: the bag has the views of a loop, which knew '
                               'that')
-    node = checked_parameters('reconstructor', summary.parameters.get(
-        f'{namespace or "/"}reconstructor'.strip('/'), {}))
+    node = _parameters(summary, 'reconstructor')
     frame_given = topics.object_frame != _ANY_TOPICS.object_frame
     topics = replace(topics, max_pose_gap=node.get('max_pose_gap', topics.max_pose_gap),
                      object_frame=node.get('object_frame', topics.object_frame))
     scene = replace(scene, object_size=scene.object_size or {
-        **_simulated_camera(summary), **node}.get('object_size'))
+        **_parameters(summary, 'turntable_camera'), **node}.get('object_size'))
     camera = camera_topics(bag, summary, topics)
     if frame_given and camera.azimuth.type_name not in POSE_TYPES:
         raise ConfigError(f'--object-frame: not for {camera.azimuth.type_name}, which the bag has '
@@ -89,7 +88,7 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
             if stream.assumed:
                 raise ConfigError("--depth needs the camera's pose and lens: expected them in the "
                                   f'bag, which lacks {"; ".join(stream.assumed)}')
-            episode = with_depth_of(camera.depth, episode, bag, stream, scene)
+            episode = with_depth_of(camera.depth, episode, bag, stream)
         gaps = gaps_between([stamp for stamp, _ in stream.images])
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
     record = LoopRecord(bag, namespace, node.get('object_size', scene.size), topics.object_frame)
@@ -104,11 +103,11 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
                  _assumed(stream, scene))
 
 
-def _simulated_camera(summary: BagSummary) -> Mapping[str, Any]:
-    """Return the parameters of the simulated camera; empty if there was none."""
-    return checked_parameters('turntable_camera', next((
+def _parameters(summary: BagSummary, node: str) -> Mapping[str, Any]:
+    """Return the parameters of a node in any namespace; empty if there was none."""
+    return checked_parameters(node, next((
         values for name, values in summary.parameters.items()
-        if name.rpartition('/')[2] == 'turntable_camera'), {}))
+        if name.rpartition('/')[2] == node), {}))
 
 
 def _assumed(stream: CameraStream, scene: Scene) -> list[str]:

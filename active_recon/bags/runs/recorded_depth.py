@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from active_recon.bags.runs.camera_stream import CameraStream
 from active_recon.bags.runs.run import RecordedEpisode
-from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import DepthTopics
 from active_recon.bags.storage.bag import Bag
 from active_recon.bags.storage.message_types import (
@@ -60,8 +59,8 @@ def with_depth(episodes: Sequence[RecordedEpisode], bag: Bag, namespace: str,
                                     for view in episode.views]) for episode in episodes]
 
 
-def with_depth_of(depth: DepthTopics, episode: RecordedEpisode, bag: Bag, stream: CameraStream,
-                  scene: Scene) -> RecordedEpisode:
+def with_depth_of(depth: DepthTopics, episode: RecordedEpisode, bag: Bag, stream: CameraStream
+                  ) -> RecordedEpisode:
     """
     Return an episode whose views have the nearest depth image of a topic, of another recorder.
 
@@ -79,9 +78,9 @@ def with_depth_of(depth: DepthTopics, episode: RecordedEpisode, bag: Bag, stream
         try:
             image = _image(each.msg, cameras[stamp], lens)
             if stream.transforms:
-                image = _registered(image, scene.about_object(stream.transforms.pose(
+                image = _registered(image, stream.transformed(
                     each.msg.header.frame_id,
-                    each.received if stream.is_unstamped else each.stamp)))
+                    each.received if stream.is_unstamped else each.stamp))
             found[stamp] = image
         except MessageError as error:
             reason = str(error)

@@ -92,7 +92,7 @@ def gated_views(stream: CameraStream, gate: ViewGate,
 def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
     found = {}
     refusal = ''
-    for view in stream.views(wanted=frozenset(stamps).__contains__):
+    for view in stream.views(frozenset(stamps).__contains__, in_order=False):
         try:
             if isinstance(view, MessageError):
                 raise view
@@ -112,6 +112,10 @@ def _episode(episode: Episode, views: Sequence[View], end: float, stream: Camera
     """Return an episode, with each goal after the view from which it was decided."""
     goals: dict[int, list[RecordedGoal]] = {}
     published = [record.published['view'][view.stamp] for view in views]
+    begun = record.published['episode'].get(episode.begin, 0)
+    if [begun, *published] != sorted([begun, *published]):
+        raise DataError('the clock went back while it was recorded, and its episodes share their '
+                        'stamps: expected later ones, or those of another time', 'clock')
     for goal in _goals(record, episode.begin, end):
         after = bisect_right(published, record.published['next_view'][goal.stamp])
         before = goals.setdefault(after, [])

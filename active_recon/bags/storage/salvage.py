@@ -1,11 +1,13 @@
 """Reading what is intact of a damaged or incomplete MCAP file."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from active_recon.bags.storage.mcap_file import chunk_records, RecordReader
 from active_recon.errors import DataError
-from mcap.records import Chunk, DataEnd, Footer, McapRecord
+from mcap.reader import SeekingReader
+from mcap.records import Chunk, DataEnd, Footer, Header, McapRecord
 from mcap.writer import MCAP0_MAGIC
 
 
@@ -56,6 +58,15 @@ class Salvage:
                 yield from self._chunk(record)
             elif in_data:
                 yield record
+            if isinstance(record, Header):
+                yield from self._described()
+
+    def _described(self) -> list[McapRecord]:
+        """Return the schemas and channels of the summary: a damaged chunk may hold them."""
+        with suppress(Exception), self.path.open('rb') as file:
+            summary = SeekingReader(file, record_size_limit=self.path.stat().st_size).get_summary()
+            return [*summary.schemas.values(), *summary.channels.values()] if summary else []
+        return []
 
     def _chunk(self, chunk: Chunk) -> list[McapRecord]:
         """Return the records of a chunk, all or none."""

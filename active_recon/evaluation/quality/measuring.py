@@ -136,8 +136,9 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
     keeps no foreground, from which silhouettes are had.
     """
     shown = FAULTS[fault](views, seed) if fault else views
-    around = all(map(on_one_ring, views.poses[:, :, :3, 3].numpy()))
-    called = kind if around else f'{kind}{_ANY}'
+    # Each object by itself: which others are measured at the same time makes no difference
+    called = np.array([kind if on_one_ring(places) else f'{kind}{_ANY}'
+                       for places in views.poses[:, :, :3, 3].numpy()], '<U16')
     count = min(count, shown.poses.shape[1])
     order = torch.from_numpy(orders_of(shown, kind, count, seed))
     observer, objects = Observer(network, shown), torch.arange(len(shown))
@@ -166,9 +167,10 @@ def measure(views: ViewSet, network: ReconstructionNetwork, threshold: float, co
         np.array(numbers), np.array(pools), np.array(ious),
         np.array([hollow_share(truth.numpy()) for truth in views.voxels])[at_row],
         np.array(counts),
-        np.array([f'{name} {called} {fault} {seed}' for name in names])[at_row], names[at_row],
+        np.array([f'{name} {own} {fault} {seed}'
+                  for name, own in zip(names, called, strict=True)])[at_row], names[at_row],
         np.array(sources_of(views.folders))[at_row], np.full(len(rows), fault, '<U16'),
-        np.full(len(rows), called, '<U16'), np.full(len(rows), weights_sha256))
+        called[at_row], np.full(len(rows), weights_sha256))
 
 
 def _ordered(order: torch.Tensor) -> Callable[[TimeStep[torch.Tensor, Seen]], torch.Tensor]:

@@ -55,6 +55,7 @@ class CameraNode(ManagedNode):
             self._open() if source is None else source, self._open, self._params.values.loop,
             lambda: self.get_clock().now().nanoseconds, guard.trigger)
         self.add_cleanup(self._grabber.close)
+        self.add_cleanup(lambda: self._diagnostics.clear_warning(_GONE, log=False))
 
     def clock_went_back(self, how: str) -> None:
         """Go on: images have the stamps of the new time."""

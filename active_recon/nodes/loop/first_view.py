@@ -7,13 +7,13 @@ import time
 from active_recon.geometry.cameras import Camera, CANONICAL_ELEVATION, orbit_camera
 from active_recon.nodes.runtime.awaited_inputs import AwaitedInputs
 from active_recon.nodes.runtime.diagnostics import Diagnostics
+from active_recon.nodes.runtime.life_cycle import ManagedNode
 from active_recon.nodes.runtime.qos import SENSOR_QOS
 from active_recon.parameters.view_planner import ViewPlannerParameters
 from geometry_msgs.msg import PoseStamped
 from msg_tools.cameras import pose_from_msg
 from msg_tools.episodes import Episode
 from msg_tools.stamps import nanoseconds_from_stamp
-from rclpy.node import Node
 
 FIND_CAMERA_S = 1.0
 """Time to wait for a publisher of the camera's pose after an episode began."""
@@ -29,7 +29,7 @@ class FirstView:
     pose of the camera.
     """
 
-    def __init__(self, node: Node, inputs: AwaitedInputs, diagnostics: Diagnostics,
+    def __init__(self, node: ManagedNode, inputs: AwaitedInputs, diagnostics: Diagnostics,
                  params: Callable[[], ViewPlannerParameters],
                  on_camera: Callable[[], object]) -> None:
         self._node, self._diagnostics = node, diagnostics
@@ -69,6 +69,8 @@ class FirstView:
     def _on_pose(self, msg: PoseStamped) -> None:
         with self._diagnostics.rejecting():
             camera = Camera(pose_from_msg(msg, self._frame))
-            if self._episode and nanoseconds_from_stamp(msg.header.stamp) >= self._episode.begin:
+            stamp = nanoseconds_from_stamp(msg.header.stamp)
+            if (self._episode and stamp >= self._episode.begin
+                    and not self._node.clock_monitor.is_ahead(stamp)):
                 self.camera = camera
         self._on_camera()

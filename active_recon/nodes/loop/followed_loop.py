@@ -54,6 +54,7 @@ class LoopFinder:
         self._collector = ParameterCollector(node, self._take)
         self._parameters_of: dict[str, dict[str, object]] = {}
         self._served_at: dict[str, float] = {}
+        self._publishers: set[bytes] = set()
         self.others: tuple[str, ...] = ()
 
     def update(self) -> None:
@@ -72,8 +73,12 @@ class LoopFinder:
                 yield name
         for topic, kinds in self._node.get_topic_names_and_types():
             if topic.endswith(_LOOP_TOPICS) and _HEADER in kinds:
-                publishers = self._node.get_publishers_info_by_topic(topic)
-                yield from filter(None, map(endpoint_node, publishers))
+                for each in self._node.get_publishers_info_by_topic(topic):
+                    if node := endpoint_node(each):
+                        if (gid := bytes(each.endpoint_gid)) not in self._publishers:
+                            self._publishers.add(gid)
+                            self._collector.forget(node)  # configured, or started again, since
+                        yield node
 
     def _is_silent(self, name: str) -> bool:
         """Return whether a node has been without parameter services for too long."""

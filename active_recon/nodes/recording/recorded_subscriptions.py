@@ -6,6 +6,7 @@ from typing import Any
 
 from active_recon.bags.storage.metadata import QosProfile
 from active_recon.bags.storage.writer import BagWriter
+from active_recon.errors import RecordingError
 from active_recon.nodes.recording.sequence_gaps import SequenceGaps
 from active_recon.nodes.runtime.definitions import message_class, message_definition
 from active_recon.nodes.runtime.qos import common_profile, offered_profile
@@ -46,6 +47,11 @@ class RecordedSubscriptions:
             return
         self._offered[name] = offered
         type_name = publishers[0].topic_type
+        try:
+            kind = message_class(type_name)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise RecordingError(f'{name}: message type not installed: expected an installed one, '
+                                 f'got {type_name}', 'message_type') from error
         bag.add_topic(name, type_name, message_definition(type_name), offered)
         profile = common_profile(offered, QUEUE)
         subscription = self._subscriptions.get(name)
@@ -55,7 +61,7 @@ class RecordedSubscriptions:
             self._node.destroy_subscription(subscription)
         self._gaps.restart(name)
         self._subscriptions[name] = self._node.create_subscription(
-            message_class(type_name), name, partial(self._on_message, name), profile, raw=True,
+            kind, name, partial(self._on_message, name), profile, raw=True,
             event_callbacks=ADAPTS)
 
     def message_type(self, name: str) -> Any:

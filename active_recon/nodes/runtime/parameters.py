@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Generic, TypeVar
 
-from active_recon.errors import ActiveReconError
+from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.nodes.runtime.run import one_line
 from active_recon.parameters.declaration import Declared, declared, nearest, NEW_START
 from rcl_interfaces.msg import (
@@ -79,6 +79,10 @@ class Parameters(Generic[Values]):
         try:
             changes = {each.name: self._declared[each.name].checked(each.value)
                        for each in request if each.name in self._declared}
+            for each in request:
+                if each.name in changes and each.type_ == Parameter.Type.NOT_SET:  # of a list
+                    raise ConfigError(f'parameter {each.name}: cannot be deleted: expected a '
+                                      'list, an empty one is [], got None')
             values = replace(self.values, **changes)  # type: ignore[type-var]
             commit = self._prepare(values) if changes else None
         except ActiveReconError as error:
