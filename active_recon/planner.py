@@ -172,7 +172,7 @@ class Planner:
 
         `size` is the side of the volume to come, metres. Nothing is decided: a policy that has
         something to compute of the cameras alone offers `prepare`, with their poses as in an
-        Observation, and keeps what it finds.
+        Observation, and keeps what it finds. Raises ViewError where one of your own fails.
         """
         prepare = getattr(self._policy, 'prepare', None)
         if prepare is None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 import pickle
+import shutil
 
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import WeightsError
@@ -63,6 +64,14 @@ def states_of(network, views):
     for view in (0, 2, 1):
         state = observer.update(objects, torch.full_like(objects, view), state)
         yield observer, state
+
+
+def test_auto_measures_in_torch_what_was_not_exported_in_whatever_precision(weights, tmp_path):
+    alone = tmp_path / weights.name
+    shutil.copy(weights, alone)
+    bundle = load_weights(alone)
+    for bfloat16 in (True, False):
+        assert network_in('auto', alone, bundle, bfloat16, threads=1) is bundle.reconstruction
 
 
 @torch.inference_mode()

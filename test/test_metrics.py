@@ -1,5 +1,7 @@
 """Episodes, IoU view by view, and the latents of other objects."""
 
+from dataclasses import replace
+
 from active_recon.errors import DataError
 from active_recon.evaluation.metrics import (
     episodes,
@@ -30,6 +32,14 @@ def test_each_object_starts_from_so_many_different_views(views, starts):
         assert set(own.tolist()) <= set(range(24))
     assert episodes(views, starts)[1].equal(first)
     assert starts == 24 or not episodes(views, starts, seed=1)[1].equal(first)
+
+
+def test_an_object_with_fewer_views_starts_from_each_of_them(views):
+    few = replace(views, images=views.images[:, :2], poses=views.poses[:, :2],
+                  intrinsics=views.intrinsics[:, :2])
+    objects, first = episodes(few, 4)
+    assert objects.tolist() == np.repeat(np.arange(6), 2).tolist()
+    assert all(sorted(own.tolist()) == [0, 1] for own in first.reshape(6, 2))
 
 
 @pytest.mark.parametrize('starts', [1, 3, 4, 24])

@@ -142,6 +142,17 @@ def test_a_view_that_is_refused_changes_nothing(attention, wrong):
     np.testing.assert_array_equal(one.camera.pose, other.camera.pose)
 
 
+def test_a_policy_that_fails_to_prepare_is_told():
+    class Fails(FarthestPolicy):
+        def prepare(self, taken, candidates):
+            raise RuntimeError('a fault of its own')
+
+    planner = Planner(Fails())
+    with pytest.raises(ViewError, match='policy: prepare fails with RuntimeError: a fault of'):
+        planner.expect_camera(orbit_camera(0.0), 1.0)
+    assert planner.add_view(LATENT, orbit_camera(0.0), 10.0).goal is not None
+
+
 def test_a_policy_that_fails_is_told_and_nothing_has_changed():
     class Fails(FarthestPolicy):
         def choose(self, seen, state):

@@ -325,6 +325,16 @@ def test_views_that_are_of_no_turntable_are_of_a_kind_and_of_episodes_of_their_o
     assert not set(around.episode) & set(everywhere.episode)
 
 
+def test_an_object_is_of_its_own_kind_of_views_whatever_is_measured_beside_it(seen):
+    torch.manual_seed(0)
+    network = Lifting.from_config(LiftingConfig((8, 8, 8, 8), 8, 8, 4, 4, (8, 8, 8), 8)).eval()
+    poses = seen.poses.clone()
+    poses[0] = poses[0, :1]
+    found = measure(replace(seen, poses=poses), network, 0.1, 1)
+    assert found.kind.tolist() == ['random', 'random, any']
+    assert [name.split(' ')[1] for name in found.episode] == ['random', 'random,']
+
+
 class Recalled(HeuristicPolicy):
     """Takes the views of an order, (N, T)."""
 

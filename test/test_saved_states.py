@@ -5,6 +5,8 @@ from pathlib import Path
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.meshes.photos import Photo
+from active_recon.models.shape_basis import ShapeBasis, ShapeBasisConfig
+from active_recon.models.weights import Bundle, save_weights
 from active_recon.models.weights_files import find_weights
 from active_recon.reconstructor import Reconstructor
 from active_recon.saved_states import read_state, SavedState, write_state
@@ -73,6 +75,18 @@ def test_what_is_read_is_what_was_written(reconstructor, written):
         np.testing.assert_array_equal(one.image, other.image)
         np.testing.assert_array_equal(one.camera.pose, other.camera.pose)
         assert one.camera.intrinsics == other.camera.intrinsics
+
+
+def test_a_state_that_grows_with_the_views_comes_back(tmp_path):
+    config = ShapeBasisConfig(categories=('box', 'none'), modes=2)
+    path = tmp_path / 'basis.safetensors'
+    save_weights(path, Bundle(ShapeBasis.from_config(config), None, config, 0.4,
+                              model='shape-basis'))
+    basis = Reconstructor.load(path, threads=1, object_size=SIZE)
+    write_state(saved := episode(basis), basis, tmp_path / 'it.state.safetensors')
+    found = read_state(tmp_path / 'it.state.safetensors', basis)
+    for name, array in saved.progress.state.items():
+        np.testing.assert_array_equal(found.progress.state[name], array)
 
 
 def test_a_state_cut_anywhere_is_refused(reconstructor, written, tmp_path):

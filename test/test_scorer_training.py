@@ -1,10 +1,10 @@
 """What a view scorer learns from: measured gains, losses of their order, a calibration."""
 
-from active_recon.datasets.layout import RENDERING
+from active_recon.datasets.layout import ObjectFolder, RENDERING
 from active_recon.errors import ConfigError, DataError
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID, MOST_VIEWS
 from active_recon.models.view_scorer import Looked, ScorerConfig, ViewScorer
-from active_recon.training.gain_files import drawn_objects
+from active_recon.training.gain_files import _file, drawn_objects
 from active_recon.training.looked import (
     joined,
     looked_states,
@@ -35,6 +35,19 @@ def some_gains(states=5, candidates=7, seed=0):
     gains = torch.randn(states, candidates, generator=torch.Generator().manual_seed(seed))
     gains[:, 2] = torch.nan
     return gains
+
+
+def test_gains_are_kept_by_what_an_object_shows(tmp_path):
+    folder = ObjectFolder(tmp_path, 'table', 'one')
+    folder.images_folder.mkdir(parents=True)
+    image = folder.images_folder / '00.png'
+    names = []
+    for content in (b'one', b'two', b'one'):
+        image.write_bytes(content)
+        names.append(_file(tmp_path, folder).name)
+    folder.depth_path(0).write_bytes(b'depth, which no gain is measured by')
+    assert names[0] == names[2] == _file(tmp_path, folder).name != names[1]
+    assert names[0].startswith('table__one-')
 
 
 @pytest.mark.parametrize('loss', LOSSES)

@@ -10,6 +10,7 @@ from active_recon.models.weights_files import (
     DEFAULT_MODEL,
     find_weights,
     PAPER_MODEL,
+    read_card,
     SHIPPED,
     weights_hash,
 )
@@ -92,6 +93,13 @@ def test_the_card_beside_tells_where_the_weights_come_from(saved, tiny):
     assert card['sha256'] == weights_hash(saved)
     assert card['threshold'] == 0.35
     assert card['config'] == json.loads(json.dumps(tiny.to_dict()))
+
+
+@pytest.mark.parametrize('text', ['{"sha256": ', '[1]', '\xff'])
+def test_a_damaged_card_is_refused_by_its_name(saved, text):
+    saved.with_suffix('.json').write_bytes(text.encode('latin-1'))
+    with pytest.raises(WeightsError, match=f'{saved.stem}.json: no readable card: expected the'):
+        read_card(saved)
 
 
 def test_nothing_in_the_file_is_a_pickle(saved):

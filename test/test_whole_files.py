@@ -18,6 +18,15 @@ def test_what_was_written_takes_the_place_once_it_is_whole(tmp_path, before):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_of_two_that_write_at_once_each_writes_the_whole_and_the_last_stays(tmp_path):
+    path = tmp_path / 'it.json'
+    with whole_file(path) as first, whole_file(path) as second:
+        first.write_text('first')
+        second.write_text('second')
+    assert path.read_text() == 'first'  # the inner block ended before
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize('error', [OSError, KeyboardInterrupt])
 @pytest.mark.parametrize('text', [None, 'half of it'])
 def test_what_fails_leaves_what_stood_there_and_nothing_beside_it(tmp_path, error, text):
