@@ -58,6 +58,15 @@ def test_an_image_that_was_delayed_still_comes_when_the_fault_is_over():
     assert stamps([faults.sent(shot(1), 0.1), faults.sent(shot(2), 0.3)], 'image') == [0, 1, 2]
 
 
+@pytest.mark.parametrize('entry', ['delay_images:0.25', 'reorder_images:1'])
+def test_after_the_clock_went_back_images_come_as_if_the_camera_had_just_begun(entry):
+    faults = CameraFaults(read_faults([entry]))
+    before = [faults.sent(shot(1000 + index), 100 + index * PERIOD) for index in range(5)]
+    assert len(stamps(before, 'image')) < 5
+    after = [faults.sent(shot(index), index * PERIOD) for index in range(SHOTS)]
+    assert stamps(after, 'image') == stamps(stream(entry), 'image')
+
+
 def test_that_share_of_the_images_is_sent_twice():
     counts = Counter(stamps(stream('duplicate_images:0.3'), 'image'))
     assert counts.keys() == set(range(SHOTS))

@@ -64,6 +64,17 @@ def test_joints_that_come_one_by_one_are_not_taken_for_one(tmp_path):
         read_run(folder)
 
 
+def test_messages_of_other_joints_than_the_chosen_one_are_no_fault(tmp_path):
+    arm = [(time + 1, '/table', JointState(
+        header=header(time + 1, ''), name=['lift', 'tilt'], position=[1.0, 2.0]))
+        for time, _ in TIMES]
+    runs = [read_run(write_bag(tmp_path / name, messages), Topics(joint='turn'))
+            for name, messages in (('alone', images() + joints()),
+                                   ('both', images() + joints() + arm))]
+    assert runs[1].counters == runs[0].counters
+    assert not any(name.startswith('refused') for name in runs[1].counters['bag'])
+
+
 def test_a_float_is_joined_on_receive_times(tmp_path):
     floats = [(time + 1, '/angle', Float64(data=AZIMUTHS[number])) for time, number in TIMES]
     first = [(BEGIN - 1, '/angle', Float64(data=AZIMUTHS[0]))]
@@ -86,6 +97,30 @@ def test_images_without_stamps_are_joined_on_receive_times_and_stamped_with_them
     found = views(tmp_path / 'run', unstamped + poses())
     assert azimuths(found) == AZIMUTHS
     assert {view.stamp - DELAY for view in found} <= {time for time, _ in TIMES}
+
+
+def test_images_from_before_a_simulations_clock_leave_the_others_their_stamps(tmp_path):
+    early = [(BEGIN - index * PERIOD, '/cam/color', image_to_msg(IMAGES[0], header(0, 'camera')))
+             for index in range(1, 4)]
+    late = [(time + 3 * PERIOD, topic, msg) for time, topic, msg in images()]
+    found = views(tmp_path / 'run', early + late + joints())
+    assert azimuths(found) == AZIMUTHS
+    assert {view.stamp for view in found} <= {time for time, _ in TIMES}
+    for view, image in zip(found, IMAGES, strict=True):
+        assert np.array_equal(view.image, image)
+
+
+def test_camera_info_without_stamps_is_joined_on_receive_times(tmp_path):
+    messages = [*images(), *cameras()]
+    zoomed = TIMES[3][0]  # where the camera stands for the second time
+    for time, topic, msg in messages:
+        msg.header = header(0, msg.header.frame_id)
+        if topic == '/info':
+            focal = 40.0 if time >= zoomed else 30.0
+            msg.k = [focal, 0.0, 16.0, 0.0, focal, 12.0, 0.0, 0.0, 1.0]
+    found = views(tmp_path / 'run', messages)
+    assert azimuths(found) == AZIMUTHS
+    assert [view.camera.intrinsics.fx for view in found] == [30, 40, 40]
 
 
 def test_of_a_fast_joint_only_the_angles_around_an_image_become_poses(tmp_path, monkeypatch):

@@ -110,6 +110,24 @@ def test_depth_from_beside_the_camera_is_registered_by_the_transforms(chair, tmp
     assert min(np.subtract(apart, aligned)) > -0.03
 
 
+def test_aligned_depth_in_the_images_wrong_frame_is_of_the_camera_that_is_named(chair, tmp_path):
+    off = np.eye(4)
+    off[:3, 3] = 0.06, 0.03, 0
+    messages = [(BEGIN, '/tf_static', tf_message(off, 'real_optical_frame', FRAME, 0))]
+    for time, topic, msg in recording(chair[0], by_tf=True):
+        if topic == '/tf':
+            msg.transforms[0].child_frame_id = 'real_optical_frame'
+        messages.append((time, topic, msg))
+    depth = '/wrist/depth/image_rect_raw'
+    (found,) = read_run(write_bag(tmp_path / 'wrong', messages),
+                        Topics(depth=depth, camera_frame='real_optical_frame')).episodes
+    (right,) = read_run(write_bag(tmp_path / 'right', recording(chair[0], by_tf=True)),
+                        Topics(depth=depth)).episodes
+    for view, expected in zip(found.views, right.views, strict=True):
+        np.testing.assert_allclose(view.camera.pose, expected.camera.pose, atol=1e-9)
+        np.testing.assert_allclose(view.depth.metres, expected.depth.metres, atol=1e-5)
+
+
 def test_compressed_depth_is_found_by_its_own_topic(chair, tmp_path):
     renderer, voxels = chair
     _, raw = reconstructed(write_bag(tmp_path / 'raw', recording(renderer)), voxels)

@@ -137,6 +137,16 @@ def test_weights_that_are_nowhere_any_more_are_asked_for_by_their_hash(
     assert code == 0
 
 
+def test_a_replay_tells_where_the_bag_does_not_name_its_network(
+        run, tmp_path, monkeypatch, capsys):
+    unnamed = {name: text for name, text in run.provenance.items() if name != 'weights_sha256'}
+    write_run(replace(run, provenance=unnamed), tmp_path / 'old')
+    for folder, is_told in ((run.path, False), (tmp_path / 'old', True)):
+        _, said = told(monkeypatch, capsys, 'replay', folder)
+        assert ('the bag does not name its network: that of the options, else the default, was '
+                'compared' in said) == is_told
+
+
 @pytest.fixture
 def copied(golden, tmp_path):
     """Return a copy of the bag that a new one may be written beside."""

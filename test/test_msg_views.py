@@ -78,6 +78,19 @@ def test_an_image_waits_for_its_later_pose_and_is_refused_when_none_can_come():
     assert 'within 0.05 s, the nearest is 0.020 s away' in str(error)
 
 
+def test_an_image_waits_for_its_later_pose_also_after_one_that_was_stamped_far_ahead():
+    joiner = ViewJoiner(max_pose_gap=0.05, patience=0.5)
+    joiner.add_pose(3_600_000 * MS, pose(2.0))
+    joiner.add_pose(0, pose(1.0))
+    for stamp in range(20 * MS, 1000 * MS, 40 * MS):
+        joiner.add_image(stamp, IMAGE, now=0.0)
+        joiner.add_intrinsics(stamp, CANONICAL_INTRINSICS)
+        assert not drain(joiner)
+        joiner.add_pose(stamp + 20 * MS, pose(1.0))
+        view, = drain(joiner)
+        assert (view.stamp, view.camera.azimuth) == (stamp, pytest.approx(1.0))
+
+
 def test_neighbours_that_are_too_far_apart_are_not_interpolated():
     joiner = ViewJoiner(max_pose_gap=0.05)
     joiner.add_pose(0, pose(1.0))

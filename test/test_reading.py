@@ -180,6 +180,33 @@ def test_two_episodes_keep_their_views_apart(tmp_path):
     assert run.episodes[1].first_goal.camera.azimuth == pytest.approx(1.0)
 
 
+def after_a_reset(first, begin):
+    """Return the messages of a loop and of a second one, under a clock that went back."""
+    second = LoopRun('second', begin, azimuths=(1.0, 3.0))
+    later = first.end - begin + PERIOD
+    return second, [*first.messages,
+                    *((time + later, topic, msg) for time, topic, msg in second.messages)]
+
+
+def test_episodes_of_a_clock_that_was_reset_keep_their_views(loop, tmp_path):
+    second, messages = after_a_reset(loop, BEGIN - 10**12)
+    run = read_run(write_bag(tmp_path / 'run', messages))
+    assert [episode.id for episode in run.episodes] == ['second', 'first']
+    for expected, episode in zip((second, loop), run.episodes, strict=True):
+        assert [view.stamp for view in episode.views] == expected.stamps
+        assert [view.camera.azimuth for view in episode.views] == pytest.approx(expected.azimuths)
+        for view, image in zip(episode.views, expected.images, strict=True):
+            assert np.array_equal(view.image, image)
+        assert episode.first_goal.camera.azimuth == pytest.approx(expected.azimuths[0])
+        assert episode.done == 'max_views'
+
+
+def test_episodes_that_share_their_stamps_after_a_reset_are_refused(loop, tmp_path):
+    _, messages = after_a_reset(loop, BEGIN + PERIOD // 2)
+    with pytest.raises(DataError, match='clock went back .* its episodes share their stamps'):
+        read_run(write_bag(tmp_path / 'run', messages))
+
+
 def test_views_before_any_episode_are_one_without_an_id(loop, tmp_path):
     later = [entry for entry in loop.messages if entry[1] != '/episode']
     episode = only(read_run(write_bag(tmp_path / 'run', later)))

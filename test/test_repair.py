@@ -18,6 +18,7 @@ from recorded_messages import (
     errors_in,
     HEADER,
     header,
+    IMAGE,
     image,
     small_disk,
     time_of,
@@ -134,6 +135,22 @@ def test_a_chunk_that_is_spoilt_costs_no_other(cut_off):
     assert read(cut_off) == [message(number) for number in range(CHUNKS * IN_CHUNK)
                              if number // IN_CHUNK != 2]
     assert_whole(cut_off)
+
+
+def test_of_a_bag_with_an_index_a_spoilt_first_chunk_costs_no_other(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    content = bytearray(bag.path.read_bytes())
+    content[content.index(b'zstd') + 40] ^= 255
+    bag.path.write_bytes(content)
+    (repair,), _ = repair_bag(bag.folder)
+    assert len(repair.lost) == 1 and 'a chunk of' in repair.lost[0]
+    with Reader(bag.folder) as reader:
+        heard = [(each.topic, each.msgtype, bytes(data)) for each, _, data in reader.messages()]
+    kinds = ('/episode', HEADER), ('/camera/image_raw', IMAGE)
+    assert heard == [(*kinds[number % 2], message(number))
+                     for number in range(IN_CHUNK, CHUNKS * IN_CHUNK)]
+    assert_whole(bag.folder)
 
 
 def test_of_a_split_bag_only_the_file_that_was_cut_off_is_written_anew(tmp_path):

@@ -127,6 +127,21 @@ def test_a_run_with_overrides_says_so_and_replays_to_the_same_bits(
                    0.12).verdict == SAME_BITS
 
 
+@pytest.mark.parametrize('overrides', [Overrides(threshold=0.2), Overrides(policy='uniform')])
+def test_a_run_with_overrides_is_computed_from_the_whole_images(
+        sweep, weights, tmp_path, overrides):
+    others = [replace(view, reduced=lambda by, view=view: (255 - view.image, view.camera))
+              for view in sweep.views]
+    (whole,), (found,) = (
+        run_with_overrides(replace(run_of([episode]), path=tmp_path),
+                           LoopSetup(weights[0], {}, None), overrides).episodes
+        for episode in (sweep, replace(sweep, views=others)))
+    for view, expected in zip(found.views, whole.views, strict=True):
+        np.testing.assert_array_equal(view.latent, expected.latent)
+        np.testing.assert_array_equal(view.reconstruction.occupancy,
+                                      expected.reconstruction.occupancy)
+
+
 def test_other_weights_are_computed_as_they_can_be_and_not_as_those_of_the_recording(
         sweep, weights):
     run = replace(run_of([sweep]), provenance={

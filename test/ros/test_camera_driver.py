@@ -49,6 +49,16 @@ def test_images_and_camera_info_share_stamps_until_the_source_goes_and_when_it_r
     bench.until(lambda: len(images) > before + 5, 'images after the node is active again')
 
 
+def test_a_camera_that_was_deactivated_misses_no_source(start_node, bench, tmp_path):
+    path = film(tmp_path / 'film.avi')
+    start_node('camera', source=path, loop=True)
+    path.rename(tmp_path / 'away.avi')
+    bench.until(lambda: 'it is searched for' in bench.state('camera').problem, 'the warning')
+    request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+    assert bench.ask(ChangeState, 'camera/change_state', request).success
+    bench.until(lambda: not bench.state('camera').problem, 'the end of the warning')
+
+
 def test_a_calibration_for_another_size_ends_the_node_with_one_line(start_node, tmp_path, lens):
     node = start_node('camera', ready=False, camera_info=lens,
                       source=film(tmp_path / 'film.avi', 2, size=(80, 60)))

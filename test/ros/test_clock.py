@@ -4,9 +4,9 @@ import itertools
 import math
 import re
 
-from active_recon.geometry.cameras import Camera
+from active_recon.geometry.cameras import Camera, orbit_camera
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import pose_from_msg
+from msg_tools.cameras import pose_from_msg, pose_to_msg
 from msg_tools.goals import azimuth_goal_to_msg, view_goal_from_msg
 from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 import pytest
@@ -164,6 +164,26 @@ def test_a_planner_keeps_an_episode_that_came_before_it_heard_the_new_time(
     assert view_goal_from_msg(first).azimuth == pytest.approx(1.0)
     wait_second(bench, fake, latent)
     assert bench.counts('view_planner')['episodes'] == 2
+
+
+def test_a_first_goal_is_not_where_the_camera_stood_before_the_clock_went_back(start_node, bench):
+    start_node('view_planner', policy='farthest', use_sim_time=True)
+    clock, fake = FakeClock(bench), FakeReconstructor(bench)
+    poses = bench.advertise(PoseStamped, 'camera/pose')
+
+    def stands_at(azimuth, second):
+        header = Header(stamp=stamp_from_nanoseconds(second * S), frame_id='object')
+        poses.publish(pose_to_msg(orbit_camera(azimuth).pose, header))
+
+    fake.begin('of before', 100 * S)
+    clock.until(lambda: stands_at(2.0, 110) or fake.goals, 'a goal', 110.0)
+    clock.until(lambda: bench.counts('view_planner').get('clock_jumps') == 1, 'the jump', 50.0)
+    fake.begin('of now', 50 * S)
+    bench.until(lambda: bench.counts('view_planner').get('episodes') == 2, 'the new episode')
+    late = bench.within(0.5, lambda: stands_at(2.0, 111) or within(fake.goals, 50, 51))
+    assert not late  # the poses were on their way since before the jump
+    first = bench.until(lambda: stands_at(1.0, 50) or within(fake.goals, 50, 51), 'a goal')[-1]
+    assert view_goal_from_msg(first).azimuth == pytest.approx(1.0)
 
 
 def test_a_turntable_begins_anew_where_its_clock_goes_back(start_node, bench, box):

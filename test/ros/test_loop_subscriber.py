@@ -15,6 +15,7 @@ from msg_tools.voxels import voxel_grid_to_msg
 import numpy as np
 import pytest
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
@@ -89,6 +90,21 @@ def test_the_size_the_frame_and_the_names_of_a_running_loop_are_found(
     found.until(lambda loops: loops[-1].namespace == '/', 'the loop of the own namespace')
     assert found.finder.others == ()
     assert found[-1].object_size == 0.3
+
+
+def test_a_node_that_has_a_new_publisher_is_asked_again(bench, found):
+    # As one that is configured late, or that was killed and is started again
+    node = Node('view_planner', context=bench.node.context)
+    bench.executor.add_node(node)
+    try:
+        node.declare_parameter('object_size', 0.16)
+        found.until(lambda loops: loops and loops[-1].object_size == 0.16, 'the size')
+        node.set_parameters([Parameter('object_size', value=0.3)])
+        node.create_publisher(Header, 'done', LATCHED_QOS)
+        found.until(lambda loops: loops[-1].object_size == 0.3, 'the size that it has now')
+    finally:
+        bench.executor.remove_node(node)
+        node.destroy_node()
 
 
 def test_publishers_of_a_remapped_topic_are_counted(bench, hear):

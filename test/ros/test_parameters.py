@@ -146,6 +146,20 @@ def test_a_change_that_is_refused_says_why_and_changes_nothing(make_node, change
     assert [each.value for each in node.get_parameters(['low', 'high', 'fixed'])] == [1, 2, 0]
 
 
+def test_a_list_can_be_emptied_and_not_deleted(make_node):
+    node = make_node(it=[0.5])
+    parameters = Parameters(node, parameters_of(it=(
+        tuple[float, ...], parameter((), 'numbers', low=-1.0, high=1.0, dynamic=True))))
+    deleted, = node.set_parameters([Parameter('it')])
+    assert not deleted.successful
+    assert 'it: cannot be deleted: expected a list, an empty one is []' in deleted.reason
+    assert list(node.get_parameter('it').value) == [0.5]
+    assert parameters.values.it == (0.5,)
+    assert node.set_parameters_atomically(
+        [Parameter('it', Parameter.Type.DOUBLE_ARRAY, [])]).successful
+    assert parameters.values.it == ()
+
+
 def test_a_read_only_parameter_is_replaced_by_its_node_alone(make_node):
     node = make_node(fact='mine')
     set_read_only_parameter(node, 'fact', 'first', 'a fact')

@@ -58,6 +58,13 @@ def test_numbers_are_read_as_ros_reads_them(tmp_path):
     assert list(read_params_file(path)) == ['view_planner']
 
 
+@pytest.mark.parametrize('date', ['2026-11-28', '2026-11-28 10:30:00', '2026-11-28T10:30:00Z'])
+def test_a_date_is_text_as_ros_reads_it(tmp_path, date):
+    path = tmp_path / 'some.yaml'
+    path.write_text(f'recorder: {{ros__parameters: {{output_dir: {date}}}}}\n')
+    assert read_params_file(path) == {'recorder': {'output_dir': date}}
+
+
 KEYS = {  # what ROS does with each, for view_planner in '', in /cell and in /a/cell
     'view_planner': (True, False, False), '/view_planner': (True, False, False),
     'cell/view_planner': (False, True, False), '/cell/view_planner': (False, True, False),

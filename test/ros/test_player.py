@@ -4,10 +4,12 @@ import subprocess
 import sys
 import time
 
+from active_recon.bags.storage.writer import BagWriter
 from geometry_msgs.msg import PoseStamped
 from msg_tools.stamps import nanoseconds_from_stamp
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from recorded_messages import cdr, definition, HEADER, header, LATCHED
 from rosbags.highlevel import AnyReader
 from std_msgs.msg import Header
 
@@ -92,6 +94,25 @@ def test_latched_topics_are_latched_again(bench, play, bag):
     bench.until(lambda: poses, 'the first pose, which follows the episode', PLAYED_WITHIN_S)
     late = bench.subscribe(Header, 'episode', LATCHED_QOS)
     bench.until(lambda: late, 'the episode, which was said before')
+    process.terminate()
+    assert process.wait(30) == 0
+
+
+def test_the_last_message_of_each_publisher_of_a_latched_topic_is_latched_again(
+        bench, play, tmp_path):
+    with BagWriter(tmp_path / 'run') as bag:
+        bag.add_topic('/frames', HEADER, definition(HEADER), (LATCHED, LATCHED))
+        bag.add_topic('/ticks', HEADER, definition(HEADER))
+        for number in range(60):
+            topic = '/frames' if number < 2 else '/ticks'
+            bag.write(topic, cdr(header(number)), number * 10**9, number * 10**9)
+    ticks = bench.subscribe(Header, 'ticks', STREAM_QOS)
+    process = play(tmp_path / 'run', '--rate', '2')
+    bench.until(lambda: ticks, 'the first tick, which follows the frames', PLAYED_WITHIN_S)
+    late = bench.subscribe(Header, 'frames', QoSProfile(
+        depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+    bench.until(lambda: len(late) == 2, 'the frames, which were said before')
+    assert [msg.frame_id for msg in late] == [header(number).frame_id for number in range(2)]
     process.terminate()
     assert process.wait(30) == 0
 

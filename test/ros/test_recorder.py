@@ -5,7 +5,11 @@ import math
 from pathlib import Path
 import resource
 import signal
+import sys
+from types import SimpleNamespace
 
+from active_recon.errors import RecordingError
+from active_recon.nodes.recording.recorded_subscriptions import RecordedSubscriptions
 from active_recon.nodes.recording.sequence_gaps import SequenceGaps
 from active_recon.nodes.runtime.topic_names import full_names, NAMES, publish_topic_names
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -121,6 +125,29 @@ def test_a_user_may_name_topics_of_any_installed_type(bench, start_node, tmp_pat
     recorded(bench, 1)
     assert bench.call('stop').success
     assert read(*bags(tmp_path / 'bags')) == {'/chatter': [goodbye]}
+
+
+def test_a_topic_whose_type_python_lacks_is_refused_and_the_next_one_is_recorded(
+        bench, monkeypatch):
+    heard, noted = [], []
+    inputs = RecordedSubscriptions(bench.node, lambda name, data, info: heard.append(name))
+    bag = SimpleNamespace(add_topic=lambda name, *others: noted.append(name))
+
+    def subscribe(kind, topic):
+        publisher = bench.node.create_publisher(kind, topic, STREAM_QOS)
+        offers = bench.until(lambda: bench.node.get_publishers_info_by_topic(topic), 'its offer')
+        inputs.update(topic, offers, bag)
+        return publisher
+
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, 'std_msgs.msg', None)  # its message files are still there
+        with pytest.raises(RecordingError, match='^/chatter: message type not installed: expected '
+                                                 'an installed one, got std_msgs/msg/String$'):
+            subscribe(String, '/chatter')
+    publisher = subscribe(PoseStamped, '/view')
+    bench.until(lambda: publisher.publish(PoseStamped()) or heard, 'a message')
+    assert noted == ['/view']
+    inputs.clear()
 
 
 def test_diagnostics_are_recorded_by_default_and_tell_the_state(bench, start_node, tmp_path):

@@ -7,9 +7,12 @@ import subprocess
 import sys
 
 from active_recon.errors import ConfigError
+from active_recon.launching.processes import NodeProcesses
 from active_recon.launching.up import run_up, Start
 from geometry_msgs.msg import PoseStamped
 import pytest
+from rclpy.node import Node
+import yaml
 
 from .conftest import BUDGET_S, FakeCamera
 from .processes import ROOT
@@ -49,6 +52,21 @@ def node_pids(folder):
         if str(folder) in command and 'active_recon.nodes.' in command:
             pids.append(int(each.name))
     return pids
+
+
+@pytest.mark.parametrize('name', [
+    'plain', 'a "b" c', "a 'b' c", 'C:\\new\\table', 'ends with \\', 'Größe', 'chair 🪑', '{a: 1}',
+    '2', 'true', 'a # b', 'two\nlines', ''])
+def test_a_node_reads_a_name_as_it_was_given(ros, monkeypatch, name):
+    commands = []
+    monkeypatch.setattr(subprocess, 'Popen', lambda command, **options: commands.append(command))
+    NodeProcesses().start('recorder', {'name': name})
+    command, = commands
+    words = command[command.index('--ros-args'):]
+    assert yaml.safe_load(words[-1].removeprefix('name:=')) == name
+    node = Node('given', cli_args=words, automatically_declare_parameters_from_overrides=True)
+    assert node.get_parameter('name').value == name
+    node.destroy_node()
 
 
 TWO = ('/**/view_planner: {ros__parameters: {policy: farthest}}\n'
