@@ -243,6 +243,7 @@ def training(validation, out, *more):
             '--batch-size', 2, '--threads', 1, '--make', 1, *more)
 
 
+@pytest.mark.slow
 def test_a_training_on_made_objects_tells_them_in_its_card(
         validation, tmp_path, monkeypatch, capsys):
     meshes = tmp_path / 'meshes' / 'lamp'
