@@ -207,6 +207,16 @@ def test_episodes_that_share_their_stamps_after_a_reset_are_refused(loop, tmp_pa
         read_run(write_bag(tmp_path / 'run', messages))
 
 
+def test_an_episode_that_is_told_after_its_first_view_as_to_a_late_recorder_is_read(
+        loop, bag, tmp_path):
+    episode = next(entry for entry in loop.messages if entry[1] == '/episode')
+    others = [entry for entry in loop.messages if entry is not episode]
+    at = next(index for index, entry in enumerate(others) if entry[1] == '/view')
+    told = (others[at][0] + 1, *episode[1:])
+    run = read_run(write_bag(tmp_path / 'run', [*others[:at + 1], told, *others[at + 1:]]))
+    assert same(run, read_run(bag))
+
+
 def test_views_before_any_episode_are_one_without_an_id(loop, tmp_path):
     later = [entry for entry in loop.messages if entry[1] != '/episode']
     episode = only(read_run(write_bag(tmp_path / 'run', later)))

@@ -112,8 +112,7 @@ def _episode(episode: Episode, views: Sequence[View], end: float, stream: Camera
     """Return an episode, with each goal after the view from which it was decided."""
     goals: dict[int, list[RecordedGoal]] = {}
     published = [record.published['view'][view.stamp] for view in views]
-    begun = record.published['episode'].get(episode.begin, 0)
-    if [begun, *published] != sorted([begun, *published]):
+    if published != sorted(published):
         raise DataError('the clock went back while it was recorded, and its episodes share their '
                         'stamps: expected later ones, or those of another time', 'clock')
     for goal in _goals(record, episode.begin, end):
