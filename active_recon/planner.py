@@ -1,6 +1,7 @@
 """A policy and the state of one episode: the core of the view planner's node."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
@@ -21,7 +22,7 @@ from active_recon.policies import (
     PolicyOptions,
 )
 from active_recon.policies.automatic import SWEEP
-from active_recon.policies.checked import chosen
+from active_recon.policies.checked import chosen, telling_failures
 from active_recon.policies.planner_views import (
     cameras_of,
     observation,
@@ -177,14 +178,10 @@ class Planner:
         prepare = getattr(self._policy, 'prepare', None)
         if prepare is None:
             return
-        try:
+        # A ViewError is told by `add_view`
+        with telling_failures('policy: prepare'), suppress(ViewError):
             prepare(policy_poses([camera], self._yaw, 1 / size)[0],
                     policy_poses(self._places.candidates(camera), self._yaw, 1 / size))
-        except ViewError:
-            pass  # which `add_view` tells
-        except Exception as error:  # whatever somebody's own raises
-            raise ViewError(f'policy: prepare fails with {type(error).__name__}: {error}',
-                            'policy') from error
 
     def expect_view(self, latent: NDArray[np.float32], camera: Camera,
                     volume: VoxelGrid | None = None) -> None:

@@ -14,6 +14,7 @@ from active_recon.photos.colmap import read_colmap
 from active_recon.photos.cube import upward
 from active_recon.photos.files import open_photos, photo_paths
 from active_recon.photos.readers import find_cameras, read_cameras
+from active_recon.photos.sources import posed_by
 from active_recon.photos.transforms_json import read_transforms
 import numpy as np
 from photo_rigs import (
@@ -27,7 +28,7 @@ from photo_rigs import (
     write_opencv,
     write_transforms,
 )
-from PIL import Image
+from PIL import ExifTags, Image
 import pytest
 
 COLMAP = Path(__file__).parent / 'colmap'
@@ -60,6 +61,18 @@ def test_a_colmap_model_has_the_cameras_it_was_written_from(kind, photos):
     model = read_colmap(COLMAP / kind)
     assert model.up is None  # the photos tell, or the table in them
     assert upward([entry.pose for entry in model.entries])[2] > 0.9
+
+
+def test_all_cameras_of_a_model_tell_what_is_up_unless_exif_turns_a_photo(tmp_path):
+    path = blank_photos(tmp_path, rig()) / 'photo0.png'
+    file, _, _ = posed_by(COLMAP / 'text', open_photos([path])[0])
+    assert len(file.entries) == 4 and not file.as_seen
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 6
+    Image.open(path).save(path, exif=exif)
+    file, [posed], _ = posed_by(COLMAP / 'text', open_photos([path])[0])
+    np.testing.assert_array_equal(file.as_seen, [posed.as_seen])
+    np.testing.assert_array_equal(posed.as_seen[:3, 1], posed.pose[:3, 0])
 
 
 @pytest.mark.parametrize('shared', [True, False])

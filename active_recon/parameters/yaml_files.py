@@ -17,7 +17,7 @@ class _RosLoader(yaml.SafeLoader):
 def read_yaml(path: Path) -> object:
     """Return what a file holds; ConfigError, with line and reason, where it is no YAML."""
     try:
-        return yaml.load(path.read_text(), _RosLoader)  # noqa: S506
+        return yaml.load(path.read_text(), _RosLoader)
     except FileNotFoundError as error:
         raise ConfigError(f'{path}: no such file: expected a ROS parameters file in YAML'
                           ) from error

@@ -46,7 +46,8 @@ class CameraFile:
     - metric: whether the units are metres for certain
     - board: the printed board that lies in the world's plane z = 0, under or beside the object
     - stored: whether the cameras are those of photos as stored, which EXIF has not turned
-    - as_seen: poses, (4, 4), of its photos turned as EXIF says
+    - as_seen: poses, (4, 4), of its photos turned as EXIF says, where that turns some that are
+      taken as stored
     """
 
     source: str
@@ -80,9 +81,14 @@ class PosedPhoto:
     def as_seen(self) -> NDArray[np.float64]:
         """The pose, (4, 4), of the photo turned as EXIF says."""
         pose = self.pose.copy()
-        if not self.upright and self.photo.orientation in _AS_SEEN:
+        if self.is_turned:
             pose[:3, :2] = pose[:3, :2] @ _AS_SEEN[self.photo.orientation]
         return pose
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the photo is taken as stored and EXIF would turn it."""
+        return not self.upright and self.photo.orientation in _AS_SEEN
 
 
 def sized(lens: Intrinsics) -> Lens:

@@ -64,4 +64,6 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
                         'file by --cameras', 'no_cameras')
     file = read_cameras(path, photos, axes)
     posed, left_out = posed_photos(file, photos)
-    return replace(file, as_seen=[each.as_seen for each in posed]), posed, left_out
+    if any(each.is_turned for each in posed):
+        file = replace(file, as_seen=[each.as_seen for each in posed])
+    return file, posed, left_out

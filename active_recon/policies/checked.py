@@ -1,5 +1,7 @@
 """The choice of a policy, which may be somebody's own, checked before anything follows from it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -35,10 +37,17 @@ def checked_choice(found: Any, count: int, batch: int = 1) -> tuple[Choice, Any]
 
 def chosen(policy: Policy, seen: Observation, state: Any) -> tuple[Choice, Any]:
     """Return what a policy chooses for one episode; raises ViewError where it fails, too."""
-    try:
+    with telling_failures('policy:'):
         found = policy.choose(seen, state)
+    return checked_choice(found, seen.candidates.shape[1])
+
+
+@contextmanager
+def telling_failures(what: str) -> Iterator[None]:
+    """Turn whatever a policy of somebody's own raises in the block into a ViewError."""
+    try:
+        yield
     except ActiveReconError:
         raise
-    except Exception as error:  # whatever somebody's own raises
-        raise ViewError(f'policy: fails with {type(error).__name__}: {error}', 'policy') from error
-    return checked_choice(found, seen.candidates.shape[1])
+    except Exception as error:
+        raise ViewError(f'{what} fails with {type(error).__name__}: {error}', 'policy') from error

@@ -156,8 +156,10 @@ class CameraStream:
                 stamp = (0 if message.type_name == FLOAT
                          else nanoseconds_from_stamp(msg.header.stamp))
                 role = POSE_ROLE if message.topic == azimuth.name else INFO_ROLE
-                if message.type_name == JOINT_STATE and self._is_of_others(msg):
-                    continue
+                if message.type_name == JOINT_STATE:
+                    self._joints.update(msg.name)
+                    if self._topics.joint and msg.name and self._topics.joint not in msg.name:
+                        continue  # of another publisher's joints, as an arm's
                 self.received[role].setdefault(stamp, message.received)
                 try:
                     if role == POSE_ROLE:
@@ -201,11 +203,6 @@ class CameraStream:
         if not math.isfinite(angle):
             raise MessageError(f'azimuth not finite: got {angle}', 'azimuth')
         return angle
-
-    def _is_of_others(self, msg: Any) -> bool:
-        """Return whether a JointState is of another publisher's joints, as an arm's."""
-        self._joints.update(msg.name)
-        return bool(self._topics.joint and msg.name) and self._topics.joint not in msg.name
 
     def _require_one_joint(self) -> None:
         """Raise DataError where it is open which of several joints, of any message, is meant."""

@@ -25,12 +25,16 @@ def node_parameters(run: RecordedRun, node: str) -> dict[str, Any]:
 
     Raises DataError if one that a replay needs is not as it is declared.
     """
-    recorded = next((values for name, values in run.parameters.items()
-                     if name.rpartition('/')[2] == node), {})
     try:
-        return checked_parameters(node, recorded)
+        return parameters_among(run.parameters, node)
     except DataError as error:
         raise DataError(f'{run.path}: {error}', error.kind) from error
+
+
+def parameters_among(recorded: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, Any]:
+    """Return those of a node in any namespace, by full names; empty if there are none."""
+    return checked_parameters(node, next((
+        values for name, values in recorded.items() if name.rpartition('/')[2] == node), {}))
 
 
 def checked_parameters(node: str, recorded: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,13 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from active_recon.acquisition.view_gate import ViewGate
 from active_recon.bags.runs.camera_stream import CameraStream
 from active_recon.bags.runs.image_gaps import gaps_between, ImageGaps, uncounted_images
 from active_recon.bags.runs.loop_record import LoopRecord
-from active_recon.bags.runs.parameters import checked_parameters
+from active_recon.bags.runs.parameters import parameters_among
 from active_recon.bags.runs.recorded_depth import with_depth, with_depth_of
 from active_recon.bags.runs.recorded_views import gated_views, recorded_episodes
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun
@@ -71,12 +70,12 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
         if given and namespace is not None:
             raise ConfigError(f'{option}: not needed: the bag has the views of a loop, which knew '
                               'that')
-    node = _parameters(summary, 'reconstructor')
+    node = parameters_among(summary.parameters, 'reconstructor')
     frame_given = topics.object_frame != _ANY_TOPICS.object_frame
     topics = replace(topics, max_pose_gap=node.get('max_pose_gap', topics.max_pose_gap),
                      object_frame=node.get('object_frame', topics.object_frame))
     scene = replace(scene, object_size=scene.object_size or {
-        **_parameters(summary, 'turntable_camera'), **node}.get('object_size'))
+        **parameters_among(summary.parameters, 'turntable_camera'), **node}.get('object_size'))
     camera = camera_topics(bag, summary, topics)
     if frame_given and camera.azimuth.type_name not in POSE_TYPES:
         raise ConfigError(f'--object-frame: not for {camera.azimuth.type_name}, which the bag has '
@@ -101,13 +100,6 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
         f'{namespace}reconstructor'.strip('/'), ()))
     return _Read(episodes, record.counters, replace(gaps, uncounted=uncounted),
                  _assumed(stream, scene))
-
-
-def _parameters(summary: BagSummary, node: str) -> Mapping[str, Any]:
-    """Return the parameters of a node in any namespace; empty if there was none."""
-    return checked_parameters(node, next((
-        values for name, values in summary.parameters.items()
-        if name.rpartition('/')[2] == node), {}))
 
 
 def _assumed(stream: CameraStream, scene: Scene) -> list[str]:
