@@ -195,6 +195,7 @@ def test_a_page_of_a_sweep_tells_of_no_planner_that_chose_or_stopped(run):
     told = Elements(page_of(sweep)).text
     assert 'No planner was recorded' in told
     assert 'a planner chose' not in told
+    assert 'The turntable from above' in told and 'goals' not in told
     compared = Elements(page_of(run, sweep)).text
     assert 'no planner' in compared and 'no end recorded' not in compared
 
