@@ -13,13 +13,13 @@ from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 from active_recon.policies.stopping import StoppingRule
 from active_recon.runtimes import precision
 from active_recon.volumes.voxels import VoxelGrid
-from active_recon.watching.advice import Adviser, ELEVATIONS
+from active_recon.watching.advice import Adviser, ELEVATIONS, ENOUGH
 from active_recon.watching.arrivals import Arrivals, SETTLED_S
 from active_recon.watching.collection import Collection
 from active_recon.watching.directions import where_to_stand
 from active_recon.watching.sketch import NEXT_COLOR, SIDE, sketch
 from active_recon.watching.watch_page import loop_state, qr_code, WatchPage
-from active_recon.watching.watcher import Progress, Watcher
+from active_recon.watching.watcher import Progress, told, Watcher
 import cv2
 import numpy as np
 from photo_scene import cameras, on_plain, rendered, write_photos
@@ -231,6 +231,17 @@ def test_it_is_enough_after_the_photos_planned_or_at_the_quality_asked_for(usual
     assert Adviser(StoppingRule(3)).advice(usual).done == 'max_views'
     assert Adviser(StoppingRule(4, 0.0)).advice(usual).done == ''
     assert Adviser(StoppingRule(12, min_gain=0.9)).advice(usual).done == 'gain_too_small'
+
+
+def test_photos_from_every_side_are_enough_and_no_other_place_is_told(usual, adviser):
+    places = [orbit(15 * step, elevation) for elevation in (20, 40, 60) for step in range(24)]
+    full = replace(usual, views=[replace(usual.views[-1], camera=camera) for camera in places])
+    advice = adviser.advice(full)
+    assert advice.goal is None and advice.done
+    assert told(full, advice, metric=True)[0] == f'Enough photos: {ENOUGH[advice.done]}.'
+    assert loop_state(full, advice).done == advice.done
+    many = Adviser(StoppingRule(100, 0.0)).advice(full)
+    assert told(full, many, metric=True)[0] == 'Enough photos: there is no place left.'
 
 
 def test_the_sketch_has_the_last_photo_below_and_the_next_at_its_side(shape):

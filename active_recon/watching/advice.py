@@ -31,11 +31,11 @@ class Advice:
     """
     The best next view, though there may be enough.
 
-    - goal: in the object frame, metres; why: what it would show
+    - goal: in the object frame, metres; None where no place is left; why: what it would show
     - done: why there are photos enough, a key of ENOUGH; '' while there are not
     """
 
-    goal: Goal
+    goal: Goal | None
     why: GoalReason | None
     done: str = ''
 
@@ -66,4 +66,4 @@ class Adviser:
             known = view.known
             done = planner.add_view(known.latent, view.camera, known.grid.entropy(), known.grid,
                                     known.quality).reason
-        return Advice(planner.plan(), planner.reason(), done)
+        return Advice(planner.next_goal().goal, planner.reason(), done)

@@ -28,6 +28,8 @@ def loop_state(shape: Shape, advice: Advice | None) -> LoopState:
     if advice is None:
         return state
     goal = advice.goal
+    if goal is None:
+        return replace(state, done=advice.done)
     scores = Scores(np.array([each.position for each in goal.candidates]), goal.scores)
     if advice.done:
         return replace(state, scores=scores, done=advice.done)

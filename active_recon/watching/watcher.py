@@ -142,17 +142,21 @@ class Watcher:
         board = self._collection.board
         self.progress = Progress(
             [*lines, *out], shape, advice,
-            sketch(shape, advice.goal.camera, None if board is None else board.board))
+            sketch(shape, None if advice.goal is None else advice.goal.camera,
+                   None if board is None else board.board))
 
 
 def told(shape: Shape, advice: Advice, metric: bool) -> list[str]:
     """Return in words where the next photo stands or why there are enough, and how good it is."""
-    way = where_to_stand(advice.goal.camera, shape.views[-1].camera, metric)
-    lines = ([f'Enough photos: {ENOUGH[advice.done]}. Another one would stand {way}.']
-             if advice.done else [f'Next: {way}.'])
+    goal = advice.goal
+    way = '' if goal is None else where_to_stand(
+        goal.camera, shape.views[-1].camera, metric)
+    another = f' Another one would stand {way}.' if way else ''
+    lines = ([f'Enough photos: {ENOUGH[advice.done]}.{another}'] if advice.done
+             else [f'Next: {way}.'])
     count = len(shape.views)
     quality = '' if shape.quality is None else f'; {shape.quality.summary}'
     lines.append(f'{count} photo{"s" if count > 1 else ""}{quality}.')
-    if advice.goal.gain is not None:
-        lines.append(f'The next photo is expected to gain {advice.goal.gain:.3f} of IoU.')
+    if goal is not None and goal.gain is not None:
+        lines.append(f'The next photo is expected to gain {goal.gain:.3f} of IoU.')
     return [*lines, *(f'Warning: {warning}' for warning in shape.warnings)]
