@@ -207,6 +207,22 @@ def test_episodes_that_share_their_stamps_after_a_reset_are_refused(loop, tmp_pa
         read_run(write_bag(tmp_path / 'run', messages))
 
 
+@pytest.mark.parametrize(('is_later', 'topic', 'told'), [
+    (True, '/camera/', 'images'), (False, '/camera/', 'images'), (False, '/camera/pose', 'poses')])
+def test_a_camera_that_has_stamps_of_views_again_after_a_reset_is_refused(
+        loop, tmp_path, is_later, topic, told):
+    idle = [entry for entry in LoopRun('idle', BEGIN, azimuths=(1.5, 1.5, 1.5)).messages
+            if entry[1].startswith(topic)]
+    second = LoopRun('second', loop.end, azimuths=(1.0, 3.0))
+    before, after = loop.messages, [*idle, *second.messages]
+    if not is_later:
+        before, after = after, before
+    later = second.end - BEGIN + PERIOD
+    messages = [*before, *((time + later, name, msg) for time, name, msg in after)]
+    with pytest.raises(DataError, match=f'clock went back .* its {told} share their stamps'):
+        read_run(write_bag(tmp_path / 'run', messages))
+
+
 def test_an_episode_that_is_told_after_its_first_view_as_to_a_late_recorder_is_read(
         loop, bag, tmp_path):
     episode = next(entry for entry in loop.messages if entry[1] == '/episode')

@@ -56,6 +56,7 @@ class CameraStream:
     - transforms: None where the bag has poses or azimuths instead
     - is_unstamped: receive times count instead of stamps; are_images_unstamped: also as stamps
     - images: stamp and receive time of each image read, wanted or not, nanoseconds
+    - went_back: whether stamps of wanted images went back, where that was allowed
     """
 
     def __init__(self, bag: Bag, camera: CameraTopics, topics: Topics, scene: Scene,
@@ -65,7 +66,7 @@ class CameraStream:
         self._topics = topics
         self._scene = scene
         self._reporting = reporting
-        self.is_unstamped = self.are_images_unstamped = False
+        self.is_unstamped = self.are_images_unstamped = self.went_back = False
         self._image_frames: set[str] = set()
         self._joints: set[str] = set()
         self._lenses: list[tuple[int, Intrinsics]] = []
@@ -120,7 +121,7 @@ class CameraStream:
             time = message.received if self.is_unstamped else stamp
             if time < last and not in_order:
                 joiner.clear()
-                fed = 0
+                fed, self.went_back = 0, True
             last = time
             # Of a fast tracker's poses only those around an image are of use
             fed = max(fed, bisect_left(self._poses, time, key=_stamp) - 1)

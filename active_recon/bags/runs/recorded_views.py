@@ -17,8 +17,10 @@ from active_recon.geometry.cameras import azimuth_difference, Camera, OrbitCamer
 from active_recon.geometry.view_distance import view_distance
 from msg_tools.episodes import Episode
 from msg_tools.views import NOT_BEGUN, View
+import numpy as np
 
 _ROUNDING = 1e-9  # rad
+_SAME_POSE = 1e-3  # metres, and parts of unit vectors
 
 
 def recorded_episodes(stream: CameraStream, record: LoopRecord,
@@ -32,7 +34,7 @@ def recorded_episodes(stream: CameraStream, record: LoopRecord,
     if the object is not found in an image.
     """
     stamps = sorted(record.parts['view'])
-    views = _taken_views(stream, stamps)
+    views = _taken_views(stream, record, stamps)
     before = set(stamps) - {view.stamp for view in views}
     begun: list[Episode] = sorted(record.parts['episode'].values(), key=lambda each: each.begin)
     if views and (not begun or views[0].stamp < begun[0].begin):
@@ -89,22 +91,34 @@ def gated_views(stream: CameraStream, gate: ViewGate,
     return RecordedEpisode('', views[0].stamp, None, views, ''), dict(counters)
 
 
-def _taken_views(stream: CameraStream, stamps: Sequence[int]) -> list[View]:
-    found = {}
+def _taken_views(stream: CameraStream, record: LoopRecord, stamps: Sequence[int]) -> list[View]:
+    found: dict[int, View] = {}
     refusal = ''
     for view in stream.views(frozenset(stamps).__contains__, in_order=False):
         try:
             if isinstance(view, MessageError):
                 raise view
-            _ = view.image  # decodes it: one that cannot be decoded is missing
-            found[view.stamp] = view
+            image = view.image  # decodes it: one that cannot be decoded is missing
         except MessageError as error:
             refusal = refusal or str(error)
+            continue
+        if view.stamp in found and not np.array_equal(found[view.stamp].image, image):
+            raise _shared('images')
+        found[view.stamp] = view
+    if stream.went_back and not stream.assumed and not all(np.allclose(
+            view.camera.pose, record.parts['view'][stamp], rtol=0, atol=_SAME_POSE)
+            for stamp, view in found.items()):
+        raise _shared('poses')
     for number, stamp in enumerate(stamps, 1):
         if stamp not in found and not (found and stream.begins_after(stamp)):
             raise DataError(f'the image or the camera of view {number} ({stamp / 1e9:.3f} s) is '
                             f'missing: {refusal or "the image was not recorded"}', 'no_image')
     return [found[stamp] for stamp in stamps if stamp in found]
+
+
+def _shared(what: str) -> DataError:
+    return DataError(f'the clock went back while it was recorded, and its {what} share their '
+                     'stamps: expected later ones, or those of another time', 'clock')
 
 
 def _episode(episode: Episode, views: Sequence[View], end: float, stream: CameraStream,
@@ -113,8 +127,7 @@ def _episode(episode: Episode, views: Sequence[View], end: float, stream: Camera
     goals: dict[int, list[RecordedGoal]] = {}
     published = [record.published['view'][view.stamp] for view in views]
     if published != sorted(published):
-        raise DataError('the clock went back while it was recorded, and its episodes share their '
-                        'stamps: expected later ones, or those of another time', 'clock')
+        raise _shared('episodes')
     for goal in _goals(record, episode.begin, end):
         after = bisect_right(published, record.published['next_view'][goal.stamp])
         before = goals.setdefault(after, [])
