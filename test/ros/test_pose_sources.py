@@ -1,12 +1,13 @@
 """Where the camera's poses come from: tf2 and a turntable's joint say what the topic would."""
 
+from contextlib import nullcontext
 import sys
 from types import SimpleNamespace
 
-from active_recon.errors import ConfigError
+from active_recon.errors import ConfigError, MessageError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
 from active_recon.geometry.turntable_pose import FixedCamera
-from active_recon.nodes.camera.pose_sources import check_pose_source, TfPoses
+from active_recon.nodes.camera.pose_sources import check_pose_source, TfPoses, TurntablePoses
 from active_recon.parameters.reconstructor import ReconstructorParameters
 from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Vector3
 from msg_tools.cameras import intrinsics_to_msg, pose_from_msg, pose_to_msg
@@ -197,6 +198,21 @@ def test_a_joint_that_is_not_there_or_nowhere_is_refused_and_said(bench, start_n
     bench.until(refused('arm', 1.0), 'the other joint to be refused')
     assert node.log('refused: no joint position: expected one of table, got 1 of arm')
     bench.until(refused('table', float('nan')), 'the position to be refused')
+
+
+def test_joints_of_another_publisher_are_refused_only_until_the_turntable_s_was_there():
+    poses = []
+    source = TurntablePoses(
+        SimpleNamespace(create_publisher=lambda *_: SimpleNamespace(publish=lambda _: None)),
+        poses.append, SimpleNamespace(rejecting=nullcontext),
+        SimpleNamespace(subscribe=lambda *_: None), FixedCamera(POSE, -1), 'table', 'object')
+    arm = JointState(name=['elbow', 'wrist'], position=[1.0, 2.0])
+    with pytest.raises(MessageError, match='no joint position: expected one of table'):
+        source._on_joint(arm)
+    for msg in (JointState(name=['table'], position=[ANGLE]), arm):
+        source._on_joint(msg)
+    [told] = poses
+    np.testing.assert_allclose(pose_from_msg(told), TURNED, atol=1e-9)
 
 
 TF = """

@@ -86,11 +86,15 @@ class TurntablePoses:
         self._diagnostics = diagnostics
         self._camera = camera
         self._joint = joint
+        self._is_there = False
         self._object_frame = object_frame
         self._publisher = node.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
         inputs.subscribe(JointState, 'turntable/joint_states', self._on_joint, HIGH_RATE_QOS)
 
     def _on_joint(self, msg: JointState) -> None:
+        self._is_there |= self._joint in msg.name
+        if self._is_there and msg.name and self._joint not in msg.name:
+            return  # of another publisher's joints, as an arm's
         with self._diagnostics.rejecting():
             pose = self._camera.pose_at(joint_position_from_msg(msg, self._joint))
             header = Header(stamp=msg.header.stamp, frame_id=self._object_frame)
