@@ -42,6 +42,16 @@ def test_a_turntable_may_turn_clockwise():
     np.testing.assert_array_equal(order, [[18, 23, 4, 8, 13]])
 
 
+def test_the_even_views_of_an_object_are_the_same_whatever_is_measured_beside_it():
+    scattered = np.random.default_rng(0).normal(size=(24, 3))
+    scattered /= np.linalg.norm(scattered, axis=1, keepdims=True)
+    shown = np.stack([ring(24), scattered, ring(24)[::-1]])
+    first = np.array([3, 5, 18])
+    for row, order in enumerate(even_orders(shown, 5, first)):
+        np.testing.assert_array_equal(
+            order, even_orders(shown[row:row + 1], 5, first[row:row + 1])[0])
+
+
 def test_views_from_anywhere_are_each_the_farthest_from_those_before():
     first = np.array([2, 7])
     order = even_orders(np.stack([SCATTERED] * 2), 6, first)

@@ -45,15 +45,18 @@ def even_orders(directions: NDArray[np.float64], count: int, first: NDArray[np.i
     """
     Return `count` evenly spread views of each object, beginning with `first` (N,): (N, count).
 
-    Takes unit vectors to the cameras, (N, V, 3). If the azimuths are V even steps, the views are
-    equidistant on the circle; else each next view is the one farthest from all before it.
+    Takes unit vectors to the cameras, (N, V, 3). If an object's azimuths are V even steps, its
+    views are equidistant on the circle; else each next view is the one farthest from all before.
     """
     objects, views = directions.shape[:2]
     azimuths = np.arctan2(directions[..., 1], directions[..., 0])
     steps = np.diff(azimuths, axis=1, append=azimuths[:, :1]) % TURN
-    if min(np.abs(way * steps % TURN - TURN / views).max(initial=0) for way in (1, -1)) < _EVEN:
-        steps_apart = np.round(np.arange(count) * views / count).astype(np.int64)
-        return np.asarray((first[:, None] + steps_apart) % views)
+    around = np.any([(np.abs(way * steps % TURN - TURN / views) < _EVEN).all(axis=1)
+                     for way in (1, -1)], axis=0)
+    steps_apart = np.round(np.arange(count) * views / count).astype(np.int64)
+    equidistant = (first[:, None] + steps_apart) % views
+    if around.all():
+        return np.asarray(equidistant)
     rows, order = np.arange(objects), first[:, None]
     cosines = np.einsum('nvi,nwi->nvw', directions, directions)
     nearest = cosines[rows, first]
@@ -62,7 +65,7 @@ def even_orders(directions: NDArray[np.float64], count: int, first: NDArray[np.i
         order = np.column_stack([order, nearest.argmin(axis=1)])
         taken = np.isinf(nearest)
         nearest = np.where(taken, np.inf, np.maximum(nearest, cosines[rows, order[:, -1]]))
-    return order
+    return np.where(around[:, None], equidistant, order)
 
 
 @torch.inference_mode()
