@@ -71,7 +71,7 @@ setup(
     ],
     extras_require={
         'batch': ['pyarrow>=18,<28'],
-        'cluster': ['pyarrow>=18,<28', 'ray[client]>=2.44,<3'],
+        'cluster': ['pyarrow>=18,<28', 'ray[client]>=2.52,<3'],
         'coacd': ['coacd>=1.0.5,<2'],
         'doc': [
             'furo>=2024.8', 'myst-parser>=4', 'sphinx>=8', 'sphinx-autodoc2>=0.5',
@@ -84,7 +84,7 @@ setup(
         'test': [
             'coacd>=1.0.5,<2', 'mcap-ros2-support>=0.5.5', 'mujoco>=3.2,<4', 'onnx>=1.17,<2',
             'onnxruntime>=1.20,<2', 'point-cloud-utils>=0.34', 'pyarrow>=18,<28',
-            'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6', 'ray[client]>=2.44,<3',
+            'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6', 'ray[client]>=2.52,<3',
             'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
         # A store's server, for the long tests
         'test-full': ['flask>=3,<4', 'flask-cors>=5', 'moto[s3]>=5,<6', 's3fs>=2025.2'],

@@ -111,3 +111,9 @@ def test_torch_that_make_installs_is_within_the_declared_range():
 
 def test_colcon_has_a_setuptools_that_it_works_with():
     assert int(pins('constraints-colcon.txt')['setuptools'].partition('.')[0]) < 80
+
+
+def test_every_ray_that_is_allowed_has_the_token_that_its_scripts_make():
+    script = (ROOT / 'examples' / 'cluster' / 'slurm.sh').read_text()
+    assert 'ray get-auth-token' in script
+    assert not requirements()['ray'].specifier.contains('2.51.9')  # Ray has it since 2.52
