@@ -3,9 +3,12 @@
 from dataclasses import replace
 from functools import partial
 import gc
+from pathlib import Path
 import shutil
 import sys
 
+from active_recon.cli import evaluation_plan
+from active_recon.cli.evaluation_plan import EvaluationPlan, run_on_crew
 from active_recon.cluster import bundles, crew_of, Result
 from active_recon.cluster.bundles import attempt_all, Bundles
 from active_recon.cluster.local import LocalCrew
@@ -164,6 +167,20 @@ def test_rendered_objects_are_the_same_on_a_cluster(cluster, tmp_path, monkeypat
     for name, where in (('local', ['--workers', 1]), ('ray', ['--cluster', cluster])):
         assert command(monkeypatch, 'render', 'meshes', name, '--samples', 1, *where) == 0
     assert same_files(tmp_path / 'local', tmp_path / 'ray')
+
+
+@pytest.mark.parametrize('split', ['splits.json', 'sorted', None])
+def test_workers_of_an_evaluation_find_its_split_file_from_any_folder(
+        tmp_path, monkeypatch, split):
+    monkeypatch.chdir(tmp_path)
+    asked = []
+    monkeypatch.setattr(evaluation_plan, 'run_blocks', lambda *given: asked.extend(given))
+    plan = EvaluationPlan(tmp_path / 'data', (), 5, 4, 5, 0, split, True, 1)
+    run_on_crew(plan, Path('a.safetensors'), None, (), None)
+    prepare, *_, reads, _ = asked
+    is_file = split == 'splits.json'
+    assert prepare.args[0].split_file == (str(tmp_path / split) if is_file else split)
+    assert (tmp_path / 'splits.json' in reads) == is_file
 
 
 def test_without_ray_or_a_cluster_the_error_says_what_to_do(monkeypatch, capsys, tmp_path):

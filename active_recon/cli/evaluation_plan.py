@@ -1,13 +1,14 @@
 """What `active-recon evaluate` measures, made anew in each worker of a cluster."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import read_objects
 from active_recon.cluster import Crew
+from active_recon.datasets.splits import SORTED
 from active_recon.evaluation.blocks import run_blocks
 from active_recon.evaluation.contenders import contender_names, contenders
 from active_recon.evaluation.exported_network import network_in
@@ -56,8 +57,11 @@ class EvaluationPlan:
 def run_on_crew(plan: EvaluationPlan, weights: Path, trial: Trial, every: Sequence[Contender],
                 crew: Crew) -> None:
     """Measure what is not in the trial's cache on the workers; raises as `run_blocks`."""
-    run_blocks(partial(_trial, plan, weights.absolute()), trial, every, crew,
-               [plan.data, weights], progress_bar)
+    reads = [plan.data, weights]
+    if plan.split_file not in (None, SORTED):  # workers begin in folders of their own
+        reads.append(Path(plan.split_file).absolute())
+        plan = replace(plan, split_file=str(reads[-1]))
+    run_blocks(partial(_trial, plan, weights.absolute()), trial, every, crew, reads, progress_bar)
 
 
 def _trial(plan: EvaluationPlan, weights: Path) -> tuple[Trial, list[Contender]]:
