@@ -1,7 +1,14 @@
 """Meshes to a dataset: every job once, what is there kept, what cannot be read told."""
 
 from active_recon.datasets.drawn_cameras import Viewing
-from active_recon.datasets.making import make_dataset, make_object, mesh_jobs, shape_jobs, yawed
+from active_recon.datasets.making import (
+    make_dataset,
+    make_object,
+    mesh_files,
+    mesh_jobs,
+    shape_jobs,
+    yawed,
+)
 from active_recon.errors import ConfigError, DataError
 from active_recon.volumes.rendering import Renderer
 from active_recon.volumes.voxelisation import voxelise
@@ -29,6 +36,13 @@ def test_a_folder_s_meshes_are_named_by_category_and_file(tmp_path):
     (tmp_path / 'car/notes.txt').write_text('no mesh')
     assert names(mesh_jobs(tmp_path, tmp_path, None, None)) == [
         ('car', 'a'), ('chair', 'a'), ('chair', 'b')]
+
+
+def test_what_macos_puts_beside_a_mesh_is_none(tmp_path):
+    save(tmp_path, 'chair/a.obj')
+    (tmp_path / 'chair' / '._a.obj').write_bytes(b'\0\5\x16\7')
+    assert mesh_files(tmp_path) == [tmp_path / 'chair' / 'a.obj']
+    assert names(mesh_jobs(tmp_path, tmp_path, None, None)) == [('chair', 'a')]
 
 
 def test_one_file_and_a_folder_of_files_are_of_their_folder_s_category(tmp_path):

@@ -44,6 +44,12 @@ def test_the_command_draws_a_category(tmp_path):
     assert cv2.imread(str(tmp_path / 'lamps.png')).shape == (160, 8 * 160, 3)
 
 
+def test_the_command_draws_a_folder_of_meshes_as_macos_leaves_it(tmp_path):
+    trimesh.creation.box((1, 1, 1)).export(tmp_path / 'a.stl')
+    (tmp_path / '._a.stl').write_bytes(b'\0\5\x16\7')
+    assert run(tmp_path / 'sheet.png', '--meshes', tmp_path).exit_code == 0
+
+
 @pytest.mark.parametrize(('model', 'side'), [('lifting', 128), ('2d3d-attention', 64)])
 def test_training_images_are_those_of_the_network(dataset, tmp_path, model, side):
     path = tmp_path / 'new' / 'batch.png'

@@ -62,7 +62,7 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
              azimuth_deg: float) -> 'NDArray[np.uint8]':
     import math
 
-    from active_recon.datasets.making import MESH_SUFFIXES
+    from active_recon.datasets.making import mesh_files, MESH_SUFFIXES
     from active_recon.shapes import ALL_CATEGORIES, make_shape
     from active_recon.volumes.meshes import load_mesh
     from active_recon.volumes.sheet import contact_sheet
@@ -71,8 +71,7 @@ def _objects(category: list[str] | None, meshes: Path | None, count: int,
         objects = [make_shape(name, seed)
                    for name in category or ALL_CATEGORIES for seed in range(count)]
     else:
-        objects = [load_mesh(path) for path in sorted(meshes.rglob('*'))
-                   if path.suffix.lower() in MESH_SUFFIXES]
+        objects = [load_mesh(path) for path in mesh_files(meshes)]
     if not objects:
         raise DataError(f'{meshes}: no mesh files: expected some '
                         f'({", ".join(sorted(MESH_SUFFIXES))}), found none')

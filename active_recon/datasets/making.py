@@ -65,6 +65,12 @@ def yawed(mesh: trimesh.Trimesh, yaw: float) -> trimesh.Trimesh:
     return fit_to_grid(turned)  # a rotation can enlarge the bounding box
 
 
+def mesh_files(folder: Path) -> list[Path]:
+    """Return the mesh files in a folder and those below it, without hidden ones, as of macOS."""
+    return sorted(path for path in folder.rglob('*') if path.suffix.lower() in MESH_SUFFIXES
+                  and not path.name.startswith('.'))
+
+
 def mesh_jobs(meshes: Path, out: Path, up: str | None, front: str | None) -> list[Job]:
     """
     Return a job for one mesh file, or for each mesh file in a folder `<category>/<mesh>`.
@@ -76,8 +82,7 @@ def mesh_jobs(meshes: Path, out: Path, up: str | None, front: str | None) -> lis
     if meshes.is_file():
         files, top = [meshes], meshes.parent
     elif meshes.is_dir():
-        files = sorted(path for path in meshes.rglob('*') if path.suffix.lower() in MESH_SUFFIXES)
-        top = meshes
+        files, top = mesh_files(meshes), meshes
     else:
         raise DataError(f'{meshes}: no such file or folder: expected a mesh file or a folder of '
                         '<category>/<mesh>')
