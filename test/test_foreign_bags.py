@@ -108,6 +108,7 @@ def test_images_from_before_a_simulations_clock_leave_the_others_their_stamps(tm
     assert {view.stamp for view in found} <= {time for time, _ in TIMES}
     for view, image in zip(found, IMAGES, strict=True):
         assert np.array_equal(view.image, image)
+    assert read_run(tmp_path / 'run').gaps.missing == 0
 
 
 def test_camera_info_without_stamps_is_joined_on_receive_times(tmp_path):

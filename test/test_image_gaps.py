@@ -36,6 +36,15 @@ def test_neither_the_order_nor_a_second_copy_matters():
     assert gaps_between([*reversed(stamps), *stamps[:5]]) == gaps_between(stamps)
 
 
+def test_between_the_times_of_a_clock_that_went_back_nothing_is_missing():
+    late, early = stream(30), [stamp - 10**12 for stamp in stream(40)]
+    del late[10], early[20]
+    received = [time - 10 * MS for time in stream(len(late) + len(early))]
+    found = gaps_between([*late, *early], received)
+    assert (found.missing, found.longest_s) == (2, pytest.approx(0.2))
+    assert gaps_between([*late, *early]).missing > 1000  # without them that is not known
+
+
 def test_a_camera_that_takes_its_images_one_by_one_misses_none():
     rng = np.random.default_rng(0)
     by_hand = np.cumsum(rng.uniform(500, 9000, 40)) * MS

@@ -199,6 +199,7 @@ def test_episodes_of_a_clock_that_was_reset_keep_their_views(loop, tmp_path):
             assert np.array_equal(view.image, image)
         assert episode.first_goal.camera.azimuth == pytest.approx(expected.azimuths[0])
         assert episode.done == 'max_views'
+    assert run.gaps.missing == 0
 
 
 def test_episodes_that_share_their_stamps_after_a_reset_are_refused(loop, tmp_path):

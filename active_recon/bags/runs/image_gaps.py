@@ -29,14 +29,16 @@ class ImageGaps:
     uncounted: int | None = None
 
 
-def gaps_between(stamps: Sequence[int]) -> ImageGaps:
+def gaps_between(stamps: Sequence[int], received: Sequence[int] = ()) -> ImageGaps:
     """
     Return the gaps in images of those stamps, nanoseconds in any order.
 
     A gap is at least twice the usual period. If the images are fewer or less regular than those
-    of a stream, nothing is reported as missing.
+    of a stream, nothing is reported as missing. By the times at which they were received, if they
+    are given, it is known where the clock went back, and nothing is missing.
     """
-    apart: NDArray[np.float64] = np.diff(np.unique(stamps)).astype(np.float64) / 1e9
+    known, first = np.unique(stamps, return_index=True)
+    apart: NDArray[np.float64] = np.diff(known).astype(np.float64) / 1e9
     if len(apart) + 1 < FEWEST:
         return ImageGaps()
     period = float(np.median(apart))
@@ -45,6 +47,8 @@ def gaps_between(stamps: Sequence[int]) -> ImageGaps:
     if regular.mean() < _REGULAR_SHARE:
         return ImageGaps()
     gaps = steps >= 2
+    if received:
+        gaps &= np.diff(np.array(received)[first]) >= 0
     return ImageGaps(period, int((steps[gaps] - 1).sum()), float(apart[gaps].max(initial=0.0)))
 
 

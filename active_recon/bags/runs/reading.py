@@ -88,18 +88,23 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
                 raise ConfigError("--depth needs the camera's pose and lens: expected them in the "
                                   f'bag, which lacks {"; ".join(stream.assumed)}')
             episode = with_depth_of(camera.depth, episode, bag, stream)
-        gaps = gaps_between([stamp for stamp, _ in stream.images])
+        gaps = _gaps(stream)
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
     record = LoopRecord(bag, namespace, node.get('object_size', scene.size), topics.object_frame)
     episodes = with_depth(recorded_episodes(stream, record, scene), bag, namespace,
                           summary.provenance, node)
     if camera.of_views:  # the images between the views were not recorded
         return _Read(episodes, record.counters, ImageGaps(), _assumed(stream, scene))
-    gaps = gaps_between([stamp for stamp, _ in stream.images])
+    gaps = _gaps(stream)
     uncounted = uncounted_images([received for _, received in stream.images], record.counted.get(
         f'{namespace}reconstructor'.strip('/'), ()))
     return _Read(episodes, record.counters, replace(gaps, uncounted=uncounted),
                  _assumed(stream, scene))
+
+
+def _gaps(stream: CameraStream) -> ImageGaps:
+    stamped = [times for times in stream.images if times[0]]  # none before a simulation's clock
+    return gaps_between([stamp for stamp, _ in stamped], [received for _, received in stamped])
 
 
 def _assumed(stream: CameraStream, scene: Scene) -> list[str]:
