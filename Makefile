@@ -26,7 +26,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full test-jazzy doc html bench soak policies weights ready read-doc chromium lint clean
+.PHONY: help venv demo golden test test-full test-jazzy test-lowest doc html bench soak policies weights ready read-doc chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -56,6 +56,12 @@ test-jazzy: ready  ## `make test` with numpy 1.26 and OpenCV 4, for which Jazzy 
 	@echo '== installing numpy 1.26 and what belongs to it'
 	@rm .venv/installed
 	@$(PIP) install --no-compile --no-deps -r constraints-jazzy.txt
+	@$(TEST) -m 'not slow' $(ARGS)
+
+test-lowest: ready  ## `make test` with the lowest versions that setup.py accepts; Python 3.11
+	@echo '== installing the lowest versions'
+	@rm .venv/installed
+	@$(PIP) install --no-compile --no-deps -r constraints-lowest.txt
 	@$(TEST) -m 'not slow' $(ARGS)
 
 # What the tests begin with; two at a time, since each keeps one core busy.

@@ -63,7 +63,7 @@ setup(
         'tensorboard>=2.16,<3',
         'torch>=2.5,<3',
         'trimesh>=4.4,<6',
-        'typer>=0.12,<1',
+        'typer>=0.16,<1',
         'viser>=1.1,<2',
         'websockets>=15,<18',
         'zstandard>=0.22,<1',

@@ -104,6 +104,16 @@ def test_the_versions_for_jazzy_are_within_the_declared_ranges():
     assert all(version in requirements()[name].specifier for name, version in found.items())
 
 
+def test_the_lowest_versions_are_the_first_of_the_declared_ranges():
+    found = pins('constraints-lowest.txt')
+    for name, version in found.items():
+        lowest = next(each.version for each in requirements()[name].specifier
+                      if each.operator == '>=')
+        assert version in requirements()[name].specifier
+        assert f'{version}.'.startswith(f'{lowest}.')
+    assert found.keys() >= (requirements().keys() - extras().keys() - ROS_WHEELS - {'torch'})
+
+
 def test_torch_that_make_installs_is_within_the_declared_range():
     chosen = re.search(r'^TORCH \?= torch==(.*)$', (ROOT / 'Makefile').read_text(), re.MULTILINE)
     assert chosen[1] in requirements()['torch'].specifier
