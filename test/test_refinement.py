@@ -6,7 +6,7 @@ from active_recon.volumes.refinement import refined, refined_mesh
 from active_recon.volumes.voxels import iou, VoxelGrid
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter, label
+from scipy.ndimage import binary_dilation, gaussian_filter, label
 from scipy.special import expit
 
 RANDOM = VoxelGrid(np.random.default_rng(0).random((6, 6, 6), np.float32))
@@ -125,6 +125,30 @@ def test_a_grid_has_no_more_bodies_in_narrow_cells_than_in_its_own(seed):
     mesh = refined_mesh(VoxelGrid(cells), 0.5)
     assert 1 <= mesh.body_count <= bodies
     assert mesh.is_watertight
+
+
+@pytest.mark.parametrize('corner', [(8, 8, 0), (8, 0, 8), (8, 8, 8)])
+def test_two_blocks_that_meet_at_an_edge_or_a_corner_are_both_there_and_one_body(corner):
+    cells = np.zeros((24, 24, 24), np.float32)
+    for first in np.array([4, 4, 4]), np.array([4, 4, 4]) + corner:
+        x, y, z = (slice(start, start + 8) for start in first)
+        cells[x, y, z] = 1
+    mesh = refined_mesh(VoxelGrid(cells, 24.0), 0.5)
+    assert mesh.body_count == 1
+    assert mesh.is_watertight
+    np.testing.assert_allclose(mesh.bounds[1], corner, atol=0.6)
+    assert 0.85 * cells.sum() < mesh.volume < cells.sum()
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_no_cell_of_a_large_body_is_further_than_a_cell_from_what_is_kept(seed):
+    cells = np.random.default_rng(seed).random((12, 12, 12)).astype(np.float32) ** 2
+    grid, around = VoxelGrid(cells), np.ones((3, 3, 3))
+    bodies, _ = label(grid.occupied(0.5), around)
+    large = bodies == np.bincount(bodies[bodies > 0]).argmax()
+    narrow = whole_bodies(grid, refined(grid), 0.5).occupied(0.5)
+    kept = narrow.reshape(12, 2, 12, 2, 12, 2).any(axis=(1, 3, 5))
+    assert not (large & ~binary_dilation(kept, around)).any()
 
 
 def test_a_speck_beside_the_object_is_left_out_and_a_smaller_object_stays():
