@@ -100,3 +100,37 @@ def test_a_glb_of_one_material_has_the_color_that_it_has_beside_another(tmp_path
     colors = [np.unique(each[each[..., 3] == 255][:, :3], axis=0).astype(int) for each in shown]
     apart = np.abs(colors[0][:, None] - colors[1]).max(axis=2).min(axis=1)
     assert apart.max() <= 2
+
+
+@pytest.mark.parametrize('materials', [
+    [{}], [{}, {'metallicFactor': 0.5}], [{'baseColorFactor': [1.0, 1.0, 1.0, 1.0]}]],
+    ids=['one', 'two', 'white'])
+def test_the_corners_of_a_glb_of_several_parts_have_the_colors_of_their_part(materials, tmp_path):
+    def with_materials(tree):
+        tree['materials'] = [{'pbrMetallicRoughness': each} for each in materials]
+        for number, part in enumerate(tree['meshes']):
+            part['primitives'][0]['material'] = number % len(materials)
+
+    parts = [trimesh.creation.box().apply_translation([0, 0, place]) for place in (0, 2, 4)]
+    for part, light in zip(parts, ([128, 10, 10], [10, 10, 128], [10, 128, 10]), strict=True):
+        part.visual.vertex_colors = np.tile(np.uint8([*light, 255]), (8, 1))
+    (tmp_path / 'parts.glb').write_bytes(
+        trimesh.Scene(parts).export(file_type='glb', tree_postprocessor=with_materials))
+    read = read_mesh(tmp_path / 'parts.glb')
+    expected = np.array([[188, 56, 56], [56, 56, 188], [56, 188, 56]])[
+        np.rint(read.vertices[:, 0] / 2).astype(int)]  # the file's z is x here
+    np.testing.assert_array_equal(read.visual.vertex_colors[:, :3], expected)
+
+
+def test_a_material_in_glb_colours_the_corners_colors(tmp_path):
+    part = trimesh.creation.box()
+    part.visual.vertex_colors = np.tile(np.uint8([255, 128, 128, 255]), (8, 1))
+
+    def tinted(tree):
+        tree['materials'] = [{'pbrMetallicRoughness': {'baseColorFactor': [0.2, 1.0, 0.4, 1.0]}}]
+        tree['meshes'][0]['primitives'][0]['material'] = 0
+
+    (tmp_path / 'box.glb').write_bytes(
+        trimesh.Scene([part]).export(file_type='glb', tree_postprocessor=tinted))
+    colors = read_mesh(tmp_path / 'box.glb').visual.vertex_colors[:, :3].astype(int)
+    assert np.abs(colors - [124, 188, 124]).max() <= 1

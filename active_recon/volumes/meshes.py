@@ -90,10 +90,11 @@ def _take_colors(mesh: trimesh.Trimesh, path: Path) -> None:
     visual: Any = mesh.visual
     if visual.kind != 'texture':
         return
-    factor = getattr(visual.material, 'baseColorFactor', None)
-    if factor is None and visual.uv is None:
+    if b'"COLOR_0"' in path.read_bytes():
         _take_corner_colors(mesh, path)
-    elif factor is not None and getattr(visual.material, 'baseColorTexture', None) is None:
+        return
+    factor = getattr(visual.material, 'baseColorFactor', None)
+    if factor is not None and getattr(visual.material, 'baseColorTexture', None) is None:
         # It is light. Where trimesh makes one mesh of several materials, it knows that
         color = from_linear(np.asarray(factor)[:3])
         mesh.visual = trimesh.visual.ColorVisuals(
@@ -101,11 +102,26 @@ def _take_colors(mesh: trimesh.Trimesh, path: Path) -> None:
 
 
 def _take_corner_colors(mesh: trimesh.Trimesh, path: Path) -> None:
-    """Let the colours of the corners in a file be the mesh's where it has no others."""
-    # They are lost where trimesh makes one mesh of a file
+    """Let the colours of the corners of a file's parts be the mesh's where none has a texture."""
+    # They are lost where trimesh makes one mesh of a file, of its nodes in their order
     scene: Any = trimesh.load(path, force='scene', process=False)
-    light = [part.visual.vertex_attributes['color'] for part in scene.geometry.values()
-             if 'color' in getattr(part.visual, 'vertex_attributes', ())]
-    if len(scene.geometry) == len(light) == 1 and len(light[0]) == len(mesh.vertices):
-        mesh.visual = trimesh.visual.ColorVisuals(
-            mesh, vertex_colors=from_linear(light[0][:, :3]))
+    parts = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
+    parts = [part for part in parts if isinstance(part, trimesh.Trimesh)]
+    colors = [found for part in parts if (found := _corner_colors(part)) is not None]
+    if len(colors) == len(parts) and sum(map(len, colors)) == len(mesh.vertices):
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.concatenate(colors))
+
+
+def _corner_colors(part: trimesh.Trimesh) -> NDArray[np.uint8] | None:
+    """Return the sRGB colours of the corners, (V, 3), of a part of a file; None: a texture."""
+    visual: Any = part.visual
+    if visual.kind != 'texture':
+        return np.asarray(visual.vertex_colors[:, :3], np.uint8)
+    factor = getattr(visual.material, 'baseColorFactor', None)
+    if getattr(visual.material, 'baseColorTexture', None) is not None:
+        return None
+    white = np.full((len(part.vertices), 3), 1.0)
+    light = visual.vertex_attributes.get('color', white)[:, :3]
+    if light.dtype.kind == 'u':
+        light = light / np.iinfo(light.dtype).max
+    return from_linear(light if factor is None else light * np.asarray(factor)[:3] / 255)
