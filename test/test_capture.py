@@ -109,6 +109,17 @@ def test_a_folder_comes_by_its_numbers_and_what_cannot_be_read_is_left_out(tmp_p
     assert '4.png: not readable' in broken
 
 
+@pytest.mark.parametrize('mode', ['RGBA', 'LA'])
+def test_a_transparent_image_of_a_folder_lies_on_white(mode, tmp_path):
+    pixels = np.zeros((*SIZE[::-1], 4), np.uint8)
+    pixels[10:20, :, :3] = 60
+    pixels[10:20, 8:40, 3], pixels[10:20, 40:, 3] = 255, 102
+    Image.fromarray(pixels).convert(mode).save(tmp_path / '1.png')
+    image = open_source(str(tmp_path)).read()
+    assert (image[0] == 255).all() and (image[15, :8] == 255).all()
+    assert (image[15, 8:40] == 60).all() and (image[15, 40:] == 177).all()
+
+
 def test_a_size_is_asked_of_a_device_alone(tmp_path):
     Image.new('RGB', SIZE).save(tmp_path / '1.png')
     for place in (tmp_path, film(tmp_path / 'film.avi')):

@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from active_recon.calibration.files import image_paths, read_image
 from active_recon.errors import ConfigError, DataError
@@ -157,7 +157,7 @@ class _Folder:
         if not self._left:
             return None
         path = self._left.pop(0)
-        image = read_image(path)
+        image = _on_white(read_image(path), path)
         if (image.shape[1], image.shape[0]) != self.size:
             raise DataError(f'{path}: another size: expected {self.size[0]} x {self.size[1]} '
                             f'pixels as before, got {image.shape[1]} x {image.shape[0]}',
@@ -166,6 +166,16 @@ class _Folder:
 
     def close(self) -> None:
         """Nothing is to be given back."""
+
+
+def _on_white(image: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
+    """Return a file's image laid on white where it is transparent, as those of messages are."""
+    stored: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if stored is None or stored.ndim < 3 or stored.shape[2] < 4:
+        return image
+    bgra = stored / (np.iinfo(stored.dtype).max if stored.dtype.kind == 'u' else 1)
+    shown = 1 - (1 - bgra[..., :3]) * bgra[..., 3:]
+    return np.asarray(np.rint(255 * shown).clip(0, 255), np.uint8)
 
 
 def _first_size(paths: list[Path]) -> tuple[int, int]:
