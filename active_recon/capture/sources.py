@@ -170,6 +170,8 @@ class _Folder:
 
 def _on_white(image: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
     """Return a file's image laid on white where it is transparent, as those of messages are."""
+    if path.suffix.lower() in ('.jpg', '.jpeg'):  # none is, and they take long to decode
+        return image
     stored: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if stored is None or stored.ndim < 3 or stored.shape[2] < 4:
         return image
