@@ -107,9 +107,13 @@ class OnDemand:
         return torch.from_numpy(found.reshape(*places[0].shape, *found.shape[1:]))
 
 
-def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],
-                                                           list[list[Camera]], tuple[str, ...]]:
-    """Return the objects whose cameras can be read, their cameras, and errors of the others."""
+def read_cameras(folders: Sequence[ObjectFolder], resolution: int) -> tuple[
+        list[ObjectFolder], list[list[Camera]], tuple[str, ...]]:
+    """
+    Return the objects whose cameras can be read, their cameras, and errors of the others.
+
+    Those without voxels of this resolution, as of a run that was interrupted, are of the others.
+    """
     good, shown, errors = [], [], []
     for folder in folders:
         try:
@@ -117,6 +121,7 @@ def read_cameras(folders: Sequence[ObjectFolder]) -> tuple[list[ObjectFolder],
             if not cameras:
                 raise DataError(f'{folder.images_folder}: no views: expected one or more, got '
                                 'none')
+            folder.grid_side(resolution)
             good.append(folder)
             shown.append(cameras)
         except DataError as error:

@@ -173,7 +173,8 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
                  image_size: int, at_once: bool, depth: bool) -> ViewSet:
     """Read views from arbitrary cameras; see `read_views`."""
     without = [folder for folder in folders if depth and not folder.has_depth]
-    folders, shown, lacking = read_cameras([each for each in folders if each not in without])
+    folders, shown, lacking = read_cameras(
+        [each for each in folders if each not in without], resolution)
     lacking += tuple(f'{folder.depth_path(0)}: no depth images: expected those that `render` or '
                      '`dataset build` makes with `--depth`' for folder in without)
     if not folders:
