@@ -1,5 +1,7 @@
 """`active-recon render` and `active-recon dataset build`, as they are typed."""
 
+import errno
+from pathlib import Path
 import subprocess
 import sys
 
@@ -142,6 +144,20 @@ def test_dataset_does_not_go_on_with_objects_of_other_generators(tmp_path):
     (tmp_path / 'generators.sha256').write_text('0123456789abcdef\n')
     with pytest.raises(DataError, match='shapes of other generators: .*choose another folder'):
         run('dataset', 'build', tmp_path, '--train', 1, '--val', 0, '--test', 0)
+
+
+def test_dataset_goes_on_where_the_disk_was_full_at_its_start(tmp_path, monkeypatch):
+    asked = ('dataset', 'build', tmp_path, '--category', 'lamp', '--train', 1, '--val', 0,
+             '--test', 0, *ONE_WORKER)
+
+    def without_room(path, text):
+        path.touch()
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    with monkeypatch.context() as patch, pytest.raises(OSError, match='No space left'):
+        patch.setattr(Path, 'write_text', without_room)
+        run(*asked)
+    assert '1 of 1 objects made' in run(*asked).stdout
 
 
 def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp_path):

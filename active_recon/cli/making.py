@@ -8,6 +8,7 @@ from active_recon.cli.cluster_option import Cluster, reachable, Workers, workers
 from active_recon.cli.progress import progress_bar
 from active_recon.datasets.seeds import FIRST_SEEDS, SEEDS
 from active_recon.errors import ConfigError, DataError
+from active_recon.whole_files import whole_file
 import typer
 
 if TYPE_CHECKING:
@@ -129,11 +130,13 @@ def build(
             for job in shape_jobs(name, range(FIRST_SEEDS[split], FIRST_SEEDS[split] + count),
                                   out / split)]
     made_by, code = out / 'generators.sha256', generators_hash()
-    if made_by.is_file() and made_by.read_text().strip() != code:
+    if not made_by.is_file():
+        out.mkdir(parents=True, exist_ok=True)
+        with whole_file(made_by) as unfinished:
+            unfinished.write_text(code + '\n')
+    elif made_by.read_text().strip() != code:
         raise DataError(f'{out}: shapes of other generators: expected those of the present code '
                         f'({code[:12]}), got another hash in {made_by}; choose another folder')
-    out.mkdir(parents=True, exist_ok=True)
-    made_by.write_text(code + '\n')
     _make('making', jobs, samples, fine, Viewing(cameras, views, turned), depth, workers, cluster)
 
 
