@@ -93,6 +93,24 @@ def test_a_match_that_is_gone_is_refused_by_itself(archive, tmp_path, monkeypatc
     assert 'gone.mcap: no bag there' in gone['refused']
 
 
+def test_a_folder_that_cannot_be_read_is_refused_by_itself(archive, tmp_path, monkeypatch):
+    locked = archive / 'b' / 'lost+found'
+    locked.mkdir()
+
+    def denied(look):
+        def looked(path):
+            if str(path) == str(locked):
+                raise PermissionError(errno.EACCES, 'Permission denied', str(path))
+            return look(path)
+        return looked
+
+    monkeypatch.setattr(os, 'scandir', denied(os.scandir))
+    monkeypatch.setattr(Path, 'iterdir', denied(Path.iterdir))
+    rows = batch(monkeypatch, 'measure', archive / 'b', tmp_path / 'out')
+    assert bags_of(rows) == ['broken.mcap', 'deep', 'lost+found']
+    assert rows[2]['refused_kind'] == 'file' and 'Permission denied' in rows[2]['refused']
+
+
 def test_a_row_of_a_bag_without_shapes_names_the_weights_that_made_them(tmp_path, monkeypatch):
     folder = write_bag(tmp_path / 'run', images() + joints())
     (row,) = batch(monkeypatch, 'measure', folder, tmp_path / 'out')

@@ -86,13 +86,18 @@ def bags_below(root: Place) -> Iterator[Place]:
     Yield the bags in a tree, in the order of their paths; a file that is named is one.
 
     A folder is a bag if it has metadata.yaml, or files that a recorder numbered after the folder;
-    every other MCAP or sqlite3 file is a bag by itself. Links to folders are not followed.
+    every other MCAP or sqlite3 file is a bag by itself. Links to folders are not followed. A
+    folder that cannot be read is taken for a bag, which its worker refuses with the reason.
     """
     yield from _bags_in(root) if root.is_dir() else [root]
 
 
 def _bags_in(folder: Place) -> Iterator[Place]:
-    entries = sorted(_entries(folder))
+    try:
+        entries = sorted(_entries(folder))
+    except OSError:
+        yield folder
+        return
     if is_bag_folder(folder, [name for name, _ in entries]):
         yield folder
         return
