@@ -8,12 +8,17 @@ import shlex
 import shutil
 import subprocess
 
+from active_recon.bags.runs.loop_setup import Overrides
+from active_recon.bags.runs.scene import Scene
+from active_recon.bags.runs.topics import Topics
+from active_recon.batch import task as task_module
 from active_recon.batch import work
 from active_recon.batch.finding import bags_below, find_roots
 from active_recon.batch.results import BagResult
 from active_recon.batch.rows import COLUMNS, refusal_row
 from active_recon.batch.summary import MOST_SHOWN, Summary
 from active_recon.batch.table import read_table, write_table
+from active_recon.batch.task import Task
 from active_recon.errors import ConfigError, DataError
 from active_recon.reconstructor import Reconstructor
 from command_line import command, refusal
@@ -146,6 +151,32 @@ def test_a_second_start_keeps_what_is_finished_and_unchanged(
     assert (tmp_path / 'out' / 'table.parquet').read_bytes() == table
     batch(monkeypatch, 'measure', archive, tmp_path / 'out', '--truth', 'sofa')
     assert len(done) >= 5  # another option: all again
+
+
+def test_what_is_kept_is_of_the_same_weights_and_what_lies_beside_them(tmp_path):
+    weights = tmp_path / 'mine.safetensors'
+    weights.write_bytes(b'weights')
+
+    def identity():
+        return Task('measure', tmp_path, Topics(), Scene(), Overrides(weights)).identity
+
+    known = [identity(), identity()]
+    assert known[0] == known[1]
+    for name in ('mine-quality.json', 'mine-scorer.safetensors', 'mine-depth.safetensors'):
+        for content in (b'first', b'fitted anew'):
+            (tmp_path / name).write_bytes(content)
+            assert identity() not in known
+            known.append(identity())
+
+
+def test_what_is_kept_of_a_policy_of_an_installed_package_is_that_of_its_code(
+        tmp_path, monkeypatch):
+    monkeypatch.setattr(task_module, 'policy_code', lambda name, options: code)
+    task = Task('replay', tmp_path, Topics(), Scene(), Overrides(policy='random'))
+    code = 'one'
+    before = task.identity
+    code = 'another'
+    assert task.identity != before
 
 
 def test_a_fault_of_the_program_refuses_its_bag_alone(archive, tmp_path, monkeypatch):

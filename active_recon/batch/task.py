@@ -15,7 +15,9 @@ from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import Topics
 from active_recon.cluster.stores import Place, Stored
 from active_recon.errors import DataError
-from active_recon.models.weights_files import weights_hash
+from active_recon.models.weights_files import depth_path, scorer_path, weights_hash
+from active_recon.policies import policy_code, PolicyOptions
+from active_recon.quality.tables import tables_path
 from active_recon.report.page import object_name
 from active_recon.report.truth import known_truth, Truth, TruthFile
 
@@ -74,6 +76,7 @@ class Task:
     def identity(self) -> str:
         """A hash of all options that rows depend on."""
         weights, empty = self.overrides.weights, self.scene.empty_scene
+        policy = self.overrides.policy
         text = json.dumps({
             'version': __version__, 'kind': self.kind, 'topics': repr(self.topics),
             'scene': repr([self.scene.parameters, self.scene.elevation,
@@ -82,10 +85,17 @@ class Task:
                            self.scene.background]),
             'empty_scene': None if empty is None else hashlib.sha256(
                 empty.tobytes()).hexdigest(),
-            'weights': None if weights is None else weights_hash(weights),
-            'policy': self.overrides.policy, 'threshold': self.overrides.threshold,
+            'weights': None if weights is None else [weights_hash(weights), *map(
+                _hash_of, (tables_path(weights), scorer_path(weights), depth_path(weights)))],
+            'policy': policy and [policy, policy_code(policy, PolicyOptions(weights=weights))],
+            'threshold': self.overrides.threshold,
             'truth': None if self.truth is None else self.truth.identity}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _hash_of(beside: Path) -> str:
+    """Return the hash of what may lie beside weights; '' where it does not."""
+    return weights_hash(beside) if beside.is_file() else ''
 
 
 def state_of(bag: Place, identity: str) -> str:

@@ -9,8 +9,15 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.evaluation.trial import Contender
 from active_recon.models.weights import state_hash
 from active_recon.models.weights_files import PAPER_MODEL
-from active_recon.plugins import code_hash, file_hash, installed, POLICIES_GROUP
-from active_recon.policies import learned_policy, load_policy, POLICIES, Policy, PolicyOptions
+from active_recon.plugins import installed, POLICIES_GROUP
+from active_recon.policies import (
+    learned_policy,
+    load_policy,
+    POLICIES,
+    Policy,
+    policy_code,
+    PolicyOptions,
+)
 from active_recon.runtimes.torch import TorchPolicyRuntime
 import numpy as np
 from torch import nn
@@ -59,7 +66,7 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
             made += [Contender(name, f'{name}-{_model_hash(each)}', partial(_learned, model, each))
                      for each in attentions]
         elif POLICIES[name].draws:
-            code = _own_code(name, count, weights)
+            code = policy_code(name, PolicyOptions(views=count, weights=weights))
             made += [Contender(name, f'{name}-{each}',
                                partial(_heuristic, name, count, weights), code)
                      for each in range(seed, seed + seeds)]
@@ -70,15 +77,6 @@ def contenders(names: Sequence[str], attentions: Sequence[nn.Module] = (), count
 
 def _heuristic(name: str, count: int, weights: Path | None, rng: np.random.Generator) -> Policy:
     return load_policy(name, PolicyOptions(rng, count, weights))
-
-
-def _own_code(name: str, count: int, weights: Path | None) -> str:
-    """Return the hash of the code of an installed package's policy, '' for one of ours."""
-    if name not in installed(POLICIES_GROUP):
-        return ''
-    made = _heuristic(name, count, weights, np.random.default_rng(0))
-    # Its class may be one of ours, made of the package's functions
-    return code_hash(made) or file_hash(installed(POLICIES_GROUP)[name].module)
 
 
 def _learned(model: str, module: nn.Module, rng: np.random.Generator) -> Policy:

@@ -6,9 +6,11 @@ from active_recon.policies.registry import (
     learned_policy,
     load_policy,
     POLICIES,
+    policy_code,
     PolicyEntry,
     PolicyOptions,
 )
 
 __all__ = ['AUTO_POLICY', 'Choice', 'Observation', 'POLICIES', 'Policy', 'PolicyEntry',
-           'PolicyInUse', 'PolicyOptions', 'learned_policy', 'load_policy', 'policy_in_use']
+           'PolicyInUse', 'PolicyOptions', 'learned_policy', 'load_policy', 'policy_code',
+           'policy_in_use']

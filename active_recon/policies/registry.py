@@ -6,7 +6,13 @@ from pathlib import Path
 
 from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.models.weights_files import read_metadata, SHIPPED
-from active_recon.plugins import installed, load_installed, POLICIES_GROUP
+from active_recon.plugins import (
+    code_hash,
+    file_hash,
+    installed,
+    load_installed,
+    POLICIES_GROUP,
+)
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.automatic import AUTO_POLICY, policy_in_use
 from active_recon.policies.base import Policy
@@ -130,3 +136,12 @@ def load_policy(name: str, options: PolicyOptions | None = None) -> Policy:
         raise ConfigError(f'no policy is called {name!r}: expected one of '
                           f'{", ".join((AUTO_POLICY, *POLICIES))}')
     return POLICIES[policy_in_use(name, options.weights).name].make(options)
+
+
+def policy_code(name: str, options: PolicyOptions | None = None) -> str:
+    """Return the hash of the code of an installed package's policy, '' for one of ours."""
+    if name not in installed(POLICIES_GROUP):
+        return ''
+    made = load_policy(name, options)
+    # Its class may be one of ours, made of the package's functions
+    return code_hash(made) or file_hash(installed(POLICIES_GROUP)[name].module)
