@@ -216,6 +216,22 @@ def test_a_full_disk_stops_with_one_line_and_a_second_start_does_the_rest(
     assert '2 of them finished before' in capsys.readouterr().out
 
 
+def test_a_command_ends_as_it_should_where_another_wrote_to_the_same_folder_meanwhile(
+        archive, tmp_path, monkeypatch):
+    rows_of = work.rows_of
+
+    def meanwhile(task, bag):
+        if bag.name == 'a':
+            batch(monkeypatch, 'measure', archive / 'c', tmp_path / 'out')
+        return rows_of(task, bag)
+
+    monkeypatch.setattr(work, 'rows_of', meanwhile)
+    rows = batch(monkeypatch, 'measure', archive, tmp_path / 'out')
+    assert bags_of(rows) == ['a', 'broken.mcap', 'deep', 'c']
+    assert sorted(path.name for path in (tmp_path / 'out').iterdir()) == [
+        'results', 'summary.html', 'table.parquet']
+
+
 def test_a_report_of_each_bag_is_linked_from_the_page(tmp_path, monkeypatch):
     (row,) = batch(monkeypatch, 'report', PAPER, tmp_path / 'out')
     page = (tmp_path / 'out' / 'summary.html').read_text()

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -63,16 +63,15 @@ def run_batch(task: Task, roots: Sequence[Place], crew: Crew,
 
 @contextmanager
 def _place_of_list(out: Place) -> Iterator[Path]:
-    """Yield the path of the list of bags, which goes again; it may be too large for memory."""
+    """
+    Yield the path of the list of bags, which goes again; it may be too large for memory.
+
+    Of two commands that write to one folder, each has its own.
+    """
     if isinstance(out, Path):
         out.mkdir(parents=True, exist_ok=True)
-        try:
-            yield out / _LIST
-        finally:
-            with suppress(OSError):
-                (out / _LIST).unlink()
-        return
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory(prefix='.', dir=out if isinstance(out, Path) else None,
+                            ignore_cleanup_errors=True) as folder:
         yield Path(folder) / _LIST
 
 
