@@ -48,6 +48,16 @@ def test_a_known_front_is_turned_to_plus_x(tmp_path):
     assert job.make_mesh().center_mass[0] > 0.1
 
 
+def test_a_front_at_the_back_of_an_axis_is_known_too(tmp_path):
+    (tmp_path / 'chair').mkdir()
+    CONE.export(tmp_path / 'chair/one.ply')
+    for axis, direction in (('-Z', [-1, 0]), ('+X', [0, -1]), ('-X (by eye)', [0, 1])):
+        (job,) = manifest_jobs(read_manifest(write(tmp_path, {**ROW, 'front_axis': axis})),
+                               tmp_path)
+        # The thick end is at the file's +z
+        assert job.make_mesh().center_mass[:2] @ direction > 0.1
+
+
 def test_an_unknown_front_stands_at_a_yaw_that_the_file_s_hash_draws(tmp_path):
     (tmp_path / 'chair').mkdir()
     CONE.export(tmp_path / 'chair/one.ply')

@@ -16,6 +16,7 @@ import trimesh
 
 _COLUMNS = {'category', 'file', 'split', 'source', 'licence', 'licence_evidence', 'front_axis',
             'sha256'}
+_FRONTS = {'+Z': 'z', '+X': 'x', '-Z': '-z', '-X': '-x'}
 _HEX = re.compile('[0-9a-f]+')
 EXPLICIT = 'explicit for the models'
 """Licence evidence that allows training on a model: the licence names the models themselves."""
@@ -38,9 +39,8 @@ class ModelRow:
 
     @property
     def front(self) -> str | None:
-        """Front axis of the file, which is y up: 'z' or 'x', None where it is unknown."""
-        sign_and_axis = self.front_axis[:2].upper()
-        return {'+Z': 'z', '+X': 'x'}.get(sign_and_axis)
+        """Front axis of the file, which is y up: such as 'z' or '-x', None where it is unknown."""
+        return _FRONTS.get(self.front_axis[:2].upper())
 
     @property
     def is_open(self) -> bool:
