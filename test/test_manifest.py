@@ -68,6 +68,13 @@ def test_an_unknown_front_stands_at_a_yaw_that_the_file_s_hash_draws(tmp_path):
     assert not np.allclose(one.make_mesh().vertices, other.make_mesh().vertices)
 
 
+def test_a_hash_in_capitals_is_one_and_a_manifest_may_have_no_rows(tmp_path):
+    path = write(tmp_path, {**ROW, 'sha256': '0123ABCD'})
+    assert read_manifest(path)[0].sha256 == '0123ABCD'
+    path.write_text(path.read_text().splitlines()[0] + '\n')
+    assert read_manifest(path) == []
+
+
 def test_a_model_that_is_missing_is_refused_and_told(tmp_path):
     (job,) = manifest_jobs(read_manifest(write(tmp_path, ROW)), tmp_path)
     assert 'no such mesh file' in make_object(job, samples=1).refusal

@@ -17,7 +17,7 @@ import trimesh
 _COLUMNS = {'category', 'file', 'split', 'source', 'licence', 'licence_evidence', 'front_axis',
             'sha256'}
 _FRONTS = {'+Z': 'z', '+X': 'x', '-Z': '-z', '-X': '-x'}
-_HEX = re.compile('[0-9a-f]+')
+_HEX = re.compile('[0-9a-fA-F]+')
 EXPLICIT = 'explicit for the models'
 """Licence evidence that allows training on a model: the licence names the models themselves."""
 _OPEN = re.compile(r'CC0\b|CC-BY(-[0-9]|$)|public[ -]domain', re.IGNORECASE)
@@ -52,11 +52,12 @@ def read_manifest(path: Path) -> list[ModelRow]:
     """Read the rows of a manifest (CSV); raises DataError where it is unreadable or invalid."""
     try:
         with path.open(newline='', encoding='utf-8-sig') as file:  # spreadsheets write the mark
-            rows = list(csv.DictReader(file))
+            reader = csv.DictReader(file)
+            rows, columns = list(reader), set(reader.fieldnames or ())
     except (OSError, ValueError, csv.Error) as error:
         raise DataError(f'{path}: no readable manifest: expected a CSV file, got: '
                         f'{error}') from error
-    missing = _COLUMNS - set(rows[0] if rows else ())
+    missing = _COLUMNS - columns
     if missing:
         raise DataError(f'{path}: missing columns: expected {", ".join(sorted(_COLUMNS))}; '
                         f'missing: {", ".join(sorted(missing))}')
