@@ -50,6 +50,13 @@ def test_a_published_split_names_the_objects_of_each_part(root):
     assert missing == []
 
 
+def test_several_records_of_a_category_all_count_and_each_object_once(root):
+    path = write(root, [record(CHAIR, train=['0a', '3a']), record(CAR, train=['1a', '1a']),
+                        record(CHAIR, train=['2a', '3a'])])
+    assert names(list_split(root, path, 'train')[0]) == [
+        f'{CHAIR}/0a', f'{CHAIR}/3a', f'{CAR}/1a', f'{CHAIR}/2a']
+
+
 def test_a_split_by_synset_is_read_like_a_list_of_records(root):
     records = [record(CHAIR, test=['2a']), record(CAR, test=['4a'])]
     listed = list_split(root, write(root, records), 'test')

@@ -33,8 +33,9 @@ def list_split(root: Path, split: Path | str, part: str) -> Listed:
     `split` is a published split file, or 'sorted' to cut every category's sorted ids by
     `PORTIONS`; `part` is train, val or test. A split file is JSON with a record for each category:
     `taxonomy_id` (the folder's name) and the lists of ids `train`, `val` and `test`. The records
-    are in a list, or in an object with the ids as keys. Raises DataError where the file is invalid
-    or none of its objects exists, ConfigError on any other part.
+    are in a list, or in an object with the ids as keys; several may be of one category, and an
+    object that is named twice is one. Raises DataError where the file is invalid or none of its
+    objects exists, ConfigError on any other part.
     """
     if part not in PORTIONS:
         raise ConfigError(f'part: no such part: expected one of {", ".join(PORTIONS)}, got '
@@ -42,8 +43,7 @@ def list_split(root: Path, split: Path | str, part: str) -> Listed:
     there = list_objects(root)
     if str(split) == SORTED:
         return list(_sorted_part(there, part)), []
-    wanted = [(category, name) for category, names in _read_split(Path(split), part).items()
-              for name in names]
+    wanted = list(dict.fromkeys(_read_split(Path(split), part)))
     by_name = {(folder.category, folder.name): folder for folder in there}
     found = [by_name[key] for key in wanted if key in by_name]
     if not found:
@@ -61,8 +61,8 @@ def _sorted_part(folders: list[ObjectFolder], part: str) -> Iterator[ObjectFolde
         yield from alike[int(len(alike) * first):int(len(alike) * last)]
 
 
-def _read_split(path: Path, part: str) -> dict[str, list[str]]:
-    """Return the ids of a part for each category's folder."""
+def _read_split(path: Path, part: str) -> list[tuple[str, str]]:
+    """Return the objects of a part: the category's folder and the id of each."""
     try:
         content = json.loads(path.read_bytes())
     except (OSError, ValueError) as error:
@@ -73,15 +73,15 @@ def _read_split(path: Path, part: str) -> dict[str, list[str]]:
     if not isinstance(content, list) or not content:
         raise DataError(f'{path}: invalid split: expected a record for each category, got '
                         f'{content!r:.80}')
-    split = {}
+    wanted: list[tuple[str, str]] = []
     for record in content:
         category, names = _fields(record, part)
         if not isinstance(category, str) or not isinstance(names, list) or not all(
                 isinstance(name, str) for name in names):
             raise DataError(f'{path}: invalid record: expected a taxonomy_id and a list of ids '
                             f'{part!r}, got {record!r:.80}')
-        split[category] = names
-    return split
+        wanted += [(category, name) for name in names]
+    return wanted
 
 
 def _fields(record: Any, part: str) -> tuple[Any, Any]:
