@@ -276,6 +276,17 @@ def test_the_page_goes_on_with_a_shape_that_has_no_surface(shape):
         page.close()
 
 
+def test_the_page_stays_in_colours_where_a_photo_is_left_out(shape):
+    page = WatchPage(0, 'http://127.0.0.1:1/word/')
+    try:
+        page._page._in_colors.value = True
+        for lines in (['3 photos.'], ['3 photos.', 'Left out: 9.jpg: no board seen in it']):
+            page.draw(Progress(lines, shape))
+            assert page._state.surface is not None
+    finally:
+        page.close()
+
+
 def test_a_phone_reads_the_address_from_the_page():
     address = 'http://192.168.1.17:43210/abcdefghijklmnopqrstuv/'
     assert cv2.QRCodeDetector().detectAndDecode(qr_code(address))[0] == address

@@ -90,7 +90,8 @@ class WatchPage:
             return
         if before is None or before.size != progress.shape.size:
             self._page.set_object_size(progress.shape.size)
-        self._state = loop_state(progress.shape, progress.advice)
+        surface = self._state.surface if progress.shape is before else None
+        self._state = replace(loop_state(progress.shape, progress.advice), surface=surface)
 
     def close(self) -> None:
         """Stop serving."""
