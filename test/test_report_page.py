@@ -241,6 +241,11 @@ def test_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     assert [each.name for each in path.parent.iterdir()] == ['page.html']
 
 
+def test_a_name_that_is_not_of_utf8_is_on_the_page_as_far_as_it_can_be(tmp_path):
+    write_page('gr\udcfcn', tmp_path / 'page.html')
+    assert (tmp_path / 'page.html').read_text() == 'gr?n'
+
+
 def test_letters_go_on_beyond_the_alphabet():
     every = list(letters())
     assert every[:2] == ['A', 'B']

@@ -301,6 +301,18 @@ def test_an_image_of_the_last_episode_is_not_that_of_the_next():
     assert observer.state.network_image is None
 
 
+def test_names_that_are_not_of_utf8_are_shown_as_far_as_they_can_be():
+    page = Page('gr\udcfcn')
+    try:
+        page.set_text(['Left out: z\udcfc.jpg: no board seen in it'])
+        assert page._text.content == r'**Left out\: z\?\.jpg\: no board seen in it**'
+        with connect(page.url.replace('http', 'ws'),
+                     subprotocols=[f'viser-v{viser.__version__}']) as client:
+            assert client.recv(timeout=10)
+    finally:
+        page.close()
+
+
 @pytest.fixture
 def served():
     shown = Page('a page')

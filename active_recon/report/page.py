@@ -67,7 +67,8 @@ def write_page(page: str, path: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as unfinished:
-            unfinished.write_text(page, encoding='utf-8')
+            # Names of files may have bytes that are not of UTF-8
+            unfinished.write_text(page, encoding='utf-8', errors='replace')
     except OSError as error:
         raise DataError(f'{path}: cannot be written: {error.strerror}') from error
 

@@ -33,9 +33,14 @@ the best one is yellow.
 """
 
 
+def _readable(words: str) -> str:
+    """Return words in UTF-8, the only ones that a browser takes; names of files may be others."""
+    return words.encode(errors='replace').decode()
+
+
 def _literal(line: str) -> str:
     """Return Markdown that shows a line as it is: names of files and topics are in it."""
-    return _PUNCTUATION.sub(r'\\\1', ' '.join(line.split()))
+    return _PUNCTUATION.sub(r'\\\1', ' '.join(_readable(line).split()))
 
 
 def _entropy_scales(count: int) -> dict[str, uplot.Scale]:
@@ -67,7 +72,7 @@ class Page:
         # viser prints its address on rich's global console, which is not used otherwise
         rich.get_console().quiet = True
         with own_origins_only():
-            self._server = ViserServer(HOST, port, label=title, verbose=False)
+            self._server = ViserServer(HOST, port, label=_readable(title), verbose=False)
         self.url = f'http://{HOST}:{self._server.get_port()}'
         self.port_taken = port not in (0, self._server.get_port())
         self._clicked: deque[str] = deque()
