@@ -25,7 +25,7 @@ img { background: #fcfcfc; border-radius: .6rem; display: block; margin: 1rem au
 <script nonce="NONCE">
 const field = (name) => document.getElementById(name);
 const say = (words) => { field('verdict').textContent = words; };
-let busy = false, shown = '';
+let busy = false, away = false, shown = '';
 const show = (state) => {
   const text = JSON.stringify(state);
   if (text === shown) return;
@@ -46,6 +46,7 @@ field('photo').addEventListener('change', async () => {
     return;
   }
   busy = true;
+  away = false; // its words make room for those of the photo
   say('Sending the photo …');
   try {
     const answer = await fetch('photo', {method: 'POST', body: file});
@@ -58,7 +59,6 @@ field('photo').addEventListener('change', async () => {
   field('photo').value = '';
   busy = false;
 });
-let away = false;
 const look = async () => {
   if (busy) return;
   try {

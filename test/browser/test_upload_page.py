@@ -33,3 +33,29 @@ def test_a_phone_sends_a_photo_and_is_told_where_to_stand(chromium, tmp_path):
         assert not chromium.errors()
     finally:
         server.close()
+
+
+def test_what_became_of_a_photo_stays_where_the_computer_was_away_before(chromium, tmp_path):
+    Image.new('RGB', (40, 30), (9, 99, 199)).save(tmp_path / 'mine.jpg')
+    verdicts, now = Verdicts(), [Progress()]
+    verdicts.put('phone-0001.jpg', 'phone-0001.jpg: no board seen in it')
+    server = UploadServer(tmp_path, lambda: now[0], verdicts)
+    try:
+        chromium.open(server.url, PHONE)
+        online(chromium, False)
+        chromium.until(lambda: 'The computer does not answer.' in chromium.text(), 'silence')
+        online(chromium, True)
+        chromium.driver.find_element('id', 'photo').send_keys(str(tmp_path / 'mine.jpg'))
+        chromium.until(lambda: 'no board seen in it' in chromium.text(), 'the verdict')
+        now[0] = Progress(['Next: half a turn.'])
+        chromium.until(lambda: 'Next: half a turn.' in chromium.text(), 'the state')
+        assert 'Left out: phone-0001.jpg: no board seen in it' in chromium.text()
+    finally:
+        online(chromium, True)
+        server.close()
+
+
+def online(chromium, there):
+    chromium.driver.execute_cdp_cmd('Network.enable', {})
+    chromium.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
+        'offline': not there, 'latency': 0, 'downloadThroughput': -1, 'uploadThroughput': -1})
