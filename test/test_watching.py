@@ -276,6 +276,17 @@ def test_the_page_goes_on_with_a_shape_that_has_no_surface(shape):
         page.close()
 
 
+@pytest.mark.parametrize('address', ['http://192.168.1.17:43210/word/', ''])
+def test_a_phone_is_invited_where_it_reaches_this_machine(address):
+    page = WatchPage(0, address)
+    try:
+        page.draw(Progress())
+        assert page._page._picture.visible == bool(address)
+        assert ('phone' in page._page._text.content) == bool(address)
+    finally:
+        page.close()
+
+
 def test_the_page_stays_in_colours_where_a_photo_is_left_out(shape):
     page = WatchPage(0, 'http://127.0.0.1:1/word/')
     try:

@@ -44,7 +44,7 @@ def watch_photos(folder: Path, source: 'Source | None', options: 'Options',
                       Adviser(stopping, options.model, options.threads), typer.echo)
     upload = UploadServer(folder, lambda: watcher.progress, watcher.verdicts, host)
     try:
-        page = WatchPage(pages.port, upload.url)
+        page = WatchPage(pages.port, upload.url if pages.lan else '')
         try:
             typer.echo(f'{folder} is watched until Ctrl-C, which writes the result')
             typer.echo(f'the shape and the next view: {page.url}')

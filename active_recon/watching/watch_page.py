@@ -56,14 +56,14 @@ class WatchPage:
     """
     The page, on this machine only; see `Page` for the port. Call `draw` repeatedly.
 
-    `upload_url` is the address for a phone, shown until there is a sketch.
+    `upload_url` is the address for a phone, '' for none, shown until there is a sketch.
     """
 
     def __init__(self, port: int, upload_url: str) -> None:
         self._page = Page('active_recon, photos', 1.0, port, has_front=False)
         self.url = self._page.url
         self._page.offer_colors()
-        self._invitation = qr_code(upload_url)
+        self._invitation = qr_code(upload_url) if upload_url else None
         self._shown: Progress | None = None
         self._state = LoopState()
         self._colored: Shape | None = None
@@ -81,10 +81,11 @@ class WatchPage:
     def _show(self, progress: Progress) -> None:
         before = None if self._shown is None else self._shown.shape
         self._shown = progress
-        self._page.set_text(progress.lines if progress.sketch is not None else [
-            *progress.lines, 'From this code a phone reads where to send photos.'])
-        self._page.set_picture(
-            self._invitation if progress.sketch is None else progress.sketch)
+        invited = progress.sketch is None and self._invitation is not None
+        self._page.set_text([
+            *progress.lines,
+            *(['From this code a phone reads where to send photos.'] if invited else [])])
+        self._page.set_picture(self._invitation if invited else progress.sketch)
         if progress.shape is None:
             self._state = LoopState()
             return
