@@ -147,6 +147,14 @@ def test_iou_is_one_where_the_estimate_is_the_truth(run):
     assert Subject('A', run, run.episodes[0]).ious == [None] * 3
 
 
+def test_without_probabilities_just_the_occupied_cells_are_shown(run):
+    episode = run.episodes[0]
+    bare = replace(episode, views=[replace(view, reconstruction=None) for view in episode.views])
+    subject = Subject('A', run, bare)
+    for view in subject.views:
+        assert (view.occupied.occupied(subject.threshold) == view.occupied.occupied(0)).all()
+
+
 def test_shapes_made_up_for_are_those_that_the_loop_would_have_found(run):
     bare = changed(run, views=[replace(view, reconstruction=None, occupied=None, entropy=None)
                                for view in run.episodes[0].views])
