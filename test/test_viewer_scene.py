@@ -11,6 +11,7 @@ from active_recon.geometry.cameras import (
 )
 from active_recon.viewer.scene import relative_scores, Scene, score_boxes
 from active_recon.viewer.state import LoopState, Scores
+from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ class Shown:
     def __init__(self):
         self.boxes = {}
         self.cameras = {}
+        self.words = []
 
     def add_batched_meshes_simple(self, name, vertices, faces, wxyzs, positions, **others):
         self.boxes[name] = SimpleNamespace(
@@ -30,11 +32,16 @@ class Shown:
         return self.boxes[name]
 
     def add_camera_frustum(self, name, fov, aspect, **others):
-        self.cameras[name] = SimpleNamespace(fov=fov, aspect=aspect, **others)
+        self.cameras[name] = SimpleNamespace(
+            fov=fov, aspect=aspect, remove=lambda: None, **others)
         return self.cameras[name]
 
+    def add_label(self, name, words, **others):
+        self.words.append(words)
+        return SimpleNamespace()
+
     def __getattr__(self, name):
-        return lambda *args, **kwargs: SimpleNamespace()
+        return lambda *args, **kwargs: SimpleNamespace(remove=lambda: None)
 
 
 @pytest.fixture
@@ -72,6 +79,14 @@ def test_a_camera_has_the_shape_of_its_images_once_its_lens_is_known(shown):
     camera = shown.cameras['/camera']
     assert camera.aspect == pytest.approx(640 / 360)
     assert camera.fov == pytest.approx(2 * math.atan(180 / 600))
+
+
+def test_views_have_their_numbers_in_the_episode_once_these_are_known(shown):
+    scene = Scene(shown, 1.0, has_front=False)
+    views = (ViewResult(110, orbit_camera(0.0)), ViewResult(130, orbit_camera(math.pi / 2)))
+    for missed in (0, 3):
+        scene.draw(LoopState(views=views, missed=missed), 0.5)
+    assert shown.words == ['1 · 0°', '2 · 90°', '4 · 0°', '5 · 90°']
 
 
 def test_scores_at_several_elevations_are_cubes_in_their_directions_the_larger_the_better():

@@ -55,7 +55,7 @@ def links(publishers=1, ago_s=None, **changed):
 
 def summary(state):
     return (state.episode, [taken.stamp for taken in state.views], state.grid, state.threshold,
-            state.goal, state.scores, state.done)
+            state.goal, state.scores, state.done, state.missed)
 
 
 REASON = GoalReason('shows the top', 0.0421)
@@ -68,6 +68,7 @@ MESSAGES = (
     lambda observer: observer.set_goal(120, GOAL),
     lambda observer: observer.set_scores(120, SCORES),
     lambda observer: observer.add_view(SECOND, LATER_GRID, OCCUPIED),
+    lambda observer: observer.set_count(130, 3),
     lambda observer: observer.set_done(130, 'max_views'))
 
 
@@ -83,7 +84,7 @@ def test_the_order_in_which_latched_messages_come_makes_no_difference():
     expected = state_after(MESSAGES)
     assert all(state_after(order) == expected for order in permutations(MESSAGES))
     assert expected == (
-        'b', [110, 130], LATER_GRID, 0.4, None, SCORES, 'max_views')
+        'b', [110, 130], LATER_GRID, 0.4, None, SCORES, 'max_views', 1)
 
 
 def test_a_reason_belongs_to_the_goal_of_its_stamp_whichever_comes_first():
@@ -124,7 +125,7 @@ def test_what_is_stamped_before_the_episode_is_left_out():
     observer.set_goal(98, GOAL)
     observer.set_scores(98, SCORES)
     observer.set_done(99, 'max_views')
-    assert summary(observer.state) == ('b', [], None, None, None, None, '')
+    assert summary(observer.state) == ('b', [], None, None, None, None, '', 0)
 
 
 def test_a_new_episode_forgets_the_last_but_not_where_the_camera_is():
@@ -136,7 +137,7 @@ def test_a_new_episode_forgets_the_last_but_not_where_the_camera_is():
     observer.set_goal(2, GOAL)
     observer.set_scores(2, SCORES)
     observer.begin_episode('b', 100)
-    assert summary(observer.state) == ('b', [], None, None, None, None, '')
+    assert summary(observer.state) == ('b', [], None, None, None, None, '', 0)
     assert observer.state.camera is camera
     assert observer.state.picture is picture
 
@@ -148,7 +149,7 @@ def test_an_episode_of_a_time_before_the_last_begins_with_nothing():
     observer.set_goal(120, GOAL)
     observer.set_done(130, 'max_views')
     observer.begin_episode('b', 10)
-    assert summary(observer.state) == ('b', [], None, None, None, None, '')
+    assert summary(observer.state) == ('b', [], None, None, None, None, '', 0)
     observer.set_goal(20, GOAL)
     assert observer.state.goal is GOAL
 
@@ -247,6 +248,12 @@ def test_the_last_view_the_end_and_a_silent_camera_are_told():
     assert status_lines(links(ago_s=130), done) == [
         'Done (entropy settled): 2 views, the last 2 min ago.',
         'No image for 2 min.', 'Episode 1f.']
+
+
+def test_views_from_before_the_page_are_counted():
+    state = LoopState(views=(view(1), view(2)), missed=3)
+    assert status_lines(links(ago_s=1.2), state)[0] == '5 views, the last 1 s ago.'
+    assert entropy_lines(state.views, state.missed)[0].tolist() == [4, 5]
 
 
 @pytest.mark.parametrize(('seconds', 'words'), [

@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 BUTTONS = {'next_object': ('Next object', 'Show the camera the next object, in a new episode.'),
            'start_episode': ('New episode', 'Discard the reconstruction and begin an episode.'),
            'save_mesh': ('Save mesh', 'Save the object as a mesh, where the reconstructor runs.')}
-TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'view', 'occupancy',
+TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'view', 'views', 'occupancy',
           'probabilities', 'quality', 'mesh', 'network_image', 'next_view', 'azimuth_scores',
           'goal_reason', 'done', 'episode')
 _DRAW_EVERY_S = 1 / 36

@@ -70,6 +70,6 @@ def ago(seconds: float) -> str:
 def _progress(link: TopicLink, state: LoopState) -> str:
     if not state.views or link.age_s is None:
         return 'No view in this episode yet.'
-    count = len(state.views)
+    count = state.missed + len(state.views)
     last = f'{count} view{"s" if count > 1 else ""}, the last {ago(link.age_s)} ago.'
     return f'Done ({state.done.replace("_", " ")}): {last}' if state.done else last

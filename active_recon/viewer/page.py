@@ -43,9 +43,9 @@ def _literal(line: str) -> str:
     return _PUNCTUATION.sub(r'\\\1', ' '.join(_readable(line).split()))
 
 
-def _entropy_scales(count: int) -> dict[str, uplot.Scale]:
-    """Return the axes' scales for `count` views, with a margin on either side."""
-    return {'x': uplot.Scale(time=False, range=(0.0, count + 1.0))}
+def _entropy_scales(count: int, missed: int = 0) -> dict[str, uplot.Scale]:
+    """Return the axes' scales for `count` views after some, with a margin on either side."""
+    return {'x': uplot.Scale(time=False, range=(missed + 0.0, missed + count + 1.0))}
 
 
 def _zoom_out_in_narrow_window(client: ClientHandle) -> None:
@@ -92,6 +92,7 @@ class Page:
         self._shown_text: Sequence[str] = ()
         self._own_threshold = _FALLBACK_THRESHOLD
         self._shown_views: object = None
+        self._shown_missed = 0
         self._shown_image: object = None
 
     def _build_figures(self) -> None:
@@ -181,14 +182,14 @@ class Page:
             self._threshold.value = self._own_threshold
         with self._server.atomic():
             self._scene.draw(state, self._threshold.value, self._in_colors.value)
-        if state.views is not self._shown_views:
-            self._shown_views = state.views
-            numbers, entropies = entropy_lines(state.views)
+        if state.views is not self._shown_views or state.missed != self._shown_missed:
+            self._shown_views, self._shown_missed = state.views, state.missed
+            numbers, entropies = entropy_lines(state.views, state.missed)
             known = any(not math.isnan(value) for value in entropies)
             self._no_entropy.visible, self._entropy.visible = not known, known
             if known:
                 self._entropy.data = (numbers, entropies)
-                self._entropy.scales = _entropy_scales(len(numbers))
+                self._entropy.scales = _entropy_scales(len(numbers), state.missed)
 
         self._draw_image(state)
 

@@ -75,8 +75,9 @@ class Scene:
         if state.grid is not before.grid or threshold != self._threshold:
             self._threshold = threshold
             self._draw_grid(None if surface is not None else state.grid, threshold)
-        if state.views is not before.views:
-            self._draw_views(before.views, state.views)
+        if state.views is not before.views or state.missed != before.missed:
+            known = before.views if state.missed == before.missed else ()
+            self._draw_views(known, state.views, state.missed)
         if state.goal is not before.goal or state.goal_reason is not before.goal_reason:
             self._draw_goal(state.goal, state.goal_reason)
         if state.scores is not before.scores:
@@ -113,16 +114,18 @@ class Scene:
         colors[np.argmax(scores.scores)] = _NEXT_COLOR
         self._boxes('/scores', _BAR_WIDTH, centers, colors, sides / _BAR_WIDTH)
 
-    def _draw_views(self, before: tuple[ViewResult, ...], views: tuple[ViewResult, ...]) -> None:
-        kept = before == views[:len(before)]
+    def _draw_views(self, before: tuple[ViewResult, ...], views: tuple[ViewResult, ...],
+                    missed: int) -> None:
+        kept = bool(before) and before == views[:len(before)]
         if not kept:
             for handle in self._views:
                 handle.remove()  # with its label
             self._views.clear()
         first = len(before) if kept else 0
-        for number, view in enumerate(views[first:], first + 1):
+        for index, view in enumerate(views[first:], first):
+            number = missed + index + 1
             name, color = f'/views/{number}', view_color(number)
-            again = _at_same_place(view, views[:number - 1])
+            again = _at_same_place(view, views[:index])
             self._views.append(self._frustum(name, view.camera, color, view.image))
             self._label(f'{name}/label', f'{number} · {whole_degrees(view.camera.azimuth)}°',
                         again)

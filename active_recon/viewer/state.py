@@ -36,6 +36,7 @@ class LoopState:
     - goal: the camera of the next view; goal_reason: why it is worth taking
     - done: the reason why the episode ended, '' before
     - surface: the last one in colours
+    - missed: how many views of the episode there were before the first of `views`
     """
 
     episode: str = ''
@@ -50,6 +51,7 @@ class LoopState:
     done: str = ''
     goal_reason: GoalReason | None = None
     surface: Surface | None = None
+    missed: int = 0
 
 
 class Observer:
@@ -57,7 +59,8 @@ class Observer:
     Keeps `state` up to date with the messages of a loop, in whatever order they arrive.
 
     Messages stamped before the episode began belong to the previous one and are dropped; stamps
-    are nanoseconds. An observer that starts late misses the episode's earlier views.
+    are nanoseconds. An observer that starts late misses the episode's earlier views, and knows
+    how many they were.
     """
 
     def __init__(self) -> None:
@@ -65,6 +68,7 @@ class Observer:
         self._begin = 0
         self._goal_stamp = self._scores_stamp = self._done_stamp = self._image_stamp = -1
         self._surface_stamp = -1
+        self._count = -1, 0
         self._quality: tuple[int, Quality | None] = -1, None
         self._reason: tuple[int, GoalReason | None] = -1, None
 
@@ -86,7 +90,7 @@ class Observer:
             known.scores if self._scores_stamp >= begin else None,
             known.done if self._done_stamp >= begin else '',
             known.goal_reason if self._goal_stamp >= begin else None,
-            known.surface if self._surface_stamp >= begin else None)
+            known.surface if self._surface_stamp >= begin else None, self._missed(views))
 
     def set_camera(self, camera: Camera | None = None,
                    picture: NDArray[np.uint8] | None = None) -> None:
@@ -110,10 +114,23 @@ class Observer:
         if view.stamp == self._quality[0]:
             view = replace(view, quality=self._quality[1])
         views = tuple(sorted((*known, view), key=lambda each: each.stamp))
-        self.state = replace(self.state, views=views)
+        self.state = replace(
+            self.state, views=views, missed=self._missed(views, self.state.missed))
         if views[-1] is view:
             threshold = None if occupied is None else own_threshold(occupied)
             self.state = replace(self.state, grid=grid, threshold=threshold)
+
+    def set_count(self, stamp: int, count: int) -> None:
+        """Set how many views there are with that of a stamp, which may not be known yet."""
+        self._count = stamp, count
+        self.state = replace(
+            self.state, missed=self._missed(self.state.views, self.state.missed))
+
+    def _missed(self, views: tuple[ViewResult, ...], before: int = 0) -> int:
+        """Return how many came before the first of some views; `before`: as was known so far."""
+        stamp, count = self._count
+        return next((max(count - number, 0) for number, view in enumerate(views, 1)
+                     if view.stamp == stamp), before)
 
     def set_quality(self, stamp: int, quality: Quality) -> None:
         """Set the quality after the view of a stamp, which may not be known yet."""
@@ -167,10 +184,15 @@ def own_threshold(occupied: VoxelGrid) -> float | None:
     return math.floor(100 * float(cells.min())) / 100 if cells.size else None
 
 
-def entropy_lines(views: Sequence[ViewResult]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the views' numbers, from 1, and entropies in nats (NaN where unknown), (N,) each."""
+def entropy_lines(views: Sequence[ViewResult], missed: int = 0
+                  ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """
+    Return the views' numbers and entropies in nats (NaN where unknown), (N,) each.
+
+    The numbers are from 1, after those `missed`.
+    """
     entropies = [math.nan if view.entropy is None else view.entropy for view in views]
-    return np.arange(1.0, len(views) + 1), np.array(entropies)
+    return np.arange(1.0, len(views) + 1) + missed, np.array(entropies)
 
 
 def thumbnail(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -106,7 +106,7 @@ def test_who_comes_late_is_shown_what_is_latched_at_another_port(demo, late_view
     url = late_view.said(r'the page is at (http://127\.0\.0\.1:\d+)')
     assert url != first
     chromium.open(url, _SMALL)
-    chromium.until(lambda: 'Done (max views): 1 view, the last' in chromium.text(),
+    chromium.until(lambda: 'Done (max views): 2 views, the last' in chromium.text(),
                    'the latched view', BUDGET_S)
     code, said = late_view.interrupt()
     assert code == 0

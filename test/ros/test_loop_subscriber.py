@@ -7,8 +7,8 @@ from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.viewer import TOPICS
 from active_recon.volumes.voxels import VoxelGrid
 import cv2
-from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import pose_to_msg
+from geometry_msgs.msg import PoseArray, PoseStamped
+from msg_tools.cameras import pose_to_msg, poses_to_msg
 from msg_tools.images import image_to_msg
 from msg_tools.stamps import stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_to_msg
@@ -142,16 +142,20 @@ def test_the_grid_has_the_size_that_the_loop_says_and_the_network_image_is_shown
             (PointCloud2, 'occupancy', voxel_grid_to_msg(grid, 0.5, header)),
             (PointCloud2, 'probabilities', voxel_grid_to_msg(grid, 0.02, header)),
             (Image, 'network_image', image_to_msg(image, header)),
+            (PoseArray, 'views', poses_to_msg([orbit_camera(0.1 * n).pose for n in range(6)],
+                                              header)),
             (PoseStamped, 'view', pose_to_msg(orbit_camera(0.5).pose, header))):
         bench.node.create_publisher(kind, topic, LATCHED_QOS).publish(msg)
 
     def taken():
         heard.update()
-        return heard.observer.state.views and heard.observer.state.network_image is not None
+        state = heard.observer.state
+        return state.views and state.network_image is not None and state.missed
 
     bench.until(taken, 'the view')
     assert heard.observer.state.grid.size == 0.16
     assert heard.observer.state.views[0].entropy == pytest.approx(grid.entropy(), rel=0.05)
+    assert heard.observer.state.missed == 5
     assert np.array_equal(heard.observer.state.network_image, image)
 
 

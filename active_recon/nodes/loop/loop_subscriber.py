@@ -9,6 +9,7 @@ from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS
 from active_recon.nodes.camera.images import IMAGE_SUFFIXES, IMAGE_TOPIC
 from active_recon.nodes.loop.followed_loop import Loop
 from active_recon.nodes.loop.problem_monitor import ProblemMonitor
+from active_recon.nodes.loop.reconstruction_publisher import MOST_VIEWS
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.polled import PolledCallbackGroup, take_messages
 from active_recon.nodes.runtime.qos import LATCHED_POLLED_QOS, SENSOR_QOS
@@ -17,7 +18,7 @@ from active_recon.viewer.link import TopicLink
 from active_recon.viewer.state import Observer, Scores, thumbnail
 from active_recon.viewer.view_result import Surface, ViewResult
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseArray, PoseStamped
 from msg_tools.camera_images import pixels_from_msg
 from msg_tools.cameras import intrinsics_from_msg, pose_from_msg
 from msg_tools.episodes import done_from_msg, episode_from_msg
@@ -71,6 +72,7 @@ class LoopSubscriber:
         self._subscribe(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         for kind, name, callback in (
                 (PoseStamped, 'view', self._on_view),
+                (PoseArray, 'views', self._on_views),
                 (PointCloud2, 'occupancy', self._on_occupancy),
                 (PointCloud2, 'probabilities', self._on_probabilities),
                 (DiagnosticArray, 'quality', self._on_quality),
@@ -147,6 +149,10 @@ class LoopSubscriber:
 
     def _on_view(self, msg: PoseStamped) -> None:
         self._join('view', msg.header, self._camera(msg))
+
+    def _on_views(self, msg: PoseArray) -> None:
+        if len(msg.poses) < MOST_VIEWS:  # there may be more
+            self.observer.set_count(nanoseconds_from_stamp(msg.header.stamp), len(msg.poses))
 
     def _on_occupancy(self, msg: PointCloud2) -> None:
         if not self._loop.has_size:  # it is latched: the next subscriber receives it again
