@@ -72,6 +72,17 @@ def test_bars_are_as_high_as_the_scores_say_at_first_and_when_they_change(shown)
         np.testing.assert_allclose(bars.batched_positions[:, 2] - found / 2, -0.5, atol=1e-6)
 
 
+def test_candidates_without_a_finite_score_have_no_bar(shown):
+    scene = Scene(shown, 1.0)
+    for without in (-math.inf, math.nan):
+        scores = Scores(standing(AZIMUTHS), np.array([without, *range(23)]))
+        scene.draw(LoopState(scores=scores), 0.5)
+        np.testing.assert_allclose(
+            heights(shown.boxes['/scores']), 0.3 * relative_scores(np.arange(23.0)), rtol=1e-5)
+    scene.draw(LoopState(scores=Scores(np.zeros((0, 3)), np.zeros(0))), 0.5)
+    assert '/scores' not in scene._objects
+
+
 def test_a_camera_has_the_shape_of_its_images_once_its_lens_is_known(shown):
     scene = Scene(shown, 1.0)
     for lens in (CANONICAL_INTRINSICS, Intrinsics(600, 600, 320, 180, 640, 360)):

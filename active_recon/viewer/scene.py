@@ -106,7 +106,8 @@ class Scene:
                 vertex_colors=surface.colors.reshape(-1, 3))))
 
     def _draw_scores(self, scores: Scores | None) -> None:
-        if scores is None:
+        scores = None if scores is None else scores.finite()
+        if scores is None or not len(scores.scores):
             self._remove('/scores')
             return
         centers, sides = score_boxes(scores)

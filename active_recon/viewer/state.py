@@ -23,6 +23,11 @@ class Scores:
     positions: NDArray[np.floating]
     scores: NDArray[np.floating]
 
+    def finite(self) -> 'Scores':
+        """Return those of candidates whose score and position are finite."""
+        known = np.isfinite(self.scores) & np.isfinite(self.positions).all(axis=1)
+        return Scores(self.positions[known], self.scores[known])
+
 
 @dataclass(frozen=True, eq=False)
 class LoopState:
