@@ -246,6 +246,12 @@ def test_a_name_that_is_not_of_utf8_is_on_the_page_as_far_as_it_can_be(tmp_path)
     assert (tmp_path / 'page.html').read_text() == 'gr?n'
 
 
+def test_an_object_keeps_the_capitals_of_its_file(run):
+    named = replace(run, provenance={**run.provenance, 'object': 'lampA2.ply'})
+    for count in (1, 2):
+        assert '>LampA2' in page_of(*[named] * count)
+
+
 def test_letters_go_on_beyond_the_alphabet():
     every = list(letters())
     assert every[:2] == ['A', 'B']
