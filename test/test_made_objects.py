@@ -95,15 +95,6 @@ def test_sources_and_cameras_are_drawn_by_their_shares():
     assert (of_meshes, of_dome) == (pytest.approx(0.75, abs=0.04), pytest.approx(0.8, abs=0.04))
 
 
-def test_shares_draw_the_same_in_any_order():
-    sources, cameras = {'thing': 1, 'parametric': 3}, {'dome': 1, 'any': 2, 'turntable': 1}
-    one, other = (Maker(Recipe(dict(order(sources.items())), dict(order(cameras.items()))), (),
-                        SPEC) for order in (list, reversed))
-    for index in range(20):
-        drawn, again = one.drawn(index, 0), other.drawn(index, 0)
-        assert (drawn[0].folder, drawn[1]) == (again[0].folder, again[1])
-
-
 def test_of_a_turntable_an_object_has_a_part_of_the_cameras_once_each():
     made = Maker(replace(SHAPES, cameras={'turntable': 1}, views=12), (), SPEC)(0)
     steps = pose_azimuths(made.poses) / (AZIMUTHS[1] - AZIMUTHS[0])

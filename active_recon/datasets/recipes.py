@@ -22,7 +22,6 @@ import trimesh
 PARAMETRIC, THING, MESH = SOURCES = ('parametric', 'thing', 'mesh')
 ROOT = Path('made')
 """The folder of objects that lie in none."""
-_ORDER = (*SOURCES, 'any', 'turntable', 'dome')
 _ATTEMPTS = 10
 _STRETCHED, _MOST_STRETCH = 0.5, 4 / 3  # share of the mesh files, and factor along an axis
 
@@ -157,10 +156,8 @@ class Maker:
 
 
 def _one_of(shares: Mapping[str, float], rng: np.random.Generator) -> str:
-    """Draw a name by its share; in which order they are given makes no difference."""
-    names = sorted(shares, key=_ORDER.index)
-    weights = np.array([shares[name] for name in names])
-    return str(rng.choice(names, p=weights / weights.sum()))
+    weights = np.array(list(shares.values()))
+    return str(rng.choice(list(shares), p=weights / weights.sum()))
 
 
 def _stretched(make_mesh: Callable[[], trimesh.Trimesh],
