@@ -192,6 +192,11 @@ def test_a_policy_s_views_are_where_it_goes(watched):
     assert sorted(chosen_by(FarthestPolicy(), watched, 3, 30)) == list(range(24))
 
 
+def test_a_sweep_of_more_views_than_there_are_takes_each_once():
+    ring = Planted((1,), AZIMUTHS[::6])
+    assert sorted(chosen_by(UniformPolicy(5), ring, 0, 5)) == [0, 1, 2, 3]
+
+
 class Planted:
     """A ring of cameras of which the same places around the first are always best."""
 

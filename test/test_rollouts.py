@@ -5,6 +5,7 @@ from active_recon.evaluation.rollouts import Observer, roll_out
 from active_recon.policies import Choice
 import numpy as np
 import pytest
+from shown_views import part_of
 import torch
 from torch.testing import assert_close
 
@@ -44,6 +45,23 @@ class Undecided:
 def test_a_policy_without_finite_scores_is_refused_where_it_is_measured(network, views):
     with pytest.raises(ViewError, match='no usable scores: expected .* with 72 NaN'):
         list(roll_out(network, Undecided(), views, torch.arange(3), torch.zeros(3).long(), 2))
+
+
+class Fond(Undecided):
+    """A policy that likes the first views best, whatever was taken."""
+
+    def choose(self, seen, state):
+        scores = -np.arange(seen.candidates.shape[1], dtype=np.float32)
+        return Choice(np.tile(scores, (len(seen.latent), 1))), state
+
+
+def test_no_view_is_taken_twice_while_there_are_others(network, views):
+    few = part_of(views, chosen=slice(None, None, 8))
+    objects, starts = torch.tensor([0, 4]), torch.tensor([0, 1])
+    *_, whole, again = roll_out(network, Fond(), few, objects, starts, 4)
+    azimuths = few.azimuths[0].double().numpy()
+    np.testing.assert_array_equal(whole.taken, azimuths[[[0, 1, 2], [1, 0, 2]]])
+    np.testing.assert_array_equal(again.taken[:, -1], azimuths[[0, 0]])
 
 
 @torch.inference_mode()

@@ -95,8 +95,15 @@ class RenderedObjects:
         return np.where(np.isnan(choice.azimuth), best, choice.azimuth)
 
     def view_of(self, choice: Choice) -> Tensor:
-        """Return the views (B,) of a policy's choice: nearest to its azimuth, else best score."""
-        best = torch.from_numpy(choice.scores.argmax(axis=1))
+        """
+        Return the views (B,) of a policy's choice: nearest to its azimuth, else best score.
+
+        As on a robot, the best is one that was not taken yet, as long as there are such.
+        """
+        taken = np.zeros(choice.scores.shape, np.bool_)
+        np.put_along_axis(taken, self.seen.chosen.numpy(), True, axis=1)
+        scores = np.where(taken & ~taken.all(axis=1, keepdims=True), -np.inf, choice.scores)
+        best = torch.from_numpy(scores.argmax(axis=1))
         if choice.azimuth is None:
             return best
         own = self._shows.views.azimuths[self.objects].numpy()

@@ -19,11 +19,10 @@ Order = tuple[int, ...]
 def chosen_by(policy: Policy, watched: WatchedObject, start: int, count: int,
               motion_cost: float = 0.0) -> Order:
     """
-    Return the views that a policy takes: the best of its scores, each time.
+    Return the views that a policy takes: the best of its scores, each time; none is taken twice.
 
-    `motion_cost` of a second, at 1 rad/s around either axis, is taken off, see `TimedMotion`; no
-    view is taken twice then. What a policy proposes between the candidates is left out, since
-    nothing was rendered there.
+    `motion_cost` of a second, at 1 rad/s around either axis, is taken off, see `TimedMotion`. What
+    a policy proposes between the candidates is left out, since nothing was rendered there.
     """
     walk, memory = watched.begin(start), policy.initial_state(1)
     cost = MotionCost(timed=TimedMotion(motion_cost=motion_cost))
@@ -31,11 +30,9 @@ def chosen_by(policy: Policy, watched: WatchedObject, start: int, count: int,
     while len(walk.taken) < min(count, watched.count):
         choice, memory = checked_choice(policy.choose(
             watched.observation(walk, policy.wants_volume), memory), watched.count)
-        scores = choice.scores[0]
-        if motion_cost:
-            scores = cost.utility(scores, choice.is_gain, cameras[walk.taken[-1]], cameras,
-                                  MotionLimits())
-            scores[list(walk.taken)] = -np.inf
+        scores = cost.utility(choice.scores[0], choice.is_gain, cameras[walk.taken[-1]], cameras,
+                              MotionLimits()).copy()
+        scores[list(walk.taken)] = -np.inf
         walk = watched.step(walk, int(scores.argmax()))
     return walk.taken
 
