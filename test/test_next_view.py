@@ -231,6 +231,15 @@ def test_a_sequence_that_is_best_for_all_is_found_and_followed_from_any_start():
     assert len(set(chosen_by(FixedSequence(np.zeros((3, 2))), objects[0], 4, 4))) == 4
 
 
+def test_a_sequence_is_as_long_as_objects_have_views():
+    ring = Planted((2, 1, 3, 1), AZIMUTHS[::6])
+    offsets = find_sequence([ring, ring], [0, 3], 6)
+    np.testing.assert_allclose(np.degrees(offsets), [[180, 30], [90, 30], [270, 30]], atol=0.1)
+    assert chosen_by(FixedSequence(offsets), ring, 1, 6) == (1, 3, 2, 0)
+    with pytest.raises(DataError, match='nothing to choose: expected .* two views or more'):
+        find_sequence([Planted((0,), AZIMUTHS[:1])], [0], 5)
+
+
 def test_places_that_only_an_easy_object_has_are_not_therefore_better():
     whole = [Planted((4,)) for _ in range(3)]
     easy = [Planted((1,), AZIMUTHS[::2], easy=0.8) for _ in range(4)]  # 30 degrees on

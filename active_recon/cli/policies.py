@@ -115,7 +115,8 @@ def _sequence(folder: Path, entrant: 'Entrant', episodes: 'Episodes',
     import numpy as np
 
     scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
-    with progress_bar('finding a sequence', len(scene) * (episodes.count - 1)) as advance:
+    steps = min(episodes.count, scene.view_count) - 1
+    with progress_bar('finding a sequence', len(scene) * steps) as advance:
         offsets = find_offsets(scene, entrant, episodes, lambda done: advance(done, ''))
     return {'data': str(folder), 'objects': len(scene),
             'offsets_deg': np.degrees(offsets).round(1).tolist()}

@@ -44,10 +44,14 @@ def find_sequence(objects: Sequence[WatchedObject], starts: Sequence[int], count
     Return the offsets that bring most IoU one after the other, over objects and their starts.
 
     Each next one is that which brings most above the mean of all views, on average over the
-    objects, given those before: what one-shot set cover comes to where IoU is what is covered.
-    Raises DataError where the cameras do not stand alike around the objects' first views, as they
-    do on a turntable.
+    objects, given those before: what one-shot set cover comes to where IoU is what is covered. It
+    ends after all views of an object. Raises DataError where there is one alone, and where the
+    cameras do not stand alike around the objects' first views, as they do on a turntable.
     """
+    count = min(count, *(watched.count for watched in objects))
+    if count < 2:
+        raise DataError('nothing to choose: expected training objects of two views or more, got '
+                        'one')
     walks = [watched.begin(start) for watched, start in zip(objects, starts, strict=True)]
     places = [_places(watched, start) for watched, start in zip(objects, starts, strict=True)]
     found: list[tuple[float, float]] = []
