@@ -115,6 +115,19 @@ def test_several_episodes_of_an_object_make_no_interval_narrower(tables):
         assert other['promises']['random'][target]['change'] == pytest.approx(found['change'])
 
 
+def test_objects_of_fewer_views_than_others_count_with_all_of_theirs(tables):
+    whole, short = made_up(60, 3), made_up(60, 4)
+    short = short.rows(short.count < COUNTS)
+    one, other, both = (study(each, tables)['promises']['random'] for each in (
+        whole, short, Measured.joined([whole, short])))
+    assert any(found['change'][0] for found in both.values())
+    for target, found in both.items():
+        for name in ('views', 'given_up'):
+            assert found[name] == pytest.approx((one[target][name] + other[target][name]) / 2)
+        assert found['change'][0] == pytest.approx(
+            (one[target]['change'][0] + other[target]['change'][0]) / 2)
+
+
 def test_views_of_the_learned_policy_have_promises_of_their_own():
     faults = [made_up(60, 2, fault) for fault in FAULTS]
     usual = made_up(400, 1)

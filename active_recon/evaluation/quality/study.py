@@ -91,23 +91,24 @@ def _promise(measured: Measured, expected: NDArray[np.float64], target: float, n
 
     - stopped: episodes that did, out of `episodes`; kept: the share of them at or above the
       target, and its exact 95 % bound `kept_at_least`
-    - views and change: of all episodes, with five views where they do not stop, the mean number
-      of views, and the difference of IoU from always five, with its interval over objects
-    - given_up: share of all told after two to four views that the target is out of reach;
+    - views and change: of all episodes, with five views (or all, where an object has fewer) where
+      they do not stop, the mean number of views, and the difference of IoU from always so many,
+      with its interval over objects
+    - given_up: share of all told after one to four views that the target is out of reach;
       wrongly: share of those that reach it by the last view
     """
     episodes = Episodes.of(measured, expected)
     objects = measured.object[np.unique(measured.episode, return_index=True)[1]]
     at, ious = episodes.stops(needed), episodes.stopped(needed)
     kept = int((ious >= target).sum())
-    full = min(FULL, episodes.iou.shape[1]) - 1
+    full = np.minimum(FULL, np.isfinite(episodes.iou).sum(axis=1)) - 1
     ends = np.where((at >= 0) & (at < full), at, full)
     rows = np.arange(len(at))
     change = difference(_by_object(episodes.iou[rows, ends], objects),
-                        _by_object(episodes.iou[:, full], objects))
-    columns = min(len(tables.growth), full)
+                        _by_object(episodes.iou[rows, full], objects))
+    columns = min(len(tables.growth), int(full.max()))
     short = episodes.expected[:, :columns] + np.array(tables.growth)[:columns] < target
-    lost = short.any(axis=1)
+    lost = (short & (np.arange(columns) < full[:, None])).any(axis=1)
     reached = np.nanmax(episodes.iou, axis=1) >= target
     return {'episodes': len(at), 'stopped': len(ious),
             'kept': kept / len(ious) if len(ious) else None,
