@@ -199,6 +199,13 @@ def test_a_promise_that_is_broken_too_often_is_never_made():
     assert needed_for(0.6, Episodes(expected, np.full_like(expected, 0.65))) < 0.6
 
 
+def test_the_same_objects_from_other_cameras_of_a_kind_do_not_replace_those_of_before(tables):
+    low, high = made_up(60, 1), replace(made_up(60, 1), iou=np.full(60 * COUNTS, 0.5))
+    for use in (lambda both: calibrated(tables, both), lambda both: study(both, tables)):
+        with pytest.raises(DataError, match="measured twice: .* got two of '1/0 '; .* --seed"):
+            use(Measured.joined([low, high]))
+
+
 def test_an_episode_stops_at_the_first_view_that_is_enough():
     expected = np.array([[0.2, 0.7, 0.6], [0.1, 0.2, 0.3], [0.9, 0.1, np.nan]])
     episodes = Episodes(expected, np.array([[0.0, 1, 2], [3, 4, 5], [6, 7, 8]]))

@@ -9,6 +9,7 @@ down, each with an exact binomial test, until one is not proven to keep the prom
 
 from dataclasses import dataclass
 
+from active_recon.errors import DataError
 from active_recon.evaluation.quality.measuring import Measured
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +34,19 @@ class Episodes:
 
     @classmethod
     def of(cls, measured: Measured, expected: NDArray[np.float64]) -> 'Episodes':
-        """Return the episodes that were measured, with expected IoU (N,)."""
+        """
+        Return the episodes that were measured, with expected IoU (N,).
+
+        Raises DataError where one is there twice: of the two, the rule would know one alone.
+        """
         names, rows = np.unique(measured.episode, return_inverse=True)
         found = np.full((2, len(names), int(measured.count.max())), np.nan)
+        again = np.bincount(rows * found.shape[2] + measured.count - 1) > 1
+        if again.any():
+            name = str(names[again.argmax() // found.shape[2]])
+            raise DataError('quality: an episode measured twice: expected an object once for a '
+                            f'kind of views and a seed, got two of {name!r}; leave a file out, or '
+                            'measure one with another --seed')
         found[:, rows, measured.count - 1] = expected, measured.iou
         return cls(*found)
 
