@@ -270,14 +270,16 @@ def test_objects_that_cannot_be_read_are_listed(made, tmp_path):
         read_views(list_objects(tmp_path), framed=True)
 
 
-@pytest.mark.parametrize('at_once', [True, False])
-def test_an_object_that_an_interrupted_run_left_without_voxels_is_listed(made, tmp_path, at_once):
+def test_an_object_without_voxels_is_left_out_and_no_other(made, tmp_path):
     folders = list_objects(shutil.copytree(made, tmp_path / 'copy'))
-    folders[1].voxels_path(64).unlink()
-    views = read_views(folders, resolution=64, image_size=128, framed=True, at_once=at_once)
-    assert views.folders == (folders[0], *folders[2:])
-    assert len(views.unreadable) == 1 and str(folders[1].voxels_path(64)) in views.unreadable[0]
-    assert views.voxels[torch.tensor([2])].any()
+    lacking, short = folders[1].voxels_path(64), folders[2].voxels_path(64)
+    lacking.unlink()
+    short.write_bytes(b'')
+    for at_once in (True, False):
+        views = read_views(folders, resolution=64, image_size=128, framed=True, at_once=at_once)
+        assert views.folders == (folders[0], *folders[3:])
+        assert [reason.partition(': ')[0] for reason in views.unreadable] == [
+            str(lacking), str(short)]
 
 
 def test_an_image_of_another_size_than_its_camera_s_is_left_out(made, tmp_path):
