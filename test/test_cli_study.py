@@ -1,8 +1,10 @@
 """`active-recon study`, from the command line to the files that it writes."""
 
 import json
+from shutil import copytree
 
 from active_recon.datasets.drawn_cameras import Viewing
+from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
 from command_line import command, refusal
 import cv2
@@ -52,6 +54,19 @@ def test_numbers_of_views_that_objects_lack_are_named(made, tmp_path, monkeypatc
                    tmp_path) == 0
     told = capsys.readouterr().err
     assert f'{made}: not measured after 5, 8 views: its objects have 3\n' in told
+
+
+@pytest.mark.parametrize('asked', [
+    ('study', '--models', 'carving', '--counts', 1, '--disturbed-views', 0),
+    ('policies', '--model', 'carving', '--policies', 'uniform', '--views', 2)])
+def test_objects_that_cannot_be_read_are_named(made, tmp_path, monkeypatch, capsys, asked):
+    last = list_objects(copytree(made, tmp_path / 'some lamps'))[-1]
+    (last.images_folder / '01.png').write_bytes(b'')
+    assert command(monkeypatch, *asked, tmp_path / 'some lamps', '--threads', 1, '--out',
+                   tmp_path) == 0
+    told = capsys.readouterr().err
+    assert f'left out: {last.images_folder / "01.png"}: no readable image' in told
+    assert 'some lamps: 1 read, 0 missing, 1 left out\n' in told
 
 
 def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypatch, capsys):

@@ -6,6 +6,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.reading import print_left_out
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError, DataError
@@ -115,6 +116,7 @@ def _sequence(folder: Path, entrant: 'Entrant', episodes: 'Episodes',
     import numpy as np
 
     scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
+    print_left_out(folder.name, len(scene), (), scene.views.unreadable)
     steps = min(episodes.count, scene.view_count) - 1
     with progress_bar('finding a sequence', len(scene) * steps) as advance:
         offsets = find_offsets(scene, entrant, episodes, lambda done: advance(done, ''))
@@ -129,6 +131,7 @@ def _set_figures(folder: Path, entrant: 'Entrant', episodes: 'Episodes', extent:
     import numpy as np
 
     scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
+    print_left_out(folder.name, len(scene), (), scene.views.unreadable)
     if len(scene) < 2 and any(name.startswith('swapped') for name in episodes.policies):
         raise DataError(f'{folder}: no other object to show: expected two or more for swapped, '
                         'got one; give more, or leave swapped out')

@@ -46,7 +46,7 @@ def read_objects(roots: Sequence[Path], title: str, spec: 'NetworkSpec',
     with progress_bar(f'reading {title}', len(folders)) as advance:
         views = read_views(folders, lambda: advance(1, ''), spec.resolution, spec.image_size,
                            framed=not spec.needs_front, at_once=at_once, depth=depth)
-    _print_left_out(title, len(views), missing, views.unreadable)
+    print_left_out(title, len(views), missing, views.unreadable)
     return views
 
 
@@ -61,12 +61,13 @@ def _read_photographs(root: Path, title: str, spec: 'NetworkSpec') -> 'ViewSet':
     with progress_bar(f'reading {title}', len(photographs)) as advance:
         views = read_photographs(photographs, left_out, lambda: advance(1, ''),
                                  spec.resolution)
-    _print_left_out(title, len(views), (), views.unreadable)
+    print_left_out(title, len(views), (), views.unreadable)
     return views
 
 
-def _print_left_out(title: str, count: int, missing: Sequence[str],
+def print_left_out(title: str, count: int, missing: Sequence[str],
                    unreadable: Sequence[str]) -> None:
+    """Print which objects of a dataset are left out, and why."""
     for reason in (*missing, *unreadable):
         typer.echo(f'left out: {reason}', err=True)
     if missing or unreadable:

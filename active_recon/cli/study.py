@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
+from active_recon.cli.reading import print_left_out
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError
@@ -112,6 +113,7 @@ def study(
                               'sets': []}
     for folder in data or []:
         found = study_set(folder, entrants, plan, extent, library, progress_bar)
+        print_left_out(folder.name, found['objects'], (), found['unreadable'])
         if beyond := [str(count) for count in plan.counts if count > found['views']]:
             typer.echo(f'{folder}: not measured after {", ".join(beyond)} views: its objects have '
                        f'{found["views"]}', err=True)
