@@ -1,5 +1,6 @@
 """What is said of a network and its policies."""
 
+import csv
 import json
 import math
 
@@ -7,6 +8,8 @@ from active_recon.errors import DataError
 from active_recon.evaluation.ablations import iou_by_yaw, latent_swap_ablation, YAWS_DEG
 from active_recon.evaluation.measure import Episodes, interval, joined, run_policy, summary
 from active_recon.evaluation.metrics import episodes, iou_per_view
+from active_recon.evaluation.paired import write_rows
+from active_recon.evaluation.trial import Trial
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
@@ -33,6 +36,14 @@ def test_the_rotation_goes_the_short_way_from_view_to_view():
     azimuths = [[0.1, math.tau - 0.1, 0.1], [0.0, 2.0, 4.0], [0.0, math.pi, 0.0]]
     found = some_episodes(azimuths, np.zeros((3, 3)))
     np.testing.assert_allclose(found.rotation, [0.4, 4.0, math.tau])
+
+
+def test_rows_tell_azimuths_just_beside_0_as_0(network, views, tmp_path):
+    trial = Trial(network, 0.1, part_of(views, slice(1)), starts=1, count=3)
+    run = some_episodes([[-0.0, math.tau - 1e-6, math.tau - 0.01]], np.zeros((1, 3)))
+    write_rows(tmp_path / 'rows.csv', {'one': (trial, {'uniform': [run]})})
+    with (tmp_path / 'rows.csv').open() as file:
+        assert [row['azimuth_deg'] for row in csv.DictReader(file)] == ['0.0', '0.0', '359.4']
 
 
 def test_a_run_measures_iou_both_entropies_and_azimuths_of_every_view(network, views):

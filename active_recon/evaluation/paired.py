@@ -64,7 +64,7 @@ def _rows(trial: Trial, run: Episodes) -> Iterator[list[Any]]:
     for episode, (category, name, start) in enumerate(_named(trial)):
         for view in range(trial.count):
             yield [category, name, start, view + 1,
-                   f'{np.degrees(run.azimuths[episode, view]):.1f}',
+                   f'{np.degrees(run.azimuths[episode, view]).round(1) % 360:.1f}',
                    f'{run.iou[episode, view]:.6f}', f'{run.entropy[episode, view]:.3f}']
 
 
