@@ -261,6 +261,12 @@ def test_without_faults_to_learn_nothing_is_fitted():
         fit(made_up(20, 9), made_up(20, 10), 'abc')
 
 
+def test_known_objects_that_are_all_hollow_are_refused():
+    known = made_up(5, 1)
+    with pytest.raises(DataError, match='no known solid objects: expected some to fit with'):
+        fit(replace(known, hollow=np.ones(len(known))), made_up(5, 2, 'pose'), 'abc')
+
+
 def test_known_objects_with_faults_are_refused():
     faults = [made_up(20, 2, fault) for fault in FAULTS]
     with pytest.raises(DataError, match='known objects with faults: .* got mask'):

@@ -32,10 +32,10 @@ def fit(known: Measured, calibration: Measured, sha256: str) -> QualityTables:
     `known` objects, without faults, and of which the network may have seen some, give the
     latents, the head, and what usual views are like beside those with a fault. The faults of
     `calibration` are learned; its other rows calibrate, see `calibrated`. Raises DataError where
-    one of the parts is empty, or `known` has faults.
+    one of the parts is empty, `known` has faults, or all of it is hollow.
     """
     faulty = calibration.rows(calibration.fault != '')
-    for name, part in (('known', known), ('faulty', faulty)):
+    for name, part in (('known', known), ('known solid', known.solid), ('faulty', faulty)):
         if not len(part):
             raise DataError(f'quality: no {name} objects: expected some to fit with, got none')
     if (known.fault != '').any():
