@@ -282,6 +282,12 @@ def test_an_object_without_voxels_is_left_out_and_no_other(made, tmp_path):
             str(lacking), str(short)]
 
 
+def test_any_cameras_are_not_taken_for_a_turntable_s_though_they_are_as_many(tmp_path):
+    list(make_dataset(shape_jobs('lamp', range(1), tmp_path), 1, viewing=Viewing('any', 24)))
+    with pytest.raises(DataError, match='cameras of another kind: expected'):
+        read_views(list_objects(tmp_path))
+
+
 def test_an_image_of_another_size_than_its_camera_s_is_left_out(made, tmp_path):
     path = shutil.copytree(made, tmp_path / 'copy') / 'ShapeNetRendering/chair/chair-000001'
     image = path / 'rendering' / '02.png'

@@ -27,7 +27,11 @@ from active_recon.evaluation.next_view.study import (
     run_episodes,
 )
 from active_recon.evaluation.next_view.summary import markdown
-from active_recon.evaluation.next_view.swapping import swapped_row, turned
+from active_recon.evaluation.next_view.swapping import (
+    require_same_cameras,
+    swapped_row,
+    turned,
+)
 from active_recon.evaluation.next_view.watching import Ahead, Walk, WatchedObject
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import read_scene
@@ -318,6 +322,15 @@ def test_what_is_swapped_in_is_another_object_of_the_set_and_each_comes_once():
         rows = [swapped_row(row, count) for row in range(count)]
         assert sorted(rows) == list(range(count))
         assert all(row != other for row, other in enumerate(rows))
+
+
+def test_another_object_is_only_shown_where_the_same_cameras_see_it(scene):
+    views = scene.views
+    require_same_cameras(views)
+    poses = views.poses.clone()
+    poses[1] = poses[1].roll(1, dims=0)
+    with pytest.raises(DataError, match='no other object can be shown'):
+        require_same_cameras(replace(views, poses=poses))
 
 
 def test_cameras_see_of_a_turned_object_what_others_saw(scene):

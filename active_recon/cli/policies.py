@@ -127,14 +127,17 @@ def _sequence(folder: Path, entrant: 'Entrant', episodes: 'Episodes',
 def _set_figures(folder: Path, entrant: 'Entrant', episodes: 'Episodes', extent: 'Extent',
                  sequence: Mapping[str, Any] | None) -> dict[str, Any]:
     from active_recon.evaluation.next_view.study import figures, run_episodes
+    from active_recon.evaluation.next_view.swapping import require_same_cameras
     from active_recon.evaluation.posed.study import read_set
     import numpy as np
 
     scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
     print_left_out(folder.name, len(scene), (), scene.views.unreadable)
-    if len(scene) < 2 and any(name.startswith('swapped') for name in episodes.policies):
-        raise DataError(f'{folder}: no other object to show: expected two or more for swapped, '
-                        'got one; give more, or leave swapped out')
+    if any(name.startswith('swapped') for name in episodes.policies):
+        if len(scene) < 2:
+            raise DataError(f'{folder}: no other object to show: expected two or more for '
+                            'swapped, got one; give more, or leave swapped out')
+        require_same_cameras(scene.views)
     offsets = None if sequence is None else np.radians(sequence['offsets_deg'])
     with progress_bar(f'choosing views of {folder.name}', len(scene)) as advance:
         found = run_episodes(scene, entrant, episodes, offsets, lambda done: advance(done, ''))

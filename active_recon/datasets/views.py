@@ -12,7 +12,7 @@ from active_recon.datasets.framed import FramedViews, OnDemand, read_cameras
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.errors import DataError
-from active_recon.geometry.cameras import Camera, VIEW_COUNT
+from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera, VIEW_COUNT
 from active_recon.models.network import Cameras
 from active_recon.volumes.voxels import RESOLUTION
 import cv2
@@ -126,10 +126,10 @@ def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = l
 
     With `framed`, the images are those of a network that needs no front: from arbitrary cameras,
     cropped to the object's cube, with as many views of each object as every object has. Without
-    it, they are the 24 of the turntable. Objects that cannot be read are left out and listed in
-    `unreadable`. Without `at_once`, framed images are read when they are first indexed, and raise
-    DataError then. With `depth`, framed views come with their depth images, and objects that have
-    none are left out. Raises DataError if no object can be read.
+    it, they are the 24 of the turntable; other cameras cannot be read. Objects that cannot be read
+    are left out and listed in `unreadable`. Without `at_once`, framed images are read when they
+    are first indexed, and raise DataError then. With `depth`, framed views come with their depth
+    images, and objects that have none are left out. Raises DataError if no object can be read.
     """
     if framed:
         return _read_framed(folders, progress, resolution, image_size, at_once, depth)
@@ -221,6 +221,10 @@ def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
     if len(cameras) != len(images):
         raise DataError(f'{folder.images_folder}: wrong number of views: expected {len(images)}, '
                         f'got {len(cameras)}')
+    if not all(map(_is_of_turntable, cameras)):
+        raise DataError(f"{folder.images_folder}: cameras of another kind: expected R2N2's lens "
+                        "and cameras that look at the object's centre, upright, as `--cameras "
+                        'turntable` makes, since the network is not told of others')
     grid = folder.voxels(len(voxels))
     voxels[:] = grid.occupied(0.5)
     size = images.shape[1]
@@ -228,6 +232,13 @@ def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
         image[:] = _premultiplied(folder.image(index), size)
     return [Camera(camera.scaled(1 / grid.size).pose, camera.intrinsics.resized(size, size))
             for camera in cameras]
+
+
+def _is_of_turntable(camera: Camera) -> bool:
+    lens = camera.intrinsics.resized(CANONICAL_INTRINSICS.width, CANONICAL_INTRINSICS.height)
+    upright = orbit_camera(camera.azimuth, camera.elevation, camera.distance)
+    return bool(np.allclose(lens.matrix, CANONICAL_INTRINSICS.matrix, atol=1)
+                and np.allclose(camera.pose[:3, :3], upright.pose[:3, :3], atol=0.01))
 
 
 def _premultiplied(rgba: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:

@@ -21,6 +21,15 @@ def swapped_row(row: int, count: int) -> int:
     return (row + count // 2) % count
 
 
+def require_same_cameras(views: ViewSet) -> None:
+    """Raise DataError unless the cameras stand alike around all objects of a set."""
+    directions = pose_directions(views.poses.numpy())  # (N, V, 3)
+    if direction_distance(directions, directions[:1]).max() > _ALIKE:
+        raise DataError('no other object can be shown: expected cameras that stand alike around '
+                        'all objects, as `--cameras turntable` and `--cameras dome` make, got '
+                        'others; leave swapped out')
+
+
 def turned(views: ViewSet, rng: np.random.Generator) -> ViewSet:
     """
     Return the views of a set's one object, turned about the vertical while the cameras stay.
