@@ -8,6 +8,7 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.evaluation.contenders import contenders, heuristic_names
 from active_recon.evaluation.posed.entrants import load_entrants
 from active_recon.evaluation.trial import Trial
+from active_recon.exporting.export import export
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.models import registry
 from active_recon.models.network import Cameras
@@ -23,6 +24,7 @@ from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLI
 from active_recon.policies import POLICIES
 from active_recon.policies.geometric import FarthestPolicy
 from active_recon.policies.registry import _installed, PolicyEntry, PolicyOptions
+from active_recon.runtimes import load_runtime
 from command_line import command, refusal
 import numpy as np
 import pytest
@@ -183,6 +185,44 @@ class Coarse(Net):
 class NoSize(Net):
     image_size = None
 
+class Counted(Net):
+    def initial_state(self, batch):
+        return {**super().initial_state(batch), 'views': torch.zeros(batch, dtype=torch.long)}
+
+    def update(self, encoded, cameras, state):
+        return super().update(encoded, cameras, state) | {'views': state['views'] + 1}
+
+class Keeping(Net):
+    def initial_state(self, batch):
+        return {**super().initial_state(batch), 'all': torch.zeros(batch, 0, 16, 4, 4)}
+
+    def update(self, encoded, cameras, state):
+        every = torch.cat([state['all'], encoded[:, None]], dim=1)
+        return {'latent': every.amax(dim=1), 'all': every}
+
+class InDouble(Net):
+    def update(self, encoded, cameras, state):
+        moved = torch.eye(4, dtype=torch.float64) @ cameras.poses
+        return super().update(encoded + moved[:, :1, :1, :1].float(), cameras, state)
+
+class Turning(Net):
+    def update(self, encoded, cameras, state):
+        turned = cameras.turned(torch.full((len(encoded),), 0.3)).azimuths
+        return super().update(encoded + turned[:, None, None, None], cameras, state)
+
+class Shifted(torch.nn.GroupNorm):
+    def forward(self, maps):
+        return super().forward(maps) + 2
+
+class Normed(Net):
+    def __init__(self, config, norm=Shifted(4, 16)):
+        super().__init__(config)
+        self.look.insert(1, norm)
+
+class Plain(Normed):
+    def __init__(self, config):
+        super().__init__(config, torch.nn.GroupNorm(4, 16, affine=False))
+
 class Needs(Net):
     @dataclass(frozen=True)
     class Config(Config):
@@ -239,6 +279,43 @@ def test_a_network_of_another_interface_is_refused_before_it_is_trained(
 def test_the_networks_of_this_package_pass_the_trial(name):
     entry = network_entry(name)
     try_network(entry.build(entry.sizes['small']).eval(), name)
+
+
+@pytest.fixture
+def own_weights(own_file, tmp_path, monkeypatch):
+    def saved(name):
+        monkeypatch.setenv(OWN_NETWORKS, f'{own_file}:{name}')
+        torch.manual_seed(0)
+        config = network_entry(name).sizes['small']
+        path = tmp_path / f'{name}.safetensors'
+        save_weights(path, Bundle(network_entry(name).build(config), None, config, 0.5,
+                                  model=name))
+        return path
+
+    return saved
+
+
+@pytest.mark.parametrize(('name', 'said'), [
+    ('Counted', r"a state of float32 numbers .* 'views': 'int64 \(1,\)'"),
+    ('Keeping', r'whose shapes no view changes.*\(1, 0, 16, 4, 4\).*\(1, 1, 16, 4, 4\)'),
+    ('InDouble', 'cameras in float32, got: expected .* Double but found Float')])
+def test_what_no_graph_can_run_is_not_exported(name, said, own_weights):
+    pytest.importorskip('onnx')
+    with pytest.raises(ConfigError, match=f'{name}: not exported: .*{said}'):
+        export(own_weights(name))
+
+
+@pytest.mark.parametrize('name', ['Normed', 'Plain', 'Turning'])
+def test_norms_of_one_s_own_and_turned_cameras_are_exported_as_they_are(name, own_weights):
+    pytest.importorskip('onnx')
+    pytest.importorskip('openvino')
+    path = own_weights(name)
+    export(path)
+    camera = orbit_camera(1.2)
+    image = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
+    theirs, ours = (runtime.step(image, camera, runtime.initial_state())[1] for runtime in (
+        load_runtime(path, library, precision='f32') for library in ('torch', 'openvino')))
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-4)
 
 
 def test_a_config_without_defaults_is_refused(own_file):

@@ -17,7 +17,7 @@ from active_recon.exporting.parts import (
 from active_recon.models.candidate_looks import CHANNELS, FACTS, GRID
 from active_recon.models.depth_weights import load_refiner
 from active_recon.models.lifting_encoder import IMAGE_SIZE
-from active_recon.models.network import State
+from active_recon.models.network import ReconstructionNetwork, State
 from active_recon.models.scorer_weights import load_scorer
 from active_recon.models.segmenter_weights import is_segmenter, read_segmenter
 from active_recon.models.weights import Bundle, load_weights
@@ -68,9 +68,12 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
     facts = {'model': bundle.model, 'threshold': bundle.threshold, 'image_size': spec.image_size,
              'resolution': spec.resolution, 'needs_front': spec.needs_front,
              'config_sha256': config_hash(bundle.config)}
-    state = _described(bundle.model, network.initial_state(1))
+    first = network.initial_state(1)
+    parts = _parts(bundle.model, network)
+    _require_steady(bundle.model, first, dict(parts['decode'].inputs))
+    state = _described(bundle.model, first)
     graphs = {name: _written(bundle.model, part, GraphMetadata(name, digest, state, facts))
-              for name, part in network_parts(network).items()}
+              for name, part in parts.items()}
     graphs |= _policy_graph(weights, bundle, digest)
     if depth_path(weights).is_file():
         told = GraphMetadata(DEPTH_PART, digest, {},
@@ -109,6 +112,25 @@ def _policy_graph(weights: Path, bundle: Bundle, digest: str) -> dict[str, bytes
     told = GraphMetadata(POLICY_PART, digest, _described(bundle.model, model.initial_state(1)),
                          facts)
     return {POLICY_PART: _written(bundle.model, policy_part(model, inputs, axes), told)}
+
+
+def _parts(model: str, network: ReconstructionNetwork) -> dict[str, Part]:
+    try:
+        return network_parts(network)
+    except RuntimeError as error:
+        raise ConfigError(f'{model}: not exported: expected a network that takes cameras in '
+                          f'float32, got: {str(error).strip().splitlines()[0]}') from error
+
+
+def _require_steady(model: str, first: State, after: State) -> None:
+    """Raise ConfigError where a view changes more of a state than its float32 numbers."""
+    kinds = [{name: f'{str(part.dtype).removeprefix("torch.")} {tuple(part.shape)}'
+              for name, part in state.items()} for state in (first, after)]
+    if kinds[0] != kinds[1] or any(part.dtype != torch.float32 or not part.numel()
+                                   for part in first.values()):
+        raise ConfigError(f'{model}: not exported: expected a state of float32 numbers whose '
+                          f'shapes no view changes, got {kinds[0]} before a view and {kinds[1]} '
+                          'after it; it runs with the runtime torch')
 
 
 def _described(model: str, state: State) -> dict[str, tuple[tuple[int, ...], float]]:

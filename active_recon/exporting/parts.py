@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from active_recon.models.depth_refiner import DepthRefiner, KINDS
 from active_recon.models.lifting import COARSE_SIDE
-from active_recon.models.lifting_encoder import IMAGE_SIZE
+from active_recon.models.lifting_encoder import IMAGE_SIZE, Norm
 from active_recon.models.network import Cameras, ReconstructionNetwork, State
 from active_recon.models.segmenter import Segmenter
 from active_recon.runtimes.graph_files import NEXT
@@ -179,6 +179,7 @@ def _for_graphs(network: Network) -> Network:
     """Return a copy of a module on the CPU whose normalisations are `ChannelNorm`."""
     copied = copy.deepcopy(network).eval().cpu()
     for layer in copied.modules():
-        if isinstance(layer, nn.GroupNorm):
+        # Others that derive from it may normalise otherwise
+        if type(layer) in (nn.GroupNorm, Norm) and layer.affine:
             layer.__class__ = ChannelNorm
     return copied

@@ -60,7 +60,7 @@ class Cameras(NamedTuple):
         turn[..., 1, 0] = yaws.sin()
         turn[..., 0, 1] = -yaws.sin()
         turn[..., 2, 2] = turn[..., 3, 3] = 1
-        return type(self)(turn.to(self.poses.device) @ self.poses, self.intrinsics)
+        return type(self)(turn.to(self.poses) @ self.poses, self.intrinsics)
 
     def to(self, device: torch.device | str) -> Self:
         """Return the cameras on a device."""
