@@ -12,6 +12,7 @@ from active_recon.training.looked import (
     mirrored_states,
     spreads,
 )
+from active_recon.training.loop import TrainingDivergedError
 from active_recon.training.scorer import (
     calibrate,
     gap_shares,
@@ -225,3 +226,16 @@ def test_rounds_go_through_all_objects_in_turn_and_each_has_as_many_as_it_can(tm
 def test_a_training_that_trains_nothing_is_refused():
     with pytest.raises(ConfigError, match='nothing to train'):
         ScorerTraining(epochs=0)
+    for rate in (0, -1e-3, float('nan'), float('inf')):
+        with pytest.raises(ConfigError, match='invalid learning_rate: expected .* above 0'):
+            ScorerTraining(learning_rate=rate)
+
+
+@pytest.mark.parametrize('steps', range(1, 13))
+def test_a_training_may_have_any_number_of_steps(steps):
+    train_scorer([learnable(states=2)], SMALL, ScorerTraining(epochs=steps))
+
+
+def test_a_training_that_diverges_is_refused():
+    with pytest.raises(TrainingDivergedError, match='epoch .: the loss is not finite; try a'):
+        train_scorer([learnable()], SMALL, ScorerTraining(epochs=8, learning_rate=1e30))

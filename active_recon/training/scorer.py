@@ -10,6 +10,7 @@ from active_recon.evaluation.rollouts import batches
 from active_recon.models.candidate_looks import MOST_VIEWS
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.training.looked import batches_of, LookedStates, mirrored_states, spreads
+from active_recon.training.loop import TrainingDivergedError
 from active_recon.training.scorer_losses import listwise_loss, ordinal_loss, standardised
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,9 @@ class ScorerTraining(Config):
         if min(self.epochs, self.batch_size) < 1:
             raise ConfigError('ScorerTraining: nothing to train: expected 1 epoch and 1 state a '
                               f'batch or more, got {self.epochs} and {self.batch_size}')
+        if not 0 < self.learning_rate < math.inf:
+            raise ConfigError('ScorerTraining: invalid learning_rate: expected a number above 0, '
+                              f'got {self.learning_rate}')
 
 
 def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: ScorerTraining,
@@ -52,7 +56,7 @@ def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: 
     The losses are listwise and ordinal, on gains standardised per number of views; the mean gain
     is learned beside it. `advance` is called after each epoch with the mean loss. The weights
     begin with those of `begun`, which stays as it is; None: with fresh ones. Raises ConfigError
-    where that is of other sizes.
+    where that is of other sizes, TrainingDivergedError where a loss is not finite.
     """
     torch.manual_seed(training.seed)
     rng = np.random.default_rng(training.seed)
@@ -61,11 +65,11 @@ def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: 
     count = sum(math.ceil(len(states) / training.batch_size) for states in train)
     optimizer = torch.optim.AdamW(scorer.parameters(), training.learning_rate,
                                   weight_decay=training.weight_decay)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, training.learning_rate, total_steps=training.epochs * count + 1,
+    schedule = torch.optim.lr_scheduler.OneCycleLR(  # divides by 0 at a warm-up of one step
+        optimizer, training.learning_rate, total_steps=max(training.epochs * count, 10) + 1,
         pct_start=_WARM_UP)
     scorer.train()
-    for _ in range(training.epochs):
+    for epoch in range(1, training.epochs + 1):
         losses = []
         for batch in batches_of(train, training.batch_size, rng):
             shown = mirrored_states(batch) if rng.random() < 0.5 else batch
@@ -75,6 +79,9 @@ def train_scorer(train: Sequence[LookedStates], config: ScorerConfig, training: 
             optimizer.step()
             schedule.step()
             losses.append(float(loss.detach()))
+        if not np.isfinite(losses).all():
+            raise TrainingDivergedError(f'epoch {epoch}: the loss is not finite; try a lower '
+                                        'learning rate')
         advance(f'loss {np.mean(losses):.4f}')
     return scorer.eval()
 
