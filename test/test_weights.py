@@ -150,6 +150,14 @@ def test_a_model_that_is_not_in_the_registry_is_refused(saved, tiny, model, said
         load_weights(saved)
 
 
+@pytest.mark.parametrize(('name', 'kind'), [
+    ('segmenter', 'segmenter'), ('lifting-scorer', 'view-scorer'),
+    ('lifting-depth', 'depth-refiner')])
+def test_what_goes_with_a_network_is_told_where_a_network_is_meant(name, kind):
+    with pytest.raises(WeightsError, match=f'of a reconstruction network.* got that of a {kind}$'):
+        load_weights(find_weights(name))
+
+
 def test_weights_without_a_view_policy_are_weights_too(tmp_path, network, tiny):
     path = tmp_path / 'weights.safetensors'
     save_weights(path, Bundle(network, None, tiny, 0.35, model='2d3d'))

@@ -43,6 +43,9 @@ def read_metadata(path: Path) -> WeightsMetadata:
         raise WeightsError(f'{path}: no whole safetensors file: {error}') from error
     if 'model' not in metadata:
         raise WeightsError(f'{path}: names no model: expected weights of one of the networks')
+    if 'threshold' not in metadata:
+        raise WeightsError(f'{path}: its config cannot be read: expected that of a reconstruction '
+                           f'network, with a threshold, got that of a {metadata["model"]}')
     try:
         return WeightsMetadata(metadata['model'], json.loads(metadata['config']),
                                float(metadata['threshold']))
