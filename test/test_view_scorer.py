@@ -216,6 +216,16 @@ def test_a_scorer_of_other_weights_is_refused_with_what_to_do(scorer, tmp_path):
         load_scorer(weights)
 
 
+def test_a_scorer_with_numbers_that_are_not_finite_is_refused(tmp_path):
+    weights = tmp_path / 'net.safetensors'
+    weights.write_bytes(b'of a network')
+    spoilt = ViewScorer.from_config(SMALL)
+    torch.nn.init.constant_(spoilt.members[0].all.bias, torch.nan)
+    save_scorer(scorer_path(weights), spoilt, SMALL, weights_hash(weights), {})
+    with pytest.raises(WeightsError, match=r'finite numbers in members\.0\.all\.bias'):
+        load_scorer(weights)
+
+
 def test_lines_of_sight_that_were_kept_show_the_same():
     volume, taken = coarse_volume(some_volume()[None]), poses([0.4, 2.0])
     sets = [poses(AZIMUTHS), poses(AZIMUTHS + 0.1), poses(AZIMUTHS, 0.9)]

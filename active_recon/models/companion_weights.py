@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
-from active_recon.models.weights_bytes import in_precision, weights_bytes
+from active_recon.models.weights_bytes import in_precision, require_finite, weights_bytes
 from active_recon.models.weights_files import weights_hash
 from safetensors import safe_open, SafetensorError
 import torch
@@ -64,8 +64,8 @@ class Companion(Generic[Module]):
 
         Without a hash it may be for any network, as where it is only trained further.
 
-        Raises WeightsError where the file is not whole or of another kind, and where it was
-        trained for other weights.
+        Raises WeightsError where the file is not whole or of another kind, where it was trained
+        for other weights, and where it has parameters that are not finite.
         """
         try:
             with safe_open(path, framework='pt', device=device) as stored:
@@ -86,5 +86,6 @@ class Companion(Generic[Module]):
             module.load_state_dict(tensors, assign=True)
         except (KeyError, ValueError, TypeError, RuntimeError, ConfigError) as error:
             raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
+        require_finite(path, module)
         module.requires_grad_(False)
         return module.eval()

@@ -11,7 +11,7 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry, NETWORKS
-from active_recon.models.weights_bytes import in_precision, weights_bytes
+from active_recon.models.weights_bytes import in_precision, require_finite, weights_bytes
 from active_recon.models.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
 from safetensors import safe_open, SafetensorError
 import torch
@@ -83,10 +83,7 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
             module.load_state_dict(own, assign=True)
         except RuntimeError as error:
             raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
-        for name, parameter in module.named_parameters():
-            if not parameter.isfinite().all():
-                raise WeightsError(f'{path}: not finite: expected finite numbers in {part}.{name},'
-                                   ' got others; a training may have diverged: take other weights')
+        require_finite(path, module, part)
         module.to(device).eval().requires_grad_(False)
     return bundle
 

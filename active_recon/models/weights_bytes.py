@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 import json
+from pathlib import Path
 
+from active_recon.errors import WeightsError
 from safetensors.torch import save
 import torch
-from torch import Tensor
+from torch import nn, Tensor
 
 _LENGTH = 8  # bytes that hold the header's length, little endian
 
@@ -31,3 +33,11 @@ def in_precision(dtype: torch.dtype, tensor: Tensor) -> Tensor:
         return tensor
     converted = tensor.to(dtype)
     return converted if torch.equal(converted.isfinite(), tensor.isfinite()) else tensor
+
+
+def require_finite(path: Path, module: nn.Module, part: str = '') -> None:
+    """Raise WeightsError where a parameter of a module that was read is not finite."""
+    for name, parameter in module.named_parameters(part):
+        if not parameter.isfinite().all():
+            raise WeightsError(f'{path}: not finite: expected finite numbers in {name}, got '
+                               'others; a training may have diverged: take other weights')
