@@ -197,6 +197,18 @@ def test_a_loss_that_is_not_finite_names_its_batch_and_leaves_the_checkpoint(
     assert path.read_bytes() == before
 
 
+def test_a_gradient_that_is_not_finite_names_its_batch_and_changes_nothing(views, tiny, tmp_path):
+    network = Network2d3d.from_config(tiny)
+    before = {name: tensor.clone() for name, tensor in network.state_dict().items()}
+    network.decoder.grow[0].weight.register_hook(lambda gradient: gradient / 0)
+    with pytest.raises(TrainingDivergedError,
+                       match=r"step 0: the gradient's norm is (nan|inf) on the batch .*, .*rate"):
+        train_reconstruction(network, views, CONFIG, LossConfig(),
+                             Run(make_fabric(False), tmp_path / 'run.safetensors',
+                                 lambda step, measured: None), lambda model: {})
+    assert_close(network.state_dict(), before, rtol=0, atol=0)
+
+
 @pytest.mark.parametrize('bfloat16', [False, True])
 def test_the_loss_falls(views, tiny, tmp_path, bfloat16):
     one = part_of(views, slice(1))

@@ -57,7 +57,7 @@ class TrainingConfig(Config):
 
 
 class TrainingDivergedError(ActiveReconError):
-    """A loss is not finite."""
+    """A loss, or its gradient, is not finite."""
 
 
 class TrainingStoppedError(KeyboardInterrupt):
@@ -155,8 +155,8 @@ def train_steps(
     seed and the step alone, so a training that was interrupted and resumed gives the same result
     as one that was not. `run.report` is called after
     every step with the losses, and with what `validate` measured where it did. Raises
-    TrainingDivergedError naming the batch where a loss is not finite, ConfigError on a checkpoint
-    of other settings or data, and TrainingStoppedError where it was interrupted.
+    TrainingDivergedError naming the batch where a loss or its gradient is not finite, ConfigError
+    on a checkpoint of other settings or data, and TrainingStoppedError where it was interrupted.
     """
     fabric = run.fabric
     parameters = [part for part in trained.parameters() if part.requires_grad]
@@ -176,10 +176,12 @@ def train_steps(
         for step, drawn in drawn_ahead(draw, steps, threads):
             torch.manual_seed(_torch_seed(config.seed, step, fabric.global_rank))
             losses = wrapped(*fabric.to_device(drawn.arguments))
-            _refuse_divergence(fabric, step, losses['loss'], drawn.names)
+            _refuse_divergence(fabric, step, 'loss', losses['loss'], drawn.names)
             optimizer.zero_grad(set_to_none=True)
             fabric.backward(losses['loss'])
-            fabric.clip_gradients(wrapped, optimizer, max_norm=1.0)
+            norm = fabric.clip_gradients(wrapped, optimizer, max_norm=1.0,
+                                         error_if_nonfinite=False)
+            _refuse_divergence(fabric, step, "gradient's norm", torch.as_tensor(norm), drawn.names)
             optimizer.step()
             schedule.step()
             measured = {name: value.item() for name, value in losses.items()}
@@ -226,12 +228,13 @@ def _is_asked_to_stop(fabric: Fabric, raise_if_asked: Callable[[], None]) -> boo
     return asked
 
 
-def _refuse_divergence(fabric: Fabric, step: int, loss: Tensor, names: Sequence[str]) -> None:
+def _refuse_divergence(fabric: Fabric, step: int, what: str, value: Tensor,
+                       names: Sequence[str]) -> None:
     """Raise TrainingDivergedError on every process, each naming its own batch (B,)."""
-    finite = torch.isfinite(loss.detach())
+    finite = torch.isfinite(value.detach())
     if fabric.world_size > 1:
         finite = torch.as_tensor(fabric.all_reduce(finite.float(), reduce_op='sum')
                                  == fabric.world_size)
     if not finite:
-        raise TrainingDivergedError(f'step {step}: the loss is {loss.item()} on the batch '
+        raise TrainingDivergedError(f'step {step}: the {what} is {value.item()} on the batch '
                                     f'{", ".join(names)}; try a lower learning rate')
