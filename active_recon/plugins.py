@@ -1,17 +1,24 @@
 """Networks and policies of one's own: from an installed package, or from a Python file."""
 
+from collections.abc import Sequence
 from functools import cache
 import hashlib
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
+import os
 from pathlib import Path
 import sys
+from types import ModuleType
 from typing import Any
 
 from active_recon.errors import ConfigError
 
 NETWORKS_GROUP, POLICIES_GROUP = 'active_recon.networks', 'active_recon.policies'
 """The groups of entry points under which packages offer theirs, each by its name."""
+_OWN = '_own_'
+"""What the name of a file's module begins with; its path follows, in hexadecimal digits."""
 
 
 @cache
@@ -45,7 +52,7 @@ def load_from_file(reference: str) -> Any:
     path = Path(place)
     if not path.is_file():
         raise ConfigError(f'{path}: no such file')
-    spec = spec_from_file_location(f'_own_{path.stem}', path)
+    spec = _spec_of(f'{_OWN}{os.fsencode(path.absolute()).hex()}')
     assert spec is not None and spec.loader is not None
     module = module_from_spec(spec)
     sys.modules[spec.name] = module  # where dataclasses look for themselves
@@ -68,3 +75,19 @@ def file_hash(module: str) -> str:
     """Return the SHA-256 of the file of an imported module; '' where it has none."""
     path = getattr(sys.modules.get(module), '__file__', None)
     return '' if path is None else hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+class _OwnFiles(MetaPathFinder):
+    """Finds files that this process did not load: a worker gets networks of their classes."""
+
+    def find_spec(self, fullname: str, path: Sequence[str] | None,
+                  target: ModuleType | None = None) -> ModuleSpec | None:
+        """Return the spec of a file's module; None of all others."""
+        return _spec_of(fullname) if fullname.startswith(_OWN) else None
+
+
+def _spec_of(name: str) -> ModuleSpec | None:
+    return spec_from_file_location(name, os.fsdecode(bytes.fromhex(name.removeprefix(_OWN))))
+
+
+sys.meta_path.append(_OwnFiles())

@@ -4,6 +4,7 @@ from pathlib import Path
 import re
 import sys
 
+from active_recon.cluster.local import LocalCrew
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.evaluation.contenders import contenders, heuristic_names
 from active_recon.evaluation.posed.entrants import load_entrants
@@ -19,7 +20,7 @@ from active_recon.models.registry import (
     OWN_NETWORKS,
 )
 from active_recon.models.trial import try_network
-from active_recon.models.weights import Bundle, load_weights, save_weights
+from active_recon.models.weights import Bundle, load_weights, save_weights, state_hash
 from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLICIES_GROUP
 from active_recon.policies import POLICIES
 from active_recon.policies.geometric import FarthestPolicy
@@ -249,6 +250,15 @@ def test_a_network_with_tensors_that_are_not_stored_is_loaded(own_file, tmp_path
     assert loaded.rates == network.rates
     for name in ('grid', 'plain'):
         torch.testing.assert_close(getattr(loaded, name), getattr(network, name))
+
+
+def test_a_network_of_a_file_is_known_to_the_processes_that_share_the_work(tmp_path):
+    path = tmp_path / 'my net.v2.py'
+    path.write_text(EXAMPLE.read_text())
+    entry = network_entry(named_network(f'{path}:Net'))
+    network = entry.build(entry.sizes['small'])
+    [result] = LocalCrew(2).map(state_hash, [network])
+    assert (result.value, result.refusal) == (state_hash(network), '')
 
 
 def test_a_network_whose_resolution_no_data_have_is_not_compared(own_file, tmp_path, monkeypatch):
