@@ -147,6 +147,25 @@ def test_the_mean_of_calibrated_gains_is_the_mean_of_those_measured():
     assert (found[:, 0] > 0).all() and (found[2:] == found[1]).all()
 
 
+def test_no_other_factors_of_score_and_level_are_nearer_to_the_measured_gains():
+    scorer = train_scorer([learnable()], SMALL, ScorerTraining(epochs=10))
+    states = learnable(states=8, seed=2)
+    a, b, c = calibrate(scorer, [states])[0]
+    scores, level = predict(scorer, [states])[0]
+    known = states.gains.isfinite() & (states.looked.views == 1)[:, None]
+    table = [part.double().numpy() for part in (
+        scores[known], level[:, None].expand_as(scores)[known], states.gains[known])]
+
+    def apart(scale, of_level):
+        rest = table[2] - scale * table[0] - of_level * table[1]
+        return rest.var()
+
+    assert c == pytest.approx((table[2] - a * table[0] - b * table[1]).mean())
+    for scale in (0.8, 0.9, 0.99, 1.01, 1.1, 1.2):
+        assert apart(scale * a, b) > apart(a, b)
+        assert apart(a, b + scale - 1) > apart(a, b) or b + scale - 1 < 0
+
+
 def test_the_spread_of_gains_is_told_by_the_number_of_views():
     found = spreads([learnable(400)], MOST_VIEWS)
     assert found[0] == pytest.approx(0.1, rel=0.15) and found[1] == pytest.approx(0.01, rel=0.15)

@@ -14,6 +14,7 @@ from active_recon.training.loop import TrainingDivergedError
 from active_recon.training.scorer_losses import listwise_loss, ordinal_loss, standardised
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 import torch
 from torch import Tensor
 
@@ -186,8 +187,7 @@ def _least_squares(table: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a, b >= 0 and c of gain = a * score + b * level + c, of rows (score, level, gain)."""
     middle = table.mean(axis=0)
     scores, level, gain = (table - middle).T
-    # Scores have mean 0 in each state, so that the two factors can be found one after the other
-    a = max(float(scores @ gain) / max(float(scores @ scores), 1e-12), _LEAST_SCALE)
-    rest = gain - a * scores
-    b = max(float(level @ rest) / max(float(level @ level), 1e-12), 0.0)
+    # Together: without those of the views taken, scores of a state have no mean of 0
+    a, b = lsq_linear(np.stack([scores, level], axis=1), gain, ([_LEAST_SCALE, 0], np.inf),
+                      method='bvls').x
     return np.array([a, b, middle[2] - a * middle[0] - b * middle[1]])
