@@ -318,6 +318,16 @@ def test_settings_that_train_nothing_are_refused(
     assert words in refusal(monkeypatch, capsys, *training(dataset, tmp_path, option, value))
 
 
+@pytest.mark.parametrize(('model', 'option', 'value'), [
+    ('lifting', '--silhouette-weight', 1), ('lifting', '--volume-weight', 0.4),
+    ('ogn', '--volume-loss', 'dice'), ('carving', '--volume-weight', 1)])
+def test_options_of_losses_that_a_network_does_not_learn_by_are_refused(
+        model, option, value, dataset, tmp_path, monkeypatch, capsys):
+    line = refusal(monkeypatch, capsys, 'train', dataset, '--validation', dataset, '--out',
+                   tmp_path / 'run', '--model', model, option, value, '--threads', 1)
+    assert f'{option}: no effect: expected none, since {model} learns' in line
+
+
 def test_a_size_beside_given_weights_is_refused(dataset, tmp_path, monkeypatch, capsys):
     asked = training(dataset, tmp_path, '--model', '2d3d', '--size', 'small')
     said = refusal(monkeypatch, capsys, *asked, '--init-from', '2d3d')

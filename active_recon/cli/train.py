@@ -25,6 +25,7 @@ from active_recon.errors import ConfigError
 import typer
 
 if TYPE_CHECKING:
+    from active_recon.models.network import ReconstructionNetwork
     from active_recon.models.weights import Bundle
 
 
@@ -189,6 +190,8 @@ def train(
     network = entry.build(plan.config)
     if own_file != model:
         try_network(network, own_file)
+    _refuse_unused({'--volume-weight': volume_weight, '--silhouette-weight': silhouette_weight,
+                    '--volume-loss': volume_loss}, model, network)
     asked = network.spec
     with ExitStack() as stack:
         if data:
@@ -223,6 +226,26 @@ def train(
                    f'wrote {weights} and its card')
         if own_file != model:
             typer.echo(f'they load where {OWN_NETWORKS}={quote(own_file)} is set')
+
+
+def _refuse_unused(losses: dict[str, object], model: str,
+                   network: 'ReconstructionNetwork') -> None:
+    """Raise ConfigError on an option of the losses, not None, that has no effect on a network."""
+    from active_recon.models.lifting import Lifting
+    from active_recon.models.network import ReconstructionNetwork
+    from active_recon.models.registry import network_entry
+
+    if isinstance(network, Lifting):
+        unused = {'--volume-weight', '--silhouette-weight'}
+    elif network_entry(model).fit or (
+            type(network).objective is not ReconstructionNetwork.objective):
+        unused = set(losses)
+    else:
+        return
+    for option, value in losses.items():
+        if value is not None and option in unused:
+            raise ConfigError(f'{option}: no effect: expected none, since {model} learns by a way '
+                              f'of its own, got {value}; leave it out')
 
 
 def _begun(path: Path, model: str, widen_to: str | None) -> 'Bundle':
