@@ -199,7 +199,7 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
         azimuth_deg = math.degrees(-camera.azimuth) % 360
         rows.append(f'{azimuth_deg:.9g} {math.degrees(camera.elevation):.9g} 0 '
                     f'{camera.distance / _DISTANCE_UNIT:.9g} {_FIELD_OF_VIEW_COLUMN:g}')
-    if all(map(_is_r2n2, cameras)):
+    if all(map(is_r2n2, cameras)):
         (folder.images_folder / 'rendering_metadata.txt').write_text('\n'.join(rows) + '\n')
     else:
         _write_cameras(folder.images_folder / _CAMERAS, cameras)
@@ -229,7 +229,7 @@ def _write_png(path: Path, image: 'cv2.typing.MatLike', options: Sequence[int] =
         raise DataError(f'{path}: cannot be written: {error.strerror}') from error
 
 
-def _is_r2n2(camera: Camera) -> bool:
+def is_r2n2(camera: Camera) -> bool:
     """Return whether a row of the metadata can represent the camera."""
     if camera.intrinsics != CANONICAL_INTRINSICS or abs(camera.elevation) > math.pi / 2 - 1e-6:
         return False

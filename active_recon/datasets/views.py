@@ -9,10 +9,10 @@ from typing import Any
 
 from active_recon.datasets.cropped import weighted
 from active_recon.datasets.framed import FramedViews, OnDemand, read_cameras
-from active_recon.datasets.layout import ObjectFolder
+from active_recon.datasets.layout import is_r2n2, ObjectFolder
 from active_recon.datasets.splits import SYNSETS
 from active_recon.errors import DataError
-from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, orbit_camera, VIEW_COUNT
+from active_recon.geometry.cameras import Camera, VIEW_COUNT
 from active_recon.models.network import Cameras
 from active_recon.volumes.voxels import RESOLUTION
 import cv2
@@ -221,7 +221,7 @@ def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
     if len(cameras) != len(images):
         raise DataError(f'{folder.images_folder}: wrong number of views: expected {len(images)}, '
                         f'got {len(cameras)}')
-    if not all(map(_is_of_turntable, cameras)):
+    if not all(map(is_r2n2, cameras)):
         raise DataError(f"{folder.images_folder}: cameras of another kind: expected R2N2's lens "
                         "and cameras that look at the object's centre, upright, as `--cameras "
                         'turntable` makes, since the network is not told of others')
@@ -232,13 +232,6 @@ def _read_object(folder: ObjectFolder, images: NDArray[np.uint8],
         image[:] = _premultiplied(folder.image(index), size)
     return [Camera(camera.scaled(1 / grid.size).pose, camera.intrinsics.resized(size, size))
             for camera in cameras]
-
-
-def _is_of_turntable(camera: Camera) -> bool:
-    lens = camera.intrinsics.resized(CANONICAL_INTRINSICS.width, CANONICAL_INTRINSICS.height)
-    upright = orbit_camera(camera.azimuth, camera.elevation, camera.distance)
-    return bool(np.allclose(lens.matrix, CANONICAL_INTRINSICS.matrix, atol=1)
-                and np.allclose(camera.pose[:3, :3], upright.pose[:3, :3], atol=0.01))
 
 
 def _premultiplied(rgba: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
