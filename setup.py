@@ -56,7 +56,7 @@ setup(
         'pillow>=11.1,<14',
         'plotly>=6,<8',
         'rich>=13.7,<16',
-        'rosbags>=0.11,<1',
+        'rosbags>=0.11.6,<1',
         'safetensors>=0.4.3,<1',
         'scikit-image>=0.22,<1',
         'scipy>=1.15,<2',
