@@ -209,6 +209,7 @@ def test_a_process_that_dies_ends_the_making_in_a_line_that_says_so():
     ahead.close()
 
 
+@pytest.mark.slow
 def test_a_resumed_training_makes_the_same_objects_and_the_same_weights(tmp_path):
     maker, pace = Maker(SHAPES, (), SPEC), Pace(2, 1, 3)
     config = TrainingConfig(4, 2, max_views=2, checkpoint_every=2, bfloat16=False)
