@@ -53,15 +53,11 @@ test-full: ready .venv/full  ## every test, high counts and soak too
 
 # Whatever is made next has the versions of constraints.txt again.
 test-jazzy: ready  ## `make test` with numpy 1.26 and OpenCV 4, for which Jazzy is built
-	@echo '== installing numpy 1.26 and what belongs to it'
-	@rm .venv/installed
-	@$(PIP) install --no-compile --no-deps -r constraints-jazzy.txt
-	@$(TEST) -m 'not slow' $(ARGS)
-
 test-lowest: ready  ## `make test` with the lowest versions that setup.py accepts; Python 3.11
-	@echo '== installing the lowest versions'
+test-jazzy test-lowest: test-%:
+	@echo '== installing the versions of constraints-$*.txt'
 	@rm .venv/installed
-	@$(PIP) install --no-compile --no-deps -r constraints-lowest.txt
+	@$(PIP) install --no-compile --no-deps -r constraints-$*.txt
 	@$(TEST) -m 'not slow' $(ARGS)
 
 # What the tests begin with; two at a time, since each keeps one core busy.

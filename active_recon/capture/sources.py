@@ -157,7 +157,7 @@ class _Folder:
         if not self._left:
             return None
         path = self._left.pop(0)
-        image = _on_white(read_image(path), path)
+        image = _on_white(path)
         if (image.shape[1], image.shape[0]) != self.size:
             raise DataError(f'{path}: another size: expected {self.size[0]} x {self.size[1]} '
                             f'pixels as before, got {image.shape[1]} x {image.shape[0]}',
@@ -168,13 +168,14 @@ class _Folder:
         """Nothing is to be given back."""
 
 
-def _on_white(image: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
+def _on_white(path: Path) -> NDArray[np.uint8]:
     """Return a file's image laid on white where it is transparent, as those of messages are."""
-    if path.suffix.lower() in ('.jpg', '.jpeg'):  # none is, and they take long to decode
-        return image
     stored: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if stored is None or stored.ndim < 3 or stored.shape[2] < 4:
-        return image
+    channels = stored.shape[2] if stored is not None and stored.ndim == 3 else 1
+    if channels == 3 and stored.dtype == np.uint8:
+        return np.asarray(stored)
+    if channels < 4:  # grey, of more bits, or not readable
+        return read_image(path)
     bgra = stored / (np.iinfo(stored.dtype).max if stored.dtype.kind == 'u' else 1)
     shown = 1 - (1 - bgra[..., :3]) * bgra[..., 3:]
     return np.asarray(np.rint(255 * shown).clip(0, 255), np.uint8)

@@ -26,12 +26,11 @@ class FramedViews:
 
     V is the smallest number of views of any object; of an object with more, every second or so is
     taken, so that turntables are still seen all around. What was read is kept, up to some
-    gigabytes, the least recently used of it being dropped first. Raises DataError where the side
-    of an object's voxel grid cannot be read.
+    gigabytes, the least recently used of it being dropped first.
     """
 
     def __init__(self, folders: Sequence[ObjectFolder], shown: Sequence[Sequence[Camera]],
-                 resolution: int, image_size: int) -> None:
+                 sides: Sequence[float], resolution: int, image_size: int) -> None:
         count, views = len(folders), min(map(len, shown))
         self.folders, self._size = folders, image_size
         self._numbers = [[view * len(cameras) // views for view in range(views)]
@@ -39,13 +38,12 @@ class FramedViews:
         self._shown = [[cameras[number] for number in numbers]
                        for cameras, numbers in zip(shown, self._numbers, strict=True)]
         self._resolution = resolution
-        self._sides = np.ones(count)
+        self._sides = sides
         self.poses = np.empty((count, views, 4, 4))
         self.intrinsics = np.empty((count, views, 3, 3))
         for index in range(count):
-            self._sides[index] = side = folders[index].grid_side(resolution)
             for view, camera in enumerate(self._shown[index]):
-                target = cropped_camera(camera, side, image_size)
+                target = cropped_camera(camera, sides[index], image_size)
                 self.poses[index, view] = target.pose
                 self.intrinsics[index, view] = target.intrinsics.matrix
         self.image_shapes = ((count, views, image_size, image_size, 4),
@@ -108,22 +106,22 @@ class OnDemand:
 
 
 def read_cameras(folders: Sequence[ObjectFolder], resolution: int) -> tuple[
-        list[ObjectFolder], list[list[Camera]], tuple[str, ...]]:
+        list[ObjectFolder], list[list[Camera]], list[float], tuple[str, ...]]:
     """
-    Return the objects whose cameras can be read, their cameras, and errors of the others.
+    Return the objects whose cameras can be read, these, their grids' sides, and others' errors.
 
     Those without voxels of this resolution, as of a run that was interrupted, are of the others.
     """
-    good, shown, errors = [], [], []
+    good, shown, sides, errors = [], [], [], []
     for folder in folders:
         try:
             cameras = folder.cameras()
             if not cameras:
                 raise DataError(f'{folder.images_folder}: no views: expected one or more, got '
                                 'none')
-            folder.grid_side(resolution)
+            sides.append(folder.grid_side(resolution))
             good.append(folder)
             shown.append(cameras)
         except DataError as error:
             errors.append(str(error))
-    return good, shown, tuple(errors)
+    return good, shown, sides, tuple(errors)

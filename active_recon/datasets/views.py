@@ -173,14 +173,14 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
                  image_size: int, at_once: bool, depth: bool) -> ViewSet:
     """Read views from arbitrary cameras; see `read_views`."""
     without = [folder for folder in folders if depth and not folder.has_depth]
-    folders, shown, lacking = read_cameras(
+    folders, shown, sides, lacking = read_cameras(
         [each for each in folders if each not in without], resolution)
     lacking += tuple(f'{folder.depth_path(0)}: no depth images: expected those that `render` or '
                      '`dataset build` makes with `--depth`' for folder in without)
     if not folders:
         raise DataError('no readable object: expected at least one in the dataset, got none'
                         + ''.join(f'\n  {error}' for error in lacking[:5]))
-    views = FramedViews(folders, shown, resolution, image_size)
+    views = FramedViews(folders, shown, sides, resolution, image_size)
     poses, intrinsics = torch.from_numpy(views.poses), torch.from_numpy(views.intrinsics)
     image_shape, seen_shape = views.image_shapes
     if not at_once:
