@@ -7,7 +7,7 @@ late where nothing is wrong: a live test that fails is run once more when nothin
 fails then has failed; what passes then is named at the end.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 import subprocess
 import sys
@@ -27,12 +27,18 @@ def pytest_configure(config: Config) -> None:
 def pytest_collection_modifyitems(config: Config, items: list[Item]) -> None:
     """Let the files of live tests take turns with the others, the same in every worker."""
     if hasattr(config, 'workerinput'):
-        order = take_turns(list(dict.fromkeys(item.nodeid.split('::')[0] for item in items)))
+        files = {item.nodeid.split('::')[0]: item.path for item in items}
+        order = take_turns({file: path.stat().st_size for file, path in files.items()})
         items.sort(key=lambda item: order.index(item.nodeid.split('::')[0]))
 
 
-def take_turns(files: Sequence[str]) -> list[str]:
-    """Return the files with those of live tests evenly among the others."""
+def take_turns(sizes: Mapping[str, int]) -> list[str]:
+    """
+    Return files, given with their sizes, with those of live tests evenly among the others.
+
+    The largest of each kind come first, so that none that takes long is left alone at the end.
+    """
+    files = sorted(sizes, key=lambda file: (-sizes[file], file))
     live = [file for file in files if file.startswith(LIVE)]
     others = [file for file in files if not file.startswith(LIVE)]
     place = {file: (index + 0.5) / len(kind)

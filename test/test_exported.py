@@ -137,7 +137,7 @@ def test_threads_may_share_a_network(exported, library):
     expected = runtime.step(image, camera, runtime.initial_state())[0]
     with ThreadPoolExecutor(3) as pool:
         found = list(pool.map(lambda _: runtime.step(
-            image, camera, runtime.initial_state())[0], range(60)))
+            image, camera, runtime.initial_state())[0], range(24)))
     assert all(np.array_equal(each, expected) for each in found)
 
 
@@ -276,8 +276,8 @@ def test_a_runtime_proposes_as_torch_does_after_every_view(exported, library):
     np.testing.assert_allclose(states[1]['memory'], states[0]['memory'], atol=1e-4)
 
 
-@pytest.mark.parametrize(('model', 'most'), [
-    pytest.param('lifting', 5e6, marks=pytest.mark.slow), ('lifting-large', 12e6)])
+@pytest.mark.slow
+@pytest.mark.parametrize(('model', 'most'), [('lifting', 5e6), ('lifting-large', 12e6)])
 def test_what_ships_is_what_the_command_makes(model, most, tmp_path):
     weights = find_weights(model)
     for path in (weights, scorer_path(weights)):

@@ -297,7 +297,9 @@ class OneView(torch.nn.Module):
         return self.network(image, Cameras(pose, intrinsics), state)
 
 
-def test_a_whole_step_exports_and_looks_maps_up_in_two_dimensions(lifting):
+def test_a_whole_step_exports_and_looks_maps_up_in_two_dimensions():
+    torch.manual_seed(0)
+    lifting = Lifting.from_config(replace(TINY, visibility=True)).eval()
     image, camera = some_images(1), VIEWS.rows(slice(0, 1))
     arguments = image, camera.poses, camera.intrinsics, lifting.initial_state(1)
     with torch.no_grad():

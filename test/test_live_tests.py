@@ -41,7 +41,8 @@ def test_only_a_live_test_is_run_once_more_and_what_fails_then_has_failed(
     assert (f'FAILED {again} - ' in done.stdout) == (kind != 'ros')
 
 
-def test_files_of_live_tests_lie_evenly_among_the_others():
-    live, others = ['test/ros/a', 'test/browser/b'], ['test/c', 'test/d', 'test/e', 'test/f']
-    assert take_turns([*live, *others]) == [
+def test_files_of_live_tests_lie_evenly_among_the_others_the_largest_of_both_first():
+    sizes = {'test/browser/b': 1, 'test/ros/a': 2,
+             'test/f': 1, 'test/e': 1, 'test/d': 7, 'test/c': 9}
+    assert take_turns(sizes) == [
         'test/c', 'test/ros/a', 'test/d', 'test/e', 'test/browser/b', 'test/f']

@@ -36,7 +36,7 @@ class Motion:
         return found
 
 
-@pytest.mark.parametrize('rate', [10.0, 30.0, 200.0])
+@pytest.mark.parametrize('rate', [10.0, 30.0, pytest.param(200.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize('speed', [0.3, 1.0, 20.0, 100.0])
 @pytest.mark.parametrize('step', [math.tau / 24, 1e-4], ids=['view by view', 'smooth'])
 def test_a_turntable_that_goes_from_goal_to_goal_neither_jumps_nor_stalls(rate, speed, step):

@@ -119,7 +119,8 @@ def cluttered(rgba):
     return [on_plain(*both) for both in zip(rgba, tiles, strict=True)]
 
 
-@pytest.mark.parametrize('background', ['auto', 'segment'])
+@pytest.mark.parametrize('background', [
+    'auto', pytest.param('segment', marks=pytest.mark.slow)])
 def test_before_clutter_the_cube_is_found_too(views, cluttered, tmp_path, background):
     shape = active_recon.reconstruct(write_photos(tmp_path, views, cluttered),
                                      background=background)
@@ -442,7 +443,8 @@ def test_a_file_in_place_of_the_folder_to_write_is_refused_before_any_work(tmp_p
 
 @pytest.mark.skipif(not DINO.is_dir(), reason='needs dinoSparseRing of Middlebury: name it by '
                                              'ACTIVE_RECON_DINO')
-@pytest.mark.parametrize(('background', 'least'), [('auto', 0.77), ('plain', 0.77)])
+@pytest.mark.parametrize(('background', 'least'), [
+    ('auto', 0.77), pytest.param('plain', 0.77, marks=pytest.mark.slow)])
 def test_five_photos_of_the_dinosaur_are_near_the_hull_of_all(background, least):
     from active_recon.datasets.middlebury import read_photographs
     from active_recon.evaluation.posed.photographs import averaged, hull

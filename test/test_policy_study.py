@@ -31,10 +31,16 @@ def few(views):
     return part_of(views, chosen=slice(None, None, 4))
 
 
+@pytest.fixture(scope='module')
+def finished_runs(tmp_path_factory):
+    """Return a folder: what one test has run the others find there."""
+    return tmp_path_factory.mktemp('runs')
+
+
 @pytest.fixture
-def trial(network, few, tmp_path):
+def trial(network, few, finished_runs):
     """Return a trial of all six objects, each from two views."""
-    return Trial(network, 0.1, few, 2, 3, cache=tmp_path)
+    return Trial(network, 0.1, few, 2, 3, cache=finished_runs)
 
 
 def some_episodes(ious):
@@ -141,8 +147,8 @@ def test_a_study_that_is_run_again_runs_nothing(trial, attentions, monkeypatch):
     assert again == found
 
 
-def test_every_run_is_reported_to_its_end(trial, attention):
-    listener = Listener()
+def test_every_run_is_reported_to_its_end(network, few, attention, tmp_path):
+    listener, trial = Listener(), Trial(network, 0.1, few, 2, 3, cache=tmp_path)
     policy_study(trial, [attention], seeds=2, subset_objects=3, reporting=listener)
     assert len(listener.told) == 7
     assert {'random-0', 'random-1', 'uniform', 'farthest', 'oracle'} < set(listener.told)

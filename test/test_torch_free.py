@@ -24,20 +24,16 @@ MODULES = [
 
 
 IMPORTED = """
-import importlib, os, sys, traceback
-import cv2, geometry_msgs.msg, jinja2, mcap.reader, mcap.writer, numpy, PIL.Image, rclpy.node
-import rosbags.rosbag2, scipy.ndimage, scipy.spatial, sensor_msgs.msg, trimesh, viser
+import importlib, sys, traceback
 
 for module in sys.argv[1:]:
-    if child := os.fork():
-        os.waitpid(child, 0)
-        continue
     try:
         importlib.import_module(module)
-        print(module, 'torch' in sys.modules, flush=True)
-    except BaseException:
+        print(module, 'torch' in sys.modules)
+    except Exception:
         traceback.print_exc()
-    os._exit(0)
+    if 'torch' in sys.modules:
+        break
 """
 
 
@@ -45,7 +41,7 @@ def imported_with(*modules):
     """
     Return by module whether torch comes with it, and what was said of what cannot be imported.
 
-    Each has a process that had none of the others; the libraries of them all are there already.
+    One process imports them all, up to the first with torch.
     """
     ended = subprocess.run([sys.executable, '-c', IMPORTED, *modules], cwd=ROOT,
                            capture_output=True, text=True)

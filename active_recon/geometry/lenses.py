@@ -18,6 +18,7 @@ MODELS = {'plumb_bob': (4, 5), 'rational_polynomial': (8, 12), 'equidistant': (4
 """The allowed numbers of coefficients of each model, in OpenCV's order: k1, k2, p1, p2, k3, ..."""
 _LARGEST = 1e6  # larger than in any lens, and its sixth power does not overflow
 _STEP = 1e-6
+_CLOSE = 1e-10
 _HALVINGS = 6  # of a step of Newton's that leads away
 _STEEPEST = 3.0  # of any lens: beyond, a model is beside a pole, as fits of 8 coefficients have
 _WITHIN = 0.9999  # at the maximum radius itself a model may divide by 0
@@ -56,7 +57,9 @@ class Distortion:
         Beyond `max_radius`, where the model would fold back towards the centre, the displacement
         is held constant, so that points outside of the field of view stay outside of the image.
         """
-        radius = np.linalg.norm(points, axis=1, keepdims=True)
+        radius = np.hypot(points[:, :1], points[:, 1:])
+        if radius.max(initial=0.0) <= self.max_radius:
+            return self._modelled(points)
         beyond = np.maximum(radius - self.max_radius, 0.0)
         outwards = points / np.maximum(radius, 1e-12)
         distorted = self._modelled(points - beyond * outwards)
@@ -66,26 +69,28 @@ class Distortion:
         """
         Return distorted points (N, 2) without the distortion, (N, 2): the inverse of `distort`.
 
-        Found by Newton's method, to 1e-6.
+        Found by Newton's method, until their distortion is within 1e-10 of the points.
         """
         found, open_ones = points.copy(), np.arange(len(points))
+        wrong = self.distort(points) - points
         for _ in range(20):  # Newton's steps; a handful is enough but at the edge of the field
-            near = found[open_ones]
-            wrong = self.distort(near) - points[open_ones]
+            near, there = found[open_ones], points[open_ones]
             across, down = ((self.distort(near + step) - self.distort(near - step)) / (2 * _STEP)
                             for step in np.eye(2) * _STEP)
             determinant = across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0]
             step = np.column_stack([
                 wrong[:, 0] * down[:, 1] - wrong[:, 1] * down[:, 0],
                 wrong[:, 1] * across[:, 0] - wrong[:, 0] * across[:, 1]]) / determinant[:, None]
+            left = self.distort(near - step) - there
             for _ in range(_HALVINGS):  # near its fold the model is flat, and steps are long
-                left = self.distort(near - step) - points[open_ones]
                 away = np.linalg.norm(left, axis=1) > np.linalg.norm(wrong, axis=1)
                 if not away.any():
                     break
                 step[away] /= 2
+                left[away] = self.distort((near - step)[away]) - there[away]
             found[open_ones] = near - step
-            open_ones = open_ones[np.abs(wrong).max(axis=1) > 1e-6]  # their last step was enough
+            still = np.abs(left).max(axis=1) > _CLOSE
+            open_ones, wrong = open_ones[still], left[still]
             if not len(open_ones):
                 break
         return found
