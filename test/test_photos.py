@@ -179,7 +179,7 @@ def test_a_few_photos_with_an_edge_of_one_colour_are_before_clutter_like_the_oth
 def test_an_object_on_a_table_with_a_pattern_is_found():
     rng = np.random.default_rng(0)
     mesh = photo_table.centred(thing(), 0.14)
-    seen_by = photo_table.around(8, 0.42, rng)
+    seen_by = photo_table.around(6, 0.42, rng)
     images, _ = photo_table.photographed(mesh, seen_by, 'boards', rng)
     shape = from_views([view_of(str(number), *both) for number, both
                         in enumerate(zip(images, seen_by, strict=True))],
