@@ -78,7 +78,7 @@ def test_what_a_dying_worker_had_is_done_again_and_no_item_is_lost_or_doubled(
     assert (tmp_path / '2-1').exists()
 
 
-@pytest.mark.parametrize('kind', ['local', 'ray'])
+@pytest.mark.parametrize('kind', ['local', pytest.param('ray', marks=pytest.mark.slow)])
 def test_items_are_drawn_as_workers_have_room_for_them(crews, kind):
     drawn = done = most = 0
 
@@ -106,7 +106,7 @@ def test_a_bundle_of_items_that_take_longer_than_those_before_is_given_back(monk
     assert [left.draw(), left.draw()] == [[(1, 41)], [(2, 42)]]
 
 
-@pytest.mark.parametrize('kind', ['local', 'ray'])
+@pytest.mark.parametrize('kind', ['local', pytest.param('ray', marks=pytest.mark.slow)])
 def test_no_item_of_a_bundle_that_is_given_back_is_lost_or_doubled(crews, kind):
     with crews[kind]() as crew:
         found = results(crew, cluster_items.quick_at_first, range(44))
@@ -123,7 +123,7 @@ def test_an_error_in_the_middle_of_the_work_starts_no_other_ray(crews):
     assert not ray.is_initialized()
 
 
-@pytest.mark.parametrize('kind', ['local', 'ray'])
+@pytest.mark.parametrize('kind', ['local', pytest.param('ray', marks=pytest.mark.slow)])
 def test_a_full_disk_stops_the_work_with_one_error(crews, kind):
     with crews[kind]() as crew, pytest.raises(
             WorkError, match='no room to write: .*No space left .*start again'):

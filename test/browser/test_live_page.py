@@ -1,5 +1,7 @@
 """The page in a real browser, with no ROS: what it draws, and its slider and buttons."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 from active_recon.bags.runs.run import (
     Candidates,
     RecordedEpisode,
@@ -43,11 +45,21 @@ def taken(number):
                      1000.0 / number)
 
 
+@pytest.fixture(scope='module')
+def end():
+    """Return a function that ends pages beside the tests that follow: it takes 5 s each."""
+    with ThreadPoolExecutor(16) as pool:
+        ending = []
+        yield lambda page: ending.append(pool.submit(page.close))
+    for each in ending:
+        each.result()
+
+
 @pytest.fixture
-def page():
+def page(end):
     shown = Page('a page', port=0)
     yield shown
-    shown.close()
+    end(shown)
 
 
 def scene(chromium):
@@ -238,11 +250,11 @@ def recorded_episode(name, count):
 
 
 @pytest.fixture
-def playback(tmp_path):
+def playback(tmp_path, end):
     shown = Playback(recorded_run(
         tmp_path / 'a_bag', [recorded_episode('a', 3), recorded_episode('b', 1)]))
     yield shown
-    shown.page.close()
+    end(shown.page)
 
 
 def test_a_bag_is_stepped_through_view_by_view(playback, chromium):

@@ -251,7 +251,7 @@ def test_a_node_that_dies_is_told_with_its_last_words(start_demo):
 
 @pytest.mark.parametrize(('name', 'said'), [
     ('teapot', 'teapot: no such mesh file, and none of bed, car, chair, sofa, table'),
-    (__file__, 'no mesh that can be read'),
+    pytest.param(__file__, 'no mesh that can be read', marks=pytest.mark.slow),
 ])
 def test_what_is_no_object_is_refused_in_one_line(start_demo, name, said):
     code, out, err = start_demo('--object', name).end()

@@ -143,8 +143,7 @@ def test_every_executable_publishes_and_ends_when_asked(
             assert process.wait(STOP_BUDGET_S) == 0, said(tmp_path, node)
 
 
-@pytest.mark.parametrize('install', [
-    'pip', pytest.param('colcon', marks=pytest.mark.slow)], indirect=True)
+@pytest.mark.slow
 def test_the_installed_demo_leaves_a_bag_a_mesh_and_a_picture(install, tmp_path):
     run([install.executables / 'active-recon', 'demo', '--views', '2', '--policy', 'farthest'],
         env=install.environment, cwd=tmp_path)

@@ -141,7 +141,7 @@ def test_the_status_names_a_node_that_tells_nothing(told, shared_bench):
     assert re.search(r'^/view_planner  WARN', said, re.MULTILINE)
 
 
-@pytest.mark.parametrize('namespace', ['/cell', '/'])
+@pytest.mark.parametrize('namespace', ['/cell', pytest.param('/', marks=pytest.mark.slow)])
 def test_the_status_names_a_silent_node_whose_name_is_like_that_of_another(
         told, shared_bench, namespace):
     warned_status(told)
