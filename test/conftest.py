@@ -1,5 +1,6 @@
 """Six small objects and a network that learns in seconds, for whatever tests the learned core."""
 
+import gc
 import os
 from pathlib import Path
 import tempfile
@@ -17,6 +18,17 @@ pytest_plugins = ['live_tests']
 # Nothing is left in the user's cache; what was compiled in one process serves the others
 os.environ.setdefault(
     'ACTIVE_RECON_CACHE', str(Path(tempfile.gettempdir()) / f'active_recon-tests-{os.getuid()}'))
+
+
+def pytest_configure() -> None:
+    """Look for no garbage while thousands of tests are collected: there is none."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage among what the tests make alone."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope='session')
