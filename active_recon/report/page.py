@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime, UTC
+from functools import cache
 import json
 import math
 from pathlib import Path
@@ -50,16 +51,22 @@ def report_page(subjects: Sequence[Subject]) -> str:
         {'scene': scene(subject), 'surface': surface, 'map': turntable_map(subject),
          'stages': stage_chart(timings(subject.episode, subject.timed))}
         for subject, surface in zip(subjects, surfaces, strict=True)]}
+    return _environment().get_template('page.html').render(
+        panels=panels, several=several, known_truth=known_truth, stages=STAGES,
+        introduction=introduction(subjects),
+        drawn=compressed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
+        plotly=plotly_script())
+
+
+@cache
+def _environment() -> Environment:
+    """Return the templates' environment, which keeps what it has compiled."""
     environment = Environment(
         loader=PackageLoader('active_recon.report', 'templates'), autoescape=True,
         trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
     environment.filters |= {'number': _number, 'degrees': whole_degrees,
                             'elevation': elevation_degrees, 'words': key_words}
-    return environment.get_template('page.html').render(
-        panels=panels, several=several, known_truth=known_truth, stages=STAGES,
-        introduction=introduction(subjects),
-        drawn=compressed(json.dumps(drawn, sort_keys=True, allow_nan=False).encode()),
-        plotly=plotly_script())
+    return environment
 
 
 def write_page(page: str, path: Path) -> None:
