@@ -1,10 +1,13 @@
 """Six small objects and a network that learns in seconds, for whatever tests the learned core."""
 
+from collections.abc import Iterator
+from functools import cache
 import gc
 import os
 from pathlib import Path
 import tempfile
 
+from active_recon import reconstructor
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.models.attention import AttentionModel
@@ -49,6 +52,14 @@ def tiny() -> Network2d3dConfig:
     return Network2d3dConfig(
         stem_channels=4, block_channels=(6, 8, 8), recurrent_channels=8, bottleneck_channels=16,
         latent_channels=2, volume_channels=6, decoder_channels=(6, 4), glimpse_channels=8)
+
+
+@pytest.fixture(scope='module')
+def loaded_once() -> Iterator[None]:
+    """Load a network once for all reconstructors and commands of a module: it has no state."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reconstructor, 'load_runtime', cache(reconstructor.load_runtime))
+        yield
 
 
 @pytest.fixture

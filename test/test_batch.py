@@ -30,6 +30,7 @@ import yaml
 
 ROOT = Path(__file__).parents[1]
 PAPER = ROOT / 'bags' / 'golden' / 'paper'
+pytestmark = pytest.mark.usefixtures('loaded_once')
 
 
 @pytest.fixture

@@ -13,9 +13,11 @@ import pytest
 from report_runs import changed, recorded_run
 from typer.testing import CliRunner
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
+
 
 @pytest.fixture(scope='module')
-def run():
+def run(loaded_once):
     return recorded_run('chair', 'uniform', 2)
 
 
