@@ -9,6 +9,7 @@ from active_recon.bags.runs import reading
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.objects import find_object
+from active_recon.report import page as page_module
 import pytest
 from report_runs import changed, recorded_run
 from typer.testing import CliRunner
@@ -33,6 +34,7 @@ def bags(tmp_path, monkeypatch, run):
         return replace(run, path=path, parameters={})
 
     monkeypatch.setattr(reading, 'read_run', read_run)
+    monkeypatch.setattr(page_module, 'colored_surface', lambda subject: None)
     for name in ('first', 'second'):
         (tmp_path / name).mkdir()
     return tmp_path / 'first', tmp_path / 'second', asked

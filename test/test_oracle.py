@@ -85,11 +85,11 @@ def test_the_oracle_takes_every_view_once_and_then_ends(network, few):
 
 
 def test_the_oracle_s_episodes_have_the_form_of_a_policy_s_and_the_second_view_is_the_best(
-        network, views):
-    objects, starts = episodes(views, 2)
+        network, few):
+    objects, starts = episodes(few, 2)
     told = []
-    oracle = run_oracle(network, views, objects, starts, THRESHOLD, 2, progress=told.append)
-    random = run_policy(network, RandomPolicy(np.random.default_rng(0)), views, objects, starts,
+    oracle = run_oracle(network, few, objects, starts, THRESHOLD, 2, progress=told.append)
+    random = run_policy(network, RandomPolicy(np.random.default_rng(0)), few, objects, starts,
                         THRESHOLD, 2)
     assert sum(told) == 12
     for name in ('iou', 'entropy', 'paper_entropy', 'azimuths'):
@@ -105,6 +105,7 @@ def test_every_sequence_has_the_iou_of_its_rollout_and_no_view_comes_twice(netwo
     assert table.shape == (6,) * length
     sequences = np.array(list(permutations(range(6), length)))
     assert np.isfinite(table).sum() == len(sequences)
+    sequences = np.random.default_rng(0).permutation(sequences)[:30]
     expected = iou_along(network, few, 4, sequences)[:, -1]
     np.testing.assert_allclose(table[tuple(sequences.T)], expected, atol=2e-3)
 

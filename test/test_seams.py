@@ -22,6 +22,7 @@ from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import iou, turned
 import numpy as np
 import pytest
+from shown_views import part_of
 import torch
 import toy
 import trimesh
@@ -65,7 +66,8 @@ def test_a_toy_is_trained_like_any_other(weights):
 
 def test_toys_are_measured_like_any_others(weights, seen):
     bundle = load_weights(weights)
-    trial = Trial(bundle.reconstruction, bundle.threshold, seen, starts=2, count=4)
+    few = part_of(seen, chosen=slice(None, None, 4))
+    trial = Trial(bundle.reconstruction, bundle.threshold, few, starts=2, count=4)
     found = compare(trial, run_all(trial, contenders(['opposite', 'random', 'oracle'], count=4)))
     ious = [value['mean'] for value in found['policies']['opposite']['iou']]
     assert ious[3] > ious[0] + 0.05  # it carves

@@ -104,7 +104,8 @@ def test_points_come_back_as_the_grid_that_they_were(size, resolution):
 
 
 @pytest.mark.parametrize('size', [0.35, 1.0])
-@pytest.mark.parametrize('resolution', [2, 4, 8, 16, 32, 64, 128, 256])
+@pytest.mark.parametrize('resolution', [
+    2, 4, 8, 16, 32, 64, 128, pytest.param(256, marks=pytest.mark.slow)])
 def test_one_point_tells_a_grid_whose_side_is_a_power_of_two(size, resolution):
     for cell in RNG.integers(0, resolution, (20, 3)):
         center = (cell + 0.5) / resolution * size - size / 2
