@@ -9,6 +9,7 @@ from active_recon.cli.main import app
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import ConfigError, DataError
 from active_recon.shapes import CATEGORIES, generators_hash, UNSEEN_CATEGORIES
+from command_line import command
 import pytest
 import trimesh
 from typer.testing import CliRunner
@@ -167,14 +168,11 @@ def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp
         run('dataset', 'build', tmp_path, '--train', 0, '--val', 0, '--test', 0, '--unseen', 0)
 
 
-def command(*arguments):
-    return subprocess.run(
-        [sys.executable, '-m', 'active_recon.cli.main', *map(str, arguments)],
-        capture_output=True, text=True, timeout=600, check=False)
-
-
 def test_two_processes_make_what_one_makes(meshes, tmp_path):
-    result = command('render', meshes, tmp_path / 'two', '--workers', 2, '--samples', 1)
+    result = subprocess.run(
+        [sys.executable, '-m', 'active_recon.cli.main', 'render', meshes, tmp_path / 'two',
+         '--workers', '2', '--samples', '1'],
+        capture_output=True, text=True, timeout=600, check=False)
     assert result.returncode == 0, result.stderr
     run('render', meshes, tmp_path / 'one', *ONE_WORKER)
     files = sorted(path.relative_to(tmp_path / 'one') for path in (tmp_path / 'one').rglob('*.*'))
@@ -183,8 +181,8 @@ def test_two_processes_make_what_one_makes(meshes, tmp_path):
         assert (tmp_path / 'one' / file).read_bytes() == (tmp_path / 'two' / file).read_bytes()
 
 
-def test_a_refusal_is_one_line_and_exit_code_2(tmp_path):
-    result = command('render', tmp_path / 'none', tmp_path / 'out')
-    assert result.returncode == 2
-    assert result.stderr == (f'active-recon: {tmp_path}/none: no such file or folder: expected a '
-                             'mesh file or a folder of <category>/<mesh>\n')
+def test_a_refusal_is_one_line_and_exit_code_2(tmp_path, monkeypatch, capsys):
+    assert command(monkeypatch, 'render', tmp_path / 'none', tmp_path / 'out') == 2
+    assert capsys.readouterr().err == (
+        f'active-recon: {tmp_path}/none: no such file or folder: expected a mesh file or a folder '
+        'of <category>/<mesh>\n')

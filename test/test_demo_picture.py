@@ -20,9 +20,13 @@ CONE = trimesh.creation.cone(radius=0.3, height=0.9).apply_translation([0, 0, -0
 TRUTH = voxelise(CONE)
 
 
+@cache
+def image_from(azimuth):
+    return composite(Renderer(CONE).render(orbit_camera(azimuth)), 255)
+
+
 def seen(azimuth=0.0, occupied=TRUTH):
-    image = composite(Renderer(CONE).render(orbit_camera(azimuth)), 255)
-    return ViewResult(0, orbit_camera(azimuth), image, 100.0, 0.01, occupied, 1.0)
+    return ViewResult(0, orbit_camera(azimuth), image_from(azimuth), 100.0, 0.01, occupied, 1.0)
 
 
 def center_of(picture, color):

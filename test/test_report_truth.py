@@ -7,6 +7,7 @@ from pathlib import Path
 from active_recon.bags.runs.rebuilt import lacks_reconstruction, with_reconstruction
 from active_recon.bags.runs.run import RecordedRun
 from active_recon.errors import ConfigError, DataError, MeshError
+from active_recon.models.weights_files import SHIPPED
 from active_recon.objects import find_object
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.subject import Subject
@@ -20,7 +21,7 @@ import trimesh
 
 
 @pytest.fixture(scope='module')
-def run() -> RecordedRun:
+def run(loaded_once: None) -> RecordedRun:
     return recorded_run('chair', 'uniform', 3)
 
 
@@ -160,7 +161,7 @@ def test_shapes_made_up_for_are_those_that_the_loop_would_have_found(run):
                                for view in run.episodes[0].views])
     assert lacks_reconstruction(bare)
     assert not lacks_reconstruction(run)
-    made = with_reconstruction(bare, Reconstructor.load(threads=1))
+    made = with_reconstruction(bare, Reconstructor.load(SHIPPED, threads=1))
     for view, recorded in zip(made.episodes[0].views, run.episodes[0].views, strict=True):
         assert (view.occupied.occupied(0) == recorded.occupied.occupied(0)).all()
         assert view.entropy == recorded.entropy

@@ -16,6 +16,8 @@ from recorded_runs import episode_of, loop_of, policies, run_of, SECOND
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
+
 
 @pytest.fixture
 def run(network, attention):
