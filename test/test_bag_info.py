@@ -8,6 +8,8 @@ from loop_bags import BEGIN, LoopRun, write_bag
 import pytest
 from typer.testing import CliRunner
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
+
 
 def info(*arguments):
     result = CliRunner().invoke(app, ['bag', 'info', *map(str, arguments)])
