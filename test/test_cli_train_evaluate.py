@@ -4,6 +4,7 @@ import json
 import math
 import shutil
 
+from active_recon.models.network_2d3d import SIZES
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import weights_hash
 from command_line import command, refusal
@@ -18,6 +19,14 @@ from torch.testing import assert_close
 def dataset(tmp_path_factory):
     """Return a folder of a lamp and a table: what is measured takes as long as its objects."""
     return lamps_and_tables(tmp_path_factory.mktemp('dataset'), 1)
+
+
+@pytest.fixture(scope='module', autouse=True)
+def small_is_tiny(tiny):
+    """Let the small size of the networks of the paper be one that is trained in no time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(SIZES, 'small', tiny)
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -73,12 +82,18 @@ def test_a_training_that_is_done_is_resumed_to_the_same_weights(run, dataset, mo
 
 @pytest.mark.parametrize(('option', 'value', 'told'), [
     ('--seed', 3, 'settings: seed: expected 0 as before, got 3; ask'),
-    ('--init-from', '2d3d-attention', "settings: begun_with: expected '' as before, got '"),
     ('--view-separation-deg', 90, 'view_separation: expected 1.04719755')])
 def test_a_training_of_other_settings_is_not_resumed(
         run, dataset, monkeypatch, capsys, option, value, told):
     line = refusal(monkeypatch, capsys, *training(dataset, run, '--resume', option, value))
     assert 'made under other settings' in line and told in line
+
+
+def test_a_training_that_began_with_other_weights_is_not_resumed(
+        run, dataset, monkeypatch, capsys):
+    assert "settings: begun_with: expected '' as before, got '" in refusal(
+        monkeypatch, capsys, *training(dataset, run, '--resume', '--init-from',
+                                       run / 'weights.safetensors'))
 
 
 def test_a_new_training_never_overwrites_the_checkpoints_of_another(

@@ -1,6 +1,8 @@
 """What holds for every network that the paper's is compared with, whatever is inside."""
 
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
@@ -40,6 +42,7 @@ def name_of(case):
     return f'{case[0]}-{getattr(case[1], "resolution", 32)}'
 
 
+@cache
 def built(case):
     """Return the network of a case; what is fitted in one go is fitted to boxes."""
     torch.manual_seed(0)
@@ -61,7 +64,7 @@ def case(request):
 
 @pytest.fixture
 def tiny_network(case):
-    return built(case)
+    return deepcopy(built(case))
 
 
 def some_views(network, count, batch):

@@ -57,9 +57,23 @@ def assert_same(a, b):
 
 
 @pytest.fixture(scope='module')
-def whole(views, tiny, tmp_path_factory):
+def finished(tmp_path_factory):
+    """Return the checkpoint of the training that nobody cut off, once it is done."""
+    return tmp_path_factory.mktemp('whole') / 'run.safetensors'
+
+
+@pytest.fixture(scope='module')
+def whole(views, tiny, finished):
     """Return a training that nobody cut off."""
-    return train(CONFIG, views, tiny, tmp_path_factory.mktemp('whole') / 'run.safetensors')
+    return train(CONFIG, views, tiny, finished)
+
+
+@pytest.fixture(scope='module')
+def begun(views, tiny, tmp_path_factory):
+    """Return the checkpoint of a training that was stopped after three steps."""
+    path = tmp_path_factory.mktemp('begun') / 'run.safetensors'
+    train(CONFIG, views, tiny, path, until=3)
+    return path
 
 
 def test_the_same_seed_walks_the_same_path(whole, views, tiny, tmp_path):
@@ -130,29 +144,24 @@ def test_what_a_network_draws_is_the_same_where_the_training_is_resumed(views, t
     assert_same(trained(tmp_path / 'cut.safetensors', resume=True), whole)
 
 
-def test_a_checkpoint_of_other_objects_or_cameras_is_refused(views, tiny, tmp_path):
-    path = tmp_path / 'run.safetensors'
-    train(CONFIG, views, tiny, path, until=3)
+def test_a_checkpoint_of_other_objects_or_cameras_is_refused(begun, views, tiny):
     for other in (part_of(views, slice(1, None)), replace(views, poses=views.poses.flip(1))):
         with pytest.raises(ConfigError, match='made under other settings'):
-            train(CONFIG, other, tiny, path, resume=True)
+            train(CONFIG, other, tiny, begun, resume=True)
 
 
-def test_a_checkpoint_that_does_not_tell_its_data_is_taken_up(views, tiny, tmp_path, monkeypatch):
+def test_a_checkpoint_that_does_not_tell_its_data_is_taken_up(begun, views, tiny, tmp_path):
     path = tmp_path / 'run.safetensors'
-    train(CONFIG, views, tiny, path, until=3)
-    with safe_open(path, 'pt') as file:
+    with safe_open(begun, 'pt') as file:
         told = json.loads(file.metadata()['checkpoint'])
     del told['settings']['data']
-    save_file(load_file(path), path, {'checkpoint': json.dumps(told)})
+    save_file(load_file(begun), path, {'checkpoint': json.dumps(told)})
     _, steps = train(CONFIG, views, tiny, path, resume=True)
     assert [step for step, _ in steps] == [4, 5, 6, 7]
 
 
-def test_a_finished_training_that_is_resumed_does_nothing(whole, views, tiny, tmp_path):
-    path = tmp_path / 'run.safetensors'
-    train(CONFIG, views, tiny, path)
-    resumed, told = train(CONFIG, views, tiny, path, seed=9, resume=True)
+def test_a_finished_training_that_is_resumed_does_nothing(whole, finished, views, tiny):
+    resumed, told = train(CONFIG, views, tiny, finished, seed=9, resume=True)
     assert told == []
     assert_same(resumed, whole[0])
     assert not resumed.training
@@ -161,11 +170,9 @@ def test_a_finished_training_that_is_resumed_does_nothing(whole, views, tiny, tm
 @pytest.mark.parametrize(('config', 'loss'), [
     (TrainingConfig(**(CONFIG.to_dict() | {'learning_rate': 2e-3})), LossConfig()),
     (CONFIG, LossConfig(volume_loss='bce'))])
-def test_a_checkpoint_of_other_settings_is_refused(views, tiny, tmp_path, config, loss):
-    path = tmp_path / 'run.safetensors'
-    train(CONFIG, views, tiny, path, until=3)
+def test_a_checkpoint_of_other_settings_is_refused(begun, views, tiny, config, loss):
     with pytest.raises(ConfigError, match='made under other settings: .*as before, got'):
-        train(config, views, tiny, path, loss=loss, resume=True)
+        train(config, views, tiny, begun, loss=loss, resume=True)
 
 
 def test_every_step_is_reported_and_validation_now_and_then_in_evaluation_mode(whole):
@@ -179,10 +186,8 @@ def test_every_step_is_reported_and_validation_now_and_then_in_evaluation_mode(w
 
 
 def test_a_loss_that_is_not_finite_names_its_batch_and_leaves_the_checkpoint(
-        views, tiny, tmp_path):
-    path = tmp_path / 'run.safetensors'
-    train(CONFIG, views, tiny, path, until=3)
-    before = path.read_bytes()
+        begun, views, tiny):
+    before = begun.read_bytes()
     config = CONFIG
     torch.manual_seed(0)
     network = Network2d3d.from_config(tiny)
@@ -193,8 +198,8 @@ def test_a_loss_that_is_not_finite_names_its_batch_and_leaves_the_checkpoint(
     with pytest.raises(TrainingDivergedError,
                        match=r'step 4: the loss is nan on the batch (lamp|table)-0.*, .*rate'):
         train_reconstruction(network, views, config, LossConfig(),
-                             Run(make_fabric(False), path, poison, resume=True), lambda model: {})
-    assert path.read_bytes() == before
+                             Run(make_fabric(False), begun, poison, resume=True), lambda model: {})
+    assert begun.read_bytes() == before
 
 
 def test_a_gradient_that_is_not_finite_names_its_batch_and_changes_nothing(views, tiny, tmp_path):
@@ -212,8 +217,8 @@ def test_a_gradient_that_is_not_finite_names_its_batch_and_changes_nothing(views
 @pytest.mark.parametrize('bfloat16', [False, True])
 def test_the_loss_falls(views, tiny, tmp_path, bfloat16):
     one = part_of(views, slice(1))
-    config = TrainingConfig(steps=60, batch_size=4, learning_rate=3e-2, max_views=2,
-                            bfloat16=bfloat16)
+    config = TrainingConfig(steps=24, batch_size=2, learning_rate=3e-2, max_views=2,
+                            bfloat16=bfloat16, warmup_steps=5)
     _, told = train(config, one, tiny, tmp_path / 'run.safetensors',
                     loss=LossConfig(1.0, 0.0, 'bce'))
     losses = [measured['loss'] for _, measured in told]
