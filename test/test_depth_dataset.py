@@ -147,8 +147,13 @@ def test_a_sample_is_what_the_network_says_alone_and_what_its_seed_draws(views):
     torch.testing.assert_close(one.logits, network.decode(state), rtol=1e-3, atol=1e-3)
 
 
+@pytest.fixture
+def calibrated_on_few_views(monkeypatch):
+    monkeypatch.setattr('active_recon.training.depth.LENGTHS', (1, 2))
+
+
 def test_a_refiner_is_trained_and_loaded_from_the_command_line(
-        deep, tmp_path, monkeypatch, capsys):
+        deep, calibrated_on_few_views, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     torch.manual_seed(0)
     weights = tmp_path / 'lifting.safetensors'
@@ -168,7 +173,7 @@ def test_a_refiner_is_trained_and_loaded_from_the_command_line(
 
 
 def test_a_training_may_begin_with_the_refiner_of_another_network(
-        deep, tmp_path, monkeypatch, capsys):
+        deep, calibrated_on_few_views, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     torch.manual_seed(0)
     sizes = replace(TINY, coarse_channels=TINY.coarse_channels + 4)

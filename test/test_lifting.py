@@ -297,6 +297,17 @@ class OneView(torch.nn.Module):
         return self.network(image, Cameras(pose, intrinsics), state)
 
 
+def test_a_whole_step_looks_maps_up_in_two_dimensions(monkeypatch):
+    dimensions, look_up = set(), torch.nn.functional.grid_sample
+    monkeypatch.setattr(torch.nn.functional, 'grid_sample', lambda maps, *others, **more: (
+        dimensions.add(maps.ndim), look_up(maps, *others, **more))[1])
+    lifting = Lifting.from_config(replace(TINY, visibility=True)).eval()
+    with torch.no_grad():
+        lifting(some_images(1), VIEWS.rows(slice(0, 1)), lifting.initial_state(1))
+    assert dimensions == {4}
+
+
+@pytest.mark.slow
 def test_a_whole_step_exports_and_looks_maps_up_in_two_dimensions():
     torch.manual_seed(0)
     lifting = Lifting.from_config(replace(TINY, visibility=True)).eval()

@@ -6,6 +6,7 @@ from functools import cache
 
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS, orbit_camera
+from active_recon.models import shape_basis
 from active_recon.models.network import Cameras
 from active_recon.models.network_2d3d_posed import Network2d3dPosedConfig
 from active_recon.models.ogn import OgnConfig
@@ -55,6 +56,11 @@ def built(case):
             box[8 - index:24 + index, 4 + index:28 - index, 6 + index:20] = True
         entry.fit(network, boxes, np.array(['box'] * 6))
     return network
+
+
+@pytest.fixture(autouse=True)
+def shapes_are_fitted_in_few_steps(monkeypatch):
+    monkeypatch.setattr(shape_basis, '_STEPS', 4)
 
 
 @pytest.fixture(params=CASES, ids=name_of)
