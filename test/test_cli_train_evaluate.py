@@ -1,5 +1,7 @@
 """`active-recon train` and `evaluate`, from the command line to the files that they write."""
 
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 import json
 import math
 import shutil
@@ -52,6 +54,18 @@ def run(dataset, tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope='module')
+def plain(dataset, tmp_path_factory):
+    """Return the folder of a training without a policy, and what it told, on both streams."""
+    out = tmp_path_factory.mktemp('plain')
+    copied = shutil.copytree(dataset, out / 'copy')
+    told, warned = StringIO(), StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(told), redirect_stderr(warned):
+        assert command(patch, *training(dataset, out, '--policy-steps', 0, '--silhouette-weight',
+                                        0, '--validation', copied)) == 0
+    return out, told.getvalue(), warned.getvalue()
+
+
 def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, dataset):
     assert {path.name for path in run.iterdir()} == {
         'reconstruction.safetensors', 'policy.safetensors', 'tensorboard', 'weights.safetensors',
@@ -66,12 +80,6 @@ def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, datase
     assert card['reconstruction']['steps'] == card['policy']['steps'] == 2
     assert card['reconstruction']['silhouette_weight'] == 0.6
     assert len(card['generators_sha256']) == 64
-
-
-def test_a_training_is_validated_on_the_objects_of_every_folder(
-        dataset, tmp_path, monkeypatch, capsys):
-    assert command(monkeypatch, *training(dataset, tmp_path, '--validation', dataset)) == 0
-    assert f'reading validation data: {2 * 2}/{2 * 2}' in capsys.readouterr().out
 
 
 def test_a_training_that_is_done_is_resumed_to_the_same_weights(run, dataset, monkeypatch):
@@ -144,32 +152,28 @@ def test_the_paper_s_network_with_cameras_goes_from_data_to_figures(
     assert all(0 <= value['mean'] <= 1 for each in found.values() for value in each['iou'])
 
 
-def test_validation_objects_that_are_trained_on_are_told_wherever_they_lie(
-        dataset, tmp_path, monkeypatch, capsys):
-    copied = shutil.copytree(dataset, tmp_path / 'copy')
-    asked = training(dataset, tmp_path, '--policy-steps', 0, '--validation', copied)
-    assert command(monkeypatch, *asked) == 0
-    assert '4 of 4 validation objects are trained on too' in capsys.readouterr().err
+def test_a_training_is_validated_on_the_objects_of_every_folder(plain):
+    assert f'reading validation data: {2 * 2}/{2 * 2}' in plain[1]
 
 
-def test_only_weights_with_a_policy_say_how_far_apart_its_views_stay(
-        run, dataset, tmp_path, monkeypatch):
-    assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0)) == 0
+def test_validation_objects_that_are_trained_on_are_told_wherever_they_lie(plain):
+    assert '4 of 4 validation objects are trained on too' in plain[2]
+
+
+def test_only_weights_with_a_policy_say_how_far_apart_its_views_stay(run, plain):
     separations = [json.loads((folder / 'weights.json').read_text())['config']['view_separation']
-                   for folder in (run, tmp_path)]
+                   for folder in (run, plain[0])]
     assert separations == [math.radians(60), 0]
 
 
-def test_a_training_is_told_as_it_goes(dataset, tmp_path, monkeypatch, capsys):
-    assert command(monkeypatch, *training(dataset, tmp_path, '--policy-steps', 0,
-                                          '--silhouette-weight', 0)) == 0
-    told = capsys.readouterr().out
+def test_a_training_is_told_as_it_goes(plain):
+    out, told, _ = plain
     assert 'reconstruction: 2/2' in told
     assert 'validation_iou_1' in told
     assert 'chosen on validation' in told
     assert 'policy' not in told
-    assert not (tmp_path / 'policy.safetensors').exists()
-    assert json.loads((tmp_path / 'weights.json').read_text())['policy'] is None
+    assert not (out / 'policy.safetensors').exists()
+    assert json.loads((out / 'weights.json').read_text())['policy'] is None
 
 
 def test_an_evaluation_measures_all_that_it_says(run, dataset, tmp_path, monkeypatch, capsys):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import count
 import json
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from active_recon.geometry.cameras import AZIMUTHS, pose_azimuths
 from active_recon.geometry.canonical import NetworkSpec
 from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.shapes import CATEGORIES
+from active_recon.training import made_objects
 from active_recon.training.lifting import train_lifting
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
 from active_recon.training.made_objects import MadeObjects, Pace
@@ -51,6 +53,24 @@ def drawn(objects, step):
     return [folder.name for folder in views.folders], *(part.clone() for part in (
         views.images[across], views.seen[across], views.poses, views.intrinsics,
         views.voxels[every]))
+
+
+class MadeHere:
+    """Makes objects as MadeAhead does, one after the other in this process."""
+
+    def __init__(self, maker, workers, ahead, first, stride):
+        self._maker, self._numbers = maker, count(first, stride)
+
+    def take(self):
+        return self._maker(next(self._numbers))
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def no_processes(monkeypatch):
+    monkeypatch.setattr(made_objects, 'MadeAhead', MadeHere)
 
 
 def of_meshes(*jobs):
@@ -115,7 +135,7 @@ def test_an_object_that_cannot_be_made_is_replaced_by_another():
     assert {each.left_out for each in made} >= {(), ('part/bad: bad.stl: a mesh without faces',)}
 
 
-def test_an_object_that_cannot_be_made_is_told_once():
+def test_an_object_that_cannot_be_made_is_told_once(no_processes):
     told = []
     maker = of_meshes(job('bad', partial(no_mesh, 'bad.stl')), job('box', a_box))
     with MadeObjects(maker, Pace(8, 0, 8), 1, left_out=told.append) as objects:
@@ -170,10 +190,11 @@ def test_a_pace_that_leaves_nothing_to_draw_is_refused(numbers):
         Pace(*numbers)
 
 
-def test_the_objects_of_a_step_depend_on_nothing_but_its_number():
+def test_the_objects_of_a_step_depend_on_nothing_but_its_number(monkeypatch):
     maker, pace = Maker(SHAPES, (), SPEC), Pace(2, 0.5, 3)
     with MadeObjects(maker, pace, 2) as one, MadeObjects(maker, pace, 1) as resumed:
         first = drawn(one, 0)
+        monkeypatch.setattr(made_objects, 'MadeAhead', MadeHere)  # the other makes its own
         passed = [drawn(one, step) for step in (2, 3, 6)]
         names, *parts = drawn(resumed, 6)
         assert names == passed[-1][0] and len(names) == 3
@@ -185,7 +206,7 @@ def test_the_objects_of_a_step_depend_on_nothing_but_its_number():
         assert_close(parts, list(passed[1][1:]), rtol=0, atol=0)
 
 
-def test_processes_that_train_together_learn_from_different_objects():
+def test_processes_that_train_together_learn_from_different_objects(no_processes):
     maker, pace = Maker(SHAPES, (), SPEC), Pace(2, 0, 2)
     with MadeObjects(maker, pace, 1, 0, 2) as one, MadeObjects(maker, pace, 1, 1, 2) as other:
         assert drawn(one, 0)[0] == [maker(0).name, maker(2).name]
