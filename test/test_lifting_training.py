@@ -135,14 +135,14 @@ def test_a_training_that_was_cut_off_goes_on_as_if_it_was_not_whoever_draws(
         torch.manual_seed(0)
         network = network_class.from_config(config)
         train(network, seen,
-              TrainingConfig(4, 2, 3e-3, 2, bfloat16=False, warmup_steps=1, checkpoint_every=2,
+              TrainingConfig(2, 2, 3e-3, 2, bfloat16=False, warmup_steps=1, checkpoint_every=1,
                              validate_every=100), LOSS,
               Run(make_fabric(False), path, lambda step, measured: None, resume, until,
                   draw_threads=draw_threads), lambda model: {})
         return network
 
     whole = learned(tmp_path / 'whole.safetensors')
-    learned(tmp_path / 'cut.safetensors', until=2)
+    learned(tmp_path / 'cut.safetensors', until=1)
     resumed = learned(tmp_path / 'cut.safetensors', resume=True, draw_threads=2)
     for name, weight in whole.state_dict().items():
         assert_close(resumed.state_dict()[name], weight, rtol=1e-4, atol=1e-5)
@@ -176,7 +176,7 @@ def test_the_losses_fall(seen_anyhow, bfloat16):
     optimizer = torch.optim.AdamW(learner.parameters(), 2e-2)
     batch = draw_posed_batch(seen_anyhow, 1, 2, np.random.default_rng(0), augment=False)
     heard = []
-    for _ in range(10):
+    for _ in range(6):
         with torch.autocast('cpu', torch.bfloat16) if bfloat16 else nullcontext():
             losses = learner(batch.images, batch.cameras, batch.alpha, batch.voxels)
         optimizer.zero_grad()
