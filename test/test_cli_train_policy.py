@@ -3,7 +3,6 @@
 import json
 import shutil
 
-from active_recon.cli.main import main
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.errors import WeightsError
@@ -11,9 +10,11 @@ from active_recon.models.scorer_weights import save_scorer
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.models.weights_files import find_weights
 from active_recon.policies import load_policy, PolicyOptions
+from command_line import command
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
+from small_datasets import lamps_and_tables
 import torch
 
 
@@ -24,11 +25,10 @@ def as_many_threads_as_before():
     torch.set_num_threads(before)
 
 
-def command(monkeypatch, name, *arguments):
-    monkeypatch.setattr('sys.argv', ['active-recon', name, *map(str, arguments)])
-    with pytest.raises(SystemExit) as end:
-        main()
-    return end.value.code or 0
+@pytest.fixture(scope='module')
+def dataset(tmp_path_factory):
+    """Return a folder of two lamps and two tables, so that two rounds see different ones."""
+    return lamps_and_tables(tmp_path_factory.mktemp('dataset'), 2)
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_a_policy_is_learned_in_two_rounds_and_chooses(
                  '--objects', 2, '--candidates', 4, '--starts', 1, '--views', 3, '--epochs', 2,
                  '--threads', 1]
     assert command(monkeypatch, 'train-policy', *arguments) == 0
-    assert '6 of 6 validation objects are trained on too' in capsys.readouterr().err
+    assert '4 of 4 validation objects are trained on too' in capsys.readouterr().err
     made = tmp_path / 'run' / 'carving-scorer.safetensors'
     card = json.loads(made.with_suffix('.json').read_text())
     assert len(card['rounds']) == 2 and card['rounds'][1]['train_states'] >= 4

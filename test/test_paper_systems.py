@@ -6,6 +6,7 @@ import json
 
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models import weights_files as weights_module
+from active_recon.models.network_2d3d import SIZES
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import FOLDER
 from active_recon.paper import systems
@@ -36,7 +37,9 @@ def study(dataset, tmp_path):
 
 
 @pytest.fixture
-def small_batches(monkeypatch):
+def small_batches(monkeypatch, tiny):
+    """Let systems learn from few views, and be of networks that are fast."""
+    monkeypatch.setitem(SIZES, 'small', tiny)
     monkeypatch.setattr(systems, 'BATCH', 2)
     monkeypatch.setattr(systems, 'POLICY_BATCH', 2)
 
