@@ -33,12 +33,12 @@ from active_recon.volumes.voxels import iou
 from judged_quality import quality_of
 import numpy as np
 from photo_scene import cameras, CENTRE, on_plain, rendered, SIDE, thing, write_photos
-import photo_table
 from PIL import Image
 import pytest
 import trimesh
 from typer.testing import CliRunner
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
 DINO = Path(os.environ.get('ACTIVE_RECON_DINO')
             or Path(__file__).parents[2] / 'shared/data/photos/dino_sparse_ring')
 BOX = (*CENTRE, 1.1 * SIDE)
@@ -66,6 +66,11 @@ def shape(plain):
     return active_recon.reconstruct(plain)
 
 
+@pytest.fixture(scope='module')
+def mesh(shape):
+    return shape.mesh()
+
+
 def truth(shape):
     """Return the true cells, in the shape's own cube."""
     mesh = thing()
@@ -83,14 +88,13 @@ def test_the_object_and_its_cube_are_found(shape):
     assert "plain background's colour" in shape.background
 
 
-def test_the_mesh_stands_in_the_world_of_the_cameras(shape):
-    mesh = shape.mesh()
+def test_the_mesh_stands_in_the_world_of_the_cameras(shape, mesh):
+    mesh = mesh.copy()
     mesh.apply_transform(shape.world_from_object)
     np.testing.assert_allclose(mesh.bounds, thing().bounds, atol=0.15 * SIDE)
 
 
-def test_the_mesh_is_closed_and_has_the_colours_of_the_photos(shape, rgba):
-    mesh = shape.mesh()
+def test_the_mesh_is_closed_and_has_the_colours_of_the_photos(mesh, rgba):
     assert mesh.is_watertight and mesh.is_winding_consistent
     photographed = np.concatenate([image[image[..., 3] > 127][:, :3] for image in rgba])
     np.testing.assert_allclose(np.median(mesh.visual.vertex_colors[:, :3], axis=0),
@@ -119,20 +123,30 @@ def cluttered(rgba):
     return [on_plain(*both) for both in zip(rgba, tiles, strict=True)]
 
 
+@pytest.fixture(scope='module')
+def clutter(views, cluttered, tmp_path_factory):
+    """Return a folder of the photos before clutter, with their cameras."""
+    return write_photos(tmp_path_factory.mktemp('clutter'), views, cluttered)
+
+
+@pytest.fixture(scope='module')
+def segmented(clutter):
+    return active_recon.reconstruct(clutter)
+
+
 @pytest.mark.parametrize('background', [
     'auto', pytest.param('segment', marks=pytest.mark.slow)])
-def test_before_clutter_the_cube_is_found_too(views, cluttered, tmp_path, background):
-    shape = active_recon.reconstruct(write_photos(tmp_path, views, cluttered),
-                                     background=background)
+def test_before_clutter_the_cube_is_found_too(clutter, segmented, background):
+    shape = (segmented if background == 'auto'
+             else active_recon.reconstruct(clutter, background=background))
     assert shape.background == 'the segmenter' and not shape.left_out
     np.testing.assert_allclose(shape.cube.centre, CENTRE, atol=0.2 * SIDE)
     assert SIDE < shape.cube.side < 1.5 * SIDE
     assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.5
 
 
-def test_a_cube_that_is_searched_in_vain_stays_as_wide_as_it_was(views, cluttered, tmp_path):
-    shape = active_recon.reconstruct(write_photos(tmp_path, views, cluttered),
-                                     background='network')
+def test_a_cube_that_is_searched_in_vain_stays_as_wide_as_it_was(views, clutter):
+    shape = active_recon.reconstruct(clutter, background='network', ground=False)
     assert shape.cube.side < 1.01 * first_cube(views, np.array([0.0, 0, 1])).side
     assert len(shape.views) == COUNT and shape.quality.suspect == 'object_size'
 
@@ -146,47 +160,34 @@ def test_the_segmenter_looks_at_the_cube_of_the_size_that_is_given(views, clutte
 
     monkeypatch.setattr('active_recon.photos.reconstruct.segmented_views', segmented)
     photos = [view_of(str(number), *both)
-              for number, both in enumerate(zip(cluttered, views, strict=True))]
+              for number, both in enumerate(zip(cluttered[:2], views[:2], strict=True))]
     shape = from_views(photos, CameraFile('a table', (), metric=True),
                        Options(background='segment', size=2 * SIDE))
     assert looked_at == [shape.cube.side] == [2 * SIDE]
 
 
 def test_before_clutter_the_segmenter_finds_the_object_and_a_mask_of_one_photo_tells_otherwise(
-        views, rgba, cluttered, tmp_path):
-    folder = write_photos(tmp_path / 'clutter', views, cluttered)
+        views, rgba, cluttered, clutter):
     ious = {}
     for background in ('auto', 'network'):
-        shape = active_recon.reconstruct(folder, box=BOX, background=background)
+        shape = active_recon.reconstruct(clutter, box=BOX, background=background, ground=False)
         ious[shape.background] = iou(shape.occupancy > shape.threshold, truth(shape))
     assert list(ious) == ['the segmenter', "the network's own silhouettes"]
     assert ious['the segmenter'] > max(0.5, ious["the network's own silhouettes"])
     mixed = active_recon.reconstruct(
         [np.dstack([cluttered[0], rgba[0][..., 3]]), *cluttered[1:]], [
             Camera(np.block([[each.pose[:3, :3], (each.position - CENTRE)[:, None]],
-                             [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views], BOX[3])
+                             [np.zeros((1, 3)), 1]]), each.intrinsics) for each in views], BOX[3],
+        views=2)
     assert 'alpha channels (1)' in mixed.background and 'own' in mixed.background
 
 
 def test_a_few_photos_with_an_edge_of_one_colour_are_before_clutter_like_the_others(
         views, rgba, cluttered, tmp_path):
     folder = write_photos(tmp_path / 'mixed', views, [on_plain(rgba[0]), *cluttered[1:]])
-    shape = active_recon.reconstruct(folder, box=BOX)
+    shape = active_recon.reconstruct(folder, box=BOX, views=3, ground=False)
     assert shape.background == 'the segmenter'
     assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.5
-
-
-def test_an_object_on_a_table_with_a_pattern_is_found():
-    rng = np.random.default_rng(0)
-    mesh = photo_table.centred(thing(), 0.14)
-    seen_by = photo_table.around(6, 0.42, rng)
-    images, _ = photo_table.photographed(mesh, seen_by, 'boards', rng)
-    shape = from_views([view_of(str(number), *both) for number, both
-                        in enumerate(zip(images, seen_by, strict=True))],
-                       CameraFile('a table', (), np.array([0.0, 0.0, 1.0])))
-    assert shape.background == 'the segmenter'
-    assert 0.9 * 0.14 < shape.size < 1.4 * 0.14
-    np.testing.assert_allclose(shape.cube.centre, 0, atol=0.02)
 
 
 def test_masks_of_files_and_an_alpha_channel_say_the_same(views, rgba, tmp_path):
@@ -202,10 +203,10 @@ def test_masks_of_files_and_an_alpha_channel_say_the_same(views, rgba, tmp_path)
     np.testing.assert_array_equal(alpha.occupancy, files.occupancy)
 
 
-def test_the_size_sets_the_scale_alone(plain, shape):
+def test_the_size_sets_the_scale_alone(plain, shape, mesh):
     twice = active_recon.reconstruct(plain, size=2 * shape.size)
     np.testing.assert_allclose(twice.occupancy, shape.occupancy, atol=1e-4)
-    np.testing.assert_allclose(twice.mesh().extents, 2 * shape.mesh().extents, rtol=1e-2)
+    np.testing.assert_allclose(twice.mesh().extents, 2 * mesh.extents, rtol=1e-2)
     box = Options(box=BOX, unit=1000.0, views=1)
     assert from_files(plain, None, box).size == pytest.approx(1000 * BOX[3])
 

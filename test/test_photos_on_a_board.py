@@ -20,6 +20,7 @@ import pytest
 from rendered_boards import BOARD
 import trimesh
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
 SIZE = 0.12
 
 

@@ -29,6 +29,7 @@ from rendered_boards import BOARD, LENS
 from typer.testing import CliRunner
 from watched_photos import orbit, with_focal, written
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
 SOURCE = BoardCameras(BOARD)
 _SAME = 1e-2  # the search for the lens ends a little elsewhere in each run
 

@@ -178,7 +178,7 @@ def _seen(camera: Camera, grey: NDArray[np.float32], points: NDArray[np.float64]
           ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return what a photo shows at points, (P, P), and 1 where it shows them, else 0."""
     pixels, depth = camera.project(points)
-    across, down = np.nan_to_num(pixels, nan=-1e4).clip(-1e4, 1e4).T.reshape(
+    across, down = np.minimum(np.fmax(pixels, -1e4), 1e4).T.reshape(  # nan is far away, too
         2, _POINTS, _POINTS).astype(np.float32)
     rows, columns = grey.shape
     shown = ((depth > 0).reshape(across.shape) & (across >= 0) & (across < columns)

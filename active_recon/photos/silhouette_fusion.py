@@ -133,9 +133,10 @@ def _agreed(photos: Sequence[SeenPhoto], places: Sequence['_Place'], own: list[L
     """
     doubt = -least_share * len(photos) * np.log(_SEEN / _ELSEWHERE)
     others: list[Logits] = [np.zeros(photo.known.shape) for photo in photos]
+    ties = [_ties(photo, place.box) for photo, place in zip(photos, places, strict=True)]
     for _ in range(_ROUNDS):
-        found = [_smooth(photo, np.where(place.outline, mine + theirs, _EXCLUDED), place.box)
-                 for photo, place, mine, theirs in zip(photos, places, own, others, strict=True)]
+        found = [_smooth(tied, np.where(place.outline, mine + theirs, _EXCLUDED), place.box)
+                 for tied, place, mine, theirs in zip(ties, places, own, others, strict=True)]
         votes = [_votes(photo, place, share)
                  for photo, place, share in zip(photos, places, found, strict=True)]
         total = np.sum(votes, axis=0) + doubt
@@ -214,16 +215,14 @@ def _along_rays(odds: Logits, place: _Place, shape: tuple[int, ...]) -> Logits:
     return np.asarray(cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, place.closed), np.float64)
 
 
-def _smooth(photo: SeenPhoto, logits: Logits, box: tuple[slice, slice]) -> NDArray[np.float32]:
+def _ties(photo: SeenPhoto, box: tuple[slice, slice]) -> sparse.csr_matrix:
     """
-    Return the object's share in each pixel, (H, W), alike in neighbours; 0 outside of a box.
+    Return how alike neighbours in a box of P pixels are, (P, P).
 
     An edge that the board has there too is none.
     """
-    own = 1 / (1 + np.exp(-np.clip(logits[box], -_MOST, _MOST)))
-    certain = np.abs(2 * own - 1) + 0.02
-    number = np.arange(own.size).reshape(own.shape)
     image, expected, known = photo.image[box], photo.expected[box], photo.known[box]
+    number = np.arange(known.size).reshape(known.shape)
     firsts, seconds, ties = [], [], []
     for axis in (0, 1):
         first, second = (np.take(number, np.arange(start, number.shape[axis] - 1 + start), axis)
@@ -237,8 +236,15 @@ def _smooth(photo: SeenPhoto, logits: Logits, box: tuple[slice, slice]) -> NDArr
         seconds.append(second.ravel())
         ties.append(_TIES * (np.exp(-apart / (2 * _EDGE ** 2)) + 0.01).ravel())
     rows, columns, weights = (np.concatenate(each) for each in (firsts, seconds, ties))
-    tied = sparse.coo_matrix((weights, (rows, columns)), (own.size,) * 2).tocsr()
-    tied = tied + tied.T
+    tied = sparse.coo_matrix((weights, (rows, columns)), (number.size,) * 2).tocsr()
+    return tied + tied.T
+
+
+def _smooth(tied: sparse.csr_matrix, logits: Logits, box: tuple[slice, slice]
+            ) -> NDArray[np.float32]:
+    """Return the object's share in each pixel, (H, W), alike in neighbours; 0 outside of a box."""
+    own = 1 / (1 + np.exp(-np.clip(logits[box], -_MOST, _MOST)))
+    certain = np.abs(2 * own - 1) + 0.02
     diagonal = np.asarray(tied.sum(axis=1)).ravel() + certain.ravel()
     solved, _ = cg(sparse.diags(diagonal) - tied, (certain * own).ravel(), own.ravel(),
                    rtol=1e-3, maxiter=60, M=sparse.diags(1 / diagonal))
