@@ -56,9 +56,10 @@ def tiny() -> Network2d3dConfig:
 
 @pytest.fixture(scope='module')
 def loaded_once() -> Iterator[None]:
-    """Load a network once for all reconstructors and commands of a module: it has no state."""
+    """Load networks once for all reconstructors and commands of a module: they have no state."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reconstructor, 'load_runtime', cache(reconstructor.load_runtime))
+        for name in ('load_runtime', 'load_depth_runtime'):
+            patch.setattr(reconstructor, name, cache(getattr(reconstructor, name)))
         yield
 
 

@@ -31,7 +31,7 @@ def mesh():
 
 @pytest.fixture(scope='module')
 def cameras():
-    return around(5, 0.3 * SIZE)
+    return around(4, 0.3 * SIZE)
 
 
 @pytest.fixture(scope='module')
@@ -52,7 +52,7 @@ def views_of(images, cameras):
 
 
 def test_the_print_fits_where_the_board_is_seen_and_not_where_the_object_is(taken, cameras):
-    for image, mask, camera in zip(*taken, cameras, strict=True):
+    for image, mask, camera in list(zip(*taken, cameras, strict=True))[:2]:
         seen = seen_board(image, camera, BOARD, max(image.shape))
         covered = seen.known & (seen.fit < UNIFORM)
         there = seen.known & mask
@@ -80,7 +80,7 @@ def test_a_shadow_on_the_board_is_no_object(taken, cameras, mesh):
 
 def test_a_mask_never_leaves_the_projected_cube(taken, cameras):
     cube = Cube(MIDDLE + [0.01, 0, 0.03], 0.06, np.array([0.0, 0, 1]))  # in the object
-    found, _, same = board_views(views_of(taken[0], cameras), BOARD, cube)
+    found, _, same = board_views(views_of(taken[0], cameras)[:2], BOARD, cube)
     assert same is cube
     for view in found:
         inside = cube_pixels(cube.camera(view.camera, 1.0), 1.0, view.image.shape[1::-1])
@@ -92,8 +92,8 @@ def test_a_mask_never_leaves_the_projected_cube(taken, cameras):
 def test_an_object_of_the_colour_of_ink_or_of_paper_is_found(cameras, mesh, level):
     painted = mesh.copy()
     painted.visual.face_colors = [level, level, level, 255]
-    images, masks = photographed(painted, cameras)
-    found, _, _ = board_views(views_of(images, cameras), BOARD, None)
+    images, masks = photographed(painted, cameras[:3])
+    found, _, _ = board_views(views_of(images, cameras[:3]), BOARD, None)
     for view, true in zip(found, masks, strict=True):
         assert iou(view.mask[None], true[None]) > 0.6
 
@@ -102,7 +102,7 @@ def test_what_stands_out_beyond_the_board_is_found(mesh):
     tall = mesh.copy()
     tall.apply_translation(-MIDDLE)
     tall.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
-    low = around(6, 0.5 * SIZE, elevations=(0.45, 0.7))
+    low = around(4, 0.5 * SIZE, elevations=(0.45, 0.7))
     images, masks = photographed(standing(tall, SIZE), low)
     found, _, cube = board_views(views_of(images, low), BOARD, None)
     beyond = [mask & ~seen_board(image, camera, BOARD, 640).known
@@ -142,7 +142,7 @@ def test_an_object_on_a_board_is_reconstructed_from_photos_alone(taken, mesh, tm
     assert SIZE < shape.size < 1.4 * SIZE  # the board is in metres
     low = shape.mesh().bounds[0, 2] + shape.world_from_object[2, 3]
     assert low > -0.02 * SIZE  # nothing is in the table
-    other = reconstruct(tmp_path, BoardCameras(BOARD), 0.2, views=3)
+    other = reconstruct(tmp_path, BoardCameras(BOARD), 0.2, views=1)
     assert other.cube.side == 0.2 and other.cube.centre[2] == pytest.approx(0.1)
 
 

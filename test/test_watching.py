@@ -56,6 +56,13 @@ def collection(photos):
 
 
 @pytest.fixture(scope='module')
+def posed(tmp_path_factory):
+    """Return a folder of four photos before a plain background, and a file of their cameras."""
+    views = cameras(4)
+    return write_photos(tmp_path_factory.mktemp('posed'), views, map(on_plain, rendered(views)))
+
+
+@pytest.fixture(scope='module')
 def shape(collection):
     return collection.shape
 
@@ -94,14 +101,6 @@ def test_what_is_wrong_with_a_photo_is_one_line_and_the_shape_stays(collection, 
     assert collection.shape.occupancy is before
 
 
-def test_a_photo_that_is_gone_leaves_the_shape_of_the_others(collection, photos):
-    before = collection.shape.occupancy
-    assert collection.add(photos[3]) == ''
-    assert len(collection.shape.views) == 4
-    collection.remove(photos[3])
-    np.testing.assert_allclose(collection.shape.occupancy, before, atol=_SAME)
-
-
 def test_until_the_lens_is_known_it_is_said_what_is_missing(photos):
     found = Collection(SOURCE, Options())
     assert found.waiting == 'no photo yet'
@@ -126,20 +125,29 @@ def test_the_board_refines_the_focal_length_that_exif_gives(photos, tmp_path):
     assert posed[0].intrinsics.fx == pytest.approx(1.2 * LENS.fx, rel=1e-3)
 
 
-def test_a_file_of_cameras_poses_photos_that_arrive(tmp_path):
-    views = cameras(4)
-    write_photos(tmp_path, views, [on_plain(image) for image in rendered(views)])
+def test_a_file_of_cameras_poses_photos_that_arrive(posed, tmp_path):
     Image.new('RGB', (240, 180)).save(tmp_path / 'other.png')
-    found = Collection(tmp_path / 'transforms.json', Options())
-    assert found.add(tmp_path / 'photo0.png') == '' and found.shape is None
+    found = Collection(posed / 'transforms.json', Options())
+    assert found.add(posed / 'photo0.png') == '' and found.shape is None
     assert found.waiting.startswith('no object found yet: object not found: expected photos from '
                                     'several directions')
     for number in (1, 2):
-        assert found.add(tmp_path / f'photo{number}.png') == ''
+        assert found.add(posed / f'photo{number}.png') == ''
     assert len(found.shape.views) == 3 and not found.metric
     assert found.add(tmp_path / 'other.png') == (
-        f'other.png: no camera in {tmp_path / "transforms.json"}')
+        f'other.png: no camera in {posed / "transforms.json"}')
     assert len(found.shape.views) == 3
+
+
+def test_a_photo_that_is_gone_leaves_the_shape_of_the_others(posed):
+    found = Collection(posed / 'transforms.json', Options())
+    for number in range(3):
+        assert found.add(posed / f'photo{number}.png') == ''
+    before = found.shape.occupancy
+    assert found.add(posed / 'photo3.png') == ''
+    assert len(found.shape.views) == 4
+    found.remove(posed / 'photo3.png')
+    np.testing.assert_allclose(found.shape.occupancy, before, atol=_SAME)
 
 
 def test_a_turntable_s_order_cannot_be_known_of_photos_that_arrive():
@@ -229,20 +237,21 @@ def test_the_goal_is_above_the_table_at_the_photos_own_distance(usual, adviser):
 
 
 def test_it_is_enough_after_the_photos_planned_or_at_the_quality_asked_for(usual):
-    assert Adviser(StoppingRule(3)).advice(usual).done == 'max_views'
+    planned = Adviser(StoppingRule(3)).advice(usual)
+    assert planned.done == 'max_views' == loop_state(usual, planned).done
+    assert told(usual, planned, metric=True)[0].startswith(
+        f'Enough photos: {ENOUGH["max_views"]}. Another one would stand ')
     assert Adviser(StoppingRule(4, 0.0)).advice(usual).done == ''
     assert Adviser(StoppingRule(12, min_gain=0.9)).advice(usual).done == 'gain_too_small'
 
 
-def test_photos_from_every_side_are_enough_and_no_other_place_is_told(usual, adviser):
+def test_photos_from_every_side_are_enough_and_no_other_place_is_told(usual):
     places = [orbit(15 * step, elevation) for elevation in (20, 40, 60) for step in range(24)]
     full = replace(usual, views=[replace(usual.views[-1], camera=camera) for camera in places])
-    advice = adviser.advice(full)
-    assert advice.goal is None and advice.done
-    assert told(full, advice, metric=True)[0] == f'Enough photos: {ENOUGH[advice.done]}.'
-    assert loop_state(full, advice).done == advice.done
     many = Adviser(StoppingRule(100, 0.0)).advice(full)
+    assert many.goal is None and many.done
     assert told(full, many, metric=True)[0] == 'Enough photos: there is no place left.'
+    assert loop_state(full, many).done == many.done
 
 
 def test_the_sketch_has_the_last_photo_below_and_the_next_at_its_side(shape):
@@ -304,22 +313,23 @@ def test_a_phone_reads_the_address_from_the_page():
     assert cv2.QRCodeDetector().detectAndDecode(qr_code(address))[0] == address
 
 
-def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(photos, tmp_path, adviser):
+def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(posed, tmp_path, adviser):
     said = []
-    watcher = Watcher(tmp_path, Collection(SOURCE, Options()), adviser, said.append)
+    watcher = Watcher(tmp_path, Collection(posed / 'transforms.json', Options()), adviser,
+                      said.append)
     with pytest.raises(DataError, match='no shape: expected photos of an object'):
         watcher.result()
     assert not watcher.step(0.0)
-    for path in photos[:3]:
-        shutil.copy(path, tmp_path)
+    for number in range(3):
+        shutil.copy(posed / f'photo{number}.png', tmp_path)
     (tmp_path / '9.jpg').write_bytes(b'no photo')
     watcher.step(1.0)
     for second in range(2, 6):
         assert watcher.step(float(second))
     assert not watcher.step(9.0)
     assert [line for line in said if 'taken in' in line] == [
-        f'{number}.png: taken in' for number in range(3)]
-    assert watcher.verdicts.wait('1.png', 0) == ''
+        f'photo{number}.png: taken in' for number in range(3)]
+    assert watcher.verdicts.wait('photo1.png', 0) == ''
     assert watcher.verdicts.wait('9.jpg', 0).startswith('9.jpg: not readable')
     assert watcher.verdicts.wait('other', 0) is None
     lines = watcher.progress.lines
@@ -348,17 +358,14 @@ def test_where_the_original_is_deleted_its_copy_is_taken_in(photos, tmp_path, ad
     assert said.index('b.png: taken in') > said.index('a.png: gone from the folder')
 
 
-def test_photos_that_arrive_may_have_a_mask_or_none(tmp_path):
-    views = cameras(4)
-    write_photos(tmp_path, views, [on_plain(image) for image in rendered(views)])
-    (tmp_path / 'masks').mkdir()
-    mask = np.zeros(rendered(views[:1])[0].shape[:2], np.uint8)
+def test_photos_that_arrive_may_have_a_mask_or_none(posed, tmp_path):
+    mask = np.zeros((180, 240), np.uint8)
     mask[60:120, 80:160] = 255
-    Image.fromarray(mask).save(tmp_path / 'masks' / 'photo0.png')
-    found = Collection(tmp_path / 'transforms.json', Options(masks=tmp_path / 'masks'))
-    for number in range(4):
-        assert found.add(tmp_path / f'photo{number}.png') == ''
-    assert len(found.shape.views) == 4 and not found.shape.left_out
+    Image.fromarray(mask).save(tmp_path / 'photo0.png')
+    found = Collection(posed / 'transforms.json', Options(masks=tmp_path))
+    for number in range(3):
+        assert found.add(posed / f'photo{number}.png') == ''
+    assert len(found.shape.views) == 3 and not found.shape.left_out
 
 
 def test_while_the_folder_cannot_be_read_photos_neither_come_nor_go(tmp_path):
@@ -381,8 +388,7 @@ def test_while_the_folder_cannot_be_read_photos_neither_come_nor_go(tmp_path):
 def test_ctrl_c_writes_the_products(photos, tmp_path, monkeypatch):
     folder = tmp_path / 'arriving'
     folder.mkdir()
-    for path in photos[:3]:
-        shutil.copy(path, folder)
+    with_focal(photos[0], folder / '0.jpg')
     step = Watcher.step
 
     def interrupted(self, now):
@@ -396,6 +402,6 @@ def test_ctrl_c_writes_the_products(photos, tmp_path, monkeypatch):
         'reconstruct', str(folder), '--watch', '--board', '--squares', '9x7', '--port', '0',
         '--out', str(tmp_path / 'out')])
     assert done.exit_code == 0, done.output
-    assert 'Next: ' in done.output and '3 photos; silhouettes: what covers' in done.output
+    assert 'Next: ' in done.output and '1 photo; silhouettes: what covers' in done.output
     for name in ('mesh.ply', 'shape.json', 'picture.png'):
         assert (tmp_path / 'out' / name).stat().st_size > 1000
