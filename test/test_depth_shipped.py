@@ -23,6 +23,7 @@ import numpy as np
 from photo_scene import cameras, CENTRE, on_plain, rendered, SIDE, thing, write_photos
 import pytest
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
 ROOT = Path(__file__).parents[1]
 SIZE = 1.1 * SIDE
 

@@ -7,9 +7,11 @@ import re
 from active_recon.cli.main import app
 from photo_scene import cameras, on_plain, rendered, write_photos
 from PIL import Image
+import pytest
 import trimesh
 import typer
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
 ROOT = Path(__file__).parents[1]
 TUTORIAL = ROOT / 'doc/photos.md'
 WATCHING = ROOT / 'doc/watching.md'
@@ -32,7 +34,7 @@ def test_the_notebook_makes_its_photos_and_a_mesh_of_them(tmp_path, monkeypatch,
 
 def test_the_tutorial_s_python_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    views = cameras(4)
+    views = cameras(3)
     write_photos(tmp_path / 'photos', views, map(on_plain, rendered(views)))
     names = {}
     for code in re.findall(r'^```python\n(.*?)^```', TUTORIAL.read_text(), re.M | re.S):

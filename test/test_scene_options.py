@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+pytestmark = pytest.mark.usefixtures('loaded_once')
 BEHIND = np.full((24, 32, 3), (0, 177, 64), np.uint8)
 SHOWN = BEHIND.copy()
 SHOWN[6:18, 10:22] = (200, 30, 40)
