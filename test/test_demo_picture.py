@@ -50,8 +50,8 @@ def test_views_that_came_back_to_a_place_are_all_seen():
     assert all((plan == view_color(number)).all(axis=2).sum() > 30 for number in (1, 2, 3))
 
 
-@pytest.mark.parametrize(('views', 'rows'), [(1, 1), (COLUMNS - 1, 1), (COLUMNS, 2),
-    pytest.param(24, 5, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(('views', 'rows'), [
+    (1, 1), (COLUMNS - 1, 1), (COLUMNS, 2), pytest.param(24, 5, marks=pytest.mark.slow)])
 def test_picture_has_room_for_every_view_and_the_truth(views, rows):
     picture = run_picture('a run', [seen(n / 4) for n in range(views)], CONE, TRUTH)
     assert picture.dtype == np.uint8

@@ -46,6 +46,7 @@ from active_recon.policies import load_policy, Observation
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
 from active_recon.training.view_gains import some_views
 from active_recon.volumes.occupancy_threshold import expected_iou
+from coarse_hull import Coarse
 import numpy as np
 import pytest
 import torch
@@ -80,12 +81,6 @@ def scene(tmp_path_factory):
         list(make_dataset(shape_jobs(category, range(2), folder), 1,
                           viewing=Viewing('turntable', 6)))
     return read_scene(list_objects(folder), [Carving(0)])
-
-
-class Coarse(Carving):
-    """The same hull of 32 cells a side."""
-
-    resolution = 32
 
 
 @pytest.fixture(scope='module')

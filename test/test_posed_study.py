@@ -30,6 +30,7 @@ from active_recon.models.weights_files import find_weights
 from active_recon.training.gain_files import collect_gains, Collecting
 from active_recon.training.view_gains import ViewGains
 from active_recon.volumes.voxels import iou, turned
+from coarse_hull import Coarse
 import numpy as np
 import pytest
 from scipy.special import logit
@@ -56,12 +57,6 @@ def scene(made):
 @pytest.fixture
 def carving():
     return Entrant('carving', Carving(0).eval(), {64: 0.5, 32: 0.5})
-
-
-class Coarse(Carving):
-    """The same hull of 32 cells a side."""
-
-    resolution = 32
 
 
 @pytest.fixture

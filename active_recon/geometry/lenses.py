@@ -18,7 +18,7 @@ MODELS = {'plumb_bob': (4, 5), 'rational_polynomial': (8, 12), 'equidistant': (4
 """The allowed numbers of coefficients of each model, in OpenCV's order: k1, k2, p1, p2, k3, ..."""
 _LARGEST = 1e6  # larger than in any lens, and its sixth power does not overflow
 _STEP = 1e-6
-_CLOSE = 1e-10
+_CLOSE = 1e-10  # at depth 1
 _HALVINGS = 6  # of a step of Newton's that leads away
 _STEEPEST = 3.0  # of any lens: beyond, a model is beside a pole, as fits of 8 coefficients have
 _WITHIN = 0.9999  # at the maximum radius itself a model may divide by 0

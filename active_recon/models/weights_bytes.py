@@ -38,7 +38,7 @@ def in_precision(dtype: torch.dtype, tensor: Tensor) -> Tensor:
 
 
 def is_finite(tensor: Tensor) -> bool:
-    """Return whether all numbers of a tensor are finite, a tenth of the time of `isfinite`."""
+    """Return whether all numbers of a tensor are finite, ten times as fast as `isfinite`."""
     return not tensor.numel() or all(each.isfinite() for each in tensor.detach().aminmax())
 
 

@@ -148,7 +148,7 @@ def yaml_mapping(text: bytes, name: str) -> dict[str, Any]:
     """
     try:
         value = _loaded(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise DataError(f'{name}: invalid YAML: {" ".join(str(error).split())}') from error
     if not isinstance(value, dict):
         raise DataError(f'{name}: invalid content: expected a mapping, got a '
@@ -180,7 +180,7 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
         offered = _loaded(text) or []
         named = [(_RELIABILITY.get(profile['reliability']), _DURABILITY.get(profile['durability']))
                  for profile in offered]
-    except (yaml.YAMLError, TypeError, KeyError, ValueError, RecursionError):
+    except (yaml.YAMLError, TypeError, KeyError, ValueError):
         return ()
     return tuple(QosProfile(reliability, durability) for reliability, durability in named
                  if reliability and durability)
