@@ -1,6 +1,7 @@
 """Weights files by name, hash and card, without reading a network."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 import hashlib
 import json
 from pathlib import Path
@@ -100,10 +101,17 @@ def weights_hash(path: Path | None = None) -> str:
     """Return the SHA-256 of a weights file; None is the one that ships. Raises WeightsError."""
     path = path or SHIPPED
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        file = path.stat()
+        return _file_hash(path, file.st_ino, file.st_size, file.st_mtime_ns, file.st_ctime_ns)
     except OSError as error:
         raise WeightsError(f'{path}: cannot be read: expected weights (.safetensors), got: '
                            f'{error.strerror}') from error
+
+
+@lru_cache(64)
+def _file_hash(path: Path, *_identity: int) -> str:
+    """Return the SHA-256 of a file, read anew once it is another: a start asks four times."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def config_hash(config: Config | dict[str, Any]) -> str:

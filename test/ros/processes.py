@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 import gc
 from importlib import import_module
+import inspect
 import multiprocessing
 import os
 from pathlib import Path
@@ -19,6 +20,8 @@ _FORKS = multiprocessing.get_context('forkserver')
 _FORKS.set_forkserver_preload([*(f'active_recon.nodes.{name}' for name in _NODES),
                                'active_recon.runtimes.torch',
                                'active_recon.runtimes.openvino', 'openvino', __name__])
+# The first line that a process logs looks for its module among all: here once, not in each fork
+inspect.getmodule(inspect.currentframe())
 
 
 class Started:
@@ -73,6 +76,7 @@ def _environment() -> dict[str, str]:
 
 
 def _run(name: str, argv: list[str], folder: Path, log: Path, environment: dict[str, str]) -> None:
+    gc.freeze()  # what was imported is no garbage
     output = os.open(log, os.O_WRONLY | os.O_APPEND)
     for descriptor in (1, 2):
         os.dup2(output, descriptor)
