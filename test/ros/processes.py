@@ -13,8 +13,7 @@ import sys
 import pytest
 
 ROOT = Path(__file__).parents[2]
-_NODES = ('reconstructor', 'view_planner', 'turntable_camera', 'camera', 'recorder', 'viewer',
-          'player')
+_NODES = ('reconstructor', 'view_planner', 'turntable_camera', 'camera', 'recorder', 'player')
 _FORKS = multiprocessing.get_context('forkserver')
 # The last are what reconstructors import with their weights
 _FORKS.set_forkserver_preload([*(f'active_recon.nodes.{name}' for name in _NODES),

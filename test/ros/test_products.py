@@ -18,15 +18,15 @@ pytestmark = pytest.mark.ros
 
 @pytest.fixture
 def start(start_node, tmp_path):
-    """Return a function that starts a reconstructor for which any image leaves a surface."""
-    def start(**parameters):
-        return start_node('reconstructor', take_views='all', threshold=0.01, output_dir=tmp_path,
-                          **parameters)
+    """Return a function that starts a reconstructor for which noise leaves a surface."""
+    def start(threshold=0.2, **parameters):
+        return start_node('reconstructor', take_views='all', threshold=threshold,
+                          output_dir=tmp_path, **parameters)
     return start
 
 
 def test_the_surface_of_a_view_is_published_and_removed_with_its_episode(start, bench):
-    start(publish_mesh=True, weights='r2n2')  # of few cells
+    start(publish_mesh=True, weights='r2n2', threshold=0.01)  # of few cells
     heard = bench.subscribe(Marker, 'mesh', LATCHED_QOS)
     stamp = FakeCamera(bench).show()
     bench.until(lambda: heard and heard[-1].action == Marker.ADD, 'the surface')

@@ -19,8 +19,8 @@ pytestmark = pytest.mark.ros
 
 @pytest.mark.parametrize('mesh_format', ['ply', 'glb'])
 def test_the_mesh_is_written_where_the_answer_says(start_node, bench, tmp_path, mesh_format):
-    # A threshold so low that any image leaves a surface
-    start_node('reconstructor', take_views='all', threshold=0.01, mesh_format=mesh_format,
+    # A threshold so low that noise leaves a surface
+    start_node('reconstructor', take_views='all', threshold=0.2, mesh_format=mesh_format,
                output_dir=tmp_path / 'meshes')
     answer = bench.call('save_mesh')
     assert not answer.success
@@ -35,7 +35,7 @@ def test_the_mesh_is_written_where_the_answer_says(start_node, bench, tmp_path, 
 
 def test_a_mesh_that_cannot_be_written_is_said_and_survived(start_node, bench, tmp_path):
     (tmp_path / 'meshes').write_text('a file, where a folder is wanted')
-    start_node('reconstructor', take_views='all', threshold=0.01, output_dir=tmp_path / 'meshes')
+    start_node('reconstructor', take_views='all', threshold=0.2, output_dir=tmp_path / 'meshes')
     camera = FakeCamera(bench)
     camera.show()
     answer = bench.call('save_mesh')
@@ -72,7 +72,7 @@ def test_images_become_views_while_a_mesh_is_made(bench):
 
 def test_a_mesh_being_made_is_written_whole_though_the_node_ends(start_node, bench, tmp_path):
     folder = tmp_path / 'meshes'
-    node = start_node('reconstructor', take_views='all', threshold=0.01, output_dir=folder)
+    node = start_node('reconstructor', take_views='all', threshold=0.2, output_dir=folder)
     FakeCamera(bench).show()
     client = bench.node.create_client(Trigger, 'save_mesh')
     bench.until(client.service_is_ready, 'the service')
@@ -87,7 +87,7 @@ def test_a_mesh_being_made_is_written_whole_though_the_node_ends(start_node, ben
     (['deactivate'], 'meshes'), (['deactivate', 'cleanup'], 'no view in this episode yet')])
 def test_a_mesh_is_answered_though_the_node_changes_its_state(
         start_node, bench, tmp_path, transitions, later):
-    start_node('reconstructor', take_views='all', threshold=0.01, output_dir=tmp_path / 'meshes')
+    start_node('reconstructor', take_views='all', threshold=0.2, output_dir=tmp_path / 'meshes')
     FakeCamera(bench).show()
     client = bench.node.create_client(Trigger, 'save_mesh')
     bench.until(client.service_is_ready, 'the service')
