@@ -39,6 +39,7 @@ LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=100)
 BUDGET_S = 60.0  # for what takes a second on an idle machine
 SEND_AGAIN_S = 5.0
+ANY_WEIGHTS = 'r2n2'  # which are ready at once, for tests in which it does not matter which
 _ENTROPY = 100.0  # nats
 _PIXELS = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 import pytest
+import rclpy.utilities
 
 ROOT = Path(__file__).parents[2]
 _NODES = ('reconstructor', 'view_planner', 'turntable_camera', 'camera', 'recorder', 'player')
@@ -87,4 +88,5 @@ def _run(name: str, argv: list[str], folder: Path, log: Path, environment: dict[
     try:
         import_module(f'active_recon.nodes.{name}').main()
     finally:
+        rclpy.utilities.g_default_context = None
         gc.collect()  # a fork ends without it, and would leave its shared memory behind

@@ -4,7 +4,7 @@ import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 
-from .conftest import FakeCamera, FakeReconstructor, STREAM_QOS
+from .conftest import ANY_WEIGHTS, FakeCamera, FakeReconstructor, STREAM_QOS
 
 pytestmark = pytest.mark.ros
 BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -30,7 +30,7 @@ def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
     for kind, topic in ((Image, 'usb_cam/image_raw'), (CompressedImage, 'front/color/compressed'),
                         (CompressedImage, 'thermal')):
         bench.node.create_publisher(kind, topic, STREAM_QOS)
-    reconstructor = start_node('reconstructor')
+    reconstructor = start_node('reconstructor', weights=ANY_WEIGHTS)
     problem = said(
         'reconstructor', 'camera/image_raw', '/usb_cam/image_raw has', '/thermal has', '/front')
     assert ('/camera/image_raw or /camera/image_raw/compressed: no messages: expected some, '
@@ -49,7 +49,8 @@ def test_inputs_that_nobody_publishes_are_told_with_the_topics_that_would_fit(
 def test_what_the_loop_itself_publishes_is_proposed_as_no_input(start_node, bench, said):
     for topic in ('next_azimuth', 'table/joints'):
         bench.node.create_publisher(JointState, topic, STREAM_QOS)
-    start_node('reconstructor', pose_source='turntable_joint', camera_position='[1.0, 0.0, 0.0]',
+    start_node('reconstructor', weights=ANY_WEIGHTS, pose_source='turntable_joint',
+               camera_position='[1.0, 0.0, 0.0]',
                camera_orientation='[-0.5, -0.5, 0.5, 0.5]', turntable_direction=1)
     problem = said('reconstructor', 'turntable/joint_states',
                    'remap with -r turntable/joint_states:=/table/joints')
@@ -58,7 +59,7 @@ def test_what_the_loop_itself_publishes_is_proposed_as_no_input(start_node, benc
 
 def test_a_publisher_that_is_silent_or_of_another_type_is_named_with_its_qos(
         start_node, bench, said):
-    start_node('reconstructor')
+    start_node('reconstructor', weights=ANY_WEIGHTS)
     bench.node.create_publisher(Image, 'camera/image_raw', BEST_EFFORT)
     bench.node.create_publisher(Image, 'camera/camera_info', STREAM_QOS)
     said('reconstructor', 'camera/image_raw',
@@ -69,7 +70,7 @@ def test_a_publisher_that_is_silent_or_of_another_type_is_named_with_its_qos(
 
 def test_the_first_message_takes_its_warning_back_for_good_also_where_it_is_refused(
         start_node, bench, said):
-    reconstructor = start_node('reconstructor', take_views='all')
+    reconstructor = start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all')
     images = bench.advertise(CompressedImage, 'camera/image_raw/compressed')
     infos = bench.advertise(CameraInfo, 'camera/camera_info')
     said('reconstructor', 'camera/pose', '/camera/camera_info: no messages',

@@ -18,7 +18,7 @@ import pytest
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import BUDGET_S, LATCHED_QOS, SEND_AGAIN_S
+from .conftest import ANY_WEIGHTS, BUDGET_S, LATCHED_QOS, SEND_AGAIN_S
 from .test_life_cycle import Supervisor
 
 pytestmark = pytest.mark.ros
@@ -101,7 +101,7 @@ def test_what_a_mask_calls_background_becomes_white_and_a_bad_mask_refuses_its_i
 
 def test_an_image_of_the_empty_scene_is_asked_for_kept_over_episodes_and_forgotten_on_cleanup(
         bench, start_node):
-    node = start(start_node, background='reference')
+    node = start(start_node, background='reference', weights=ANY_WEIGHTS)
     room = Room(bench)
     room.until(refused(bench, 'no_reference'), SHOWN)
     line, = node.log('refused')

@@ -13,14 +13,14 @@ import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from .conftest import BUDGET_S, FakeCamera, SEND_AGAIN_S
+from .conftest import ANY_WEIGHTS, BUDGET_S, FakeCamera, SEND_AGAIN_S
 
 pytestmark = pytest.mark.ros
 
 
 @pytest.fixture(scope='module')
 def reconstructor(start_shared_node):
-    return start_shared_node('reconstructor', take_views='all')
+    return start_shared_node('reconstructor', weights=ANY_WEIGHTS, take_views='all')
 
 
 @pytest.fixture(scope='module')
@@ -163,7 +163,7 @@ def test_what_is_late_of_the_last_episode_never_reaches_the_new_one(
 
 
 def test_a_goal_without_a_stamp_is_refused(start_node, bench):
-    node = start_node('reconstructor')
+    node = start_node('reconstructor', weights=ANY_WEIGHTS)
     goals = bench.advertise(PoseStamped, 'next_view')
     _, pose = camera_to_msgs(orbit_camera(0.5), Header())
     said = 'refused: goal without a stamp: expected that of when it was published, got 0'
@@ -219,7 +219,7 @@ def test_goals_that_are_not_finite_are_told_each_said_once_counted_and_survived(
 
 
 def test_images_from_a_clock_that_is_far_ahead_are_warned_of(start_node, bench):
-    reconstructor = start_node('reconstructor', take_views='all')
+    reconstructor = start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all')
     camera = FakeCamera(bench)
     camera.show()
     assert 'warned/clock_ahead' not in bench.counts('reconstructor')

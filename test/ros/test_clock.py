@@ -14,7 +14,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from .conftest import FakeCamera, FakeReconstructor, LATCHED_QOS
+from .conftest import ANY_WEIGHTS, FakeCamera, FakeReconstructor, LATCHED_QOS
 from .test_parameter_changes import change
 from .test_planner_node import latent  # noqa: F401
 
@@ -47,7 +47,7 @@ def begin_of(episode):
 
 
 def test_a_reconstructor_begins_an_episode_where_its_clock_goes_back(start_node, bench):
-    node = start_node('reconstructor', take_views='all', use_sim_time=True)
+    node = start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all', use_sim_time=True)
     clock = FakeClock(bench)
     episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
     bench.until(lambda: episodes, 'the first episode')
@@ -77,7 +77,7 @@ def test_a_reconstructor_begins_an_episode_where_its_clock_goes_back(start_node,
 
 
 def test_a_reconstructor_that_hears_no_clock_of_its_simulation_says_so(start_node, bench):
-    node = start_node('reconstructor', take_views='all', use_sim_time=True)
+    node = start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all', use_sim_time=True)
     FakeCamera(bench).show()
     bench.until(lambda: bench.counts('reconstructor').get('warned/no_clock'), 'the warning')
     assert 'warned/clock_ahead' not in bench.counts('reconstructor')
@@ -87,7 +87,7 @@ def test_a_reconstructor_that_hears_no_clock_of_its_simulation_says_so(start_nod
 
 
 def test_a_camera_that_waits_for_the_same_clock_is_told_of_it_too(start_node, bench):
-    start_node('reconstructor', take_views='all', use_sim_time=True)
+    start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all', use_sim_time=True)
     camera = FakeCamera(bench)
 
     def warned():
@@ -111,7 +111,7 @@ def test_a_goal_of_before_the_clock_began_is_open_since_the_clock_began(start_no
 
 
 def test_a_node_that_changes_to_the_clock_of_a_simulation_begins_an_episode(start_node, bench):
-    start_node('reconstructor')
+    start_node('reconstructor', weights=ANY_WEIGHTS)
     episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
     bench.until(lambda: episodes, 'the first episode')
     assert change(bench, 'reconstructor', use_sim_time=True)['use_sim_time'].successful

@@ -10,7 +10,7 @@ from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
 
-from .conftest import FakeCamera, FakeReconstructor
+from .conftest import ANY_WEIGHTS, FakeCamera, FakeReconstructor
 from .test_life_cycle import Supervisor
 
 pytestmark = pytest.mark.ros
@@ -45,7 +45,7 @@ def test_the_reconstructor_tells_its_rates_its_latency_and_its_episode(start_nod
 
 def test_what_is_refused_is_told_at_once_but_not_in_a_flood_and_its_warning_ends(
         start_node, bench):
-    start_node('reconstructor', take_views='all')
+    start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all')
     camera = FakeCamera(bench)
     told = bench.subscribe(DiagnosticArray, '/diagnostics')
 
@@ -65,7 +65,7 @@ def test_what_is_refused_is_told_at_once_but_not_in_a_flood_and_its_warning_ends
 
 
 def test_a_node_tells_the_state_of_its_life_cycle_as_it_changes(start_node, bench, facts):
-    start_node('reconstructor', ready=False, autostart=False)
+    start_node('reconstructor', ready=False, autostart=False, weights=ANY_WEIGHTS)
     facts = partial(facts, 'reconstructor')
     bench.until(lambda: facts().get('State') == 'unconfigured', 'the node')
     assert 'Weights SHA-256' not in facts()
@@ -100,7 +100,7 @@ def test_a_node_that_is_configured_anew_tells_nothing_of_before(start_node, benc
 
 def test_the_planner_tells_the_episode_and_why_it_is_done(start_node, bench, facts, box):
     start_node('turntable_camera', mesh=box, rate=30.0, time_scale=20.0)
-    start_node('reconstructor', take_views='at_goal')
+    start_node('reconstructor', weights=ANY_WEIGHTS, take_views='at_goal')
     start_node('view_planner', policy='farthest', max_views=2, entropy_tolerance=0.0)
     facts = partial(facts, 'view_planner')
     bench.until(lambda: facts().get('Done') == 'max_views', 'the end of the episode')

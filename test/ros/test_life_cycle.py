@@ -14,7 +14,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from .conftest import BUDGET_S, FakeCamera, LATCHED_QOS
+from .conftest import ANY_WEIGHTS, BUDGET_S, FakeCamera, LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 NODES = {'reconstructor': {}, 'view_planner': {'policy': 'farthest'}}
@@ -130,7 +130,7 @@ def test_what_is_not_possible_in_a_state_is_refused_in_one_line_and_survived(sta
 
 def test_a_reconstructor_hears_nothing_while_inactive_and_then_begins_an_episode(
         start_node, bench):
-    start_node('reconstructor', take_views='all')
+    start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all')
     supervisor = Supervisor(bench, 'reconstructor')
     episodes = bench.subscribe(Header, 'episode', LATCHED_QOS)
     camera = FakeCamera(bench)

@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import LATCHED_QOS, STREAM_QOS
+from .conftest import ANY_WEIGHTS, LATCHED_QOS, STREAM_QOS
 from .test_recorder import CAMERA, start_remapped
 
 pytestmark = pytest.mark.ros
@@ -161,7 +161,7 @@ def test_the_grid_has_the_size_that_the_loop_says_and_the_network_image_is_shown
 
 def test_what_nodes_warn_of_is_heard_and_forgotten_when_it_is_over(start_node, bench, hear):
     heard = hear(Loop('/'))
-    node = start_node('reconstructor')
+    node = start_node('reconstructor', weights=ANY_WEIGHTS)
 
     def problems():
         heard.update()
@@ -175,8 +175,8 @@ def test_what_nodes_warn_of_is_heard_and_forgotten_when_it_is_over(start_node, b
 
 def test_warnings_of_another_loop_are_not_told(start_node, bench, hear):
     heard = hear(Loop('/cell_1'))
-    start_node('reconstructor')
-    start_node('reconstructor', namespace='cell_1')
+    start_node('reconstructor', weights=ANY_WEIGHTS)
+    start_node('reconstructor', namespace='cell_1', weights=ANY_WEIGHTS)
 
     def problems():
         heard.update()

@@ -5,7 +5,7 @@ import pytest
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from .conftest import LATCHED_QOS
+from .conftest import ANY_WEIGHTS, LATCHED_QOS
 
 pytestmark = pytest.mark.ros
 NODES = ['turntable_camera', 'reconstructor', 'view_planner']
@@ -23,7 +23,7 @@ class Loop:
     def __init__(self, bench, start_node, name, mesh):
         self.name = name
         self._bench = bench
-        start_node('reconstructor', namespace=name, take_views='at_goal')
+        start_node('reconstructor', namespace=name, weights=ANY_WEIGHTS, take_views='at_goal')
         start_node('turntable_camera', namespace=name, mesh=mesh, rate=20.0, time_scale=20.0)
         start_node('view_planner', namespace=name, policy='farthest', max_views=VIEWS,
                    entropy_tolerance=0.0)

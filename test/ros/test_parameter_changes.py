@@ -26,7 +26,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import FakeCamera, FakeReconstructor, LATCHED_QOS
+from .conftest import ANY_WEIGHTS, FakeCamera, FakeReconstructor, LATCHED_QOS
 from .test_planner_node import latent  # noqa: F401
 
 pytestmark = pytest.mark.ros
@@ -86,7 +86,7 @@ def test_parameters_that_exclude_each_other_change_together_or_in_their_order(st
 
 
 def test_views_are_taken_by_the_rule_that_was_set_last(start_node, bench):
-    start_node('reconstructor', take_views='at_goal')
+    start_node('reconstructor', weights=ANY_WEIGHTS, take_views='at_goal')
     camera = FakeCamera(bench)
 
     def is_unused():

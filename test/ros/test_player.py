@@ -13,6 +13,8 @@ from recorded_messages import cdr, definition, HEADER, header, LATCHED
 from rosbags.highlevel import AnyReader
 from std_msgs.msg import Header
 
+from .conftest import ANY_WEIGHTS
+
 pytestmark = pytest.mark.ros
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=1000)
@@ -41,7 +43,7 @@ def bag(shared_bench, start_shared_node, box, tmp_path_factory):
     bags = tmp_path_factory.mktemp('bags')
     nodes = [start_shared_node('recorder', output_dir=bags),
              start_shared_node('turntable_camera', mesh=box, speed=3.0),
-             start_shared_node('reconstructor'),
+             start_shared_node('reconstructor', weights=ANY_WEIGHTS),
              start_shared_node('view_planner', policy='farthest', max_views=VIEWS,
                                entropy_tolerance=0.0)]
     done = shared_bench.subscribe(Header, 'done', LATCHED_QOS)
@@ -119,7 +121,7 @@ def test_the_last_message_of_each_publisher_of_a_latched_topic_is_latched_again(
 
 def test_live_nodes_take_the_recorded_camera_for_one(bench, play, start_node, bag):
     recorded, _ = read(bag)
-    start_node('reconstructor', use_sim_time='true')
+    start_node('reconstructor', weights=ANY_WEIGHTS, use_sim_time='true')
     start_node('view_planner', use_sim_time='true', policy='farthest', max_views=VIEWS,
                entropy_tolerance=0.0)
     views = bench.subscribe(PoseStamped, 'view', LATCHED_QOS)

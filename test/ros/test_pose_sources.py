@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
-from .conftest import BUDGET_S, LATCHED_QOS, SEND_AGAIN_S
+from .conftest import ANY_WEIGHTS, BUDGET_S, LATCHED_QOS, SEND_AGAIN_S
 from .test_clock import FakeClock
 
 pytestmark = pytest.mark.ros
@@ -155,7 +155,7 @@ class Eye:
 
 
 def start(start_node, **parameters):
-    return start_node('reconstructor', take_views='all', **parameters)
+    return start_node('reconstructor', take_views='all', weights=ANY_WEIGHTS, **parameters)
 
 
 def posed(stamp):
@@ -260,7 +260,7 @@ def test_a_view_is_taken_from_where_tf_says(bench, start_node, put_tf):
 
 def test_transforms_are_forgotten_where_the_clock_goes_back(bench, start_node, put_tf):
     put_tf(TF.format(0, 0, 1, 0, 0, 0, 1))
-    node = start_node('reconstructor', pose_source='tf', use_sim_time=True)
+    node = start_node('reconstructor', weights=ANY_WEIGHTS, pose_source='tf', use_sim_time=True)
     clock = FakeClock(bench)
 
     def went_back():
@@ -273,7 +273,7 @@ def test_transforms_are_forgotten_where_the_clock_goes_back(bench, start_node, p
 
 def test_a_node_that_is_to_ask_a_tf2_that_is_missing_does_not_start(start_node, put_tf):
     put_tf('raise ImportError("no tf2_ros here")')
-    node = start_node('reconstructor', ready=False, pose_source='tf')
+    node = start_node('reconstructor', ready=False, weights=ANY_WEIGHTS, pose_source='tf')
     assert node.wait() == 1
     line, = node.log()
     assert 'pose_source: tf2_ros is not installed: expected it' in line

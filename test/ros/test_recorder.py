@@ -29,6 +29,8 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header, String
 import yaml
 
+from .conftest import ANY_WEIGHTS
+
 pytestmark = pytest.mark.ros
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=100)
@@ -291,7 +293,7 @@ def test_the_loop_goes_on_where_the_recording_has_stopped(bench, start_node, box
     recorder = start_node('recorder', output_dir=tmp_path / 'bags')
     resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (30_000, resource.RLIM_INFINITY))
     start_node('turntable_camera', mesh=box, speed=3.0)
-    start_node('reconstructor')
+    start_node('reconstructor', weights=ANY_WEIGHTS)
     bench.until(lambda: recorder.log('recording stopped'), 'the end of the recording')
     start_node('view_planner', policy='farthest', max_views=2, entropy_tolerance=0.0)
     done = bench.subscribe(Header, 'done', LATCHED_QOS)

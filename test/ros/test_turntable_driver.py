@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Header
 
-from .conftest import BUDGET_S, STREAM_QOS
+from .conftest import ANY_WEIGHTS, BUDGET_S, STREAM_QOS
 
 pytestmark = pytest.mark.ros
 DRIVER = str(Path(__file__).parents[2] / 'examples' / 'turntable_driver.py')
@@ -111,8 +111,9 @@ def test_the_loop_goes_round_with_the_driver_and_a_camera_that_only_streams(
         bench, joints, start_node):
     views, done, asked = (bench.subscribe(kind, topic, KEPT) for kind, topic in (
         (PoseStamped, 'view'), (Header, 'done'), (JointState, 'next_azimuth')))
-    start_node('reconstructor', take_views='at_goal', pose_source='turntable_joint',
-               camera_position=POSE_AT_ZERO[:3, 3].tolist(), turntable_direction=DIRECTION,
+    start_node('reconstructor', weights=ANY_WEIGHTS, take_views='at_goal',
+               pose_source='turntable_joint', turntable_direction=DIRECTION,
+               camera_position=POSE_AT_ZERO[:3, 3].tolist(),
                camera_orientation=Rotation.from_matrix(POSE_AT_ZERO[:3, :3]).as_quat().tolist())
     start_node('view_planner', policy='farthest', max_views=VIEWS, entropy_tolerance=0.0)
     image, info = (bench.node.create_publisher(kind, f'camera/{topic}', STREAM_QOS)

@@ -1,6 +1,7 @@
 """Start, spin and stop a node: shared by every executable."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 import faulthandler
 from itertools import pairwise
 from pathlib import Path
@@ -61,9 +62,9 @@ def run_nodes(makers: Callable[[], Iterable[Callable[[], Node]]],
         for make_node in makers():
             nodes.append(make_node())
             executor.add_node(nodes[-1])
-        stop.wakes(executor)
-        while not stop.requested:
-            executor.spin_once()
+        with stop.waking(executor):
+            while not stop.requested:
+                executor.spin_once()
     except ActiveReconError as error:
         get_logger('active_recon').fatal(one_line(error))
         raise SystemExit(1) from None
@@ -89,9 +90,10 @@ class _StopRequests:
         for request in stop_signals():
             signal.signal(request, self._note)
 
-    def wakes(self, executor: Executor) -> None:
+    @contextmanager
+    def waking(self, executor: Executor) -> Iterator[None]:
         """
-        Let each request end the executor's wait, from now on.
+        Let each request end the executor's wait, while the body runs.
 
         Python handles a signal only between its own instructions, so a thread waits for its byte:
         an executor that looked several times a second would use more than all else when idle.
@@ -101,11 +103,18 @@ class _StopRequests:
         signal.set_wakeup_fd(written.fileno(), warn_on_full_buffer=False)
 
         def wake_at_each() -> None:
-            with written:  # which lives as long as the thread
+            with received:
                 while received.recv(1):
                     executor.create_task(lambda: None)  # a wait ends for work only
 
-        threading.Thread(target=wake_at_each, daemon=True).start()
+        waking = threading.Thread(target=wake_at_each, daemon=True)
+        waking.start()
+        try:
+            yield
+        finally:
+            signal.set_wakeup_fd(-1)
+            written.close()
+            waking.join()
 
     def _note(self, _number: int, _frame: object) -> None:
         self.requested = True
