@@ -88,5 +88,6 @@ def _run(name: str, argv: list[str], folder: Path, log: Path, environment: dict[
     try:
         import_module(f'active_recon.nodes.{name}').main()
     finally:
+        # A fork ends without destroying its context, and would leave its shared memory behind
         rclpy.utilities.g_default_context = None
-        gc.collect()  # a fork ends without it, and would leave its shared memory behind
+        gc.collect()
