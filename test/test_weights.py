@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from pathlib import Path
 
 from active_recon.errors import WeightsError
@@ -114,6 +115,21 @@ def test_the_weights_that_ship_load_and_know_their_hash():
     bundle = load_weights()
     assert 0 < bundle.threshold < 1
     assert weights_hash() == bundle_card()['sha256']
+
+
+def test_a_file_is_read_once_for_its_hash_until_another_is_in_its_place(tmp_path, monkeypatch):
+    path, other = tmp_path / 'a.safetensors', tmp_path / 'b.safetensors'
+    path.write_bytes(b'one')
+    first = weights_hash(path)
+    with monkeypatch.context() as patch:
+        patch.delattr(Path, 'read_bytes')
+        assert weights_hash(path) == first
+    other.write_bytes(b'two')
+    os.replace(other, path)
+    second = weights_hash(path)
+    assert second != first
+    path.write_bytes(b'three')
+    assert weights_hash(path) not in (first, second)
 
 
 def bundle_card():

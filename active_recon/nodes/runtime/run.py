@@ -53,7 +53,7 @@ def _alone(make_node: Callable[[], Node], args: list[str] | None) -> list[Callab
 def run_nodes(makers: Callable[[], Iterable[Callable[[], Node]]],
               args: list[str] | None = None) -> None:
     """Spin the nodes that `makers` returns functions to make, all in one executor; as above."""
-    stop = _StopRequests()
+    stop = StopRequests()
     make_room()
     nodes: list[Node] = []
     try:
@@ -77,7 +77,7 @@ def run_nodes(makers: Callable[[], Iterable[Callable[[], Node]]],
         rclpy.try_shutdown()
 
 
-class _StopRequests:
+class StopRequests:
     """
     Notes the `stop_signals` from now on; `requested` is whether one came.
 
