@@ -54,7 +54,8 @@ autodoc2_packages = [{
     'exclude_dirs': [
         '__pycache__', 'cli', 'demo', 'evaluation', 'launching', 'nodes', 'objects', 'paper',
         'report', 'shapes', 'storage', 'training', 'viewer', 'weights'],
-    'exclude_files': ['config.py', 'interrupts.py', 'reporting.py', 'view_colors.py'],
+    'exclude_files': [
+        'config.py', 'interrupts.py', 'reporting.py', 'view_colors.py', 'yaml_text.py'],
 }]
 autodoc2_output_dir = 'api'
 autodoc2_render_plugin = 'myst'

@@ -10,6 +10,7 @@ from active_recon.calibration.board import Detection
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.geometry.lenses import Distortion
+from active_recon.yaml_text import yaml_value
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,7 +59,7 @@ def write_lens(lens: Intrinsics, path: Path) -> None:
 def read_lens(path: Path) -> Intrinsics:
     """Read ROS's calibration YAML; raises DataError where it is invalid or of another model."""
     try:
-        content = yaml.safe_load(path.read_text())
+        content = yaml_value(path.read_text())
         matrix = np.array(content['camera_matrix']['data'], np.float64).reshape(3, 3)
         coefficients = tuple(map(float, content['distortion_coefficients']['data']))
         size = int(content['image_width']), int(content['image_height'])
@@ -66,8 +67,7 @@ def read_lens(path: Path) -> Intrinsics:
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file: expected a YAML file of ROS's camera_calibration"
                         ) from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError,
-            ValueError) as error:
+    except (OSError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise DataError(f"{path}: no calibration: expected a YAML file of ROS's "
                         f'camera_calibration, got: {type(error).__name__}: {error}') from error
     except ViewError as error:

@@ -1,6 +1,7 @@
 """A parameter's value as text: YAML, taken and shown in the same form."""
 
 from active_recon.errors import ConfigError
+from active_recon.yaml_text import yaml_value
 import yaml
 
 _INTEGERS = range(-2**63, 2**63)
@@ -15,9 +16,9 @@ def value_from_text(text: str, present: object = None) -> object:
     one, and `off` the string in place of another. Raises ConfigError where it is no such value.
     """
     try:
-        value = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError) as error:
-        raise _not_a_value(text, ' '.join(str(error).split())) from error
+        value = yaml_value(text)
+    except ValueError as error:
+        raise _not_a_value(text, str(error)) from error
     if isinstance(present, str) and not isinstance(value, str | list | dict):
         return text  # YAML reads off, 1 and nothing at all as no strings
     if isinstance(present, float):

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from active_recon.errors import DataError
+from active_recon.yaml_text import yaml_value
 import yaml
 
 VERSION = 9  # of metadata.yaml in Jazzy
@@ -16,8 +17,6 @@ _RELIABILITY: Mapping[object, str] = {
     **{word: word for word in RELIABILITIES}, 1: 'reliable', 2: 'best_effort'}
 _DURABILITY: Mapping[object, str] = {
     **{word: word for word in DURABILITIES}, 1: 'transient_local', 2: 'volatile'}
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # libyaml takes a tenth of the time
-_MOST_NESTED = 100
 PROVENANCE = 'active_recon'
 """The MCAP metadata record with the versions, weights and policy that made a bag; the last one in
 a file is valid."""
@@ -141,32 +140,15 @@ def as_yaml(value: object) -> str:
 
 
 def yaml_mapping(text: bytes, name: str) -> dict[str, Any]:
-    """
-    Return the mapping in a YAML text; raises DataError with the name if it is none.
-
-    Aliases are rejected: a few nested ones expand to gigabytes.
-    """
+    """Return the mapping in a YAML text; raises DataError with the name if it is none."""
     try:
-        value = _loaded(text)
-    except (yaml.YAMLError, ValueError) as error:
-        raise DataError(f'{name}: invalid YAML: {" ".join(str(error).split())}') from error
+        value = yaml_value(text)
+    except ValueError as error:
+        raise DataError(f'{name}: invalid YAML: {error}') from error
     if not isinstance(value, dict):
         raise DataError(f'{name}: invalid content: expected a mapping, got a '
                         f'{type(value).__name__}')
     return value
-
-
-def _loaded(text: bytes | str) -> Any:
-    """Return the value of a YAML text; raises YAMLError on aliases and on deep nesting."""
-    depth = 0
-    for event in yaml.parse(text, _LOADER):  # libyaml itself composes until the stack is full
-        if isinstance(event, yaml.AliasEvent):
-            raise yaml.YAMLError('aliases are not allowed')
-        depth += isinstance(event, yaml.CollectionStartEvent)
-        depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > _MOST_NESTED:
-            raise yaml.YAMLError(f'nested too deep: expected at most {_MOST_NESTED} levels')
-    return yaml.load(text, _LOADER)
 
 
 @lru_cache(maxsize=256)  # a bag is read several times, and most channels say the same
@@ -177,10 +159,10 @@ def qos_from_yaml(text: str) -> tuple[QosProfile, ...]:
     Before Jazzy the policies were the numbers of the middleware's enumerations.
     """
     try:
-        offered = _loaded(text) or []
+        offered = yaml_value(text) or []
         named = [(_RELIABILITY.get(profile['reliability']), _DURABILITY.get(profile['durability']))
                  for profile in offered]
-    except (yaml.YAMLError, TypeError, KeyError, ValueError):
+    except (TypeError, KeyError, ValueError):
         return ()
     return tuple(QosProfile(reliability, durability) for reliability, durability in named
                  if reliability and durability)
