@@ -8,6 +8,7 @@ from typing import Any
 
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.json_text import json_value
 from active_recon.meshes.photos import Photo
 from active_recon.quality.quality import Quality
 from active_recon.quality.silhouettes import SeenView
@@ -126,7 +127,7 @@ def _read(facts: Mapping[str, str], arrays: Mapping[str, NDArray[Any]],
     evidence, side = arrays.get(_EVIDENCE), reconstructor.spec.resolution
     if evidence is not None and evidence.shape != no_evidence(side).shape:
         raise ValueError(f'depth evidence of {evidence.shape}')
-    told = json.loads(facts['quality'])
+    told = json_value(facts['quality'])
     quality = Quality(**told) if told else None
     occupancy = arrays['occupancy']
     if occupancy.shape != (side,) * 3 or not (

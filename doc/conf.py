@@ -55,7 +55,8 @@ autodoc2_packages = [{
         '__pycache__', 'cli', 'demo', 'evaluation', 'launching', 'nodes', 'objects', 'paper',
         'report', 'shapes', 'storage', 'training', 'viewer', 'weights'],
     'exclude_files': [
-        'config.py', 'interrupts.py', 'reporting.py', 'view_colors.py', 'yaml_text.py'],
+        'config.py', 'interrupts.py', 'json_text.py', 'reporting.py', 'view_colors.py',
+        'yaml_text.py'],
 }]
 autodoc2_output_dir = 'api'
 autodoc2_render_plugin = 'myst'

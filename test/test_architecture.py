@@ -12,7 +12,8 @@ PACKAGES = ('active_recon', 'msg_tools')
 # A subpackage imports itself and what stands in the rows above its own
 ROWS: tuple[set[str], ...] = (
     {'errors'},
-    {'config', 'file_names', 'freed_memory', 'geometry', 'interrupts', 'objects', 'plugins',
+    {'config', 'file_names', 'freed_memory', 'geometry', 'interrupts', 'json_text',
+     'objects', 'plugins',
      'reporting', 'view_colors', 'whole_files', 'yaml_text'},
     {'cluster', 'volumes'},
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},

@@ -6,6 +6,7 @@ import json
 
 from active_recon.batch.rows import Row
 from active_recon.cluster.stores import Place, whole
+from active_recon.json_text import json_value
 
 _FOLDER = 'results'
 
@@ -37,7 +38,7 @@ class BagResult:
     def read(cls, out: Place, bag: Place) -> 'BagResult | None':
         """Return the result of a bag; None where there is none, or not a whole one."""
         try:
-            written = json.loads(result_place(out, bag).read_text(encoding='utf-8'))
+            written = json_value(result_place(out, bag).read_text(encoding='utf-8'))
             return cls(written['state'], written['rows'])
         except (OSError, ValueError, KeyError, TypeError):
             return None

@@ -27,6 +27,7 @@ from pathlib import Path
 
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
+from active_recon.json_text import json_value
 from active_recon.volumes.binvox import binvox_side, read_binvox, write_binvox
 from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION, VoxelGrid
 from active_recon.whole_files import whole_file
@@ -248,8 +249,8 @@ def _read_cameras(path: Path) -> list[Camera]:
         return [Camera(np.array(row['pose'], np.float64),
                        Intrinsics(float(row['fx']), float(row['fy']), float(row['cx']),
                                   float(row['cy']), int(row['width']), int(row['height'])))
-                for row in json.loads(path.read_text())]
-    except (OSError, ValueError, KeyError, TypeError, ViewError) as error:
+                for row in json_value(path.read_text())]
+    except (OSError, ValueError, KeyError, OverflowError, TypeError, ViewError) as error:
         raise DataError(f'{path}: no readable cameras: expected a list, each with pose, '
                         f'{", ".join(_LENS)}, got: {error}') from error
 

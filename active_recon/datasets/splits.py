@@ -1,12 +1,12 @@
 """Splits of ShapeNet as R2N2 publishes it: its categories, and the objects of each part."""
 
 from collections.abc import Iterator
-import json
 from pathlib import Path
 from typing import Any
 
 from active_recon.datasets.layout import list_objects, ObjectFolder
 from active_recon.errors import ConfigError, DataError
+from active_recon.json_text import json_value
 
 SYNSETS = {
     '02691156': 'airplane', '02828884': 'bench', '02933112': 'cabinet', '02958343': 'car',
@@ -64,7 +64,7 @@ def _sorted_part(folders: list[ObjectFolder], part: str) -> Iterator[ObjectFolde
 def _read_split(path: Path, part: str) -> list[tuple[str, str]]:
     """Return the objects of a part: the category's folder and the id of each."""
     try:
-        content = json.loads(path.read_bytes())
+        content = json_value(path.read_bytes())
     except (OSError, ValueError) as error:
         raise DataError(f'{path}: no readable split file: expected JSON, got: {error}') from error
     if isinstance(content, dict):

@@ -8,6 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
+from active_recon.json_text import json_value
 from active_recon.models.weights_bytes import in_precision, require_finite, weights_bytes
 from active_recon.models.weights_files import weights_hash
 from safetensors import safe_open, SafetensorError
@@ -82,7 +83,7 @@ class Companion(Generic[Module]):
                 f'one for {facts.get("network_sha256", "none")[:12]}; {self.advice}')
         try:
             with torch.device('meta'):
-                module = self.build(json.loads(facts['config']))
+                module = self.build(json_value(facts['config']))
             module.load_state_dict(tensors, assign=True)
         except (KeyError, ValueError, TypeError, RuntimeError, ConfigError) as error:
             raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error

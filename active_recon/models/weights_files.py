@@ -9,6 +9,7 @@ from typing import Any
 
 from active_recon.config import Config, with_current_keys
 from active_recon.errors import WeightsError
+from active_recon.json_text import json_value
 from safetensors import safe_open, SafetensorError
 
 DEFAULT_MODEL, PAPER_MODEL = 'lifting-large', '2d3d-attention'
@@ -48,7 +49,7 @@ def read_metadata(path: Path) -> WeightsMetadata:
         raise WeightsError(f'{path}: its config cannot be read: expected that of a reconstruction '
                            f'network, with a threshold, got that of a {metadata["model"]}')
     try:
-        return WeightsMetadata(metadata['model'], json.loads(metadata['config']),
+        return WeightsMetadata(metadata['model'], json_value(metadata['config']),
                                float(metadata['threshold']))
     except (KeyError, ValueError, TypeError) as error:
         raise WeightsError(f'{path}: its config cannot be read: {error}') from error
@@ -91,7 +92,7 @@ def read_card(path: Path) -> dict[str, Any]:
     """Return the card beside weights, with current keys; empty where there is none."""
     beside = path.with_suffix('.json')
     try:
-        return with_current_keys(dict(json.loads(beside.read_text()))) if beside.is_file() else {}
+        return with_current_keys(dict(json_value(beside.read_text()))) if beside.is_file() else {}
     except (OSError, ValueError, TypeError) as error:
         raise WeightsError(f'{beside}: no readable card: expected the JSON that was written '
                            f'beside {path.name}, got: {error}') from error

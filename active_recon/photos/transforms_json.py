@@ -11,7 +11,6 @@ The format: https://docs.nerf.studio/quickstart/data_conventions.html
 """
 
 from collections.abc import Mapping
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from typing import Any
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Intrinsics
 from active_recon.geometry.lenses import Distortion
+from active_recon.json_text import json_value
 from active_recon.photos.camera_file import CameraFile, Entry, Lens, rigid, sized
 import numpy as np
 
@@ -31,7 +31,7 @@ _FISHEYE = {'OPENCV_FISHEYE', 'FISHEYE'}
 def read_transforms(path: Path) -> CameraFile:
     """Read the file; raises DataError that names the frame and the key that are wrong."""
     try:
-        content = json.loads(path.read_text(encoding='utf-8-sig'))  # Windows writes its mark
+        content = json_value(path.read_text(encoding='utf-8-sig'))  # Windows writes its mark
         frames = content['frames']
         if not isinstance(frames, list) or not frames:
             raise ValueError('no frames')

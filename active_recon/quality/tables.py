@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from active_recon.errors import WeightsError
+from active_recon.json_text import json_value
 from active_recon.quality.features import FEATURES
 from active_recon.quality.latents import KnownLatents
 from active_recon.quality.quality import SUSPECTS
@@ -123,7 +124,7 @@ class QualityTables(Heads):
     def read(cls, path: Path) -> Self:
         """Read tables; raises WeightsError where they cannot be used."""
         try:
-            found = json.loads(path.read_text())
+            found = json_value(path.read_text())
             return cls(**{each.name: found[each.name] for each in fields(cls)
                           if each.name in found or each.default_factory is MISSING})
         except (OSError, ValueError, KeyError, TypeError) as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import WeightsError
+from active_recon.json_text import json_value
 from active_recon.models.weights_files import SHIPPED
 
 FORMAT = 2  # in 1 the update also gave what it had summed up for the decoder
@@ -70,7 +71,7 @@ def read_graph_metadata(path: Path, text: str | None, part: str,
         raise WeightsError(f'{path}: says nothing of active_recon: expected a file that '
                            '`active-recon export` wrote')
     try:
-        told = json.loads(text)
+        told = json_value(text)
         if told['format'] != FORMAT:
             raise WeightsError(f'{path}: another format of exported files: expected {FORMAT}, got '
                                f'{told["format"]}; export the weights anew, or update this '
@@ -79,7 +80,7 @@ def read_graph_metadata(path: Path, text: str | None, part: str,
             told['part'], told['weights_sha256'],
             {name: (tuple(map(int, shape)), float(value))
              for name, (shape, value) in told['state'].items()}, dict(told['facts']))
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, OverflowError, TypeError, AttributeError) as error:
         raise WeightsError(f'{path}: its metadata cannot be read: {error!r}') from error
     if found.part != part:
         raise WeightsError(f'{path}: another part of a network: expected {part}, got {found.part}')
