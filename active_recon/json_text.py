@@ -9,4 +9,4 @@ def json_value(text: bytes | str) -> Any:
     try:
         return json.loads(text)
     except RecursionError:
-        raise ValueError('nested too deep: expected less than a thousand levels') from None
+        raise ValueError('nested too deep: expected fewer than a thousand levels') from None

@@ -107,14 +107,14 @@ class StopRequests:
                 while received.recv(1):
                     executor.create_task(lambda: None)  # a wait ends for work only
 
-        waking = threading.Thread(target=wake_at_each, daemon=True)
-        waking.start()
+        thread = threading.Thread(target=wake_at_each, daemon=True)
+        thread.start()
         try:
             yield
         finally:
             signal.set_wakeup_fd(-1)
             written.close()
-            waking.join()
+            thread.join()
 
     def _note(self, _number: int, _frame: object) -> None:
         self.requested = True
