@@ -8,7 +8,10 @@ from active_recon.models.weights_files import read_card
 from active_recon.photos.transforms_json import read_transforms
 from active_recon.quality.tables import QualityTables
 from active_recon.runtimes.graph_files import read_graph_metadata
+from active_recon.training.checkpoints import step_reached
+import numpy as np
 import pytest
+from safetensors.numpy import save_file
 
 DEEP = '[' * 100_000
 
@@ -42,6 +45,11 @@ def test_a_split_that_is_nested_too_deep_is_refused_in_words(dataset, tmp_path):
     (tmp_path / 'split.json').write_text(DEEP)
     with pytest.raises(DataError, match='no readable split file: expected JSON, got: nested too'):
         list_split(dataset, tmp_path / 'split.json', 'test')
+
+
+def test_a_checkpoint_that_is_nested_too_deep_is_no_whole_one(tmp_path):
+    save_file({'step': np.zeros(1)}, tmp_path / 'any.safetensors', {'checkpoint': DEEP})
+    assert step_reached(tmp_path / 'any.safetensors') == 0
 
 
 def test_an_image_of_endless_width_is_refused(tmp_path):

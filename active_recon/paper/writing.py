@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from active_recon.errors import DataError
+from active_recon.json_text import json_value
 from active_recon.models.weights_files import FOLDER, read_card, weights_hash
 from active_recon.paper.claims import sentences
 from active_recon.paper.results import Claim, Result
@@ -42,7 +43,7 @@ def read_result(study: Study, name: str) -> dict[str, Any]:
     """Return a part's JSON; raises DataError where it cannot be read."""
     path = study.out / f'{name}.json'
     try:
-        found: dict[str, Any] = json.loads(path.read_bytes())
+        found: dict[str, Any] = json_value(path.read_bytes())
     except (OSError, ValueError) as error:
         raise DataError(f'{path}: no readable result: expected that of `active-recon paper '
                         f'{name}`, got: {error}') from error

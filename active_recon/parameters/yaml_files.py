@@ -9,8 +9,7 @@ from active_recon.yaml_text import yaml_value
 def read_yaml(path: Path) -> object:
     """Return what a file holds; ConfigError, with line and reason, where it is no YAML."""
     try:
-        found: object = yaml_value(path.read_text())
-        return found
+        return yaml_value(path.read_text())
     except FileNotFoundError as error:
         raise ConfigError(f'{path}: no such file: expected a ROS parameters file in YAML'
                           ) from error

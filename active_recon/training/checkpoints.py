@@ -8,6 +8,7 @@ from typing import Any
 
 from active_recon.config import with_current_keys
 from active_recon.errors import ConfigError, DataError
+from active_recon.json_text import json_value
 from active_recon.whole_files import whole_file
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save
@@ -47,7 +48,7 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
 
     try:
         with safe_open(path, framework='pt') as stored:
-            meta = json.loads(stored.metadata()['checkpoint'])
+            meta = json_value(stored.metadata()['checkpoint'])
         tensors: dict[str, Tensor] = load_file(path)
         module.load_state_dict({name.removeprefix('module.'): tensor
                                 for name, tensor in tensors.items()
@@ -70,7 +71,7 @@ def step_reached(path: Path) -> int:
 
     try:
         with safe_open(path, framework='np') as stored:
-            return int(json.loads(stored.metadata()['checkpoint'])['step'])
+            return int(json_value(stored.metadata()['checkpoint'])['step'])
     except (OSError, SafetensorError, KeyError, TypeError, ValueError):
         return 0
 

@@ -18,6 +18,7 @@ from active_recon.evaluation.next_view.renderings import another_rendering
 from active_recon.evaluation.next_view.watching import WatchedObject
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import read_scene
+from active_recon.json_text import json_value
 from active_recon.policies import load_policy, Policy, PolicyOptions
 from active_recon.reporting import Advance
 from active_recon.training.checkpoints import differences
@@ -121,7 +122,7 @@ def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
             unfinished.write_text(json.dumps(collected) + '\n')
         return
     try:
-        before = dict(json.loads(noted.read_text()))
+        before = dict(json_value(noted.read_text()))
     except (ValueError, TypeError) as error:
         raise DataError(f'{noted}: no readable note of how gains were collected: expected that of '
                         f'`train-policy`, got: {error}; name another folder with --out') from error

@@ -28,9 +28,11 @@ def test_a_request_ends_the_wait_and_afterwards_nobody_waits_for_one(ros, stop, 
     before = threading.active_count()
     with stop.waking(executor):
         assert not stop.requested
-        threading.Timer(0.1, os.kill, (os.getpid(), asked)).start()
+        asking = threading.Timer(0.1, os.kill, (os.getpid(), asked))
+        asking.start()
         executor.spin_once(BUDGET_S)
         assert stop.requested
+    asking.join()
     assert threading.active_count() == before
     assert signal.set_wakeup_fd(-1) == -1
     executor.shutdown()
