@@ -471,6 +471,32 @@ def test_a_mask_is_the_object_where_it_is_more_than_half_of_its_full_value(full,
     np.testing.assert_array_equal(_mask(tmp_path / 'mask.png', 8, 8), shares > 0.5)
 
 
+@pytest.mark.parametrize('mode', ['P', 'RGB'])
+def test_a_mask_of_coloured_labels_is_the_object_wherever_it_is_not_black(mode, tmp_path):
+    labels = np.zeros((8, 8), np.uint8)
+    labels[2:5, 3:6], labels[5, 3:6] = 1, 2
+    mask = Image.fromarray(labels)
+    mask.putpalette([0, 0, 0, 128, 0, 0, 0, 0, 255])  # dark red and blue
+    mask.convert(mode).save(tmp_path / 'mask.png')
+    np.testing.assert_array_equal(_mask(tmp_path / 'mask.png', 8, 8), labels > 0)
+
+
+def test_a_palette_that_is_see_through_masks_like_an_alpha_channel(tmp_path):
+    clear = np.zeros((8, 8), np.uint8)
+    clear[2:5, 3:6] = 1
+    mask = Image.fromarray(clear)
+    mask.putpalette([90, 90, 90, 20, 20, 20])
+    mask.save(tmp_path / 'mask.png', transparency=0)
+    np.testing.assert_array_equal(_mask(tmp_path / 'mask.png', 8, 8), clear > 0)
+
+
+def test_an_empty_mask_is_refused_with_how_bright_an_object_is(tmp_path):
+    Image.fromarray(np.full((8, 8), 2, np.uint8)).save(tmp_path / 'mask.png')
+    with pytest.raises(DataError, match='expected an object, brighter than 127.5 of 255, got at '
+                                        'most 2'):
+        _mask(tmp_path / 'mask.png', 8, 8)
+
+
 def test_an_opaque_alpha_channel_is_no_mask(tmp_path):
     grey = np.zeros((8, 8), np.uint8)
     grey[2:5, 3:6] = 255

@@ -16,6 +16,7 @@ from active_recon.photos.large_images import opened
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 _SEE_THROUGH = 250  # alpha below which a photo has an alpha channel worth the name
 _EMPTY_SHARE = 0.02
@@ -171,15 +172,27 @@ def _masks_by_stem(folder: Path | None) -> dict[str, Path]:
             for path in sorted(folder.iterdir()) if path.suffix.lower() in ENDINGS}
 
 
+def _brightness(image: Image.Image) -> NDArray[np.float32]:
+    """
+    Return a mask's values, (H, W): its alpha channel unless that is opaque, else its brightness.
+
+    That of a colour, as masks of labels have, is its brightest channel's.
+    """
+    if image.mode.startswith(('I', 'F')):  # 16 bits, 32, or floats
+        return np.asarray(image, np.float32)
+    if image.has_transparency_data:
+        alpha = image.convert('RGBA').getchannel('A')
+        if alpha.getextrema() != (255, 255):
+            return np.asarray(alpha, np.float32)
+    return np.asarray(image.convert('RGB'), np.float32).max(axis=2)
+
+
 def _mask(path: Path, width: int, height: int,
           turned: Callable[[NDArray[Any]], NDArray[Any]] = lambda stored: stored
           ) -> NDArray[np.bool_]:
     try:
         with opened(path) as image:
-            alpha = image.getchannel('A') if image.mode in ('RGBA', 'LA') else None
-            if alpha is None or alpha.getextrema() == (255, 255):  # an opaque one masks nothing
-                alpha = image if image.mode.startswith('I') else image.convert('L')
-            grey = np.asarray(alpha, np.float32)
+            grey = _brightness(image)
     except DataError as error:
         raise DataError(f'{path}: no mask: expected an image, got: {error}') from error
     grey = turned(grey)
@@ -190,5 +203,6 @@ def _mask(path: Path, width: int, height: int,
     sized = cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
     found = np.asarray(sized > full / 2)
     if not found.any():
-        raise DataError(f'{path}: empty mask: expected an object in it, got only background')
+        raise DataError(f'{path}: empty mask: expected an object, brighter than {full / 2:g} of '
+                        f'{full}, got at most {grey.max():g}')
     return found
