@@ -26,7 +26,7 @@ SOURCES := setup.py setup.cfg package.xml pyproject.toml constraints.txt $(shell
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo golden test test-full test-jazzy test-lowest doc html bench soak policies weights ready read-doc chromium lint clean
+.PHONY: help venv demo golden test test-full test-jazzy test-lowest doc html bench soak policies weights ready read-doc compiled chromium lint clean
 
 help:  ## this list
 	@echo 'make TARGET, where TARGET is one of'
@@ -62,7 +62,12 @@ test-jazzy test-lowest: test-%:
 
 # What the tests begin with; two at a time, since each keeps one core busy.
 ready:
-	@$(MAKE) --no-print-directory -j2 lint read-doc chromium .venv/colcon/installed
+	@$(MAKE) --no-print-directory -j2 lint read-doc compiled chromium .venv/colcon/installed
+
+# What the tests import is compiled once, and not by each of their workers at the same time. They
+# tell what is wrong with it.
+compiled: .venv/installed
+	@$(BIN)/python -m pytest -p no:cacheprovider --collect-only >/dev/null 2>&1 || true
 
 # The pages are tested in Debian's Chromium, which only root can install.
 chromium:

@@ -52,11 +52,12 @@ myst_heading_anchors = 3
 autodoc2_packages = [{
     'path': os.path.relpath(f'{repository}/active_recon', HERE),
     'exclude_dirs': [
-        '__pycache__', 'cli', 'demo', 'evaluation', 'launching', 'nodes', 'objects', 'paper',
-        'report', 'shapes', 'storage', 'training', 'viewer', 'weights'],
+        '__pycache__', 'batch', 'capture', 'cli', 'cluster', 'demo', 'evaluation', 'launching',
+        'nodes', 'objects', 'paper', 'parameters', 'report', 'shapes', 'simulation', 'storage',
+        'training', 'viewer', 'watching', 'weights'],
     'exclude_files': [
-        'config.py', 'interrupts.py', 'json_text.py', 'reporting.py', 'view_colors.py',
-        'yaml_text.py'],
+        'config.py', 'environment.py', 'file_names.py', 'freed_memory.py', 'interrupts.py',
+        'json_text.py', 'reporting.py', 'view_colors.py', 'whole_files.py', 'yaml_text.py'],
 }]
 autodoc2_output_dir = 'api'
 autodoc2_render_plugin = 'myst'

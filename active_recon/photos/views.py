@@ -184,7 +184,7 @@ def _brightness(image: Image.Image) -> NDArray[np.float32]:
         alpha = image.convert('RGBA').getchannel('A')
         if alpha.getextrema() != (255, 255):
             return np.asarray(alpha, np.float32)
-    return np.asarray(image.convert('RGB'), np.float32).max(axis=2)
+    return np.asarray(np.asarray(image.convert('RGB')).max(axis=2), np.float32)
 
 
 def _mask(path: Path, width: int, height: int,

@@ -16,10 +16,11 @@ import rclpy.utilities
 ROOT = Path(__file__).parents[2]
 _NODES = ('reconstructor', 'view_planner', 'turntable_camera', 'camera', 'recorder', 'player')
 _FORKS = multiprocessing.get_context('forkserver')
-# The last are what reconstructors import with their weights
-_FORKS.set_forkserver_preload([*(f'active_recon.nodes.{name}' for name in _NODES),
-                               'active_recon.runtimes.torch',
-                               'active_recon.runtimes.openvino', 'openvino', __name__])
+# What reconstructors import with their weights, and rclpy with the first message
+_LATER = ('active_recon.runtimes.torch', 'active_recon.runtimes.openvino', 'openvino',
+          'rosidl_generator_py')
+_FORKS.set_forkserver_preload([*(f'active_recon.nodes.{name}' for name in _NODES), *_LATER,
+                               __name__])
 # The first line that a process logs looks for its module among all: here once, not in each fork
 inspect.getmodule(inspect.currentframe())
 
