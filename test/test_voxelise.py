@@ -2,10 +2,11 @@
 
 import math
 
-from active_recon.volumes.voxelisation import voxelise
+from active_recon.volumes.voxelisation import _filled, voxelise
 from active_recon.volumes.voxels import iou
 import numpy as np
 import pytest
+from scipy.ndimage import binary_fill_holes
 import trimesh
 
 
@@ -68,3 +69,9 @@ def test_long_thin_bars_take_the_cells_along_them_and_no_others():
     occupied = voxelise(trimesh.util.concatenate(bars)).occupied(0.5)
     assert occupied[:, 15:17, 4:28].any(axis=1).all()
     assert not occupied[:, :15].any()
+
+
+@pytest.mark.parametrize('share', [0.0, 0.3, 0.6, 0.9, 1.0])
+def test_what_is_enclosed_is_what_scipy_fills(share):
+    surface = np.random.default_rng(0).random((16, 16, 16)) < share
+    np.testing.assert_array_equal(_filled(surface), binary_fill_holes(surface))

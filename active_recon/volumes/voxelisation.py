@@ -6,7 +6,7 @@ import math
 from active_recon.volumes.voxels import RESOLUTION, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_fill_holes
+from scipy.ndimage import label
 import trimesh
 
 _AT_ONCE = 1 << 20  # samples: those of a mesh of long thin bars do not fit into memory at once
@@ -24,7 +24,17 @@ def voxelise(mesh: trimesh.Trimesh, resolution: int = RESOLUTION) -> VoxelGrid:
     for samples in _surface_samples(np.asarray(mesh.triangles), spacing=1 / (2 * resolution)):
         index = np.clip(np.floor((samples + 0.5) * resolution).astype(int), 0, resolution - 1)
         surface[tuple(index.T)] = True
-    return VoxelGrid(binary_fill_holes(surface).astype(np.float32))
+    return VoxelGrid(_filled(surface).astype(np.float32))
+
+
+def _filled(surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """
+    Return the cells, (R, R, R), from which no way through faces leads out without a true one.
+
+    This is what scipy's `binary_fill_holes` returns, in half of its time.
+    """
+    regions, _ = label(~np.pad(surface, 1))
+    return np.asarray(regions[1:-1, 1:-1, 1:-1] != regions[0, 0, 0])
 
 
 def _surface_samples(triangles: NDArray[np.float64],
