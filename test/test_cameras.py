@@ -116,6 +116,16 @@ def test_a_ray_is_projected_to_the_pixel_that_it_came_from(camera, samples):
     np.testing.assert_allclose(pixels, centers, atol=1e-9)
 
 
+@pytest.mark.parametrize('samples', [1, 2])
+@pytest.mark.parametrize('camera', CAMERAS[:1] + BENT)
+def test_rays_through_some_pixels_are_those_of_all_pixels(camera, samples):
+    left, top, right, bottom = (each * samples for each in (30, 60, 90, 110))
+    np.testing.assert_allclose(
+        camera.ray_directions(samples, (30, 60, 90, 110)),
+        camera.ray_directions(samples)[top:bottom, left:right],
+        rtol=0, atol=0 if camera.intrinsics.distortion is None else 1e-9)
+
+
 def test_the_canonical_camera_just_holds_the_grid_s_sphere():
     camera = orbit_camera(0.3)
     assert camera.distance == CANONICAL_DISTANCE

@@ -207,25 +207,28 @@ class Camera:
         with np.errstate(divide='ignore', invalid='ignore'):
             return (image[:2] / image[2]).T, optical[2]
 
-    def ray_directions(self, samples: int = 1) -> NDArray[np.float64]:
+    def ray_directions(self, samples: int = 1, window: tuple[int, int, int, int] | None = None
+                       ) -> NDArray[np.float64]:
         """
         Return rays through the pixels in the object frame, (height, width, 3), of depth 1.
 
         With `samples` there are samples x samples rays in each pixel: (samples x height, samples
-        x width, 3).
+        x width, 3). `window`, (left, top, right, bottom) in pixels, asks for the rays through
+        those alone.
         """
-        lens = self.intrinsics.resized(
-            self.intrinsics.width * samples, self.intrinsics.height * samples)
-        across = (np.arange(lens.width) + 0.5 - lens.cx) / lens.fx
-        down = (np.arange(lens.height) + 0.5 - lens.cy) / lens.fy
-        right, below, forward = self.pose[:3, :3].T
+        width, height = self.intrinsics.width, self.intrinsics.height
+        lens = self.intrinsics.resized(width * samples, height * samples)
+        left, top, right, bottom = (0, 0, width, height) if window is None else window
+        across = (np.arange(left * samples, right * samples) + 0.5 - lens.cx) / lens.fx
+        down = (np.arange(top * samples, bottom * samples) + 0.5 - lens.cy) / lens.fy
+        rightward, downward, forward = self.pose[:3, :3].T
         if lens.distortion is None:
             rays: NDArray[np.float64] = (
-                across[None, :, None] * right + down[:, None, None] * below + forward)
+                across[None, :, None] * rightward + down[:, None, None] * downward + forward)
             return rays
         seen = np.stack(np.meshgrid(across, down), axis=-1)
         straight = lens.distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
-        return np.asarray(straight[..., :1] * right + straight[..., 1:] * below + forward)
+        return np.asarray(straight[..., :1] * rightward + straight[..., 1:] * downward + forward)
 
 
 class OrbitCamera(Camera):

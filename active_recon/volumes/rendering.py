@@ -46,8 +46,7 @@ class Renderer:
         image = np.zeros((lens.height, lens.width, 4), np.uint8)
         if left >= right or top >= bottom:
             return image
-        rays = camera.ray_directions(samples)[
-            top * samples:bottom * samples, left * samples:right * samples].astype(np.float32)
+        rays = camera.ray_directions(samples, (left, top, right, bottom)).astype(np.float32)
         height, width = rays.shape[:2]
         origins = np.broadcast_to(camera.position.astype(np.float32), (height * width, 3))
         hit = self._scene.run(np.ascontiguousarray(origins), rays.reshape(-1, 3))
@@ -71,7 +70,8 @@ class Renderer:
         depth = np.zeros((lens.height, lens.width), np.float32)
         if left >= right or top >= bottom:
             return depth
-        rays = camera.ray_directions()[top:bottom, left:right].astype(np.float32).reshape(-1, 3)
+        rays = camera.ray_directions(1, (left, top, right, bottom)).astype(np.float32)
+        rays = rays.reshape(-1, 3)
         origins = np.broadcast_to(camera.position.astype(np.float32), rays.shape)
         found = self._scene.run(np.ascontiguousarray(origins), rays, query='DISTANCE')
         found = np.where(found < _NOWHERE, found, 0)
