@@ -1,5 +1,8 @@
 """The recorder asks any node for its parameters, also one that cannot tell them all."""
 
+from contextlib import suppress
+
+from mcap.exceptions import McapError
 from mcap.reader import make_reader
 import pytest
 from rclpy.parameter import Parameter
@@ -11,9 +14,10 @@ pytestmark = pytest.mark.ros
 
 def attached(path):
     """Return the parameters of each node, as an open or a finished file has them."""
-    with path.open('rb') as stream:
+    with path.open('rb') as stream, suppress(McapError):  # read while it is written
         return {attachment.name: yaml.safe_load(attachment.data)
                 for attachment in make_reader(stream).iter_attachments()}
+    return {}
 
 
 def test_a_parameter_without_a_value_hides_no_other(bench, start_node, tmp_path):
