@@ -57,7 +57,8 @@ autodoc2_packages = [{
         'training', 'viewer', 'watching', 'weights'],
     'exclude_files': [
         'config.py', 'environment.py', 'file_names.py', 'freed_memory.py', 'interrupts.py',
-        'json_text.py', 'reporting.py', 'view_colors.py', 'whole_files.py', 'yaml_text.py'],
+        'json_text.py', 'png_files.py', 'reporting.py', 'view_colors.py',
+        'whole_files.py', 'yaml_text.py'],
 }]
 autodoc2_output_dir = 'api'
 autodoc2_render_plugin = 'myst'

@@ -13,9 +13,8 @@ PACKAGES = ('active_recon', 'msg_tools')
 ROWS: tuple[set[str], ...] = (
     {'errors'},
     {'config', 'file_names', 'freed_memory', 'geometry', 'interrupts', 'json_text',
-     'objects', 'plugins',
-     'reporting', 'view_colors', 'whole_files', 'yaml_text'},
-    {'cluster', 'volumes'},
+     'objects', 'plugins', 'reporting', 'view_colors', 'whole_files', 'yaml_text'},
+    {'cluster', 'png_files', 'volumes'},
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},
     {'environment', 'exporting', 'policies', 'simulation'},

@@ -39,7 +39,7 @@ def sheet(
 
     Example: active-recon sheet images.png --training data/train
     """
-    import cv2
+    from active_recon.png_files import write_png
 
     asked = {'--category': category, '--meshes': meshes, '--training': training}
     if len(given := [name for name, value in asked.items() if value]) > 1:
@@ -53,8 +53,7 @@ def sheet(
     writable(out)
     picture = _objects(category, meshes, count, azimuth_deg) if training is None else (
         _training(training, count, model or 'lifting'))
-    if not cv2.imwrite(str(out), picture[..., ::-1]):
-        raise DataError(f'{out}: cannot be written: expected the path of a PNG file')
+    write_png(out, picture[..., ::-1])
     typer.echo(f'wrote {out}')
 
 

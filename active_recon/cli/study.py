@@ -167,7 +167,7 @@ def _draw(figures: Mapping[str, Any], path: Path) -> None:
     """Draw IoU over the number of views, at 64 and 32 cells, random and even, with bands."""
     from active_recon.evaluation.statistics import Interval
     from active_recon.paper.plotting import canvas, curves, drawn
-    import cv2
+    from active_recon.png_files import write_png
 
     with canvas(11, 7, columns=2, rows=2) as (figure, grid):
         for row, kind in enumerate(('random', 'even')):
@@ -183,4 +183,4 @@ def _draw(figures: Mapping[str, Any], path: Path) -> None:
                     axes.set_visible(False)
         figure.suptitle(f'{Path(figures["data"]).name}: {figures["objects"]} objects')
         picture = drawn(figure)
-    cv2.imwrite(str(path), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    write_png(path, picture[..., ::-1])

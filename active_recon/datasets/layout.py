@@ -28,6 +28,7 @@ from pathlib import Path
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_INTRINSICS, Intrinsics, orbit_camera
 from active_recon.json_text import json_value
+from active_recon.png_files import write_png
 from active_recon.volumes.binvox import binvox_side, read_binvox, write_binvox
 from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION, VoxelGrid
 from active_recon.whole_files import whole_file
@@ -195,8 +196,8 @@ def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
     for index, (image, camera) in enumerate(zip(images, cameras, strict=True)):
         names.append(f'{index:02d}.png')
         path = folder.images_folder / names[-1]
-        _write_png(path, cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA),
-                   [cv2.IMWRITE_PNG_COMPRESSION, 4])
+        write_png(path, cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA),
+                  [cv2.IMWRITE_PNG_COMPRESSION, 4])
         azimuth_deg = math.degrees(-camera.azimuth) % 360
         rows.append(f'{azimuth_deg:.9g} {math.degrees(camera.elevation):.9g} 0 '
                     f'{camera.distance / _DISTANCE_UNIT:.9g} {_FIELD_OF_VIEW_COLUMN:g}')
@@ -218,16 +219,7 @@ def write_depths(folder: ObjectFolder, depths: Sequence[NDArray[np.float32]]) ->
     for index, depth in reversed(list(enumerate(depths))):
         path = folder.depth_path(index)
         stored = np.rint(np.where(depth <= _FARTHEST, depth, 0) * _STEPS).astype(np.uint16)
-        _write_png(path, stored)
-
-
-def _write_png(path: Path, image: 'cv2.typing.MatLike', options: Sequence[int] = ()) -> None:
-    """Write an image whole or not at all; cv2.imwrite tells nothing of a full disk."""
-    try:
-        with whole_file(path) as unfinished:
-            unfinished.write_bytes(cv2.imencode('.png', image, options)[1].tobytes())
-    except OSError as error:
-        raise DataError(f'{path}: cannot be written: {error.strerror}') from error
+        write_png(path, stored)
 
 
 def is_r2n2(camera: Camera) -> bool:

@@ -5,11 +5,11 @@ from functools import cache, partial
 from pathlib import Path
 
 from active_recon.demo.picture import run_picture, voxel_tile
+from active_recon.png_files import write_png
 from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.boxes import height_range
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.voxelisation import voxelise
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,4 +44,4 @@ class KnownObject:
         if views and views[-1].occupied is not None:
             truth = self._voxels(len(views[-1].occupied.occupancy))
             picture = run_picture(f'active_recon: {title}', views, self._mesh, truth, self._tile)
-            cv2.imwrite(str(file), picture[..., ::-1])
+            write_png(file, picture[..., ::-1])
