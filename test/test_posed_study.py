@@ -9,6 +9,7 @@ from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.errors import ConfigError, DataError, WeightsError
+from active_recon.evaluation.posed import robustness
 from active_recon.evaluation.posed.choosing import choose
 from active_recon.evaluation.posed.entrants import Entrant, load_entrants
 from active_recon.evaluation.posed.measuring import logits_of, measure, orders_of, Plan
@@ -20,10 +21,11 @@ from active_recon.evaluation.posed.robustness import (
     turned_back,
     YAWS,
 )
-from active_recon.evaluation.posed.scene import chosen_folders, read_scene
+from active_recon.evaluation.posed.scene import chosen_folders, read_scene, Scene
 from active_recon.evaluation.posed.scoring import pooled, scored, target
 from active_recon.evaluation.posed.study import Extent, study_set
 from active_recon.evaluation.posed.summary import figure, markdown, robustness_figures
+from active_recon.evaluation.posed.walking import some_objects
 from active_recon.models.carving import Carving
 from active_recon.models.lifted import projected, projection
 from active_recon.models.weights_files import find_weights
@@ -258,6 +260,17 @@ def test_disturbances_are_those_of_objects_of_every_category(dataset, coarse):
     scene = read_scene(list_objects(dataset), [Carving(0)])
     rows = {found.row for found in disturbances(scene, coarse, PLAN, 1, 2)}
     assert sorted(scene.views.categories[sorted(rows)]) == ['lamp', 'table']
+
+
+def test_every_object_is_disturbed_in_its_own_way(scene, coarse, monkeypatch):
+    monkeypatch.setattr(robustness, 'YAWS', 1)
+    rows = torch.zeros(12, dtype=torch.long)
+    alike = Scene({128: some_objects(scene.views, rows)},
+                  {32: scene.truths[32][rows]}, {})
+    found = list(disturbances(alike, coarse, PLAN, scene.view_count, len(rows)))
+    for name in ('poses off by 2 degrees', 'a third of the cube cut'):
+        ious = [each.disturbed['iou_32'] for each in found if each.name == name]
+        assert len({*map(tuple, np.reshape(ious, (3, 4)))}) == 3
 
 
 def test_yaws_of_carving_hardly_differ(scene, carving):

@@ -72,8 +72,9 @@ def disturbances(scene: Scene, entrant: Entrant, plan: Plan, count: int, most: i
         rows = some[part]
         block = Block(some_objects(shown, rows), targets_of(scene, rows, surface=False),
                       orders[rows.numpy()])
+        own = replace(plan, seed=plan.seed + int(part[0]))  # else all blocks were drawn alike
         for kind in (_turned, _off, _cut, _bands):
-            for found in kind(block, entrant, plan):
+            for found in kind(block, entrant, own):
                 yield found._replace(row=int(rows[found.row]))
         advance(len(rows))
 
