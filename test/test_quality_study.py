@@ -103,16 +103,25 @@ def test_promises_that_were_calibrated_are_kept_by_new_objects(figures):
     assert all(found['kept'] > 1 - BROKEN - 0.04 for found in made)
 
 
+def measured_four_times(once):
+    return Measured.joined([replace(once, episode=np.array([
+        f'{name} {seed}' for name in once.episode])) for seed in range(4)])
+
+
 def test_several_episodes_of_an_object_make_no_interval_narrower(tables):
     once = made_up(60, 3)
-    again = [replace(once, episode=np.array([f'{name} {seed}' for name in once.episode]))
-             for seed in range(4)]
-    one, other = (study(each, tables) for each in (once, Measured.joined(again)))
+    one, other = (study(each, tables) for each in (once, measured_four_times(once)))
     for count, after in one['views'].items():
         assert other['views'][count]['solid']['error'] == pytest.approx(after['solid']['error'])
     assert any(found['change'][0] for found in one['promises']['random'].values())
     for target, found in one['promises']['random'].items():
         assert other['promises']['random'][target]['change'] == pytest.approx(found['change'])
+        assert other['promises']['random'][target]['kept_at_least'] == found['kept_at_least']
+
+
+def test_several_episodes_of_an_object_prove_no_more_than_one(tables):
+    few = made_up(60, 1)
+    assert calibrated(tables, measured_four_times(few)).needed == calibrated(tables, few).needed
 
 
 def test_objects_of_fewer_views_than_others_count_with_all_of_theirs(tables):

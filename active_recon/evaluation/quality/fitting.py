@@ -6,7 +6,7 @@ from dataclasses import fields
 from active_recon.errors import DataError
 from active_recon.evaluation.quality.faults import FAULTS
 from active_recon.evaluation.quality.measuring import LEARNED, Measured
-from active_recon.evaluation.quality.promises import Episodes, needed_for
+from active_recon.evaluation.quality.promises import Episodes, needed_for, one_of_each
 from active_recon.evaluation.quality.shells import HOLLOW
 from active_recon.quality.conformal import upper_quantile
 from active_recon.quality.judge import expected_iou, standardised
@@ -145,7 +145,8 @@ def _softmax_head(classes: Sequence[Matrix]) -> Matrix:
 
 def _needed(usual: Measured, expected: Matrix) -> list[float]:
     """Return the expected IoU that each of TARGETS needs in one order of the views."""
-    episodes = Episodes.of(usual, expected)
+    own = one_of_each(usual)
+    episodes = Episodes.of(usual.rows(own), expected[own])
     return [needed_for(target, episodes) for target in TARGETS]
 
 

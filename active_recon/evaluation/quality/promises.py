@@ -4,7 +4,8 @@ When an episode may stop, so that what it promises is kept: Learn then Test.
 A bound that holds after a fixed number of views need not hold where it chooses when to stop: the
 episodes that stop are those whose quality is overestimated. So the rule is calibrated, on episodes
 that follow it (Angelopoulos et al. 2021, arXiv 2110.01052): margins are tested from the largest
-down, each with an exact binomial test, until one is not proven to keep the promise.
+down, each with an exact binomial test, until one is not proven to keep the promise. The test takes
+episodes that are independent: one of each object.
 """
 
 from dataclasses import dataclass
@@ -60,6 +61,13 @@ class Episodes:
         at = self.stops(needed)
         rows = np.flatnonzero(at >= 0)
         return self.iou[rows, at[rows]]
+
+
+def one_of_each(measured: Measured) -> NDArray[np.bool_]:
+    """Return which rows are of the first episode of each object, by its name, (N,)."""
+    episodes, first = np.unique(measured.episode, return_index=True)
+    _, place = np.unique(measured.object[first], return_index=True)
+    return np.isin(measured.episode, episodes[place])
 
 
 def needed_for(target: float, episodes: Episodes) -> float:

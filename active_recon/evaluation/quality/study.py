@@ -5,7 +5,7 @@ from typing import Any
 
 from active_recon.evaluation.quality.fitting import numbers_of
 from active_recon.evaluation.quality.measuring import LEARNED, Measured
-from active_recon.evaluation.quality.promises import Episodes, kept_at_least
+from active_recon.evaluation.quality.promises import Episodes, kept_at_least, one_of_each
 from active_recon.evaluation.quality.shells import HOLLOW
 from active_recon.evaluation.statistics import difference, mean_interval
 from active_recon.quality.judge import Judge
@@ -90,7 +90,7 @@ def _promise(measured: Measured, expected: NDArray[np.float64], target: float, n
     Return how a target is kept: by episodes that stop, and against always so many views.
 
     - stopped: episodes that did, out of `episodes`; kept: the share of them at or above the
-      target, and its exact 95 % bound `kept_at_least`
+      target, and its exact 95 % bound `kept_at_least`, by one episode of each object
     - views and change: of all episodes, with five views (or all, where an object has fewer) where
       they do not stop, the mean number of views, and the difference of IoU from always so many,
       with its interval over objects
@@ -100,7 +100,8 @@ def _promise(measured: Measured, expected: NDArray[np.float64], target: float, n
     episodes = Episodes.of(measured, expected)
     objects = measured.object[np.unique(measured.episode, return_index=True)[1]]
     at, ious = episodes.stops(needed), episodes.stopped(needed)
-    kept = int((ious >= target).sum())
+    own = one_of_each(measured)
+    sure = Episodes.of(measured.rows(own), expected[own]).stopped(needed)
     full = np.minimum(FULL, np.isfinite(episodes.iou).sum(axis=1)) - 1
     ends = np.where((at >= 0) & (at < full), at, full)
     rows = np.arange(len(at))
@@ -111,8 +112,9 @@ def _promise(measured: Measured, expected: NDArray[np.float64], target: float, n
     lost = (short & (np.arange(columns) < full[:, None])).any(axis=1)
     reached = np.nanmax(episodes.iou, axis=1) >= target
     return {'episodes': len(at), 'stopped': len(ious),
-            'kept': kept / len(ious) if len(ious) else None,
-            'kept_at_least': kept_at_least(kept, len(ious)) if len(ious) else None,
+            'kept': float((ious >= target).mean()) if len(ious) else None,
+            'kept_at_least': kept_at_least(int((sure >= target).sum()), len(sure))
+            if len(sure) else None,
             'views': float(ends.mean() + 1), 'change': [change.mean, change.low, change.high],
             'given_up': float(lost.mean()),
             'wrongly': float(reached[lost].mean()) if lost.any() else None}
