@@ -1,5 +1,6 @@
 """An archive of bags becomes one table and one page, whatever single bags do."""
 
+from dataclasses import replace
 import errno
 import os
 from pathlib import Path
@@ -9,6 +10,7 @@ import shutil
 import subprocess
 
 from active_recon.bags.runs.loop_setup import Overrides
+from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topics import Topics
 from active_recon.batch import task as task_module
@@ -121,6 +123,16 @@ def test_a_row_of_a_bag_without_shapes_names_the_weights_that_made_them(tmp_path
     folder = write_bag(tmp_path / 'run', images() + joints())
     (row,) = batch(monkeypatch, 'measure', folder, tmp_path / 'out')
     assert row['weights_sha256'] == Reconstructor.load().provenance['weights_sha256']
+
+
+def test_an_episode_that_ended_before_its_first_view_has_a_row_too(tmp_path, monkeypatch):
+    run = read_run(PAPER)
+    [whole] = run.episodes
+    assert whole.first_goal is not None
+    both = replace(run, episodes=[whole, replace(whole, views=[])])
+    monkeypatch.setattr(work, 'read_run', lambda *_: both)
+    rows = work.rows_of(Task('report', tmp_path, Topics(), Scene()), PAPER)
+    assert [row['views'] for row in rows] == [len(whole.views), 0]
 
 
 def test_a_truth_that_is_fitted_turns_with_the_yaw_that_is_told(tmp_path, monkeypatch):

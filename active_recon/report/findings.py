@@ -111,7 +111,7 @@ def _lost(subject: Subject) -> Iterator[tuple[str, str]]:
 def _off_goal(subject: Subject) -> Iterator[tuple[str, str]]:
     parameters = node_parameters(subject.run, 'reconstructor')
     tolerance = parameters.get('goal_tolerance', GOAL_TOLERANCE)
-    for number, (view, goal) in enumerate(zip(subject.views, subject.goals, strict=True), 1):
+    for number, (view, goal) in enumerate(zip(subject.views, subject.goals, strict=False), 1):
         away = 0.0 if goal is None else view_distance(view.camera, goal.camera)
         if away > tolerance:
             yield 'warning', (f'View {number} was taken {math.degrees(away):.0f}° away from its '

@@ -58,7 +58,7 @@ class Subject:
 
     @property
     def goals(self) -> list[RecordedGoal | None]:
-        """The goal of each view."""
+        """The goal of each view; without views that of the first, which was not taken."""
         decided = [self.episode.first_goal, *(view.goal for view in self.views[:-1])]
         return [goal and goal.final for goal in decided]
 
