@@ -135,6 +135,14 @@ def test_an_episode_that_ended_before_its_first_view_has_a_row_too(tmp_path, mon
     assert [row['views'] for row in rows] == [len(whole.views), 0]
 
 
+def test_every_episode_of_a_long_bag_has_a_row(tmp_path, monkeypatch):
+    run = read_run(PAPER)
+    many = replace(run, episodes=[replace(run.episodes[0], views=[])] * 800)
+    monkeypatch.setattr(work, 'read_run', lambda *_: many)
+    task = Task('report', tmp_path, Topics(), Scene())
+    assert [row['episode'] for row in work.rows_of(task, PAPER)] == [*range(1, 801)]
+
+
 def test_a_truth_that_is_fitted_turns_with_the_yaw_that_is_told(tmp_path, monkeypatch):
     folder = write_bag(tmp_path / 'run', images() + joints())
     bar, turned_bar = tmp_path / 'bar.ply', tmp_path / 'turned.ply'

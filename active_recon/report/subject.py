@@ -3,7 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count, product
 import math
+from string import ascii_uppercase
 
 from active_recon.bags.runs.run import (
     PHOTOS,
@@ -107,10 +109,9 @@ def shown_grid(view: RecordedView) -> VoxelGrid | None:
 
 
 def letters() -> Iterator[str]:
-    """Yield A, B, ..., Z, then AA, AB, ..."""
-    for number in range(26 ** 2 + 26):
-        high, low = divmod(number, 26)
-        yield (chr(64 + high) if high else '') + chr(65 + low)
+    """Yield A, B, ..., Z, then AA, AB, ..., without end."""
+    for size in count(1):
+        yield from map(''.join, product(ascii_uppercase, repeat=size))
 
 
 def elevation_degrees(radians: float) -> int:
