@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import math
 from pathlib import Path
 
 import numpy as np
@@ -36,12 +37,14 @@ class Memory:
         Return the use of each process.
 
         The first tenth of the samples is left out as its warming up; what is warm, and what is
-        the end, is the median of the tenth that follows, and of the last.
+        the end, is the median of the tenth that follows, and of the last. NaN of fewer than two.
         """
         return {name: _use(np.array(samples)) for name, samples in self._samples.items()}
 
 
 def _use(samples: np.ndarray) -> MemoryUse:
+    if len(samples) < 2:
+        return MemoryUse(math.nan, math.nan, math.nan, math.nan)
     part = max(len(samples) // _PARTS, 1)
     warm, end = np.median(samples[part:2 * part]), np.median(samples[-part:])
     return MemoryUse(float(warm), float(end), float(end - warm), float(samples.max()))

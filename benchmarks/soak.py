@@ -11,6 +11,7 @@ the views took, and what each process held in memory. The exit code is 1 where a
 import argparse
 from dataclasses import asdict, dataclass
 import json
+import math
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -87,7 +88,9 @@ class Soak:
         if self.recorded_views < self.views:
             missed.append(f'{self.views - self.recorded_views} views are not in the bag')
         growth = self.memory['reconstructor'].growth_mb
-        if growth >= GROWTH_GOAL_MB:
+        if math.isnan(growth):
+            missed.append('memory was sampled too rarely to tell any growth')
+        elif growth >= GROWTH_GOAL_MB:
             missed.append(f'the reconstructor grew by {growth:.1f} MB')
         return missed
 

@@ -23,6 +23,11 @@ def test_a_warm_up_is_no_growth(monkeypatch):
     assert (use.warm_mb, use.end_mb, use.growth_mb, use.peak_mb) == (100, 100, 0, 100)
 
 
+@pytest.mark.parametrize('samples', [[], [100.0]])
+def test_of_fewer_than_two_samples_no_growth_is_told(monkeypatch, samples):
+    assert np.isnan(use_of(monkeypatch, samples).growth_mb)
+
+
 def test_steady_growth_is_found_and_a_spike_is_not(monkeypatch):
     growing = 100 + np.arange(100) * 0.1
     assert use_of(monkeypatch, growing).growth_mb == pytest.approx(8, abs=0.1)

@@ -1,6 +1,7 @@
 """What a soak counts as missed."""
 
 from dataclasses import replace
+import math
 
 from benchmarks.memory import MemoryUse
 from benchmarks.soak import as_markdown, FLAGGED, Soak
@@ -19,3 +20,9 @@ def test_views_flagged_by_mistake_count_only_beyond_their_share():
 def test_any_other_fault_is_missed_by_its_name():
     soak = replace(SOAK, faults={'/reconstructor dropped/overtaken': 2})
     assert soak.missed == ['/reconstructor dropped/overtaken: 2']
+
+
+def test_growth_that_is_not_known_is_missed():
+    unknown = replace(USE, growth_mb=math.nan)
+    assert replace(SOAK, memory={'reconstructor': unknown}).missed == [
+        'memory was sampled too rarely to tell any growth']
