@@ -5,6 +5,7 @@ import json
 from benchmarks.__main__ import BY_THEMSELVES, PARTS
 from benchmarks.figures import Figure
 from benchmarks.record import DOCUMENT, part_record, RESULTS, rows, with_table
+from benchmarks.stream import counting_lost
 import pytest
 
 
@@ -31,3 +32,8 @@ def test_times_are_told_as_multiples_of_the_reference_and_nothing_else_is():
     assert cells(Figure('a view', 'ms', [5.0], None))[4] == '2.5'
     assert cells(Figure('a start', 's', [5.0], None))[4] == '2500.0'
     assert cells(Figure('memory', 'MB', [5.0], None))[4] == ''
+
+
+def test_images_that_were_lost_are_among_the_slowest():
+    some = Figure('p99', 'ms', counting_lost([0.01] * 147 + [0.0] * 3), 60, percentile=99)
+    assert some.value == 1000 and not some.reached
