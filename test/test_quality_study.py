@@ -270,6 +270,13 @@ def test_without_faults_to_learn_nothing_is_fitted():
         fit(made_up(20, 9), made_up(20, 10), 'abc')
 
 
+def test_a_single_known_reconstruction_is_refused():
+    known = made_up(1, 0)
+    with pytest.raises(DataError, match='a single known reconstruction: expected two or more'):
+        fit(known.rows(known.count == 1), Measured.joined(
+            [made_up(40, 1), *(made_up(20, 2, fault) for fault in FAULTS)]), 'abc')
+
+
 def test_known_objects_that_are_all_hollow_are_refused():
     known = made_up(5, 1)
     with pytest.raises(DataError, match='no known solid objects: expected some to fit with'):

@@ -32,12 +32,15 @@ def fit(known: Measured, calibration: Measured, sha256: str) -> QualityTables:
     `known` objects, without faults, and of which the network may have seen some, give the
     latents, the head, and what usual views are like beside those with a fault. The faults of
     `calibration` are learned; its other rows calibrate, see `calibrated`. Raises DataError where
-    one of the parts is empty, `known` has faults, or all of it is hollow.
+    one of the parts is empty, `known` is a single row, has faults, or all of it is hollow.
     """
     faulty = calibration.rows(calibration.fault != '')
     for name, part in (('known', known), ('known solid', known.solid), ('faulty', faulty)):
         if not len(part):
             raise DataError(f'quality: no {name} objects: expected some to fit with, got none')
+    if len(known) < 2:
+        raise DataError('quality: a single known reconstruction: expected two or more to tell '
+                        'what is usual, got one; measure more objects or views')
     if (known.fault != '').any():
         raise DataError('quality: known objects with faults: expected those without, got '
                         f'{", ".join(sorted(set(known.fault.tolist()) - {""}))}')
