@@ -135,6 +135,18 @@ def test_an_episode_that_ended_before_its_first_view_has_a_row_too(tmp_path, mon
     assert [row['views'] for row in rows] == [len(whole.views), 0]
 
 
+def test_the_verdict_of_an_episode_is_not_that_of_another(tmp_path, monkeypatch):
+    run = read_run(PAPER)
+    [whole] = run.episodes
+    wrong = replace(whole, begin=whole.begin + 1, views=[
+        replace(view, entropy=2 * view.entropy) for view in whole.views])
+    both = replace(run, episodes=[whole, wrong])
+    monkeypatch.setattr(work, 'read_run', lambda *_: both)
+    rows = work.rows_of(Task('replay', tmp_path, Topics(), Scene()), PAPER)
+    assert rows[0]['verdict'] in ('same bits', 'within tolerance')
+    assert rows[1]['verdict'] == 'different'
+
+
 def test_every_episode_of_a_long_bag_has_a_row(tmp_path, monkeypatch):
     run = read_run(PAPER)
     many = replace(run, episodes=[replace(run.episodes[0], views=[])] * 800)

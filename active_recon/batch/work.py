@@ -1,14 +1,15 @@
 """One bag to its rows, in a worker."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from itertools import repeat
 import math
 from pathlib import Path
 from typing import Any
 
-from active_recon.bags.replay.replay import ReplayedEpisode
-from active_recon.bags.replay.verification import verify
+from active_recon.bags.replay.comparison import compare
+from active_recon.bags.replay.replay import replay, ReplayedEpisode
 from active_recon.bags.replay.what_if import run_with_overrides
 from active_recon.bags.runs.loop_setup import LoopSetup, Overrides, recorded_setup
 from active_recon.bags.runs.reading import read_run
@@ -79,7 +80,7 @@ def rows_of(task: Task, bag: Place) -> list[Row]:
     """Return a row for each episode of a bag; raises ActiveReconError where it is refused."""
     with at_hand(bag) as path:
         run = read_run(path, task.topics, task.scene)
-        run, computed, verdict = _considered(task, run)
+        run, computed, verdicts = _considered(task, run)
         if not run.episodes:
             raise DataError(f'{path}: no episode: expected one or more, got none', 'no_episode')
         true = (known_truth(run) if task.truth is None
@@ -89,29 +90,34 @@ def rows_of(task: Task, bag: Place) -> list[Row]:
                     for letter, episode in zip(letters(), run.episodes, strict=False)]
         pages = _write_pages(task, bag, [each for each in subjects if each.views])
         return [episode_row(str(bag), number, subject, verdict, pages.get(subject.letter, ''))
-                for number, subject in enumerate(subjects, 1)]
+                for number, (subject, verdict) in enumerate(
+                    zip(subjects, verdicts or repeat(''), strict=False), 1)]
 
 
-def _considered(task: Task, run: RecordedRun) -> tuple[RecordedRun, str, str]:
-    """Return the run that the rows are of, what computed its shapes, and a replay's verdict."""
+def _considered(task: Task, run: RecordedRun) -> tuple[RecordedRun, str, Sequence[str]]:
+    """
+    Return the run that the rows are of, what computed its shapes, and a replay's verdicts.
+
+    There is one for each episode; without a replay there is none.
+    """
     computes = (task.kind == 'replay' or task.overrides != Overrides()
                 or lacks_reconstruction(run))
     if not computes:
-        return run, '', ''
+        return run, '', ()
     setup = _KeptSetup.of(recorded_setup(run, task.overrides.weights,
                                          task.overrides.weights is not None,
                                          task.scene.parameters))
     made_by = f'the weights {setup.load_reconstructor().provenance["weights_sha256"][:12]}'
     if task.overrides != Overrides():
-        return run_with_overrides(run, setup, task.overrides), '', ''
+        return run_with_overrides(run, setup, task.overrides), '', ()
     reconstructor = setup.load_reconstructor()
     if task.kind != 'replay':
         run = replace(run, provenance={**run.provenance, **reconstructor.provenance})
-        return with_reconstruction(run, reconstructor), made_by, ''
-    verified = verify(run, reconstructor, setup.load_planner())
-    return replace(run, provenance={**run.provenance, **reconstructor.provenance},
-                   episodes=[_replayed(each, reconstructor.threshold)
-                             for each in verified.episodes]), '', verified.comparison.verdict
+        return with_reconstruction(run, reconstructor), made_by, ()
+    episodes = replay(run, reconstructor, setup.load_planner())
+    return (replace(run, provenance={**run.provenance, **reconstructor.provenance},
+                    episodes=[_replayed(each, reconstructor.threshold) for each in episodes]), '',
+            [compare([each], reconstructor.threshold).verdict for each in episodes])
 
 
 def _replayed(episode: ReplayedEpisode, threshold: float) -> RecordedEpisode:
