@@ -144,7 +144,7 @@ def figures(found: Found) -> dict[str, Any]:
 
     - policies: the IoU after each view, and the area under that curve (its mean), on the other
       rendering; `ahead` of other policies, paired by object and start; `share` of the repeatable
-      gap, None where there surely is none; `views_for_random`: after how many views it is where
+      gap, None where it is not surely there; `views_for_random`: after how many views it is where
       random ends; `motion_s`: the time of the motion
     - gap: what the oracle is ahead of random, `same`: on the rendering that it chose on;
       `repeatable`: on the other one
