@@ -121,7 +121,13 @@ def test_several_episodes_of_an_object_make_no_interval_narrower(tables):
 
 def test_several_episodes_of_an_object_prove_no_more_than_one(tables):
     few = made_up(60, 1)
-    assert calibrated(tables, measured_four_times(few)).needed == calibrated(tables, few).needed
+    assert calibrated(tables, measured_four_times(few)) == calibrated(tables, few)
+    other = replace(few, kind=np.full(len(few), 'even'), episode=np.char.add(few.episode, ' even'))
+    both = calibrated(tables, Measured.joined([few, other]))
+    assert both.fewest_usual == 2 * 60
+    short = replace(few, episode=np.array([f'0 {name}' for name in few.episode]))
+    assert calibrated(tables, Measured.joined(
+        [short.rows(short.count == 1), few])) == calibrated(tables, few)
 
 
 def test_objects_of_fewer_views_than_others_count_with_all_of_theirs(tables):

@@ -64,13 +64,15 @@ def calibrated(heads: Heads, calibration: Measured) -> QualityTables:
     """
     Return tables of heads whose quantiles and promises are those of new objects.
 
-    Nothing may have been fitted to the objects; rows with a fault are left out. What is said of
+    Nothing may have been fitted to the objects; rows with a fault are left out, and all but one
+    episode of an object in one kind of views: the others are not independent. What is said of
     the IoU is calibrated on objects that are not hollow: of others no view tells what is inside.
     What is usual is told apart for turntables and for any cameras. Raises DataError where there
     is no object, or there are fewer views than the heads have numbers of views for.
     """
     counts = range(1, len(heads.intercepts) + 1)
     usual = calibration.rows((calibration.fault == '') & (calibration.count <= counts[-1]))
+    usual = usual.rows(one_of_each(usual))
     if missing := set(counts) - set(usual.solid.count.tolist()):
         raise DataError('quality: no objects to calibrate with after some numbers of views: '
                         f'expected solid ones without a fault after 1 to {counts[-1]}, got none '
@@ -148,8 +150,7 @@ def _softmax_head(classes: Sequence[Matrix]) -> Matrix:
 
 def _needed(usual: Measured, expected: Matrix) -> list[float]:
     """Return the expected IoU that each of TARGETS needs in one order of the views."""
-    own = one_of_each(usual)
-    episodes = Episodes.of(usual.rows(own), expected[own])
+    episodes = Episodes.of(usual, expected)
     return [needed_for(target, episodes) for target in TARGETS]
 
 

@@ -64,10 +64,16 @@ class Episodes:
 
 
 def one_of_each(measured: Measured) -> NDArray[np.bool_]:
-    """Return which rows are of the first episode of each object, by its name, (N,)."""
-    episodes, first = np.unique(measured.episode, return_index=True)
-    _, place = np.unique(measured.object[first], return_index=True)
-    return np.isin(measured.episode, episodes[place])
+    """
+    Return which rows are of one episode of each object in each kind of views, (N,).
+
+    That is the one of most views; of several, the first by its name.
+    """
+    _, first, sizes = np.unique(measured.episode, return_index=True, return_counts=True)
+    longest = first[np.argsort(-sizes, kind='stable')]
+    named = np.stack([measured.object[longest], measured.kind[longest]], axis=1)
+    _, place = np.unique(named, axis=0, return_index=True)
+    return np.isin(measured.episode, measured.episode[longest[place]])
 
 
 def needed_for(target: float, episodes: Episodes) -> float:
