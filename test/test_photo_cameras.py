@@ -218,8 +218,11 @@ def test_an_umlaut_of_two_characters_is_that_of_one(tmp_path):
     ({'cx': float('nan')}, 'frame 0: no camera: .*cx, cy of nan'),
     ({'fl_x': 1e400}, 'fl_x of inf'),
     ({'frames': [{'file_path': 'a.png'}]}, 'frame 0: no camera: .*transform_matrix'),
-    ({'frames': [{'file_path': 'a.png', 'transform_matrix': np.ones((4, 4)).tolist()}]},
+    ({'frames': [{'file_path': 'a.png', 'transform_matrix': np.ones((3, 4)).tolist()}]},
      'frame 0: no rotation'),
+    ({'frames': [{'file_path': 'a.png', 'transform_matrix': [
+        [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [3, 4, 5, 1]]}]},
+     'frame 0: no camera: .*last row, got .3.0, 4.0, 5.0, 1.0.; is it transposed'),
     ({'frames': [{'file_path': 'a.png', 'transform_matrix': [
         [1, 0, 0, float('nan')], [0, 1, 0, 0], [0, 0, 1, 0]]}]},
      'frame 0: no position: expected finite numbers, got .nan')])

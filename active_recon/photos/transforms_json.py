@@ -24,6 +24,7 @@ import numpy as np
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """OpenGL's camera axes in those of OpenCV, and the other way round, (4, 4)."""
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 _STRAIGHT = {'PINHOLE', 'SIMPLE_PINHOLE', 'OPENCV', 'PERSPECTIVE'}
 _FISHEYE = {'OPENCV_FISHEYE', 'FISHEYE'}
 
@@ -46,6 +47,9 @@ def read_transforms(path: Path) -> CameraFile:
             name = str(frame['file_path'])
             if matrix.shape not in ((4, 4), (3, 4)):
                 raise ValueError(f'transform_matrix of the shape {matrix.shape}')
+            if not np.allclose(matrix[3:], _LAST_ROW, atol=1e-4):
+                raise ValueError('transform_matrix: expected 0, 0, 0, 1 as its last row, got '
+                                 f'{matrix[3].tolist()}; is it transposed?')
             lens = _lens({**content, **frame})
         except (KeyError, TypeError, ValueError, OverflowError, ViewError) as error:
             raise DataError(f'{where}: no camera: expected file_path, transform_matrix and '
