@@ -3,6 +3,7 @@
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.camera_file import CameraFile, Entry, sized
+from active_recon.photos.conventions import looks_right
 from active_recon.photos.cube import Cube, upward
 from active_recon.photos.ground import BOARD_GROUND, Ground
 from active_recon.photos.ground_search import found_ground
@@ -98,6 +99,13 @@ def test_a_lid_with_a_texture_is_not_taken_for_the_table_below_it(cameras):
     box.visual.vertex_colors = rng.integers(0, 256, (len(box.vertices), 3))
     ground = found_ground(photos_of(box, cameras), np.zeros(3), UP)
     assert float(ground.height(np.zeros(3))) == pytest.approx(0.3 * SIZE, abs=0.01 * SIZE)
+
+
+def test_a_camera_at_the_object_s_place_does_no_harm(views, table):
+    lost = view_of('lost', views[0].image, Camera(np.eye(4), views[0].camera.intrinsics))
+    ground = found_ground([*views, lost], np.zeros(3), UP)
+    assert ground.level == pytest.approx(table.level, abs=0.01 * SIZE)
+    assert looks_right([view.camera for view in (*views, *views, lost)], np.zeros(3))
 
 
 @pytest.mark.parametrize('count', [0, 2])

@@ -67,8 +67,9 @@ def looks_right(cameras: Sequence[Camera], centre: NDArray[np.float64] | None = 
     forward = np.array([camera.pose[:3, 2] for camera in cameras])
     depths = (towards * forward).sum(axis=1)
     aside = np.linalg.norm(towards - depths[:, None] * forward, axis=1)
+    away = np.linalg.norm(towards, axis=1)
     return bool(np.median(depths) > 0 and np.mean(depths > 0) > 0.8
-                and np.median(aside / np.linalg.norm(towards, axis=1)) < _FAR)
+                and np.median(aside / np.where(away > 0, away, 1)) < _FAR)
 
 
 def _inverse(pose: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -108,9 +108,8 @@ def _reduced(view: PhotoView, middle: NDArray[np.float64], width: float
              ) -> tuple[Camera, NDArray[np.float32]]:
     """Return a camera and its grey image, as fine as the points of the plane."""
     lens = view.camera.intrinsics
-    pixels = (_WIDTH * width / _POINTS * lens.fx
-              / float(np.linalg.norm(view.camera.position - middle)))
-    shrink = min(1.0, _PIXELS / pixels)
+    away = float(np.linalg.norm(view.camera.position - middle))
+    shrink = min(1.0, _PIXELS * away / (_WIDTH * width / _POINTS * lens.fx))
     size = max(8, round(lens.width * shrink)), max(8, round(lens.height * shrink))
     small = cv2.resize(cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY), size,
                        interpolation=cv2.INTER_AREA)
