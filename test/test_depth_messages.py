@@ -134,6 +134,13 @@ def test_depth_files_are_millimetres_or_metres_at_the_size_of_the_photo(tmp_path
     np.testing.assert_array_equal(read_depth(tmp_path / 'c.tiff', 320, 240), found)
 
 
+def test_depth_finer_than_its_photo_is_that_in_the_middle_of_each_pixel(tmp_path):
+    across = (np.arange(320, dtype=np.float32) + 0.5) / 320
+    write_depth(tmp_path / 'a.tiff', np.tile(1 + across, (240, 1)), np.float32)
+    found = read_depth(tmp_path / 'a.tiff', 64, 48)
+    np.testing.assert_allclose(found[0], 1 + (np.arange(64) + 0.5) / 64, atol=1e-6)
+
+
 def test_depth_of_another_shape_or_kind_is_refused(tmp_path):
     path = tmp_path / 'a_depth.png'
     write_depth(path, PHOTO_DEPTH)

@@ -57,5 +57,6 @@ def read_depth(path: Path, width: int, height: int,
         raise DataError(f'{path.name}: depth of another size: expected {width} x {height} pixels '
                         f'or the same shape, got {stored.shape[1]} x {stored.shape[0]}')
     metres = stored.astype(np.float32) / (MM_PER_METRE if stored.dtype == np.uint16 else 1)
-    sized = cv2.resize(metres, (width, height), interpolation=cv2.INTER_NEAREST)
+    # OpenCV's other nearest pixel is the one at the left and above, up to half a pixel away
+    sized = cv2.resize(metres, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
     return np.asarray(np.where(np.isfinite(sized), sized, 0), np.float32)
