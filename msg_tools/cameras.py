@@ -84,17 +84,17 @@ def _distortion(msg: CameraInfo) -> Distortion | None:
         raise MessageError(str(error), error.kind) from error
 
 
-def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME,
-                  advice: str = '') -> NDArray[np.float64]:
+def pose_from_msg(msg: PoseStamped, frame: str = OBJECT_FRAME, advice: str = '',
+                  at_origin: bool = False) -> NDArray[np.float64]:
     """
     Return the pose, (4, 4), object from optical frame; its quaternion is normalised.
 
     Raises MessageError if the pose is in another frame, which ends with the `advice` for that
     case, not finite, a million kilometres away or at the frame's origin, or its quaternion is
-    zero.
+    zero. With `at_origin` the object is not there, and the camera may be.
     """
     _check_frame(msg.header, frame, advice)
-    return _matrix(msg.pose)
+    return _matrix(msg.pose, at_origin)
 
 
 def poses_from_msg(msg: PoseArray, frame: str = OBJECT_FRAME) -> list[NDArray[np.float64]]:
@@ -109,9 +109,9 @@ def _check_frame(header: Header, frame: str, advice: str = '') -> None:
                            f'got {header.frame_id!r}{advice and "; "}{advice}', 'frame')
 
 
-def _matrix(pose: Pose) -> NDArray[np.float64]:
+def _matrix(pose: Pose, at_origin: bool = False) -> NDArray[np.float64]:
     position, quaternion = numbers_from_msgs(pose.position, pose.orientation, 'camera pose')
-    if math.hypot(*position) < 1e-6:
+    if math.hypot(*position) < 1e-6 and not at_origin:
         raise MessageError("invalid camera pose: it is at the object's centre", 'pose')
     return pose_from_quaternion(position, quaternion)
 

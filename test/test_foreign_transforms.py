@@ -89,6 +89,17 @@ def test_an_objects_place_in_the_robots_frame_becomes_the_origin(tmp_path, monke
     assert 'azimuths 0, 86, 172 degrees' in said
 
 
+def test_a_tracker_may_begin_at_its_own_origin_where_the_object_is_elsewhere(tmp_path):
+    moved = list(cameras())
+    for _, topic, msg in moved:
+        if topic == '/tracker':
+            place = msg.pose.position
+            place.x, place.y, place.z = np.array([place.x, place.y, place.z]) - POSES[0][:3, 3]
+    run = read_run(bag(tmp_path / 'run', images(), moved),
+                   scene=Scene(object_position=-POSES[0][:3, 3]))
+    np.testing.assert_allclose(poses(run), POSES, atol=1e-9)
+
+
 def test_transforms_with_the_objects_frame_are_preferred_to_joints(tmp_path):
     arm = joints(topic='/joint_states', names=('shoulder', 'elbow'))
     run = read_run(bag(tmp_path / 'run', images(), LENSES, arm, transforms()))

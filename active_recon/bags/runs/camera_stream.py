@@ -196,7 +196,8 @@ class CameraStream:
         if kind == POSE:
             return pose_from_msg(
                 msg, self._topics.object_frame, 'name it with --object-frame, and with '
-                '--object-position where the object is in it')
+                '--object-position where the object is in it',
+                at_origin=self._scene.object_position is not None)
         if kind == JOINT_STATE:
             angle = joint_position_from_msg(msg, self._topics.joint)
         else:
