@@ -55,6 +55,15 @@ def test_object_that_ships_is_as_large_as_the_camera_showed_it_in_a_larger_cube(
     assert sides[0] == pytest.approx(sides[1] / 2, abs=2)
 
 
+@pytest.mark.parametrize('size', [1.0, 0.5])
+def test_what_the_camera_showed_stands_as_it_was_shown_whatever_front_was_told(run, size):
+    camera = run.parameters['turntable_camera'] | {'object_size': size}
+    straight, turned = (known_truth(replace(run, parameters={
+        'turntable_camera': camera, 'reconstructor': {'object_size': 1.0, 'object_yaw': yaw}}))
+        for yaw in (0.0, 1.0))
+    np.testing.assert_array_equal(turned.cells, straight.cells)
+
+
 def test_mesh_and_its_binvox_are_the_same_truth(run, tmp_path):
     cells = cells_of('chair', run)
     write_binvox(VoxelGrid(cells.astype(np.float32)), tmp_path / 'chair.binvox')

@@ -98,7 +98,11 @@ class TruthFile:
 
 
 def known_truth(run: RecordedRun) -> Truth | None:
-    """Return the true cells if the simulated camera showed a shipped object, else None."""
+    """
+    Return the true cells if the simulated camera showed a shipped object, else None.
+
+    It shows the front at +x, wherever the reconstructor was told that it is.
+    """
     camera = node_parameters(run, 'turntable_camera')
     mesh = Path(str(camera.get('mesh', '')))
     ships = mesh.stem in shipped_objects() and (
@@ -108,10 +112,10 @@ def known_truth(run: RecordedRun) -> Truth | None:
     size = _object_size(run)
     shown = float(camera.get('object_size', size))
     if abs(shown / size - 1) < _SAME_SIDE:
-        return TruthFile(Path(mesh.stem)).read(run)
+        return TruthFile(Path(mesh.stem)).read(run, object_yaw=0.0)
     scaled = load_mesh(find_object(mesh.stem))
     scaled.apply_transform(np.diag([*[shown / size] * 3, 1.0]))
-    cells = _turned(VoxelGrid(_in_place(scaled, _resolution(run)).astype(np.float32)), run)
+    cells = _in_place(scaled, _resolution(run))
     return Truth(cells, f'The true shape is {mesh.stem}, whose longest side was {shown:g} m; the '
                         f"run's cube is {size:g} m.")
 
