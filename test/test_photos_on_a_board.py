@@ -1,7 +1,10 @@
 """What stands on a printed board is told from it, found, and reconstructed before clutter."""
 
+from dataclasses import replace
+
 from active_recon.calibration.lens import board_pose
 from active_recon.errors import DataError
+from active_recon.geometry.cameras import Camera
 from active_recon.photos.backgrounds import cube_pixels
 from active_recon.photos.board_masks import board_views
 from active_recon.photos.board_print import seen_board, UNIFORM
@@ -67,6 +70,15 @@ def test_the_light_on_the_board_makes_no_difference(taken, cameras):
         image, np.rint(image * light).astype(np.uint8)))
     assert iou((before.known & (before.fit < UNIFORM))[None],
                (after.known & (after.fit < UNIFORM))[None]) > 0.75
+
+
+def test_a_photo_is_searched_where_the_lens_of_its_smaller_image_says(cameras):
+    lens = replace(cameras[0].intrinsics, height=110)
+    image = np.broadcast_to(2 * np.arange(110, dtype=np.uint8)[:, None, None],
+                            (110, lens.width, 3)).copy()
+    seen = seen_board(image, Camera(cameras[0].pose, lens), BOARD, 300)
+    rows = (np.arange(seen.camera.intrinsics.height) + 0.5) * lens.fy / seen.camera.intrinsics.fy
+    np.testing.assert_allclose(seen.image[:, 0, 0], 2 * (rows - 0.5), atol=1)
 
 
 def test_a_shadow_on_the_board_is_no_object(taken, cameras, mesh):

@@ -121,7 +121,8 @@ def grabcut(image: NDArray[np.uint8], camera: Camera, size: float) -> NDArray[np
     """
     height, width = image.shape[:2]
     shrink = min(1.0, _SEARCHED_SIDE / max(height, width))
-    small = cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(image, (max(1, round(width * shrink)), max(1, round(height * shrink))),
+                       interpolation=cv2.INTER_AREA)
     inside = cube_pixels(camera, size, (small.shape[1], small.shape[0]))
     share = inside.mean()
     if not _LEAST_SHARE < share < _MOST_SHARE:

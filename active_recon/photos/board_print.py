@@ -50,9 +50,10 @@ def seen_board(image: NDArray[np.uint8], camera: Camera, board: Board, side: int
     Ink, paper, and the light on both are fitted, and so is the noise. Paper in a shadow agrees.
     """
     shrink = min(1.0, side / max(image.shape[:2]))
-    small = np.asarray(cv2.resize(image, None, fx=shrink, fy=shrink,
-                                  interpolation=cv2.INTER_AREA), np.float32)
-    rows, columns = small.shape[:2]
+    rows, columns = (max(1, round(count * shrink)) for count in image.shape[:2])
+    # Of factors instead of a size OpenCV would leave out the rest of a pixel at the end
+    small = np.asarray(cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA),
+                       np.float32)
     camera = Camera(camera.pose, camera.intrinsics.resized(columns, rows))
     printed, known = _printed(camera, board)
     if not known.any():
