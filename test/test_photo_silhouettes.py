@@ -10,6 +10,7 @@ from active_recon.photos import matting
 from active_recon.photos.backgrounds import grabcut, named, off_plain, separated, shown_image
 from active_recon.photos.conventions import conventions, looks_right, misreading
 from active_recon.photos.cube import Cube, first_cube, meeting_point, upward
+from active_recon.photos.doubts import _covered
 from active_recon.photos.hull import (
     ceiling,
     coverage,
@@ -160,6 +161,11 @@ def test_a_plain_background_is_told_from_the_object(views):
     assert off_plain(rng.integers(0, 255, image.shape, np.uint8)) is None
     with pytest.raises(ViewError, match='no object: expected one before the plain background'):
         off_plain(np.full_like(image, 130))
+
+
+def test_masks_of_a_camera_in_the_middle_of_the_cube_agree_with_none(views):
+    lost = replace(views[0], camera=Camera(np.eye(4), views[0].camera.intrinsics))
+    assert _covered([lost, *views], replace(CUBE, centre=np.zeros(3))) == 0
 
 
 def test_grabcut_finds_the_object_in_its_projected_cube(views):

@@ -71,7 +71,7 @@ def _fitting(views: Sequence[PhotoView], cube: Cube, reconstructor: Reconstructo
 def _covered(views: Sequence[PhotoView], cube: Cube) -> float:
     """Return the coverage of the masks; 0 where a camera does not look at the cube."""
     cameras = [cube.camera(view.camera, 1.0) for view in views]
-    if any(camera.pose[:3, 2] @ camera.direction > -_TOWARDS or camera.distance < _OUTSIDE
+    if any(camera.distance < _OUTSIDE or camera.pose[:3, 2] @ camera.direction > -_TOWARDS
            for camera in cameras):
         return 0.0
     return coverage(hull(depth_in_masks(views, cameras, _CELLS)), views, cameras)
