@@ -5,15 +5,26 @@ from active_recon.batch.summary import Summary
 import pytest
 
 pytestmark = pytest.mark.browser
+BARS = 'return document.querySelectorAll("[data-chart] .bars path").length'
+
+
+def opened(chromium, folder, *rows, **look):
+    """Open the page of some rows, and wait for its charts."""
+    summary = Summary()
+    assert list(summary.counting(rows)) == list(rows)
+    summary.write(folder / 'page.html', 'measure')
+    chromium.open((folder / 'page.html').as_uri(), **look)
+    chromium.until(lambda: chromium.run(BARS), 'the charts')
 
 
 def test_the_charts_are_drawn_without_complaint(chromium, tmp_path):
-    summary = Summary()
-    rows = [refusal_row(f'{number}.mcap', 'damaged', kind)
-            for number, kind in enumerate(('data', 'data', 'version'))]
-    assert list(summary.counting(rows)) == rows
-    summary.write(tmp_path / 'page.html', 'measure')
-    chromium.open((tmp_path / 'page.html').as_uri())
-    bars = 'return document.querySelectorAll("[data-chart] .bars path").length'
-    assert chromium.until(lambda: chromium.run(bars), 'the chart') == 2
+    opened(chromium, tmp_path, *(refusal_row(f'{number}.mcap', 'damaged', kind)
+                                 for number, kind in enumerate(('data', 'data', 'version'))))
+    assert chromium.run(BARS) == 2
     assert chromium.errors() == []
+
+
+def test_the_page_fits_the_narrowest_window(chromium, tmp_path):
+    opened(chromium, tmp_path, refusal_row(f'{"long" * 60}.mcap', 'damaged', 'data'),
+           size=(320, 640))
+    assert chromium.run('return document.documentElement.scrollWidth') <= 320
