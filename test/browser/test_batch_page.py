@@ -28,3 +28,13 @@ def test_the_page_fits_the_narrowest_window(chromium, tmp_path):
     opened(chromium, tmp_path, refusal_row(f'{"long" * 60}.mcap', 'damaged', 'data'),
            size=(320, 640))
     assert chromium.run('return document.documentElement.scrollWidth') <= 320
+
+
+def test_the_charts_turn_dark_with_their_reader(chromium, tmp_path):
+    opened(chromium, tmp_path, refusal_row('1.mcap', 'damaged', 'data'))
+    ink, words = (f'return getComputedStyle(document.querySelector("{of}")).{what}'
+                  for of, what in (('body', 'color'), ('[data-chart] .xtick text', 'fill')))
+    light = chromium.run(words)
+    assert light == chromium.run(ink)
+    chromium.prefer('dark')
+    chromium.until(lambda: chromium.run(words) == chromium.run(ink) != light, 'the other ink')
