@@ -1,7 +1,9 @@
 """An archive of bags becomes one table and one page, whatever single bags do."""
 
+from base64 import b64decode
 from dataclasses import replace
 import errno
+import gzip
 import os
 from pathlib import Path
 import re
@@ -303,6 +305,16 @@ def test_the_page_shows_the_lowest_quality_first_and_tells_what_it_leaves_out(tm
     assert shown == list(range(MOST_SHOWN + 6, 6, -1))
     assert '7 more are in the table alone' in page
     assert 'no &lt;bag&gt;' in page and '3 bags refused' in page
+
+
+def test_a_reason_on_the_page_of_an_archive_is_text_and_never_markup(tmp_path):
+    summary = Summary()
+    list(summary.counting([row_of(1, stopped='<a href="https://other">b</a> & c')]))
+    summary.write(tmp_path / 'page.html', 'measure')
+    page = (tmp_path / 'page.html').read_text()
+    charts = gzip.decompress(b64decode(page.split('id="charts">')[1].split('<')[0])).decode()
+    assert '&lt;a href=' in charts and '&amp; c' in charts  # Plotly takes texts for HTML
+    assert '<a' not in charts and '<a href="https' not in page
 
 
 def test_the_documentation_has_every_column():

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import heapq
+from html import escape
 import json
 from typing import Any
 
@@ -88,7 +89,8 @@ class Summary:
         for title, counts in (('views', self._views), ('why it stopped', self._stops),
                               ('why it was refused', self._refusals)):
             found = sorted(counts.items())
-            drawn.append((title, [str(name) for name, _ in found], [count for _, count in found]))
+            drawn.append((title, [escape(str(name), quote=False) for name, _ in found],
+                          [count for _, count in found]))  # Plotly takes texts for HTML
         return {title: _bars(title, x, y) for title, x, y in drawn if any(y)}
 
 
