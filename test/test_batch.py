@@ -278,6 +278,12 @@ def test_a_report_of_each_bag_is_linked_from_the_page(tmp_path, monkeypatch):
     assert 'https://' not in page.partition('<script type')[0]
 
 
+def test_a_bag_whose_name_is_not_of_utf8_has_its_report(tmp_path, monkeypatch):
+    bag = shutil.copytree(PAPER, tmp_path / 'bags' / os.fsdecode(b'a\xff'))
+    (row,) = batch(monkeypatch, 'report', bag.parent, tmp_path / 'out')
+    assert not row['refused'] and 'a?' in (tmp_path / 'out' / row['report']).read_text()
+
+
 def test_a_replay_tells_whether_it_agrees_and_what_would_have_been(tmp_path, monkeypatch):
     (row,) = batch(monkeypatch, 'replay', PAPER, tmp_path / 'replayed')
     assert row['verdict'] in ('same bits', 'within tolerance')

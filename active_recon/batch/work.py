@@ -139,7 +139,8 @@ def _write_pages(task: Task, bag: Place, subjects: list[Subject]) -> Mapping[str
         shown = subjects[number * MAX_SUBJECTS:(number + 1) * MAX_SUBJECTS]
         page = f'reports/{name_of(bag)}{f"-{number + 1}" if number else ""}.html'
         with whole(task.out / page) as unfinished:
-            unfinished.write_text(report_page(shown), encoding='utf-8')
+            # As names of files, it may have bytes that are not of UTF-8
+            unfinished.write_text(report_page(shown), encoding='utf-8', errors='replace')
         pages |= dict.fromkeys((each.letter for each in shown), page)
     return pages
 
