@@ -41,6 +41,7 @@ const show = (state) => {
 field('photo').addEventListener('change', async () => {
   const file = field('photo').files[0];
   if (!file) return;
+  field('photo').value = ''; // the same choice again is a change again
   if (file.size > LARGEST) {
     say('Not sent: expected at most ' + LARGEST / 1e6 + ' MB');
     return;
@@ -56,7 +57,6 @@ field('photo').addEventListener('change', async () => {
   } catch (error) {
     say('Not sent: is the computer still in this network?');
   }
-  field('photo').value = '';
   busy = false;
 });
 const look = async () => {

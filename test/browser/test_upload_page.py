@@ -2,7 +2,7 @@
 
 import threading
 
-from active_recon.watching.upload import UploadServer
+from active_recon.watching.upload import LARGEST_UPLOAD, UploadServer
 from active_recon.watching.watcher import Progress, Verdicts
 import numpy as np
 from PIL import Image
@@ -52,6 +52,21 @@ def test_what_became_of_a_photo_stays_where_the_computer_was_away_before(chromiu
         assert 'Left out: phone-0001.jpg: no board seen in it' in chromium.text()
     finally:
         online(chromium, True)
+        server.close()
+
+
+def test_a_photo_that_was_too_large_is_heard_of_again_once_it_is_smaller(chromium, tmp_path):
+    (tmp_path / 'photos').mkdir()
+    (tmp_path / 'mine.jpg').write_bytes(bytes(LARGEST_UPLOAD + 1))
+    server = UploadServer(tmp_path / 'photos', Progress, Verdicts())
+    try:
+        chromium.open(server.url, PHONE)
+        chromium.driver.find_element('id', 'photo').send_keys(str(tmp_path / 'mine.jpg'))
+        chromium.until(lambda: 'Not sent: expected at most 30 MB' in chromium.text(), 'refusal')
+        Image.new('RGB', (40, 30), (9, 99, 199)).save(tmp_path / 'mine.jpg')
+        chromium.driver.find_element('id', 'photo').send_keys(str(tmp_path / 'mine.jpg'))
+        chromium.until(lambda: list((tmp_path / 'photos').glob('phone-*.jpg')), 'the photo')
+    finally:
         server.close()
 
 
