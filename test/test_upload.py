@@ -182,6 +182,14 @@ def test_photos_that_come_together_are_all_kept(server, folder):
     assert len(list(folder.iterdir())) == 4
 
 
+def test_who_sends_a_large_photo_while_others_are_in_work_is_told_to_try_again(server, folder):
+    for _ in range(4):
+        assert server.open_uploads.acquire(blocking=False)
+    status, told = send(server, bytes(20_000_000))
+    assert status == 503 and told['verdict'] == 'Busy with other photos: try again'
+    assert not list(folder.iterdir())
+
+
 @pytest.mark.parametrize(('address', 'served'), [
     ('127.0.0.1', True), ('192.168.1.7', True), ('10.3.4.5', True), ('8.8.8.8', False),
     ('172.15.0.1', False)])

@@ -166,6 +166,7 @@ class _Handler(BaseHTTPRequestHandler):
                        f'Refused: expected at most {LARGEST_UPLOAD / 1e6:.0f} MB'})
             return
         if not self.server.open_uploads.acquire(blocking=False):
+            self._skip(int(length))  # who sends it all before the answer would not hear it
             self._tell(HTTPStatus.SERVICE_UNAVAILABLE,
                        {'verdict': 'Busy with other photos: try again'})
             return
@@ -181,6 +182,11 @@ class _Handler(BaseHTTPRequestHandler):
             parts.append(part)
             length -= len(part)
         return b''.join(parts)
+
+    def _skip(self, length: int) -> None:
+        """Read up to so many bytes away."""
+        while length and (part := self.rfile.read(min(length, _CHUNK))):
+            length -= len(part)
 
     def _take(self, photo: bytes, length: int) -> None:
         if len(photo) < length:
