@@ -206,6 +206,11 @@ def test_the_local_network_is_never_all_networks():
         assert found.is_private and not found.is_loopback and not found.is_unspecified
 
 
+def test_the_network_is_not_asked_for_the_name_of_the_address(folder, verdicts, monkeypatch):
+    monkeypatch.setattr(socket, 'getfqdn', lambda _: pytest.fail('asks a name server'))
+    UploadServer(folder, Progress, verdicts).close()
+
+
 def test_an_address_that_is_not_this_machine_s_is_refused(folder, verdicts):
     with pytest.raises(ConfigError, match='upload page: cannot be served at 192.0.2.1'):
         UploadServer(folder, Progress, verdicts, '192.0.2.1')

@@ -16,6 +16,7 @@ import json
 from pathlib import Path
 import secrets
 import socket
+from socketserver import TCPServer
 import threading
 from typing import Any
 
@@ -67,6 +68,10 @@ class UploadServer(ThreadingHTTPServer):
         self._naming = threading.Lock()
         self._last_number = 0
         threading.Thread(target=self.serve_forever, args=(_LOOK_S,), daemon=True).start()
+
+    def server_bind(self) -> None:
+        """Take the address, without asking the network for its name: it may not answer."""
+        TCPServer.server_bind(self)
 
     def verify_request(self, request: Any, client_address: Any) -> bool:
         """Return whether a client is on this machine or in a private network."""
