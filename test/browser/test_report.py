@@ -1,12 +1,15 @@
 """The report in a real browser: it is drawn, it answers, and it complains of nothing."""
 
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
+from active_recon.policies.reasons import GoalReason
 from active_recon.report.page import report_page, write_page
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
 import pytest
-from report_runs import recorded_run
+from report_runs import changed, recorded_run
 
 LAPTOP, PHONE = (1280, 800), (390, 844)
 pytestmark = pytest.mark.browser
@@ -76,6 +79,21 @@ def test_page_is_drawn_without_complaint_and_fits_its_window(opened, name, size,
     assert page.run('return document.documentElement.scrollWidth') <= size[0]
     assert page.run('return document.getElementById("trouble").hidden')
     assert page.errors() == []
+
+
+@pytest.mark.parametrize('count', [1, 2])
+def test_long_names_make_the_page_no_wider_than_a_phone(chromium, tmp_path, count):
+    run, name = recorded_run('chair', views=2), 'name' * 40
+    first, last = run.episodes[0].views
+    first = replace(first, goal=replace(first.goal, reason=GoalReason(name)))
+    run = replace(changed(run, views=[first, last], id=name, done=name), path=Path(name),
+                  provenance={'object': name, 'policy': f'{name}:{name}', name: name},
+                  parameters={name: {name: name}}, counters={name: {f'refused/{name}': 3}})
+    write_page(report_page([Subject(letter, run, run.episodes[0])
+                            for letter in 'AB'[:count]]), tmp_path / 'page.html')
+    chromium.open((tmp_path / 'page.html').as_uri(), PHONE)
+    chromium.run('for (const each of document.querySelectorAll("details")) each.open = true')
+    assert chromium.run('return document.documentElement.scrollWidth') <= PHONE[0]
 
 
 @pytest.mark.parametrize('name', ['one', pytest.param('three', marks=pytest.mark.slow)])
