@@ -1,10 +1,12 @@
 """The upload page: only who has its address may send photos, and only photos are kept."""
 
+from contextlib import suppress
 import http.client
 import ipaddress
 import json
 import socket
 import threading
+import time
 
 from active_recon.errors import ConfigError
 from active_recon.watching import upload as room
@@ -195,6 +197,22 @@ def test_who_sends_a_large_photo_while_others_are_in_work_is_told_to_try_again(s
     ('172.15.0.1', False)])
 def test_only_clients_of_a_private_network_are_answered(server, address, served):
     assert server.verify_request(None, (address, 1234)) is served
+
+
+def test_clients_without_end_take_neither_all_threads_nor_the_place_of_others(
+        server, monkeypatch):
+    monkeypatch.setattr(server, '_connections', threading.BoundedSemaphore(3))
+    clients = [socket.create_connection(server.server_address, timeout=2) for _ in range(4)]
+    with clients.pop() as last:
+        assert last.recv(1) == b''  # left, as one too many
+    for client in clients:
+        client.close()
+    for _ in range(100):
+        with suppress(ConnectionError):
+            assert ask(server, 'GET', f'/{server.token}/state')[0] == 200
+            return
+        time.sleep(0.02)  # until the others are found to have gone
+    pytest.fail('no room for another')
 
 
 def test_the_local_network_is_never_all_networks():

@@ -35,6 +35,7 @@ _SUFFIXES = {'JPEG': '.jpg', 'PNG': '.png'}
 _MOST_PIXELS = 200_000_000
 _READ_SIDE = 1024
 _AT_ONCE = 4
+_MOST_CONNECTIONS = 64  # also of those without the random word: each takes a thread and a file
 _ANSWER_S = 60.0
 _LOOK_S = 0.1  # how often it is looked whether to stop
 _IDLE_S = 30.0  # after which a client that sends nothing is left
@@ -64,6 +65,7 @@ class UploadServer(ThreadingHTTPServer):
         self.url = f'http://{host}:{self.server_address[1]}/{self.token}/'
         self.progress, self.verdicts = progress, verdicts
         self.open_uploads = threading.BoundedSemaphore(_AT_ONCE)
+        self._connections = threading.BoundedSemaphore(_MOST_CONNECTIONS)
         self._folder = folder
         self._naming = threading.Lock()
         self._last_number = 0
@@ -76,6 +78,20 @@ class UploadServer(ThreadingHTTPServer):
     def verify_request(self, request: Any, client_address: Any) -> bool:
         """Return whether a client is on this machine or in a private network."""
         return ipaddress.ip_address(client_address[0]).is_private
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a client in a thread of its own; leave it where there are too many."""
+        if self._connections.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer a client, and make room for another."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._connections.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Let a client go whose connection broke."""
