@@ -21,6 +21,7 @@ from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
 from active_recon.report.scene import encoded, STEPS
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 import pytest
 from report_runs import changed, recorded_run
@@ -239,6 +240,13 @@ def test_figure_that_is_not_finite_is_left_out(run):
     page = page_of(changed(run, views=views))
     json.dumps(drawn_in(page), allow_nan=False)
     assert 'nan' not in Elements(page).text
+
+
+def test_a_shape_without_any_doubt_has_an_entropy_of_0_and_not_of_minus_0(run):
+    sure = VoxelGrid(np.ones((2, 2, 2), np.float32)).entropy()
+    views = [replace(view, entropy=sure) for view in without_shapes(run).episodes[0].views]
+    text = Elements(page_of(changed(run, views=views))).text
+    assert '0 nats' in text and '-0 nats' not in text
 
 
 def test_no_episode_and_too_many_are_refused(run):

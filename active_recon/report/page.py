@@ -113,4 +113,4 @@ def object_name(provenance: str) -> str:
 
 def _number(value: float | None, places: int = 0) -> str:
     """Return a number as text, a dash if it is unknown."""
-    return '–' if value is None else f'{value:,.{places}f}'.replace(',', '\u202f')
+    return '–' if value is None else f'{value:z,.{places}f}'.replace(',', '\u202f')
