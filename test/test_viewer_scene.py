@@ -9,6 +9,7 @@ from active_recon.geometry.cameras import (
     Intrinsics,
     orbit_camera,
 )
+from active_recon.policies.reasons import GoalReason
 from active_recon.viewer.scene import relative_scores, Scene, score_boxes
 from active_recon.viewer.state import LoopState, Scores
 from active_recon.viewer.view_result import ViewResult
@@ -98,6 +99,16 @@ def test_views_have_their_numbers_in_the_episode_once_these_are_known(shown):
     for missed in (0, 3):
         scene.draw(LoopState(views=views, missed=missed), 0.5)
     assert shown.words == ['1 · 0°', '2 · 90°', '4 · 0°', '5 · 90°']
+
+
+@pytest.mark.parametrize(('gain', 'told'), [
+    (0.0123, '+0.012'), (-0.0123, '-0.012'), (-0.0001, '+0.000')])
+def test_an_expected_gain_has_one_sign(shown, gain, told):
+    reason = GoalReason('shows the top', gain)
+    Scene(shown, 1.0, has_front=False).draw(
+        LoopState(goal=orbit_camera(math.pi), goal_reason=reason), 0.5)
+    assert shown.words == [f'next · 180° · IoU {told}']
+    assert reason.sentence.endswith(f'gain of IoU {told.removeprefix("+")}')
 
 
 def test_scores_at_several_elevations_are_cubes_in_their_directions_the_larger_the_better():

@@ -24,7 +24,7 @@ class GoalReason:
     def sentence(self) -> str:
         """Both in words."""
         return self.shows if self.gain is None else (
-            f'{self.shows}; expected gain of IoU {self.gain:.3f}')
+            f'{self.shows}; expected gain of IoU {self.gain:z.3f}')
 
 
 def goal_reason(seen: Observation, goal: NDArray[np.float64],

@@ -138,7 +138,7 @@ class Scene:
             return
         words = f'next · {whole_degrees(goal.azimuth)}°'
         if reason is not None and reason.gain is not None:
-            words += f' · IoU +{reason.gain:.3f}'
+            words += f' · IoU {reason.gain:+z.3f}'
         if '/goal' in self._objects:
             self._place(self._objects['/goal'], goal)
             self._objects['/goal/label'].text = words

@@ -158,5 +158,5 @@ def told(shape: Shape, advice: Advice, metric: bool) -> list[str]:
     quality = '' if shape.quality is None else f'; {shape.quality.summary}'
     lines.append(f'{count} photo{"s" if count > 1 else ""}{quality}.')
     if goal is not None and goal.gain is not None:
-        lines.append(f'The next photo is expected to gain {goal.gain:.3f} of IoU.')
+        lines.append(f'The next photo is expected to gain {goal.gain:z.3f} of IoU.')
     return [*lines, *(f'Warning: {warning}' for warning in shape.warnings)]
