@@ -43,6 +43,11 @@ def _literal(line: str) -> str:
     return _PUNCTUATION.sub(r'\\\1', ' '.join(_readable(line).split()))
 
 
+def slider_value(slider: Any) -> Any:
+    """Return a slider's value; one that is typed beyond its ends is there until it is left."""
+    return min(max(slider.value, slider.min), slider.max)
+
+
 def _entropy_scales(count: int, missed: int = 0) -> dict[str, uplot.Scale]:
     """Return the axes' scales for `count` views after some, with a margin on either side."""
     return {'x': uplot.Scale(time=False, range=(missed + 0.0, missed + count + 1.0))}
@@ -181,7 +186,7 @@ class Page:
             self._own_threshold = min(max(state.threshold, _LOWEST), _HIGHEST)
             self._threshold.value = self._own_threshold
         with self._server.atomic():
-            self._scene.draw(state, self._threshold.value, self._in_colors.value)
+            self._scene.draw(state, slider_value(self._threshold), self._in_colors.value)
         if state.views is not self._shown_views or state.missed != self._shown_missed:
             self._shown_views, self._shown_missed = state.views, state.missed
             numbers, entropies = entropy_lines(state.views, state.missed)

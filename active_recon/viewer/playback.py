@@ -12,7 +12,7 @@ from active_recon.bags.runs.run import (
 from active_recon.errors import DataError
 from active_recon.meshes.photos import album_of
 from active_recon.viewer.link import goal_lines, quality_lines
-from active_recon.viewer.page import Page
+from active_recon.viewer.page import Page, slider_value
 from active_recon.viewer.state import (
     LoopState,
     Observer,
@@ -98,16 +98,17 @@ class Playback:
 
     def draw(self, now: float) -> None:
         """Draw the selected view; `now` is any clock in seconds."""
+        step = slider_value(self._step)
         if PLAY in self.page.clicks():
             self._stepped_at = now
-            if self._step.value == len(self._states):
-                self._step.value = 1
+            if step == len(self._states):
+                self._step.value = step = 1
         if self._stepped_at is not None and now - self._stepped_at >= _STEP_S:
-            self._stepped_at = now if self._step.value < len(self._states) else None
-            self._step.value = min(self._step.value + 1, len(self._states))
-        state = self._states[self._step.value - 1]
+            self._stepped_at = now if step < len(self._states) else None
+            self._step.value = step = min(step + 1, len(self._states))
+        state = self._states[step - 1]
         if self.page.in_colors:
-            state = self._with_surface(self._step.value - 1)
+            state = self._with_surface(step - 1)
         self.shown_text = self._text(state)
         self.page.set_text(self.shown_text)
         self.page.draw(state)

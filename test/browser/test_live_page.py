@@ -278,6 +278,16 @@ def test_a_bag_is_stepped_through_view_by_view(playback, chromium):
     assert not chromium.errors()
 
 
+def test_a_view_that_is_typed_beyond_the_last_one_is_the_last_one(playback, chromium):
+    opened(chromium, playback.page.url)
+    field = chromium.driver.find_element('css selector', '.mantine-NumberInput-input')
+    for typed, words in (('99', 'View 1 of 1, episode 2 of 2'),
+                         ('-7', 'View 1 of 3, episode 1 of 2')):
+        field.send_keys('\ue003' * 3 + typed)  # backspaces; the field is not left
+        chromium.until(lambda words=words: (playback.draw(0.0), words in chromium.text())[1],
+                       words)
+
+
 @pytest.mark.slow
 def test_a_bag_plays_to_its_end_and_then_from_the_first_view(playback, chromium):
     opened(chromium, playback.page.url)
