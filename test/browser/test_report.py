@@ -180,6 +180,14 @@ def test_object_turns_until_it_is_paused(opened, changed_share):
     assert page.errors() == []
 
 
+def test_who_hears_the_page_is_not_told_that_the_shape_turns_while_it_stands(opened):
+    page = opened(motion='reduce')
+    said = page.run('const turn = document.querySelector(".turn"); turn.click(); turn.click();'
+                    'return [turn.textContent, turn.ariaPressed, document.querySelector('
+                    '".scene").ariaLabel]')
+    assert said == ['Turn', None, 'The reconstructed shape in 3D']  # a label, or a state
+
+
 def test_the_surface_in_its_colours_is_drawn(opened, changed_share):
     page = opened()
     before = shape(page)

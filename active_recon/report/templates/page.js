@@ -62,7 +62,6 @@
     self.setTurning = (on) => {
       self.turning = on;
       turn.textContent = on ? 'Pause' : 'Turn';
-      turn.setAttribute('aria-pressed', on);
     };
     const choose = () => {
       if (chosen() === 'colors') self.at = grids.length - 1;
