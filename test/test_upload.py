@@ -1,6 +1,6 @@
 """The upload page: only who has its address may send photos, and only photos are kept."""
 
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 import http.client
 import ipaddress
 import json
@@ -190,6 +190,28 @@ def test_who_sends_a_large_photo_while_others_are_in_work_is_told_to_try_again(s
     status, told = send(server, bytes(20_000_000))
     assert status == 503 and told['verdict'] == 'Busy with other photos: try again'
     assert not list(folder.iterdir())
+
+
+def test_of_photos_that_come_together_one_at_a_time_is_decoded(server, folder, monkeypatch):
+    opened, inside, most = room.opened, [], []
+
+    @contextmanager
+    def counted(*rest):
+        with opened(*rest) as image:
+            inside.append(image)
+            most.append(len(inside))
+            time.sleep(0.05)
+            yield image
+            inside.pop()
+
+    monkeypatch.setattr(room, 'opened', counted)
+    photo = encoded('JPEG', folder)
+    threads = [threading.Thread(target=send, args=(server, photo)) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert most == [1, 1, 1]
 
 
 @pytest.mark.parametrize(('address', 'served'), [

@@ -31,6 +31,7 @@ import cv2
 
 LARGEST_UPLOAD = 30_000_000
 """Bytes of a photo."""
+_ONE_AT_A_TIME = threading.Lock()  # of photos that are looked at: one may take a gigabyte
 _SUFFIXES = {'JPEG': '.jpg', 'PNG': '.png'}
 _MOST_PIXELS = 200_000_000
 _READ_SIDE = 1024
@@ -140,7 +141,7 @@ def refusal(photo: bytes) -> str:
 def _format(photo: bytes) -> str:
     """Return the format by the content, '' where it is none of those allowed, or cut off."""
     try:
-        with opened(io.BytesIO(photo), _MOST_PIXELS, tuple(_SUFFIXES)) as image:
+        with _ONE_AT_A_TIME, opened(io.BytesIO(photo), _MOST_PIXELS, tuple(_SUFFIXES)) as image:
             kind = str(image.format)
             if kind == 'PNG':
                 image.verify()  # by its checksums
