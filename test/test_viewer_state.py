@@ -3,6 +3,7 @@
 from contextlib import nullcontext
 from itertools import permutations
 from pathlib import Path
+from urllib.request import urlopen
 
 from active_recon.bags.runs.run import (
     Candidates,
@@ -339,3 +340,9 @@ def test_only_pages_of_this_machine_connect_to_the_page(origin, may, served):
         connect(address, origin=origin and origin.format(port=port),
                 subprotocols=[f'viser-v{viser.__version__}']).close()
     assert server.serve is serve
+
+
+def test_no_website_shows_the_page_in_a_frame(served):
+    with urlopen(served.url, timeout=10) as answer:
+        policy = answer.headers['Content-Security-Policy']
+    assert policy.startswith('frame-ancestors http://127.0.0.1:*') and ' *' not in policy
