@@ -7,7 +7,8 @@ PAGE = """<!doctype html>
 <title>active_recon, photos</title>
 <style nonce="NONCE">
 :root { color-scheme: light dark; }
-body { font: 17px/1.45 system-ui, sans-serif; margin: 0 auto; max-width: 30rem; padding: 1rem; }
+body { font: 17px/1.45 system-ui, sans-serif; margin: 0 auto; max-width: 30rem;
+       overflow-wrap: anywhere; padding: 1rem; }
 label { background: #2563a8; border-radius: .6rem; color: #fff; display: block; padding: 1rem;
         text-align: center; }
 label:focus-within { outline: 3px solid #fac400; }

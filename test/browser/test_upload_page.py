@@ -70,6 +70,17 @@ def test_a_photo_that_was_too_large_is_heard_of_again_once_it_is_smaller(chromiu
         server.close()
 
 
+def test_a_long_name_makes_the_page_no_wider_than_the_phone(chromium, tmp_path):
+    name = f'IMG_{"0123456789" * 20}.jpg'
+    server = UploadServer(tmp_path, lambda: Progress([f'Left out: {name}: no board']), Verdicts())
+    try:
+        chromium.open(server.url, PHONE)
+        chromium.until(lambda: name in chromium.text(), 'the name')
+        assert chromium.run('return document.documentElement.scrollWidth') <= PHONE[0]
+    finally:
+        server.close()
+
+
 def online(chromium, there):
     chromium.driver.execute_cdp_cmd('Network.enable', {})
     chromium.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
