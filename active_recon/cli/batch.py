@@ -104,7 +104,8 @@ def _work(
         counts = run_batch(task, roots, crew, progress_bar)
     took = time.monotonic() - begun
     before = f', {counts.kept} of them finished before' if counts.kept else ''
-    typer.echo(f'{counts.bags} bags in {took:.0f} s{before}; {counts.refused} refused')
+    typer.echo(f'{counts.bags} bag{"s" if counts.bags != 1 else ""} in {took:.0f} s{before}; '
+               f'{counts.refused} refused')
     for name in (TABLE, SUMMARY):
         typer.echo(f'wrote {task.out / name}')
     if counts.refused == counts.bags:

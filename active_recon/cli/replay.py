@@ -131,8 +131,8 @@ def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
             f'reconstructed from {len(episode.steps)} views'
             f'{told_depth([step.recorded for step in episode.steps])}: '
             f'{count} of {last.occupancy.size} '
-            f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():.0f} to '
-            f'{last.entropy():.0f} nats; {uncompared}')
+            f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():z.0f} to '
+            f'{last.entropy():z.0f} nats; {uncompared}')
         _print_quality(episode)
         _print_refused_depth([step.reconstruction.depth_refusal for step in episode.steps])
     typer.echo(f'hash {verified.hash}')
@@ -205,7 +205,7 @@ def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Ov
     files.write([(grid, views) for grid, views in shapes if grid is not None], threshold)
     _print_input(run)
     for episode in other.episodes:
-        entropies = ', '.join(f'{view.entropy:.0f}' for view in episode.views)
+        entropies = ', '.join(f'{view.entropy:z.0f}' for view in episode.views)
         azimuths = ', '.join(str(whole_degrees(view.camera.azimuth)) for view in episode.views)
         typer.echo(f'views from {azimuths} degrees; entropy {entropies} nats')
         _print_refused_depth([view.depth_refusal for view in episode.views])
