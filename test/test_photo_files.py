@@ -185,6 +185,16 @@ def test_the_same_photo_twice_is_used_once(tmp_path):
     assert left_out[1].startswith('c.jpg: not readable: expected a whole image')
 
 
+def test_the_same_photo_from_two_folders_or_named_twice_is_used_once(tmp_path):
+    paths = [tmp_path / folder / 'a.png' for folder in ('one', 'two')]
+    for path in paths:
+        path.parent.mkdir()
+        Image.fromarray(drawn()).save(path)
+    photos, left_out = open_photos([*paths, paths[0]])
+    assert [photo.path for photo in photos] == paths[:1]
+    assert left_out == [f'a.png: the same photo as {paths[0]}'] * 2
+
+
 def test_photos_are_in_the_order_of_their_numbers(tmp_path):
     for name in ('img10.png', 'img2.png', 'notes.txt'):
         (tmp_path / name).touch()

@@ -103,7 +103,7 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
     named = Counter(path.with_suffix('') for path in paths)
     photos: list[PhotoFile] = []
     left_out: list[str] = []
-    known: dict[bytes, str] = {}
+    known: dict[bytes, Path] = {}
     for path in paths:
         try:
             photos.append(open_photo(path, known))
@@ -117,11 +117,11 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
     return photos, left_out
 
 
-def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
+def open_photo(path: Path, known: dict[bytes, Path]) -> PhotoFile:
     """
-    Return the photo of a file, which is noted in `known`: names of photos by their bytes' hash.
+    Return the photo of a file, which is noted in `known`: paths of photos by their bytes' hash.
 
-    Raises DataError where it cannot be read, or another of `known` has the same bytes.
+    Raises DataError where it cannot be read, or one of `known` has the same bytes.
     """
     if path.suffix.lower() in HEIC_ENDINGS:
         raise DataError(f'{path.name}: {HEIC_ADVICE}', _UNREADABLE)
@@ -131,8 +131,11 @@ def open_photo(path: Path, known: dict[bytes, str]) -> PhotoFile:
     except (DataError, OSError) as error:
         raise DataError(f'{path.name}: not readable: expected a whole image, got: '
                         f'{error}', _UNREADABLE) from error
-    if known.setdefault(digest, path.name) != path.name:
-        raise DataError(f'{path.name}: the same photo as {known[digest]}')
+    if digest in known:
+        same = known[digest]
+        raise DataError(f'{path.name}: the same photo as '
+                        f'{same if same.name == path.name else same.name}')
+    known[digest] = path
     return photo
 
 

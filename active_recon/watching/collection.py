@@ -48,7 +48,7 @@ class Collection:
         self._reconstructor = load(options.model, threads=options.threads)
         self._kept: dict[Path, _Kept] = {}
         self._views: dict[Path, PhotoView] = {}
-        self._digests: dict[bytes, str] = {}
+        self._digests: dict[bytes, Path] = {}
         self.shape: Shape | None = None
         self.metric = False
         self.waiting = 'no photo yet'
@@ -61,6 +61,7 @@ class Collection:
     def add(self, path: Path) -> str:
         """Take in a photo; return why it is left out, in one line, '' where it is used."""
         digests = dict(self._digests)
+        self._digests = self._digests_without(path)
         try:
             photo = open_photo(path, self._digests)
             seen = None if self.board is None else seen_board(photo, self.board.board)
@@ -87,12 +88,14 @@ class Collection:
         if path not in self._kept:
             return
         self._forget(path)
-        self._digests = {digest: name for digest, name in self._digests.items()
-                         if name != path.name}
+        self._digests = self._digests_without(path)
         try:
             self._update()
         except ActiveReconError as error:
             self.shape, self.waiting = None, self._missing(error)
+
+    def _digests_without(self, path: Path) -> dict[bytes, Path]:
+        return {digest: each for digest, each in self._digests.items() if each != path}
 
     def _forget(self, path: Path) -> None:
         self._kept.pop(path, None)
