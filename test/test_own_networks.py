@@ -180,6 +180,15 @@ class Flat(Net):
 class AnyCamera(Net):
     needs_front = False
 
+class Adding(Net):
+    def update(self, encoded, cameras, state):
+        return {'latent': state['latent'].add_(encoded)}
+
+class Replacing(Net):
+    def update(self, encoded, cameras, state):
+        state['latent'] = state['latent'] + 1
+        return state
+
 class Coarse(Net):
     resolution = 16
 
@@ -271,6 +280,8 @@ def test_a_network_whose_resolution_no_data_have_is_not_compared(own_file, tmp_p
     ('NoLatent', r'no latent: expected \(2, C, h, w\) .* got .*seen'),
     ('Flat', r'occupancy: expected logits \(2, 32, 32, 32\) of decode, got \(2, 32768\)'),
     ('AnyCamera', r'on two views of \(2, 4, 64, 64\): RuntimeError'),
+    ('Adding', 'the given state is modified: expected .* got other latent'),
+    ('Replacing', 'the given state is modified: expected .* got other latent'),
     ('NoSize', r'expected image_size and resolution \(int\).*got None, 32 and True')])
 def test_a_network_of_another_interface_is_refused_before_it_is_trained(
         name, said, own_file, dataset, tmp_path, monkeypatch, capsys):

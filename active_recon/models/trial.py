@@ -4,6 +4,7 @@ from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera, orbit_camera
 from active_recon.models.network import Cameras, ReconstructionNetwork
 import torch
+from torch import Tensor
 
 
 @torch.no_grad()
@@ -11,8 +12,8 @@ def try_network(network: ReconstructionNetwork, name: str) -> None:
     """
     Show a network two blank views of two objects, and look at what it returns.
 
-    Raises ConfigError in one line where it fails or where something has another shape than its
-    interface tells, see `ReconstructionNetwork`.
+    Raises ConfigError in one line where it fails, modifies the state that it is given, or where
+    something has another shape than its interface tells, see `ReconstructionNetwork`.
     """
     side, cells = (getattr(network, each, None) for each in ('image_size', 'resolution'))
     front = getattr(network, 'needs_front', None)
@@ -25,17 +26,31 @@ def try_network(network: ReconstructionNetwork, name: str) -> None:
     cameras = Cameras.of([camera] * 2).to(network.device)
     images = torch.ones(2, 3 if front else 4, side, side, device=network.device)
     try:
-        state = network.initial_state(2)
+        state, modified = network.initial_state(2), set[str]()
         for _ in range(2):
-            logits, state = network(images, cameras, state)
+            before = {key: each.clone() for key, each in state.items()}
+            logits, after = network(images, cameras, state)
+            modified |= {key for key in before.keys() | state.keys()
+                         if not _is_same(before.get(key), state.get(key))}
+            state = after
         latent = state.get('latent')
         found = {key: tuple(each.shape) for key, each in state.items()}
     except Exception as error:
         raise ConfigError(f'{name}: fails on two views of {tuple(images.shape)}: '
                           f'{type(error).__name__}: {error}') from error
+    if modified:  # then a second view from one state, as searches take, begins elsewhere
+        raise ConfigError(f'{name}: the given state is modified: expected a new one of update, '
+                          f'got other {", ".join(sorted(modified))} in the one it was given')
     if tuple(logits.shape) != (2, cells, cells, cells):
         raise ConfigError(f'{name}: wrong occupancy: expected logits (2, {cells}, {cells}, '
                           f'{cells}) of decode, got {tuple(logits.shape)}')
     if latent is None or latent.ndim != 4 or len(latent) != 2:
         raise ConfigError(f'{name}: no latent: expected (2, C, h, w) as `latent` in the state, '
                           f'got {found}')
+
+
+def _is_same(one: Tensor | None, other: Tensor | None) -> bool:
+    """Return whether two entries of a state have the same numbers, or neither is there."""
+    if one is None or other is None:
+        return one is other
+    return one.shape == other.shape and torch.allclose(one, other, 0, 0, equal_nan=True)
