@@ -34,6 +34,10 @@ _COMPARED_VIEWS = 24
 """Views, the last ones, whose silhouettes are compared: a stream of views must not get slower."""
 
 
+def _not_judged() -> None:
+    """Return no quality; a function of its own, since lambdas are not pickled."""
+
+
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
     """
@@ -48,7 +52,7 @@ class Reconstruction:
     latent: NDArray[np.float32] = field(repr=False)
     image: NDArray[np.uint8] | None = field(default=None, repr=False)
     depth_refusal: str = ''
-    judge: Callable[[], Quality | None] = field(default=lambda: None, repr=False)
+    judge: Callable[[], Quality | None] = field(default=_not_judged, repr=False)
 
     @cached_property
     def quality(self) -> Quality | None:
@@ -247,7 +251,7 @@ class Reconstructor:
                    camera: Camera) -> Callable[[], Quality | None]:
         """Return what judges the state after a view, from the network's frame."""
         if self._judge is None or 'foreground' not in self._state:
-            return lambda: None
+            return _not_judged
         foreground, seen = self._state['foreground'][0]
         self._seen.append(SeenView(camera, foreground.copy(), seen.copy()))
         return partial(self._judge.judge, occupancy, self.threshold, latent, tuple(self._seen),

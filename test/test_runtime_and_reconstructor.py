@@ -1,6 +1,7 @@
 """The reconstructor: one episode after another, in the object's frame and size."""
 
 import math
+import pickle
 
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, Intrinsics, orbit_camera
@@ -49,6 +50,13 @@ def test_a_step_answers_as_the_network_itself(runtime, network):
     occupancy, latent, _ = runtime.step(pixels, orbit_camera(0.0), runtime.initial_state())
     np.testing.assert_allclose(occupancy, logits[0].sigmoid(), atol=1e-5)
     np.testing.assert_allclose(latent, state['latent'][0], atol=1e-5)
+
+
+def test_what_is_reconstructed_without_quality_tables_can_be_pickled(runtime):
+    known = add(Reconstructor(runtime), 0)
+    again = pickle.loads(pickle.dumps(known))
+    np.testing.assert_array_equal(again.grid.occupancy, known.grid.occupancy)
+    assert again.quality is None
 
 
 def test_a_reset_reconstructor_is_as_good_as_new(runtime):
