@@ -222,6 +222,7 @@ class Reconstructor:
         shown, seen_by = network_image(image, camera, self._runtime.spec, self.object_size)
         placed = seen_by.turned(-self._yaw).scaled(1 / self.object_size)
         occupancy, latent, state = self._runtime.step(shown, placed, self._state)
+        latent = latent.copy()  # it may be a view of the state, which views to come begin with
         if not (np.isfinite(occupancy).all() and np.isfinite(latent).all()):
             raise ViewError('not finite: expected an occupancy and a latent of finite numbers '
                             'from the network, got others; take other weights, or precision f32',

@@ -25,6 +25,7 @@ from active_recon.plugins import installed, load_from_file, NETWORKS_GROUP, POLI
 from active_recon.policies import POLICIES
 from active_recon.policies.geometric import FarthestPolicy
 from active_recon.policies.registry import _installed, PolicyEntry, PolicyOptions
+from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_runtime
 from command_line import command, refusal
 import numpy as np
@@ -332,6 +333,17 @@ def test_norms_of_one_s_own_and_turned_cameras_are_exported_as_they_are(own_weig
     theirs, ours = (runtime.step(image, camera, runtime.initial_state())[1] for runtime in (
         load_runtime(path, library, precision='f32') for library in ('torch', 'openvino')))
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-4)
+
+
+def test_a_latent_that_is_changed_changes_no_view_that_comes(own_weights):
+    reconstructor = Reconstructor.load(own_weights('Turning'), threads=1)
+    image = np.random.default_rng(0).integers(0, 256, (137, 137, 3), np.uint8)
+    reconstructor.add_view(image, orbit_camera(0.3))
+    wanted = reconstructor.add_view(image, orbit_camera(1.3))
+    reconstructor.reset()
+    reconstructor.add_view(image, orbit_camera(0.3)).latent[:] = 7
+    found = reconstructor.add_view(image, orbit_camera(1.3))
+    np.testing.assert_array_equal(found.grid.occupancy, wanted.grid.occupancy)
 
 
 def test_a_config_without_defaults_is_refused(own_file):
