@@ -114,6 +114,15 @@ def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, view
     assert own.size == read.size == BOX[3]
 
 
+def test_pixels_that_are_filled_anew_leave_the_colours_of_the_mesh(rgba, views):
+    images = [on_plain(image) for image in rgba[:3]]
+    before = np.stack(images)
+    shape = active_recon.reconstruct(images, views[:3], 0.3, background='network', box=BOX)
+    for image in images:
+        image[:] = 0
+    np.testing.assert_array_equal([view.image for view in shape.views], before)
+
+
 @pytest.fixture(scope='module')
 def cluttered(rgba):
     """Return the photos before tiles of any colours."""

@@ -256,8 +256,10 @@ def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Op
         views.append(view_of(f'image {number}', image, camera))
     file = CameraFile('cameras', (), np.array([0.0, 0.0, 1.0]))
     box = (0.0, 0.0, 0.0, options.size) if options.box is None else options.box
-    return from_views(even_choice(views, options.views or len(views)), file,
-                      replace(options, box=box))
+    # Their own, so that a buffer that is filled anew changes no colour of a mesh to come
+    own = [replace(view, image=view.image.copy())
+           for view in even_choice(views, options.views or len(views))]
+    return from_views(own, file, replace(options, box=box))
 
 
 def _separated(views: Sequence[PhotoView], file: CameraFile, cube: Cube | None, background: str
