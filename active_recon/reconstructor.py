@@ -264,6 +264,7 @@ def load(model: str | Path | None = None, object_size: float = 1.0,
     """
     Return a reconstructor of a model that ships, by its name, or of a weights file.
 
-    None is the default's; `object_size` the side of the voxel grid, metres. Raises WeightsError.
+    None is the default's; `object_size` the side of the voxel grid, metres. Raises WeightsError
+    and ConfigError.
     """
     return Reconstructor.load(find_weights(model), object_size=object_size, threads=threads)

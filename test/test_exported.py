@@ -427,6 +427,8 @@ def test_weights_that_were_not_exported_are_told_with_what_to_do(tmp_path, libra
     ('onnxruntime', {'device': 'cuda'}, 'device: cuda not available: expected one that this'),
     ('torch', {'precision': 'bf16'}, 'bf16 is not for the runtime torch'),
     ('torch', {'device': 'gpu'}, "device: unknown value: expected one of torch.*, got 'gpu'"),
+    ('auto', {'threads': -1}, 'threads: too few: expected 1 or more, got -1'),
+    ('torch', {'threads': 0}, 'threads: too few: expected 1 or more, got 0'),
     ('tensorflow', {}, 'runtime: unknown value: expected one of auto, openvino, torch, onnxr')])
 def test_what_a_runtime_has_not_is_refused(library, wrong, words):
     with pytest.raises(ConfigError, match=words):

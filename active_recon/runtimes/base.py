@@ -152,7 +152,7 @@ def load_runtime(weights: Path | None = None, runtime: str = AUTO, device: str =
     export is there and cannot be used, the provenance's `remark` says why. `threads` is the number
     of CPU threads; None is the library's default. `precision` is one of `precision.PRECISIONS`.
     Raises WeightsError, and ConfigError on a runtime, a device or a precision that is not
-    available.
+    available, and on less than one thread.
     """
     loaded: Runtime = _loaded('load_network', NETWORK_PARTS, weights, runtime, device, threads,
                               precision)
@@ -187,6 +187,8 @@ def load_segmenter_runtime(weights: Path | None = None, runtime: str = AUTO, dev
 def _loaded(what: str, parts: Sequence[str], weights: Path | None, runtime: str, device: str,
             threads: int | None, precision: str) -> Any:
     require_precision(precision)
+    if threads is not None and threads < 1:
+        raise ConfigError(f'threads: too few: expected 1 or more, got {threads}')
     if runtime == AUTO:
         return _loaded_by_choice(what, parts, weights, device, threads, precision)
     if runtime not in RUNTIMES:
