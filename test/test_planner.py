@@ -646,3 +646,20 @@ def test_a_goal_that_was_given_up_leaves_out_no_other_azimuth_that_is_listed_lat
     after = Planner(FarthestPolicy(), limits=MotionLimits(reachable_azimuths=(0.5,)))
     after.go_on_from(before)
     assert after.plan().camera.azimuth == pytest.approx(0.5)
+
+
+class InPlace(FarthestPolicy):
+    """Works in the arrays that it is given."""
+
+    wants_volume = True
+
+    def choose(self, seen, state):
+        seen.latent[:] = seen.occupancy[:] = 0
+        return super().choose(seen, state)
+
+
+def test_a_policy_that_works_in_place_leaves_the_reconstruction_as_it_is():
+    grid, latent = VoxelGrid(np.full((8, 8, 8), 0.5, np.float32)), LATENT.copy()
+    Planner(InPlace()).add_view(latent, orbit_camera(0.0), 1.0, grid)
+    assert (grid.occupancy == 0.5).all()
+    np.testing.assert_array_equal(latent, LATENT)

@@ -52,9 +52,10 @@ def observation(views: Sequence[PlannerView], candidates: Sequence[Camera], yaw:
                         'looks at them, got none', 'volume')
     unit = 1.0 if last.volume is None else 1 / last.volume.size
     taken = policy_poses(cameras_of(views), yaw, unit)
-    volume = None if last.volume is None else turned(last.volume.occupancy, -yaw)[None]
+    # Copies: a policy that works in place leaves the reconstruction as it is
+    volume = None if last.volume is None else turned(last.volume.occupancy.copy(), -yaw)[None]
     return Observation(
-        last.latent[None], taken[None], policy_poses(candidates, yaw, unit)[None], volume)
+        last.latent[None].copy(), taken[None], policy_poses(candidates, yaw, unit)[None], volume)
 
 
 def cameras_of(views: Sequence[PlannerView]) -> list[Camera]:
