@@ -114,6 +114,17 @@ def test_pixels_with_cameras_of_their_own_give_what_the_folder_gives(plain, view
     assert own.size == read.size == BOX[3]
 
 
+def test_pixels_without_an_object_or_of_another_size_are_left_out(rgba, views):
+    images = [rgba[0], np.zeros_like(rgba[1]), rgba[2][1:]]
+    shape = active_recon.reconstruct(images, views[:3], 0.3, box=BOX)
+    assert [view.name for view in shape.views] == ['image 1']
+    empty, smaller = shape.left_out
+    assert empty.startswith('image 2: empty: expected an object in its alpha channel')
+    assert smaller.startswith('image 3: wrong image: expected')
+    with pytest.raises(DataError, match='no photo can be used: image 1: empty'):
+        active_recon.reconstruct(images[1:2], views[1:2], 0.3, box=BOX)
+
+
 def test_pixels_that_are_filled_anew_leave_the_colours_of_the_mesh(rgba, views):
     images = [on_plain(image) for image in rgba[:3]]
     before = np.stack(images)

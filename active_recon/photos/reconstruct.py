@@ -248,18 +248,24 @@ def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Op
     if len(images) != len(cameras) or len(images) == 0:
         raise ConfigError(f'cameras: expected one for each of {len(images)} images, got '
                           f'{len(cameras)}')
-    views = []
+    views, left_out = [], []
     for number, (image, camera) in enumerate(zip(images, cameras, strict=True), 1):
         if not isinstance(image, np.ndarray):
             raise ConfigError(f'image {number}: expected pixels, (H, W, 3) uint8 RGB, for a '
                               f'camera of its own, got {type(image).__name__}')
-        views.append(view_of(f'image {number}', image, camera))
+        try:
+            views.append(view_of(f'image {number}', image, camera))
+        except DataError as error:
+            left_out.append(str(error))
+    if not views:
+        raise DataError(f'no photo can be used: {"; ".join(left_out[:3])}', 'no_photos')
     file = CameraFile('cameras', (), np.array([0.0, 0.0, 1.0]))
     box = (0.0, 0.0, 0.0, options.size) if options.box is None else options.box
     # Their own, so that a buffer that is filled anew changes no colour of a mesh to come
     own = [replace(view, image=view.image.copy())
            for view in even_choice(views, options.views or len(views))]
-    return from_views(own, file, replace(options, box=box))
+    with _telling(left_out):
+        return from_views(own, file, replace(options, box=box), left_out)
 
 
 def _separated(views: Sequence[PhotoView], file: CameraFile, cube: Cube | None, background: str
