@@ -67,7 +67,7 @@ def test_auto_is_the_cluster_that_ray_address_names(cluster, monkeypatch):
             LocalCrew(1), cluster_items.halved, range(8))
 
 
-@pytest.mark.parametrize('kind', ['local', 'ray'])
+@pytest.mark.parametrize('kind', ['local', pytest.param('ray', marks=pytest.mark.slow)])
 def test_what_a_dying_worker_had_is_done_again_and_no_item_is_lost_or_doubled(
         crews, kind, tmp_path):
     with crews[kind]() as crew:

@@ -203,7 +203,7 @@ def test_the_last_view_is_shown_as_the_network_saw_it(page, chromium):
     assert not chromium.errors()
 
 
-@pytest.mark.parametrize('size', [LAPTOP, PHONE])
+@pytest.mark.parametrize('size', [pytest.param(LAPTOP, marks=pytest.mark.slow), PHONE])
 def test_words_and_controls_lie_within_the_window(page, chromium, size):
     page.add_button('New episode', 'begin again')
     page.set_text(['Waiting for a loop.'])

@@ -44,6 +44,29 @@ def opened(chromium, pages):
     return opened
 
 
+@pytest.fixture
+def page(one_chromium, pages):
+    """
+    Return the page of one run, its last view chosen, at the recorded threshold.
+
+    It takes seconds to be drawn, so that it is left open for the next test.
+    """
+    if one_chromium.driver.current_url != pages('one'):
+        one_chromium.open(pages('one'), LAPTOP)
+        one_chromium.until(lambda: one_chromium.run(
+            'return document.documentElement.dataset.ready'), 'the drawings')
+    one_chromium.run('document.querySelector(`.after input[value="4"]`).click()')
+    slide(one_chromium, None)
+    return one_chromium
+
+
+def slide(page, threshold):
+    """Move the threshold, where it was at first if None."""
+    page.run('const slider = document.querySelector("input[type=range]");'
+             'slider.value = arguments[0] ?? slider.defaultValue;'
+             'slider.dispatchEvent(new Event("input", {bubbles: true}))', threshold)
+
+
 def button(page):
     return page.run('return document.querySelector(".turn").textContent')
 
@@ -81,7 +104,7 @@ def test_page_is_drawn_without_complaint_and_fits_its_window(opened, name, size,
     assert page.errors() == []
 
 
-@pytest.mark.parametrize('count', [1, 2])
+@pytest.mark.parametrize('count', [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_long_names_make_the_page_no_wider_than_a_phone(chromium, tmp_path, count):
     run, name = recorded_run('chair', views=2), 'name' * 40
     first, last = run.episodes[0].views
@@ -111,8 +134,7 @@ def test_no_figure_of_the_timing_table_is_cut_off_on_a_phone(opened, name):
         assert right <= edge + 1
 
 
-def test_another_view_shows_another_shape_and_what_was_thought_then(opened, changed_share):
-    page = opened()
+def test_another_view_shows_another_shape_and_what_was_thought_then(page, changed_share):
     seen = []
     for chosen in ('4', '0', 'truth'):  # the last view, the first, and the truth
         page.run('document.querySelector(`.after input[value="${arguments[0]}"]`).click()', chosen)
@@ -137,21 +159,17 @@ def test_page_turns_dark_with_its_reader(opened, changed_share):
     assert ink[0] == ink[1] == 'rgb(230, 231, 234)'
 
 
-def test_choosing_an_image_chooses_its_view(opened):
-    page = opened()
+def test_choosing_an_image_chooses_its_view(page):
     page.run('document.querySelectorAll(".film label")[1].click()')
     assert page.run('return document.querySelector(".after input:checked").value') == '1'
     assert page.run('return [...document.querySelectorAll(".film li")].findIndex((item) => '
                     'item.classList.contains("chosen"))') == 1
 
 
-def test_higher_threshold_leaves_fewer_cells(opened, changed_share):
-    page = opened()
-    slide = ('const slider = document.querySelector("input[type=range]"); slider.value = '
-             'arguments[0]; slider.dispatchEvent(new Event("input", {bubbles: true}))')
+def test_higher_threshold_leaves_fewer_cells(page, changed_share):
     before, counts = shape(page), []
     for threshold in (0.1, 0.3, 0.6, 0.9):
-        page.run(slide, threshold)
+        slide(page, threshold)
         counts.append(cells(page))
         assert page.run('return document.querySelector("output").textContent') == (
             f'{threshold:.2f}')
@@ -180,16 +198,14 @@ def test_object_turns_until_it_is_paused(opened, changed_share):
     assert page.errors() == []
 
 
-def test_who_hears_the_page_is_not_told_that_the_shape_turns_while_it_stands(opened):
-    page = opened(motion='reduce')
+def test_who_hears_the_page_is_not_told_that_the_shape_turns_while_it_stands(page):
     said = page.run('const turn = document.querySelector(".turn"); turn.click(); turn.click();'
                     'return [turn.textContent, turn.ariaPressed, document.querySelector('
                     '".scene").ariaLabel]')
     assert said == ['Turn', None, 'The reconstructed shape in 3D']  # a label, or a state
 
 
-def test_the_surface_in_its_colours_is_drawn(opened, changed_share):
-    page = opened()
+def test_the_surface_in_its_colours_is_drawn(page, changed_share):
     before = shape(page)
     page.run('document.querySelector(".after input[value=colors]").click()')
     page.until(lambda: 'in the colours' in page.run(

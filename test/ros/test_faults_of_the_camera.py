@@ -105,7 +105,7 @@ EPISODES = [1, pytest.param(10, marks=pytest.mark.slow)]
 
 @pytest.mark.parametrize('episodes', EPISODES)
 @pytest.mark.parametrize('fault', [
-    name if name in ('drop_images', 'corrupt_images', 'stall_motor', 'restart') else
+    name if name in ('drop_images', 'stall_motor') else
     pytest.param(name, marks=pytest.mark.slow) for name in FAULTS])
 def test_a_fault_is_told_and_when_it_is_over_the_loop_goes_on_with_the_right_views(
         loop, expected, fault, episodes):
