@@ -174,13 +174,17 @@ def test_a_photo_that_is_cut_off_is_not_kept(server, folder):
     assert not list(folder.iterdir())
 
 
-def test_photos_that_come_together_are_all_kept(server, folder):
-    photo = encoded('PNG', folder)
-    threads = [threading.Thread(target=send, args=(server, photo)) for _ in range(4)]
+def send_together(server, photo, times):
+    threads = [threading.Thread(target=send, args=(server, photo)) for _ in range(times)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
+
+
+def test_photos_that_come_together_are_all_kept(server, folder):
+    photo = encoded('PNG', folder)
+    send_together(server, photo, 4)
     assert len(list(folder.iterdir())) == 4
 
 
@@ -206,11 +210,7 @@ def test_of_photos_that_come_together_one_at_a_time_is_decoded(server, folder, m
 
     monkeypatch.setattr(room, 'opened', counted)
     photo = encoded('JPEG', folder)
-    threads = [threading.Thread(target=send, args=(server, photo)) for _ in range(3)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    send_together(server, photo, 3)
     assert most == [1, 1, 1]
 
 

@@ -37,11 +37,16 @@ def pages(tmp_path_factory):
 def opened(chromium, pages):
     """Return a function that opens a page and waits until it is drawn."""
     def opened(name='one', size=LAPTOP, scheme='light', motion='reduce'):
-        chromium.open(pages(name), size, scheme, motion)
-        chromium.until(lambda: chromium.run('return document.documentElement.dataset.ready'),
-                       'the drawings')
-        return chromium
+        return drawn(chromium, pages(name), size, scheme, motion)
     return opened
+
+
+def drawn(chromium, *page):
+    """Open a page, and wait until it is drawn."""
+    chromium.open(*page)
+    chromium.until(lambda: chromium.run('return document.documentElement.dataset.ready'),
+                   'the drawings')
+    return chromium
 
 
 @pytest.fixture
@@ -52,9 +57,7 @@ def page(one_chromium, pages):
     It takes seconds to be drawn, so that it is left open for the next test.
     """
     if one_chromium.driver.current_url != pages('one'):
-        one_chromium.open(pages('one'), LAPTOP)
-        one_chromium.until(lambda: one_chromium.run(
-            'return document.documentElement.dataset.ready'), 'the drawings')
+        drawn(one_chromium, pages('one'), LAPTOP)
     one_chromium.run('document.querySelector(`.after input[value="4"]`).click()')
     slide(one_chromium, None)
     return one_chromium
