@@ -17,7 +17,12 @@ from active_recon.training.loop import (
     TrainingStoppedError,
 )
 from active_recon.training.pictures import progress_picture
-from active_recon.training.supervised import longest_sequence, steps_for, train_reconstruction
+from active_recon.training.supervised import (
+    drawn_length,
+    longest_sequence,
+    steps_for,
+    train_reconstruction,
+)
 import numpy as np
 import pytest
 from safetensors import safe_open
@@ -244,6 +249,14 @@ def test_sequences_are_short_in_the_first_half_and_the_samples_are_counted_so():
     seen = sum(8 * (most + 1) / 2 for most in longest)
     assert steps_for(seen, 8, 5) == 1000
     assert longest_sequence(0, TrainingConfig(steps=9, max_views=1)) == 1
+
+
+@pytest.mark.parametrize('rank', [0, 1])
+def test_the_length_of_sequences_tells_nothing_of_the_objects_that_are_drawn(rank):
+    config = TrainingConfig(1000, curriculum_fraction=0)
+    drawn = [(length, rng.integers(1000)) for length, rng in (
+        drawn_length(step, config, rank) for step in range(config.steps))]
+    assert abs(np.corrcoef(drawn, rowvar=False)[0, 1]) < 0.1
 
 
 def test_a_picture_shows_views_and_what_the_network_makes_of_them(network, views):

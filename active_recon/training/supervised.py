@@ -86,7 +86,8 @@ def drawn_length(step: int, config: TrainingConfig,
     """
     shared = np.random.default_rng([config.seed, step])
     length = int(shared.integers(1, longest_sequence(step, config) + 1))
-    return length, np.random.default_rng([config.seed, step, rank])
+    # Not the rank itself: numpy takes [seed, step, 0] for [seed, step], the length's own numbers
+    return length, np.random.default_rng([config.seed, step, rank + 1])
 
 
 def steps_for(samples: int, batch_size: int, max_views: int,
