@@ -86,7 +86,9 @@ def read_state(path: Path, reconstructor: Reconstructor) -> SavedState:
     try:
         with safe_open(path, 'np') as file:
             facts = file.metadata() or {}
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+            # Those of another file may have numbers that numpy has not, as bfloat16
+            arrays = {name: file.get_tensor(name) for name in file.keys()  # noqa: SIM118
+                      if facts.get('format') == _FORMAT}
     except (OSError, SafetensorError) as error:
         raise DataError(f'{path}: no readable state: expected a whole file of save_state, got: '
                         f'{error}') from error

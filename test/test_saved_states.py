@@ -13,6 +13,8 @@ from active_recon.saved_states import read_state, SavedState, write_state
 import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
+from safetensors.torch import save_file as torch_file
+import torch
 
 SIZE = 0.2
 
@@ -133,6 +135,12 @@ def test_a_spoilt_state_is_refused_in_one_line(spoil, reconstructor, written, tm
 def test_weights_are_no_state(reconstructor):
     with pytest.raises(DataError, match='no state: expected a file of save_state in format 1'):
         read_state(find_weights('r2n2'), reconstructor)
+
+
+def test_weights_of_numbers_that_numpy_has_not_are_no_state(reconstructor, tmp_path):
+    torch_file({'layer': torch.zeros(3, dtype=torch.bfloat16)}, tmp_path / 'bf16.safetensors')
+    with pytest.raises(DataError, match='no state: expected a file of save_state in format 1'):
+        read_state(tmp_path / 'bf16.safetensors', reconstructor)
 
 
 def test_a_file_that_is_not_there_is_refused(reconstructor, tmp_path):
