@@ -329,7 +329,8 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
 @pytest.mark.parametrize(('option', 'value', 'words'), [
     ('--volume-loss', 'mae', 'unknown volume loss: expected one of mse, bce'),
     ('--silhouette-weight', -1, 'invalid weights: expected 0 or more'),
-    ('--learning-rate', 0, 'number too small: expected numbers above 0'),
+    ('--learning-rate', 0, 'number out of range: expected finite numbers above 0'),
+    ('--learning-rate', 'inf', 'number out of range: expected finite numbers above 0'),
     ('--max-views', 1, 'nothing to choose: expected 2 or more'),
     ('--group-size', 3, 'expected a divisor of the 2 episodes')])
 def test_settings_that_train_nothing_are_refused(

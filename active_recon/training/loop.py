@@ -48,9 +48,10 @@ class TrainingConfig(Config):
     def __post_init__(self) -> None:
         """Reject what trains nothing."""
         if min(self.steps, self.batch_size, self.max_views, self.warmup_steps,
-               self.checkpoint_every, self.validate_every) < 1 or not self.learning_rate > 0:
-            raise ConfigError('TrainingConfig: number too small: expected numbers above 0, got '
-                              f'{self.to_dict()}')
+               self.checkpoint_every, self.validate_every) < 1 or not (
+                   0 < self.learning_rate < math.inf):
+            raise ConfigError('TrainingConfig: number out of range: expected finite numbers above '
+                              f'0, got {self.to_dict()}')
         if not 0 <= self.curriculum_fraction <= 1:
             raise ConfigError('TrainingConfig: invalid curriculum_fraction: expected 0 to 1, got '
                               f'{self.curriculum_fraction}')
