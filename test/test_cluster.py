@@ -143,6 +143,14 @@ def test_a_machine_that_does_not_see_a_path_says_which(crews, tmp_path):
     assert not list((tmp_path / 'out').iterdir())
 
 
+def test_work_that_ends_leaves_other_work_in_its_folder(tmp_path):
+    first, second = SharedFolder.of(tmp_path), SharedFolder.of(tmp_path)
+    first.forget()
+    second.require()
+    second.forget()
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.slow
 def test_a_batch_of_bags_is_the_same_on_a_cluster_and_a_bag_that_is_none_is_refused(
         cluster, tmp_path, monkeypatch, capsys):

@@ -9,16 +9,16 @@ import uuid
 from active_recon.cluster.stores import Place, whole
 from active_recon.errors import ActiveReconError, WorkError
 
-_MARK = '.shared_folder'
+_MARK = '.shared_folder-'
 
 
 @dataclass(frozen=True)
 class SharedFolder:
     """
-    A folder and what its mark says.
+    A folder and the name of its mark, a file in it that only this work has.
 
-    A folder of the same path on a worker's own disk has another mark or none: without it, results
-    would be written where nobody looks for them.
+    A folder of the same path on a worker's own disk has no such mark: without it, results would be
+    written where nobody looks for them.
     """
 
     place: Place
@@ -26,28 +26,23 @@ class SharedFolder:
 
     @classmethod
     def of(cls, place: Place) -> 'SharedFolder':
-        """Return the folder, made and marked; a mark that is there already is kept."""
+        """Return the folder, made and marked."""
         place = place.resolve() if isinstance(place, Path) else place
-        mark = place / _MARK
-        try:
-            return cls(place, mark.read_text())
-        except OSError:
-            with whole(mark) as unfinished:
-                unfinished.write_text(f'{uuid.uuid4().hex}\n')
-        return cls(place, mark.read_text())
+        folder = cls(place, f'{_MARK}{uuid.uuid4().hex}')
+        with whole(place / folder.mark) as unfinished:
+            unfinished.write_text('active_recon\n')  # not every store keeps files of no bytes
+        return folder
 
     def forget(self) -> None:
         """Remove the mark."""
-        (self.place / _MARK).unlink(missing_ok=True)
+        (self.place / self.mark).unlink(missing_ok=True)
 
     def require(self) -> None:
         """Raise WorkError where this machine does not see the folder."""
         try:
-            seen = (self.place / _MARK).read_text() == self.mark
-        except OSError:
-            seen = False
-        if not seen:
-            raise WorkError(_not_seen(self.place), 'not_seen')
+            (self.place / self.mark).read_text()
+        except OSError as error:
+            raise WorkError(_not_seen(self.place), 'not_seen') from error
 
 
 @dataclass(frozen=True)
