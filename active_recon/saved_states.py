@@ -101,7 +101,8 @@ def read_state(path: Path, reconstructor: Reconstructor) -> SavedState:
                             f'{facts.get(name, "none")[:12]}')
     try:
         return _read(facts, arrays, reconstructor)
-    except (KeyError, ValueError, TypeError, IndexError, ViewError, DataError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, OverflowError, ViewError,
+            DataError) as error:
         raise DataError(f'{path}: a spoilt state: expected what save_state wrote, got '
                         f'{type(error).__name__}: {error}') from error
 

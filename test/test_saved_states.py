@@ -122,6 +122,7 @@ def metadata(path):
     lambda arrays, facts: arrays.pop('image/1'),
     lambda arrays, facts: arrays.update({'image/1': arrays['image/1'][:9]}),
     lambda arrays, facts: arrays.update(last_pose=2 * arrays['last_pose']),
+    lambda arrays, facts: arrays.update(seen_lenses=arrays['seen_lenses'] + np.inf),
     lambda arrays, facts: facts.update(views='many'),
     lambda arrays, facts: facts.update(quality='{"expected_iou": 2}')])
 def test_a_spoilt_state_is_refused_in_one_line(spoil, reconstructor, written, tmp_path):
