@@ -91,6 +91,12 @@ def test_what_is_no_manifest_is_refused(content, tmp_path):
         read_manifest(path)
 
 
+@pytest.mark.parametrize('category', ['', '.', 'furniture/chair', '/chair', 'chair/'])
+def test_a_category_that_cannot_name_one_folder_is_refused(category, tmp_path):
+    with pytest.raises(DataError, match='a category that can name a folder .* in line 2'):
+        read_manifest(write(tmp_path, {**ROW, 'category': category}))
+
+
 def test_a_missing_manifest_is_refused(tmp_path):
     with pytest.raises(DataError, match='No such file'):
         read_manifest(tmp_path / 'manifest.csv')

@@ -62,9 +62,11 @@ def read_manifest(path: Path) -> list[ModelRow]:
         raise DataError(f'{path}: missing columns: expected {", ".join(sorted(_COLUMNS))}; '
                         f'missing: {", ".join(sorted(missing))}')
     for number, row in enumerate(rows, start=2):
-        if any(row[column] is None for column in _COLUMNS) or not _HEX.fullmatch(row['sha256']):
-            raise DataError(f'{path}: invalid row: expected every column and a hexadecimal sha256 '
-                            f'in line {number}, got {row}')
+        if any(row[column] is None for column in _COLUMNS) or not (
+                _HEX.fullmatch(row['sha256'])
+                and Path(row['category']).parts == (row['category'],)):
+            raise DataError(f'{path}: invalid row: expected every column, a category that can '
+                            f'name a folder and a hexadecimal sha256 in line {number}, got {row}')
     return [ModelRow(row['category'], path.parent / row['file'], row['split'], row['source'],
                      row['licence'], row['licence_evidence'], row['front_axis'], row['sha256'])
             for row in rows]
