@@ -5,6 +5,7 @@ import errno
 import math
 from pathlib import Path
 
+from active_recon.cli.train_depth import train_depth
 from active_recon.cluster.results import is_no_room
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.layout import list_objects, ObjectFolder, write_depths
@@ -16,7 +17,7 @@ from active_recon.models.depth_weights import load_refiner
 from active_recon.models.lifting import Lifting
 from active_recon.models.weights import Bundle, save_weights
 from active_recon.models.weights_files import find_weights
-from active_recon.training.depth import depth_sample, depth_view
+from active_recon.training.depth import depth_sample, depth_view, LENGTHS
 from active_recon.training.posed_batches import draw_posed_batch
 from active_recon.volumes.depth_evidence import depth_evidence
 from command_line import command
@@ -145,6 +146,11 @@ def test_a_sample_is_what_the_network_says_alone_and_what_its_seed_draws(views):
     for number in range(2):
         state = network.step(batch.images[number], batch.cameras.rows(number), state)
     torch.testing.assert_close(one.logits, network.decode(state), rtol=1e-3, atol=1e-3)
+
+
+def test_the_longest_sequence_to_ask_for_is_the_longest_that_is_drawn():
+    (option,) = train_depth.__annotations__['max_views'].__metadata__
+    assert option.max == max(LENGTHS)
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ def train_depth(
     batch_size: Annotated[int, typer.Option(min=1, help='Objects of a step.')] = 8,
     learning_rate: Annotated[float, typer.Option(help='Peak learning rate.')] = 2e-3,
     max_views: Annotated[int, typer.Option(
-        min=1, max=99, help='Longest sequence, in views; at most all of an object.')] = 8,
+        min=1, max=8, help='Longest sequence, in views; at most all of an object.')] = 8,
     warmup_steps: Annotated[int, typer.Option(
         min=1, help='Steps over which the learning rate rises to its peak.')] = 100,
     checkpoint_every: Annotated[int, typer.Option(
