@@ -25,6 +25,12 @@ def dying(folder, number):
     return number
 
 
+def signalled(kind):
+    """Get a signal, as all processes of a terminal do; return which."""
+    os.kill(os.getpid(), kind)
+    return kind
+
+
 def slowly(folder, number):
     """Take a tenth of a second, and tell in a folder that the item was done by which process."""
     time.sleep(0.1)

@@ -5,6 +5,7 @@ from functools import partial
 import gc
 from pathlib import Path
 import shutil
+import signal
 import sys
 
 from active_recon.cli import evaluation_plan
@@ -76,6 +77,12 @@ def test_what_a_dying_worker_had_is_done_again_and_no_item_is_lost_or_doubled(
     assert found[5] == Result(5, None, DIED, 'worker_died')
     assert [result.value for result in found if result.index != 5] == [0, 1, 2, 3, 4, 6, 7]
     assert (tmp_path / '2-1').exists()
+
+
+def test_ctrl_c_and_a_closed_terminal_are_the_driver_s():
+    kinds = [signal.SIGINT, signal.SIGHUP]
+    assert [result.value for result in results(LocalCrew(2), cluster_items.signalled, kinds)
+            ] == kinds
 
 
 @pytest.mark.parametrize('kind', ['local', pytest.param('ray', marks=pytest.mark.slow)])

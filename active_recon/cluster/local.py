@@ -117,8 +117,9 @@ def _begin(function: Callable[[Any], Any]) -> None:
 
 
 def begin_worker() -> None:
-    """Prepare a worker: Ctrl-C is the driver's, and no worker outlives it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Prepare a worker: Ctrl-C and a closed terminal are the driver's, and none outlives it."""
+    for kind in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(kind, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None
 
