@@ -165,13 +165,15 @@ def test_a_hundred_megapixels_are_reduced_and_their_lens_with_them(tmp_path):
     assert views[0].camera.intrinsics.fx == pytest.approx(0.9 * side)
 
 
-def test_a_photo_beyond_the_limit_of_pillow_is_read_and_the_limit_stays(tmp_path, monkeypatch):
-    Image.fromarray(drawn()).save(tmp_path / 'photo.png')
+@pytest.mark.parametrize('ending', ['png', 'tif'])
+def test_a_photo_beyond_the_limit_of_pillow_is_read_and_the_limit_stays(
+        ending, tmp_path, monkeypatch):
+    path = tmp_path / f'photo.{ending}'
+    Image.fromarray(drawn()).save(path)
     monkeypatch.setattr(Image, 'MAX_IMAGE_PIXELS', 100)
-    assert read_photo(opened(tmp_path / 'photo.png')).shape == (30, 40, 3)
+    assert read_photo(opened(path)).shape == (30, 40, 3)
     assert Image.MAX_IMAGE_PIXELS == 100
-    with pytest.raises(DataError, match='30 x 40|40 x 30'), opened_large(
-            tmp_path / 'photo.png', most_pixels=1199):
+    with pytest.raises(DataError, match='30 x 40|40 x 30'), opened_large(path, most_pixels=1199):
         pass
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Lock
+from threading import RLock
 from typing import BinaryIO
 
 from active_recon.errors import DataError
@@ -11,7 +11,7 @@ from PIL import Image
 
 MOST_PIXELS = 400_000_000
 _UNREADABLE = (OSError, SyntaxError, ValueError)  # what Pillow raises, also as pixels are read
-_PILLOWS_LIMIT = Lock()
+_PILLOWS_LIMIT = RLock()
 
 
 @contextmanager
@@ -33,10 +33,13 @@ def opened(source: Path | BinaryIO, most_pixels: int = MOST_PIXELS,
         raise DataError(str(error)) from error
 
 
-def _opened(source: Path | BinaryIO, formats: tuple[str, ...] | None) -> Image.Image:
+@contextmanager
+def _opened(source: Path | BinaryIO, formats: tuple[str, ...] | None) -> Iterator[Image.Image]:
+    """Open an image without Pillow's limit, which holds as the pixels of TIFF are read, too."""
     with _PILLOWS_LIMIT:
         limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
         try:
-            return Image.open(source, formats=formats)
+            with Image.open(source, formats=formats) as image:
+                yield image
         finally:
             Image.MAX_IMAGE_PIXELS = limit
