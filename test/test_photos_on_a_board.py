@@ -5,11 +5,13 @@ from dataclasses import replace
 from active_recon.calibration.lens import board_pose
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
+from active_recon.geometry.lenses import Distortion
 from active_recon.photos.backgrounds import cube_pixels
 from active_recon.photos.board_masks import board_views
 from active_recon.photos.board_print import seen_board, UNIFORM
 from active_recon.photos.cube import Cube
 from active_recon.photos.reconstruct import reconstruct
+from active_recon.photos.silhouette_fusion import silhouettes
 from active_recon.photos.sources import BoardCameras
 from active_recon.photos.views import PhotoView
 from active_recon.volumes.voxelisation import voxelise
@@ -98,6 +100,19 @@ def test_a_mask_never_leaves_the_projected_cube(taken, cameras):
         inside = cube_pixels(cube.camera(view.camera, 1.0), 1.0, view.image.shape[1::-1])
         grown = cv2.dilate(inside.astype(np.uint8), np.ones((13, 13), np.uint8)) > 0
         assert view.mask.any() and not (view.mask & ~grown).any()
+
+
+def test_a_photo_from_within_the_cube_shows_the_object_whether_or_not_its_lens_bends(mesh):
+    straight = [*around(2, 0.3 * SIZE), *around(1, 0, elevations=(1.2, 1.2), distance=0.31)]
+    bent = [Camera(camera.pose, replace(camera.intrinsics, distortion=Distortion(
+        'plumb_bob', (1e-9, 0, 0, 0, 0)))) for camera in straight]
+    images, masks = photographed(mesh, straight)
+    cube = Cube(MIDDLE + [0, 0, 0.155], 0.31, np.array([0, 0, 1.0]))
+    found = [silhouettes([seen_board(image, camera, BOARD, 160) for image, camera in zip(
+        images, cameras, strict=True)], cube, 0.3)[0][-1] for cameras in (straight, bent)]
+    np.testing.assert_allclose(*found, atol=1e-3)
+    mask = cv2.resize(masks[-1].astype(np.uint8), found[0].shape[::-1]) > 0
+    assert iou((found[1] > 0.5)[None], mask[None]) > 0.8
 
 
 @pytest.mark.parametrize(('level', 'photos'), [

@@ -160,8 +160,9 @@ def _place(camera: Camera, above: NDArray[np.bool_]) -> _Place:
     drawn = np.zeros((lens.height, lens.width), np.uint8)
     drawn[down[shown], across[shown]] = 1
     outline = cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, closed) > 0
-    corners, _ = camera.project(cube_corners())
-    first, last = corners.min(axis=0) - 2, corners.max(axis=0) + 2
+    corners, before = camera.project(cube_corners())
+    first, last = ((corners.min(axis=0) - 2, corners.max(axis=0) + 2) if before.min() > 0
+                   else (np.zeros(2), np.array([lens.width, lens.height])))  # inside, or beside it
     left, top = np.clip(first, 0, [lens.width - 1, lens.height - 1]).astype(int)
     right, bottom = np.clip(last, [left + 1, top + 1], [lens.width, lens.height]).astype(int)
     return _Place(down, across, shown, np.asarray(outline),
