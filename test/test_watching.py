@@ -4,6 +4,7 @@ from dataclasses import replace
 import math
 import shutil
 import signal
+from types import SimpleNamespace
 
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
@@ -342,6 +343,25 @@ def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(posed, tm
     watcher.step(10.0)
     assert not watcher.result().left_out
     assert '9.jpg: gone from the folder' in said
+
+
+def test_a_photo_is_told_as_left_out_only_as_long_as_it_is(shape, adviser, tmp_path):
+    others = [f'{name}: of another lens' for name in ('a.png', 'b.png')]
+    used = {'a.png': ['a.png'], 'b.png': ['a.png'], 'c.png': ['b.png', 'c.png']}
+
+    def add(path):  # of two lenses the first is that of the photos, until there are more others
+        left_out = {'a.png': [], 'b.png': others[1:], 'c.png': others[:1]}[path.name]
+        found.shape = replace(shape, left_out=left_out, views=[
+            replace(shape.views[0], name=name) for name in used[path.name]])
+        return ''.join(each for each in left_out if each.startswith(path.name))
+
+    found = SimpleNamespace(add=add, shape=None, metric=True, board=None)
+    watcher = Watcher(tmp_path, found, adviser, print)
+    for number, name in enumerate(used):
+        (tmp_path / name).write_bytes(b'any')
+        for now in (2.0 * number, 2.0 * number + 1):
+            watcher.step(now)
+        assert watcher.result().left_out == found.shape.left_out
 
 
 def test_where_the_original_is_deleted_its_copy_is_taken_in(photos, tmp_path, adviser):

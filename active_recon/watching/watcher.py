@@ -122,9 +122,12 @@ class Watcher:
         return replace(shape, left_out=self._all_left_out(shape))
 
     def _all_left_out(self, shape: Shape | None) -> list[str]:
-        own = list(self._left_out.values())
-        return [*own, *(reason for reason in (() if shape is None else shape.left_out)
-                        if reason not in own)]
+        """Return why photos are left out of a shape now, whatever became of them at first."""
+        if shape is None:
+            return list(self._left_out.values())
+        used = {view.name for view in shape.views}
+        now = {reason.partition(': ')[0]: reason for reason in shape.left_out}
+        return [reason for name, reason in {**self._left_out, **now}.items() if name not in used]
 
     def _tell(self) -> None:
         """Say where to stand next, and show it."""
