@@ -223,6 +223,13 @@ def test_a_device_is_asked_for_its_size_and_gives_colours_at_its_own_pace(device
         open_source(str(tmp_path / 'video4'))
 
 
+def test_a_device_is_one_by_any_of_its_names(device, tmp_path):
+    name = tmp_path / 'by-id'
+    name.symlink_to('/dev/null')  # a character device, as those of cameras are
+    source = open_source(str(name), 1280, 720)
+    assert device['place'] == source.name == str(name) and source.rate is None
+
+
 def test_what_cannot_be_opened_is_told_in_one_line(tmp_path, capfd):
     (tmp_path / 'film.mp4').write_bytes(b'no film at all')
     for place, words in (

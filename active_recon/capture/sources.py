@@ -62,7 +62,7 @@ def open_source(place: str, width: int = 0, height: int = 0, rate: float = 0.0) 
     if place.isascii() and place.isdigit():
         place = f'{_DEVICE}{place}'
     path = Path(place)
-    if place.startswith(_DEVICE):
+    if place.startswith(_DEVICE) or path.is_char_device():  # also /dev/v4l/by-id/...
         return _Device(path, width, height, rate)
     if width or height:
         raise ConfigError(f'{place}: no device, so no size can be asked for: expected 0 x 0, got '
