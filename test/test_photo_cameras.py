@@ -102,6 +102,13 @@ def test_what_opencv_writes_has_the_cameras_it_was_written_from(named, suffix, p
     assert_same(write_opencv(tmp_path / f'cameras.{suffix}', rig(), named), photos, rig())
 
 
+def test_a_name_that_is_not_of_utf_8_is_refused_with_its_file(photos, tmp_path):
+    path = write_opencv(tmp_path / 'cameras.yml', rig())
+    path.write_bytes(path.read_bytes().replace(b'photo2', 'für2'.encode('latin-1')))
+    with pytest.raises(DataError, match=r"cameras.yml: .*names in UTF-8, got b'f\\xfcr2.png'"):
+        read_cameras(path, photos)
+
+
 def test_a_fisheye_of_opencv_is_one_and_a_tilted_sensor_is_refused_by_its_count(photos, tmp_path):
     fisheye = replace(LENS, distortion=Distortion('equidistant', (0.1, -0.05, 0.02, -0.01)))
     path = write_opencv(tmp_path / 'cameras.yml', rig(fisheye))

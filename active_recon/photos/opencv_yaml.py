@@ -40,6 +40,9 @@ def read_opencv(path: Path, photos: Sequence[PhotoFile]) -> CameraFile:
     except cv2.error as error:
         raise DataError(f'{path}: no cameras: expected matrices and lists as OpenCV writes them, '
                         f'got {error.err}') from error
+    except UnicodeDecodeError as error:
+        raise DataError(f'{path}: not readable: expected names in UTF-8, got {error.object!r}'
+                        ) from error
     finally:
         storage.release()
     entries = []
