@@ -240,6 +240,15 @@ def test_transforms_that_cannot_be_used_are_refused_by_what_is_wrong(change, exp
         read_transforms(path)
 
 
+def test_a_colmap_model_whose_lines_lack_a_number_is_refused(tmp_path):
+    for name in ('cameras.txt', 'images.txt'):
+        (tmp_path / name).write_text((COLMAP / 'text' / name).read_text())
+    lines = (tmp_path / 'images.txt').read_text().replace('0.4337614669220507 ', '')
+    (tmp_path / 'images.txt').write_text(lines)
+    with pytest.raises(DataError, match='a pose of 6 numbers in the line .3 0.55'):
+        read_colmap(tmp_path)
+
+
 def test_a_colmap_model_that_is_cut_off_is_refused(tmp_path):
     for name in ('cameras.bin', 'images.bin'):
         (tmp_path / name).write_bytes((COLMAP / 'binary' / name).read_bytes())

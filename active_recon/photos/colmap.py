@@ -106,6 +106,8 @@ def _text_images(text: str) -> Iterator[_Image]:
         if not line:
             continue
         _, *numbers, camera, name = line.split(maxsplit=9)
+        if len(numbers) != 7:
+            raise ValueError(f'a pose of {len(numbers)} numbers in the line {line[:60]!r}')
         yield name, int(camera), tuple(map(float, numbers))
         next(lines, '')  # the image's points, perhaps none
 
