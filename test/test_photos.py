@@ -351,7 +351,7 @@ def test_a_place_without_an_object_is_refused(plain, rgba, views, tmp_path):
 @pytest.mark.parametrize(('how', 'expected'), [
     ({'background': 'green'}, 'background: unknown value'), ({'size': -1}, 'size: out of range'),
     ({'box': (0, 0, 1)}, 'box: expected four numbers'), ({'views': 0}, 'views: out of range'),
-    ({'up': 'w'}, 'up: not an axis')])
+    ({'up': 'w'}, 'up: not an axis'), ({'size': 0.3, 'unit': 0.1}, 'both set the scale')])
 def test_options_that_cannot_be_are_refused(how, expected, plain):
     with pytest.raises(ConfigError, match=expected):
         active_recon.reconstruct(plain, **how)

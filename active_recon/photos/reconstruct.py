@@ -103,8 +103,8 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
     camera for each image in the object frame, whose origin is the centre of the object's cube.
     `size` is the side of that cube in metres. With a camera file it only sets the scale, and the
     cube is found unless `box` (x, y, z, side, in the file's units) or the file tells it. The rest
-    is as in `Options`; `masks`, `unit` and `order` are for files alone, `axes` for those of
-    cameras. Raises ActiveReconError where no photo can be used.
+    is as in `Options`; `masks`, `unit` (instead of `size`) and `order` are for files alone, `axes`
+    for those of cameras. Raises ActiveReconError where no photo can be used.
     """
     options = Options(box, unit, size, up, axes, background, None if masks is None else
                       Path(masks), views, model, threads, order, ground)
@@ -115,6 +115,8 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
             raise ConfigError('images: expected pixels for a list of cameras, got the path '
                               f'{images}')
         return _of_cameras(images, cameras, options)
+    if size is not None and unit != 1:
+        raise ConfigError('size and unit both set the scale: give one of them')
     if isinstance(images, Path | str):
         place: Path | list[Path] = Path(images)
     else:
