@@ -153,6 +153,7 @@ def test_the_board_to_print_comes_with_its_size(tmp_path):
     (['images', '--object-size', 1, '--step-deg', 15, '--mount-frame', 'flange'],
      '--mount-frame without --poses'),
     (['nowhere', '--object-size', 1], 'nowhere'),
+    (['images', '--object-size', 1, '--out', 'images/'], '--out: a folder of images, images'),
     (['images', '--object-size', 1, '--step-deg', 'nan'], '--step-deg: not finite'),
     (['images', '--object-size', 1, '--board-thickness-mm', 'inf'], 'board_thickness: not finite'),
     (['images', '--object-size', 1, '--camera-azimuth-deg', 'nan'], 'azimuth_at_zero: not finite'),

@@ -98,6 +98,9 @@ def calibrate(
         raise ConfigError('several of --step-deg, --angles-deg and --poses: give one of them')
     if step_deg is not None and not math.isfinite(step_deg):
         raise ConfigError(f'--step-deg: not finite: expected degrees, got {step_deg}')
+    if out.resolve() in [place.resolve() for place in (*images, *(lens_images or ()))]:
+        raise ConfigError(f'--out: a folder of images, {out}: its calibration.png would be an '
+                          'image of the next run; give another folder')
     paths = image_paths(images)
     names = [path.name for path in paths]
     placement = Placement(
