@@ -200,6 +200,19 @@ def test_a_flat_board_on_a_table_tells_the_focal_length_alone(seen):
     assert_same_camera(Placement(SIZE).on_table(found), true_pose(), metres=3e-3)
 
 
+def test_corners_that_no_lens_fits_are_refused():
+    rng, refused = np.random.default_rng(0), []
+    for _ in range(8):
+        anywhere = [Detection(f'{name}.png', BOARD.corners, rng.uniform(
+            0, LENS.height, (len(BOARD.corners), 2)), (LENS.width, LENS.height))
+            for name in range(3)]
+        try:
+            estimate_lens(anywhere)
+        except DataError as error:
+            refused.append(str(error))
+    assert refused and all('got corners that no lens fits (3 images)' in each for each in refused)
+
+
 def test_boards_held_every_way_tell_the_whole_lens():
     rng = np.random.default_rng(2)
     held = []

@@ -98,8 +98,18 @@ def estimate_lens(seen: Sequence[Detection], focal: float | None = None) -> Esti
     The search begins at the focal length `focal`, pixels; None: the image's width.
 
     A board that rotates flat under a fixed camera stays in one plane. A single plane, in however
-    many images, does not separate principal point and distortion from its tilt.
+    many images, does not separate principal point and distortion from its tilt. Raises DataError
+    where no lens fits.
     """
+    try:
+        return _estimated(seen, focal)
+    except cv2.error as error:
+        raise DataError('lens not estimated: expected the board from several sides, and large in '
+                        f'the images, got corners that no lens fits ({len(seen)} images); take '
+                        'more, or give the lens by --camera-info', 'too_few_images') from error
+
+
+def _estimated(seen: Sequence[Detection], focal: float | None) -> EstimatedLens:
     points = [one.points.astype(np.float32) for one in seen]
     pixels = [(one.pixels - 0.5).astype(np.float32) for one in seen]
     width, height = size = seen[0].size

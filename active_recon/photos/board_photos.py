@@ -89,13 +89,7 @@ def _lens(seen: Sequence[SeenPhoto], board: Board, lens_file: Path | None,
               if photo.focal is not None]
     focal = float(np.median(focals)) if focals else None
     if len(seen) >= FEWEST:
-        try:
-            return estimate_lens([found for _, found in same], focal).lens
-        except cv2.error as error:
-            raise DataError('lens not estimated: expected the board from several sides, and large '
-                            f'in the photos, got corners that no lens fits ({len(same)} photos); '
-                            'take more, or give the lens by --camera-info',
-                            'too_few_images') from error
+        return estimate_lens([found for _, found in same], focal).lens
     if focal is not None:
         width, height = same[0][1].size
         return Intrinsics(focal, focal, width / 2, height / 2, width, height)
