@@ -91,6 +91,17 @@ def test_a_curve_that_turns_back_is_followed_to_where_it_does():
     assert 0.25 < pole.max_radius < 0.5  # where it gets steep before the pole
 
 
+@pytest.mark.parametrize('tiny', [1e-12, -1e-15, 1e-17, 1e-25, 1e-200])
+def test_coefficients_that_are_0_but_for_rounding_are_0(tiny):
+    for model, bent, nearly in (
+            ('plumb_bob', (-0.3, 0, 0, 0, 0), (-0.3, tiny, 0, 0, 0)),
+            ('plumb_bob', (-0.3, 0.1, 0, 0, -0.1), (-0.3, 0.1, tiny, tiny, -0.1)),
+            ('equidistant', (-0.2, 0, 0, 0), (-0.2, tiny, 0, tiny)),
+            ('rational_polynomial', (0, 0, 0, 0, 0, -4, 0, 0), (0, 0, 0, 0, tiny, -4, tiny, 0))):
+        np.testing.assert_allclose(Distortion(model, nearly).distort(points(3)),
+                                   Distortion(model, bent).distort(points(3)), atol=1e-6)
+
+
 @pytest.mark.parametrize(('model', 'coefficients', 'said'), [
     ('kannala_brandt', (0.1,) * 4, "plumb_bob.*got 'kannala_brandt'; publish rectified"),
     ('', (0.1,) * 5, "got ''"),

@@ -125,7 +125,8 @@ class Distortion:
 
 
 def _first_root(polynomial: Polynomial) -> float:
-    """Return the smallest positive root; a million where there is none."""
-    roots = polynomial.trim().roots()
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    return float(min(real[real > 1e-9], default=1e6))
+    """Return the smallest positive root of what is not 0 at 0; a million where there is none."""
+    # Their inverses are exact where the highest coefficients are 0 but for rounding
+    inverses = Polynomial(polynomial.coef[::-1]).roots()
+    real = inverses[np.abs(inverses.imag) < 1e-9].real
+    return float(min(1 / real[real > 1e-6], default=1e6))
