@@ -47,6 +47,7 @@ from active_recon.volumes.voxels import iou
 from command_line import command
 import numpy as np
 import pytest
+from recorded_messages import small_disk
 import test_lifting
 import test_network_laws
 import test_view_scorer
@@ -332,6 +333,14 @@ def test_the_command_writes_the_files_where_it_is_told_or_says_why_not(
     assert command(monkeypatch, 'export', exported('ptn'), tmp_path) == 2
     assert "onnx is not installed: expected it, as `pip install 'active_recon[export]'`" in (
         capsys.readouterr().err)
+
+
+def test_graphs_are_written_whole_or_those_before_stay(exported):
+    weights = exported('ptn')
+    before = {path: path.read_bytes() for path in weights.parent.glob('ptn*')}
+    with small_disk(1000), pytest.raises(OSError):
+        export(weights)
+    assert {path: path.read_bytes() for path in weights.parent.glob('*ptn*')} == before
 
 
 def metadata(model):

@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 
 from active_recon.errors import WeightsError
+from active_recon.models.scorer_weights import save_scorer
+from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.models.weights import Bundle, load_weights, save_weights
 from active_recon.models.weights_files import (
     DEFAULT_MODEL,
@@ -17,6 +19,7 @@ from active_recon.models.weights_files import (
 )
 import numpy as np
 import pytest
+from recorded_messages import small_disk
 from safetensors.torch import load_file, save_file
 from shown_views import known_after
 import torch
@@ -70,6 +73,18 @@ def test_a_loaded_network_answers_as_the_one_that_was_saved(saved, network):
         expected = known_after(network, images[None])
     found = known_after(load_weights(saved).reconstruction, images[None])
     assert_close(found.logits, expected.logits, rtol=0, atol=0.01)
+
+
+@pytest.mark.parametrize('write', [
+    lambda path, bundle: save_weights(path, bundle),
+    lambda path, _: save_scorer(
+        path, ViewScorer.from_config(ScorerConfig()), ScorerConfig(), 'a' * 64, {})],
+    ids=['network', 'policy'])
+def test_weights_are_written_whole_or_those_before_stay(write, saved, network, tiny):
+    before = {path: path.read_bytes() for path in saved.parent.iterdir()}
+    with small_disk(1000), pytest.raises(OSError):
+        write(saved, Bundle(network, None, tiny, 0.5))
+    assert {path: path.read_bytes() for path in saved.parent.iterdir()} == before
 
 
 def test_loaded_networks_are_frozen_and_in_float32(saved):

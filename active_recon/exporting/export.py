@@ -35,6 +35,7 @@ from active_recon.runtimes.graph_files import (
     POLICY_PART,
     SEGMENT_PART,
 )
+from active_recon.whole_files import whole_file
 import numpy as np
 import torch
 
@@ -50,9 +51,9 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
     That is the view policy in them or beside them, and the depth refiner beside them. Weights of
     a segmenter are a graph of their own.
 
-    They lie beside the weights, or in another folder. Raises WeightsError as `load_weights` does,
-    and ConfigError where the network runs in torch alone, where it has something that no graph
-    can have, or where onnx is not installed.
+    They lie beside the weights, or in another folder, and appear whole. Raises WeightsError as
+    `load_weights` does, and ConfigError where the network runs in torch alone, where it has
+    something that no graph can have, or where onnx is not installed.
     """
     _require_onnx()
     if is_segmenter(weights):
@@ -88,7 +89,8 @@ def _saved(graphs: Mapping[str, bytes], weights: Path, folder: Path | None) -> l
     written = []
     for name, data in graphs.items():
         written.append(graph_path(weights, name, folder))
-        written[-1].write_bytes(data)
+        with whole_file(written[-1]) as unfinished:
+            unfinished.write_bytes(data)
     return written
 
 

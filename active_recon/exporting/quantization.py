@@ -14,6 +14,7 @@ from active_recon.runtimes.exported import Arrays, ExportedRuntime
 from active_recon.runtimes.graph_files import DECODE_PART, graph_path, INT8_PART, KEY
 from active_recon.runtimes.openvino import load_network
 from active_recon.volumes.rendering import composite
+from active_recon.whole_files import whole_file
 import numpy as np
 
 OBJECTS, VIEWS = 60, 5
@@ -68,7 +69,8 @@ def quantize(weights: Path, objects: Sequence[ObjectFolder], folder: Path | None
             told.value = told.value.replace(f'"part": "{DECODE_PART}"', f'"part": "{INT8_PART}"')
     path = graph_path(weights, INT8_PART, folder)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(found.SerializeToString(deterministic=True))
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(found.SerializeToString(deterministic=True))
     return path
 
 

@@ -11,6 +11,7 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.json_text import json_value
 from active_recon.models.weights_bytes import in_precision, require_finite, weights_bytes
 from active_recon.models.weights_files import weights_hash
+from active_recon.whole_files import whole_file
 from safetensors import safe_open, SafetensorError
 import torch
 from torch import nn
@@ -39,14 +40,19 @@ class Companion(Generic[Module]):
 
     def save(self, path: Path, module: Module, config: Config, network_sha256: str | None,
              card: dict[str, Any]) -> None:
-        """Write `path` (.safetensors) for a network's weights, or any, and the card beside it."""
+        """
+        Write `path` (.safetensors) for a network's weights, or any, and the card beside it.
+
+        The file appears whole.
+        """
         path.parent.mkdir(parents=True, exist_ok=True)
         belongs_to = {} if network_sha256 is None else {'network_sha256': network_sha256}
         dtype = torch.float16 if self.half else torch.float32
         tensors = {name: in_precision(dtype, tensor.detach().cpu()).contiguous()
                    for name, tensor in module.state_dict().items()}
-        path.write_bytes(weights_bytes(tensors, {
-            'model': self.kind, 'config': json.dumps(config.to_dict()), **belongs_to}))
+        with whole_file(path) as unfinished:
+            unfinished.write_bytes(weights_bytes(tensors, {
+                'model': self.kind, 'config': json.dumps(config.to_dict()), **belongs_to}))
         path.with_suffix('.json').write_text(json.dumps({
             'model': self.kind, 'config': config.to_dict(), **belongs_to,
             'sha256': weights_hash(path), **card}, indent=2) + '\n')

@@ -13,6 +13,7 @@ from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry, NETWORKS
 from active_recon.models.weights_bytes import in_precision, require_finite, weights_bytes
 from active_recon.models.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
+from active_recon.whole_files import whole_file
 from safetensors import safe_open, SafetensorError
 import torch
 from torch import nn
@@ -34,7 +35,8 @@ def save_weights(path: Path, bundle: Bundle) -> None:
     """
     Write `path` (.safetensors) and the card beside it (.json).
 
-    Floats are stored in half precision, but for tensors with numbers too large for it.
+    Floats are stored in half precision, but for tensors with numbers too large for it. The file
+    appears whole.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     tensors = {f'{part}.{name}': in_precision(torch.float16, tensor.detach().cpu()).contiguous()
@@ -42,8 +44,9 @@ def save_weights(path: Path, bundle: Bundle) -> None:
                for name, tensor in module.state_dict().items()}
     config = json.dumps(bundle.config.to_dict())
     # Written here: safetensors itself writes for the owner alone
-    path.write_bytes(weights_bytes(tensors, {'model': bundle.model, 'config': config,
-                                             'threshold': repr(bundle.threshold)}))
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(weights_bytes(tensors, {
+            'model': bundle.model, 'config': config, 'threshold': repr(bundle.threshold)}))
     card = {'model': bundle.model, 'config': bundle.config.to_dict(),
             'threshold': bundle.threshold,
             'sha256': weights_hash(path), **bundle.card}
