@@ -214,8 +214,8 @@ def test_a_config_that_makes_no_network_is_refused(saved, tiny, config):
         load_weights(saved)
 
 
-@pytest.mark.parametrize('threshold', [None, 'high'])
-def test_a_threshold_that_is_no_number_is_refused(saved, tiny, threshold):
+@pytest.mark.parametrize('threshold', [None, 'high', 'nan', 'inf', '-0.1', '35'])
+def test_a_threshold_that_is_no_share_is_refused(saved, tiny, threshold):
     rewritten(saved, tiny, threshold=threshold)
     with pytest.raises(WeightsError, match='its config cannot be read'):
         load_weights(saved)

@@ -49,8 +49,10 @@ def read_metadata(path: Path) -> WeightsMetadata:
         raise WeightsError(f'{path}: its config cannot be read: expected that of a reconstruction '
                            f'network, with a threshold, got that of a {metadata["model"]}')
     try:
-        return WeightsMetadata(metadata['model'], json_value(metadata['config']),
-                               float(metadata['threshold']))
+        config, threshold = dict(json_value(metadata['config'])), float(metadata['threshold'])
+        if not 0 <= threshold <= 1:
+            raise ValueError(f'expected a threshold from 0 to 1, got {threshold}')
+        return WeightsMetadata(metadata['model'], config, threshold)
     except (KeyError, ValueError, TypeError) as error:
         raise WeightsError(f'{path}: its config cannot be read: {error}') from error
 
