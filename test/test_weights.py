@@ -224,15 +224,16 @@ def test_a_threshold_that_is_no_share_is_refused(saved, tiny, threshold):
 def test_tensors_of_other_sizes_than_the_config_are_refused(saved, tiny):
     other = json.dumps(tiny.to_dict() | {'recurrent_channels': 16})
     rewritten(saved, tiny, config=other)
-    with pytest.raises(WeightsError, match='(?s)tensors do not fit its config.*size mismatch'):
+    with pytest.raises(WeightsError, match='tensors do not fit its config.*size mismatch') as told:
         load_weights(saved)
+    assert len(str(told.value).splitlines()) == 1
 
 
 def test_a_tensor_that_is_lacking_is_named(saved, tiny):
     tensors = load_file(saved)
     del tensors['attention.location.bias']
     rewritten(saved, tiny, tensors)
-    with pytest.raises(WeightsError, match=r'(?s)do not fit its config.*location\.bias'):
+    with pytest.raises(WeightsError, match=r'do not fit its config.*location\.bias'):
         load_weights(saved)
 
 

@@ -9,7 +9,12 @@ from typing import Any, Generic, TypeVar
 from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.json_text import json_value
-from active_recon.models.weights_bytes import in_precision, require_finite, weights_bytes
+from active_recon.models.weights_bytes import (
+    in_precision,
+    misfit,
+    require_finite,
+    weights_bytes,
+)
 from active_recon.models.weights_files import weights_hash
 from active_recon.whole_files import whole_file
 from safetensors import safe_open, SafetensorError
@@ -92,7 +97,8 @@ class Companion(Generic[Module]):
                 module = self.build(json_value(facts['config']))
             module.load_state_dict(tensors, assign=True)
         except (KeyError, ValueError, TypeError, RuntimeError, ConfigError) as error:
-            raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
+            raise WeightsError(f'{path}: its tensors do not fit its config: '
+                               f'{misfit(error)}') from error
         require_finite(path, module)
         module.requires_grad_(False)
         return module.eval()

@@ -11,7 +11,12 @@ from active_recon.config import Config
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.registry import network_entry, NETWORKS
-from active_recon.models.weights_bytes import in_precision, require_finite, weights_bytes
+from active_recon.models.weights_bytes import (
+    in_precision,
+    misfit,
+    require_finite,
+    weights_bytes,
+)
 from active_recon.models.weights_files import PAPER_MODEL, read_metadata, SHIPPED, weights_hash
 from active_recon.whole_files import whole_file
 from safetensors import safe_open, SafetensorError
@@ -85,7 +90,8 @@ def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
         try:
             module.load_state_dict(own, assign=True)
         except RuntimeError as error:
-            raise WeightsError(f'{path}: its tensors do not fit its config: {error}') from error
+            raise WeightsError(f'{path}: its tensors do not fit its config: '
+                               f'{misfit(error)}') from error
         require_finite(path, module, part)
         module.to(device).eval().requires_grad_(False)
     return bundle

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 import json
 from pathlib import Path
+from textwrap import shorten
 
 from active_recon.errors import WeightsError
 from safetensors.torch import save
@@ -10,6 +11,7 @@ import torch
 from torch import nn, Tensor
 
 _LENGTH = 8  # bytes that hold the header's length, little endian
+_LINE = 300  # letters of a message, beside its file's path
 
 
 def weights_bytes(tensors: Mapping[str, Tensor], facts: Mapping[str, str]) -> bytes:
@@ -40,6 +42,11 @@ def in_precision(dtype: torch.dtype, tensor: Tensor) -> Tensor:
 def is_finite(tensor: Tensor) -> bool:
     """Return whether all numbers of a tensor are finite, ten times as fast as `isfinite`."""
     return not tensor.numel() or all(each.isfinite() for each in tensor.detach().aminmax())
+
+
+def misfit(error: Exception) -> str:
+    """Return on one line why tensors make no module; torch has a line for each of them."""
+    return shorten(str(error), _LINE, placeholder=' ...')
 
 
 def require_finite(path: Path, module: nn.Module, part: str = '') -> None:

@@ -9,6 +9,7 @@ from typing import Any
 from active_recon.config import with_current_keys
 from active_recon.errors import ConfigError, DataError
 from active_recon.json_text import json_value
+from active_recon.models.weights_bytes import misfit
 from active_recon.whole_files import whole_file
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save
@@ -54,7 +55,7 @@ def load_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer) -> Chec
                                 for name, tensor in tensors.items()
                                 if name.startswith('module.')})
     except (OSError, SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise DataError(f'{path}: no whole checkpoint of this model: {error}') from error
+        raise DataError(f'{path}: no whole checkpoint of this model: {misfit(error)}') from error
     for name, parameter in module.named_parameters():
         for key in ('step', 'exp_avg', 'exp_avg_sq'):
             stored_name = f'optimizer.{key}.{name}'
