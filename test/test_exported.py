@@ -530,6 +530,14 @@ def test_a_cache_that_cannot_be_written_is_done_without(exported, tmp_path, monk
         assert '\n' not in told.get(REMARK, '')
 
 
+def test_a_cache_may_be_read_by_others_as_what_else_is_written(exported, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    (tmp_path / 'other').touch()
+    load_runtime(exported('ptn'), 'openvino', threads=1)
+    assert {path.stat().st_mode for path in tmp_path.rglob('*') if path.is_file()} == {
+        (tmp_path / 'other').stat().st_mode}
+
+
 def test_a_user_without_a_home_keeps_nothing_that_was_compiled(exported, monkeypatch):
     def without_home(path):
         raise RuntimeError('Could not determine home directory.')

@@ -3,7 +3,8 @@
 import hashlib
 import os
 from pathlib import Path
-import tempfile
+
+from active_recon.whole_files import whole_file
 
 VARIABLE = 'ACTIVE_RECON_CACHE'
 """Names another folder for what may be made anew at any time; empty for none."""
@@ -50,14 +51,8 @@ def write_compiled(path: Path | None, compiled: bytes) -> str:
         return ''
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            try:
-                file.write(hashlib.sha256(compiled).digest() + compiled)
-                file.close()
-                os.replace(file.name, path)
-            except OSError:
-                os.unlink(file.name)
-                raise
+        with whole_file(path) as unfinished:
+            unfinished.write_bytes(hashlib.sha256(compiled).digest() + compiled)
     except OSError as error:
         return (f'{path.parent}: compiled networks cannot be kept there: {error.strerror}; each '
                 f'start takes a second more: set {VARIABLE} to another folder, or to none')
