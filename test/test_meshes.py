@@ -117,6 +117,16 @@ def test_a_truncated_glb_is_refused(tmp_path):
             load_mesh(tmp_path / 'cut.glb')
 
 
+@pytest.mark.parametrize('corner', [4, -1])
+@pytest.mark.parametrize('suffix', ['ply', 'glb'])
+def test_a_face_with_a_corner_that_the_file_lacks_is_refused(suffix, corner, tmp_path):
+    path = tmp_path / f'mesh.{suffix}'
+    path.write_bytes(WEDGE.export(file_type=suffix).replace(
+        np.int32([1, 2, 3]).tobytes(), np.int32([1, 2, corner]).tobytes()))
+    with pytest.raises(MeshError, match=f'mesh.{suffix}: no mesh that can be read'):
+        load_mesh(path)
+
+
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     for path in (tmp_path / 'none.ply', tmp_path):
         with pytest.raises(MeshError, match='no such mesh file'):

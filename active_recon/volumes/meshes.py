@@ -61,8 +61,8 @@ def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
     `up` and `front` are the file's axes (for example 'y' and '-z'). By default glTF and GLB are y
     up with the front at +z, as their standard says, other formats z up with the front at +x.
     Vertex colours are sRGB, those of glTF too, whose files have them linear beside a material.
-    Raises MeshError where the file is missing, is not a mesh or has no face with an area,
-    ConfigError on invalid axes.
+    Raises MeshError where the file is missing, is not a mesh, has no face with an area or faces
+    of corners that it lacks, ConfigError on invalid axes.
     """
     rotation = file_rotation(path, up, front)
     if not path.is_file():
@@ -74,6 +74,10 @@ def read_mesh(path: Path, up: str | None = None, front: str | None = None) -> tr
                         f'{error}') from error
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise MeshError(f'{path}: a mesh without faces')
+    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+        raise MeshError(f'{path}: no mesh that can be read: expected corners 0 to '
+                        f'{len(mesh.vertices) - 1} in its faces, got {mesh.faces.min()} to '
+                        f'{mesh.faces.max()}')
     if not np.isfinite(mesh.vertices).all() or not mesh.extents.max() > 0 or not mesh.area > 0:
         raise MeshError(f'{path}: no surface: expected faces with finite corners and an area, got '
                         f'extents {mesh.extents}')
