@@ -32,6 +32,18 @@ def test_a_mesh_has_the_colours_of_its_own_views(tmp_path, capsys):
     assert capsys.readouterr().out.count('wrote ') == 2
 
 
+def test_a_shape_without_a_surface_is_told_and_keeps_no_other_from_its_files(tmp_path, capsys):
+    empty, files = VoxelGrid(0 * GRID.occupancy, 0.2), ShapeFiles(
+        tmp_path / 'mug.stl', tmp_path / 'mug.npz')
+    files.write([(GRID, []), (empty, []), (GRID, [])], 0.5)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        'mug-1.npz', 'mug-1.stl', 'mug-2.npz', 'mug-3.npz', 'mug-3.stl']
+    assert 'mug-2.stl: not written: no cell is above the threshold 0.5' in capsys.readouterr().out
+    for shapes in ([(empty, [])], [(empty, []), (empty, [])]):
+        with pytest.raises(DataError, match='there is no surface yet'):
+            files.write(shapes, 0.5)
+
+
 def test_a_robot_description_weighs_as_its_density_says(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, 'coacd', None)
     for density in (400.0, None):

@@ -49,20 +49,24 @@ class ShapeFiles:
         """
         Write shapes, each with the views that it was made from, and print the paths.
 
-        Each file appears whole. Raises DataError where there is no surface, or a file cannot be
-        written.
+        Each file appears whole. Of shapes some of which have no surface those have no mesh, which
+        is printed. Raises DataError where none has one, or a file cannot be written.
         """
         from active_recon.volumes.binvox import write_binvox
         from active_recon.volumes.voxel_files import write_npz
 
+        solid = [bool(grid.occupied(threshold).any()) for grid, _ in shapes]
         for number, (grid, views) in enumerate(shapes, 1):
             of_several = number if len(shapes) > 1 else None
             if self.mesh is not None:
                 path = _numbered(self.mesh, of_several)
-                with _told(path):
-                    missing = self._write_mesh(path, grid, views, threshold)
-                if missing:
-                    typer.echo(missing)
+                if any(solid) and not solid[number - 1]:
+                    typer.echo(f'{path}: not written: no cell is above the threshold {threshold}')
+                else:
+                    with _told(path):
+                        missing = self._write_mesh(path, grid, views, threshold)
+                    if missing:
+                        typer.echo(missing)
             if self.voxels is not None:
                 path = _numbered(self.voxels, of_several)
                 write = write_binvox if path.suffix.lower() == '.binvox' else write_npz
