@@ -15,7 +15,9 @@ from active_recon.geometry.view_distance import (
 )
 from active_recon.parameters.view_planner import ViewPlannerParameters
 from active_recon.planner import Planner
+from active_recon.policies.attention import AttentionPolicy
 from active_recon.policies.geometric import FarthestPolicy, RandomPolicy, UniformPolicy
+from active_recon.runtimes.torch import TorchPolicyRuntime
 import numpy as np
 import pytest
 
@@ -133,6 +135,15 @@ def test_a_listed_view_is_asked_for_though_one_far_from_it_is_nearest_to_it():
         asked.append(nearest_camera(camera, listed))
     assert sorted(asked) == [0, 1, 2, 3]
     assert asked[-1] == 0
+
+
+def test_attention_stays_at_the_elevation_of_the_camera_until_no_view_is_left_there(attention):
+    policy = AttentionPolicy(TorchPolicyRuntime(attention))
+    planner = Planner(policy, 100, 0.0, elevation_range=(0.0, 1.2))
+    goals = [goal.camera.elevation for goal in followed(planner, orbit_camera(0.3, 0.4), 24)]
+    ring = round(24 * math.cos(0.4))
+    np.testing.assert_allclose(goals[:ring], 0.4, atol=1e-9)
+    assert np.abs(np.subtract(goals[ring:], 0.4)).min() > 0.3
 
 
 @pytest.mark.parametrize('kind', ['uniform', 'farthest'])

@@ -3,7 +3,13 @@
 import math
 
 from active_recon.errors import ViewError
-from active_recon.geometry.cameras import azimuth_difference, pose_azimuths, TURN
+from active_recon.geometry.cameras import (
+    azimuth_difference,
+    ELEVATION_TOLERANCE,
+    pose_azimuths,
+    TURN,
+)
+from active_recon.geometry.view_distance import pose_directions
 from active_recon.policies.base import Choice, Observation
 from active_recon.runtimes import PolicyRuntime, State
 import numpy as np
@@ -18,7 +24,7 @@ class AttentionPolicy:
 
     The paper's policy always takes the mean, and so the same view twice in half of its episodes.
     Here goals keep the model's `view_separation` from all views taken. Only the cameras' azimuths
-    are used.
+    are used; of several elevations, the camera's is kept.
     """
 
     wants_volume = False
@@ -39,8 +45,9 @@ class AttentionPolicy:
         Choose the mean, or the candidate nearest to it that is separated from the views taken.
 
         A candidate's score is its log density, up to a constant. Candidates too near to a view
-        score lower than all others, and the lower the nearer they are. Raises ViewError where the
-        latents are those of another model.
+        score lower than all others, and the lower the nearer they are. Where candidates stand at
+        several elevations, those away from the last view's score lower still. Raises ViewError
+        where the latents are those of another model.
         """
         if seen.latent.shape[1:] != self._latent_shape:
             raise ViewError(f'wrong shape of the latent: expected {self._latent_shape}, as the '
@@ -54,8 +61,17 @@ class AttentionPolicy:
         scores = np.where(gaps > self._separation - _ROUNDING, -away ** 2 / 2,
                           -(math.pi / self._sigma) ** 2 / 2
                           - (self._separation - gaps) / self._sigma)
+        scores -= _is_elsewhere(seen) * (1 + np.ptp(scores, axis=1, keepdims=True))
         separated = is_separated(mean, taken, self._separation)
         return Choice(scores.astype(np.float32), np.where(separated, mean, np.nan)), state
+
+
+def _is_elsewhere(seen: Observation) -> NDArray[np.bool_]:
+    """Return which candidates are not at the elevations nearest to the camera's, (B, K)."""
+    own, others = (np.arcsin(pose_directions(poses)[..., 2].clip(-1, 1))
+                   for poses in (seen.taken[:, -1:], seen.candidates))
+    away = np.abs(others - own)
+    return np.asarray(away > away.min(axis=1, keepdims=True) + ELEVATION_TOLERANCE)
 
 
 def enforce_separation(wanted: NDArray[np.float64], taken: NDArray[np.float64],
