@@ -55,6 +55,10 @@ def test_a_sequence_whose_motion_costs_is_found_on_the_training_objects(
 
 @pytest.mark.parametrize(('arguments', 'said'), [
     (['--policies', 'random,best'], "got 'best'"),
+    (['--policies', ','], 'policies: none: expected some of'),
+    (['--policies', 'random@'], 'no cost of motion: expected NAME@COST'),
+    (['--policies', 'random@-1'], "got 'random@-1'"),
+    (['--policies', 'random@nan'], "got 'random@nan'"),
     (['--policies', 'sequence'], 'no training objects: expected --training'),
     (['--policies', 'sequence@0.1'], 'no training objects: expected --training'),
     (['--model', 'carving,lifting'], 'several networks: expected one'),

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+import math
 from typing import Any
 
 from active_recon.errors import ConfigError
@@ -60,8 +61,10 @@ class Episodes:
     bfloat16: bool = True
 
     def __post_init__(self) -> None:
-        """Reject policies that there are not, and episodes without a choice."""
+        """Reject policies that there are not, none at all, and episodes without a choice."""
         known = known_names()
+        if not self.policies:
+            raise ConfigError(f'policies: none: expected some of {", ".join(known)}, got no name')
         if unknown := [name for name in self.policies if _parted(name)[0] not in known]:
             raise ConfigError(f'policies: no such policy: expected some of {", ".join(known)}, '
                               f'got {unknown[0]!r}')
@@ -191,12 +194,15 @@ def _order(name: str, watched: WatchedObject, start: int, seed: Sequence[int], e
 
 def _parted(name: str) -> tuple[str, float]:
     """Return the policy of a name NAME@COST and its cost of motion, 0 where none is named."""
-    plain, _, cost = name.partition('@')
+    plain, named, cost = name.partition('@')
     try:
-        return plain, float(cost or 0)
-    except ValueError as error:
-        raise ConfigError(f'policies: no cost of motion: expected NAME@COST such as '
-                          f'attention@0.002, got {name!r}') from error
+        motion_cost = float(cost) if named else 0.0
+    except ValueError:
+        motion_cost = math.nan
+    if not 0 <= motion_cost < math.inf:
+        raise ConfigError('policies: no cost of motion: expected NAME@COST such as '
+                          f'attention@0.002, 0 or more, got {name!r}')
+    return plain, motion_cost
 
 
 def _policy(name: str, seed: Sequence[int], entrant: Entrant, episodes: Episodes,
