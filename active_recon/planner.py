@@ -119,9 +119,10 @@ class Planner:
         return provenance
 
     def reset(self) -> None:
-        """Forget the episode."""
+        """Forget the episode; raises ViewError where a policy of one's own fails."""
         self._views: list[PlannerView] = []
-        self._state = self._policy.initial_state(1)
+        with telling_failures('policy: initial_state'):
+            self._state = self._policy.initial_state(1)
         self._choice: Choice | None = None
         self._first: Camera | None = None
         self._wanted: Wanted | None = None

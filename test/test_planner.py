@@ -167,6 +167,15 @@ def test_a_policy_that_fails_is_told_and_nothing_has_changed():
     assert planner.plan() is asked
 
 
+def test_a_policy_that_fails_to_begin_is_told():
+    class Fails(FarthestPolicy):
+        def initial_state(self):  # of how many episodes?
+            return {}
+
+    with pytest.raises(ViewError, match='policy: initial_state fails with TypeError: .*argument'):
+        Planner(Fails())
+
+
 @pytest.mark.parametrize('azimuth', [math.nan, math.inf, -math.inf])
 def test_a_camera_that_is_not_finite_is_none(azimuth):
     with pytest.raises(ViewError, match='expected finite angles'):
