@@ -10,6 +10,7 @@ from active_recon.acquisition.goal_places import goal_places
 from active_recon.acquisition.goals import best_goal, Goal, Wanted
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
+from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, OrbitCamera
 from active_recon.geometry.view_distance import on_one_ring, view_distance
@@ -62,8 +63,8 @@ class Planner:
     needs it thinks relative to the front. A goal is what the policy chooses, or the best of the
     candidates where the camera cannot go there, was there already, or has too long a way:
     `motion_weight` is what half a turn costs, beside 1 for what lies between the policy's worst
-    and best candidate, and `motion` what a second costs instead. No view is asked for again: the
-    episode ends when none is left.
+    and best candidate, and `motion` what a second costs instead. No view is asked for again, nor a
+    goal whose view was taken, however roughly it was reached: the episode ends when none is left.
 
     `max_views`, `entropy_tolerance`, `target_quality` and `min_gain` end an episode: see
     `StoppingRule`. While views are flagged as unusual, their quality ends nothing, and an even
@@ -128,6 +129,7 @@ class Planner:
         self._wanted: Wanted | None = None
         self._candidates: list[OrbitCamera] = []
         self._failed: list[Camera] = []
+        self._reached: list[Camera] = []
         self._stopped = False
         self._goal: Goal | None = None
         self._early: tuple[PlannerView, Choice, State] | None = None
@@ -142,7 +144,8 @@ class Planner:
         nothing.
         """
         self._views = list(other._views)
-        self._failed, self._stopped = list(other._failed), other._stopped
+        self._failed, self._reached = list(other._failed), list(other._reached)
+        self._stopped = other._stopped
         if self._views:
             self._look_from(self._views[-1].camera)
             if (self._policy is other._policy and self._yaw == other._yaw
@@ -232,6 +235,9 @@ class Planner:
             self._candidates = before
             raise
         self._views = views
+        if (self._goal is not None
+                and view_distance(self._goal.camera, camera) <= GOAL_TOLERANCE):
+            self._reached.append(self._goal.camera)
         self._aim(camera)
         if self._stopped:
             return self.stop()
@@ -346,5 +352,5 @@ class Planner:
         """Return the best goal for a camera that is somewhere; None where none is left."""
         assert self._wanted is not None
         return best_goal(
-            self._wanted, self._candidates, camera, cameras_of(self._views),
+            self._wanted, self._candidates, camera, [*cameras_of(self._views), *self._reached],
             self._failed, self._limits, self._cost if self._views else MotionCost())

@@ -245,6 +245,23 @@ def test_a_goal_that_was_reached_roughly_counts_as_what_the_pose_says(planner):
     assert goal.azimuth == expected.azimuth
 
 
+@pytest.mark.parametrize('kind', KINDS)
+def test_no_goal_is_asked_for_again_however_roughly_it_was_reached(planner, kind):
+    rng = np.random.default_rng(3)
+    for _ in range(25):
+        limits, off = random_limits(rng), rng.uniform(-0.12, 0.12)
+        goals = followed(planner(kind, limits=limits), rng.uniform(0, 6), 7, off)
+        assert all(apart(goal, other) > 1e-5
+                   for at, goal in enumerate(goals) for other in goals[:at])
+
+
+def test_a_view_away_from_the_goal_leaves_it_to_be_asked_for(planner):
+    made = planner('farthest', limits=MotionLimits(reachable_azimuths=[1.0, 1.2, 4.0]))
+    made.first_goal(1.0)
+    assert made.add_view(LATENT, 1.19, 10.0).goal.azimuth == 4.0
+    assert made.add_view(LATENT, 4.0, 9.0).goal.azimuth == 1.0
+
+
 @pytest.mark.parametrize(('azimuth', 'expected'), [(1.0, 1.0), (-0.2, 0.0), (3.0, 2.0943951),
                                                    (2.1, 2.1), (4.0, 2.0943951)])
 def test_the_first_goal_is_where_it_is_asked_for_or_the_nearest_that_can_be_reached(
