@@ -2,6 +2,7 @@
 
 import hashlib
 import random
+import re
 import subprocess
 import sys
 
@@ -124,14 +125,15 @@ def test_wherever_the_file_is_cut_all_chunks_before_it_are_kept(cut_off, seed):
     assert_whole(cut_off)
 
 
-def test_a_chunk_that_is_spoilt_costs_no_other(cut_off):
+@pytest.mark.parametrize('spoilt', [40, 0, -4], ids=['content', 'name', 'length'])
+def test_a_chunk_that_is_spoilt_anywhere_costs_no_other(cut_off, spoilt):
     path = cut_off / 'run_0.mcap'
     content = bytearray(path.read_bytes())
     third = [at for at in range(len(content)) if content[at:at + 4] == b'zstd'][2]
-    content[third + 40] ^= 255
+    content[third + spoilt] ^= 255
     path.write_bytes(content)
     (repair,), _ = repair_bag(cut_off)
-    assert len(repair.lost) == 1 and 'a chunk of' in repair.lost[0]
+    assert len(repair.lost) == 1 and re.match('a (chunk|record) of', repair.lost[0])
     assert read(cut_off) == [message(number) for number in range(CHUNKS * IN_CHUNK)
                              if number // IN_CHUNK != 2]
     assert_whole(cut_off)
@@ -151,6 +153,31 @@ def test_of_a_bag_with_an_index_a_spoilt_first_chunk_costs_no_other(tmp_path):
     assert heard == [(*kinds[number % 2], message(number))
                      for number in range(IN_CHUNK, CHUNKS * IN_CHUNK)]
     assert_whole(bag.folder)
+
+
+def test_a_spoilt_summary_changes_nothing_of_a_bag_that_is_repaired(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    content = bytearray(bag.path.read_bytes())
+    content[content.rindex(b'/episode')] ^= 1
+    second = content.index(b'zstd', content.index(b'zstd') + 1)
+    content[second + 40] ^= 255  # a file without a loss is left as it is
+    bag.path.write_bytes(content)
+    repair_bag(bag.folder)
+    with Reader(bag.folder) as reader:
+        assert set(reader.topics) == {'/episode', '/camera/image_raw'}
+    assert_whole(bag.folder)
+
+
+def test_parameters_with_a_wrong_bit_are_refused_and_their_loss_in_a_repair_is_told(cut_off):
+    path = cut_off / 'run_0.mcap'
+    path.write_bytes(path.read_bytes().replace(b'seed: 7', b'seed: 6'))
+    with pytest.raises(DataError, match='damaged attachment'):
+        open_bag(cut_off).summary()
+    (repair,), _ = repair_bag(cut_off)
+    assert len(repair.lost) == 1 and 'damaged attachment' in repair.lost[0]
+    assert not open_bag(cut_off).summary().parameters
+    assert read(cut_off) == [message(number) for number in range(CHUNKS * IN_CHUNK)]
 
 
 def test_of_a_split_bag_only_the_file_that_was_cut_off_is_written_anew(tmp_path):

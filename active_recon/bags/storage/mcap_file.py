@@ -71,19 +71,23 @@ class RecordReader:
     """
     Reads the top-level records of an MCAP file from its beginning.
 
-    `size` is the file's, in bytes. `position` is the end of the last complete record.
+    `size` is the file's, in bytes. `position` is the end of the last complete record. `skip` is
+    told in words of each record that cannot be understood, which is then left out; None: such a
+    record ends the reading with its error.
     """
 
     def __init__(self, file: BinaryIO, size: int,
                  advance: Advance = lambda steps, note: None,
                  max_record_bytes: int = MAX_RECORD_BYTES,
-                 max_attachment_bytes: int = MAX_ATTACHMENT_BYTES) -> None:
+                 max_attachment_bytes: int = MAX_ATTACHMENT_BYTES,
+                 skip: Callable[[str], None] | None = None) -> None:
         self.position = 0
         self._file = file
         self._size = size
         self._advance = advance
         self._max_record_bytes = max_record_bytes
         self._max_attachment_bytes = max_attachment_bytes
+        self._skip = skip
 
     def records(self) -> Iterator[McapRecord]:
         """
@@ -100,7 +104,15 @@ class RecordReader:
             if not wanted or (
                     opcode == Opcode.ATTACHMENT and length > self._max_attachment_bytes):
                 continue
-            record = _parse(opcode, self._file, length, self._max_record_bytes)
+            begin = self._file.tell()
+            try:
+                record = _parse(opcode, self._file, length, self._max_record_bytes)
+            except Exception as error:  # the decoders raise all kinds of errors on damaged bytes
+                if self._skip is None:
+                    raise
+                self._skip(f'a record of {length} bytes, from byte {begin} '
+                           f'({str(error) or type(error).__name__})')
+                continue
             self.position = self._file.tell()
             if isinstance(record, Footer):
                 if self._file.read() != MCAP0_MAGIC:
@@ -146,7 +158,12 @@ def _parse(opcode: int, stream: BinaryIO, length: int, max_bytes: int) -> McapRe
     if length > max_bytes:
         raise DataError(f'record too large: expected at most {max_bytes} bytes, got {length}',
                         'too_large')
-    content = ReadDataStream(BytesIO(stream.read(length)))
+    data = stream.read(length)
+    if opcode == Opcode.ATTACHMENT and int.from_bytes(data[-4:], 'little') not in (
+            0, zlib.crc32(data[:-4])):
+        raise DataError(f'damaged attachment: its {length} bytes do not match their checksum; '
+                        f'{_REPAIR}', 'damaged')
+    content = ReadDataStream(BytesIO(data))
     if opcode != Opcode.MESSAGE:
         return _PARSERS[opcode](content)
     if length < _MIN_MESSAGE_BYTES:

@@ -2,13 +2,20 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
+from os import SEEK_END
 from pathlib import Path
+import struct
+from typing import BinaryIO
+import zlib
 
 from active_recon.bags.storage.mcap_file import chunk_records, RecordReader
 from active_recon.errors import DataError
 from mcap.reader import SeekingReader
 from mcap.records import Chunk, DataEnd, Footer, Header, McapRecord
 from mcap.writer import MCAP0_MAGIC
+
+_FOOTER = struct.Struct('<QQI')  # where summary and summary offsets begin, and the checksum
+_CHECKSUM_BYTES = 4
 
 
 class Salvage:
@@ -37,7 +44,8 @@ class Salvage:
         self.indexed = False
         size = self.path.stat().st_size
         with self.path.open('rb') as file:
-            reader = RecordReader(file, size, max_record_bytes=size, max_attachment_bytes=size)
+            reader = RecordReader(file, size, max_record_bytes=size, max_attachment_bytes=size,
+                                  skip=self.lost.append)
             try:
                 yield from self._content(reader)
             except OSError:
@@ -62,10 +70,11 @@ class Salvage:
                 yield from self._described()
 
     def _described(self) -> list[McapRecord]:
-        """Return the schemas and channels of the summary: a damaged chunk may hold them."""
+        """Return the schemas and channels of an intact summary: a damaged chunk may hold them."""
         with suppress(Exception), self.path.open('rb') as file:
             summary = SeekingReader(file, record_size_limit=self.path.stat().st_size).get_summary()
-            return [*summary.schemas.values(), *summary.channels.values()] if summary else []
+            if summary and _is_summary_intact(file):
+                return [*summary.schemas.values(), *summary.channels.values()]
         return []
 
     def _chunk(self, chunk: Chunk) -> list[McapRecord]:
@@ -75,3 +84,12 @@ class Salvage:
         except Exception as error:
             self.lost.append(f'a chunk of {len(chunk.data)} bytes ({error})')
             return []
+
+
+def _is_summary_intact(file: BinaryIO) -> bool:
+    """Return whether the summary of a file matches its checksum, if it has one."""
+    file.seek(-_FOOTER.size - len(MCAP0_MAGIC), SEEK_END)
+    start, _, checksum = _FOOTER.unpack(file.read(_FOOTER.size))
+    file.seek(start)
+    checked = file.read()[:-_CHECKSUM_BYTES - len(MCAP0_MAGIC)]
+    return checksum in (0, zlib.crc32(checked))
