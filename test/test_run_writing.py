@@ -158,6 +158,23 @@ def test_what_is_read_is_what_was_written(run, bag):
         np.testing.assert_array_equal(view.occupied.occupancy, before.occupied.occupancy)
 
 
+def test_goals_stay_before_the_views_of_images_that_were_exposed_before_they_were_decided(
+        run, tmp_path):
+    (episode,) = run.episodes
+    late = SECOND // 10  # of a camera: the image that comes after a goal may have an earlier stamp
+    first = replace(episode.first_goal, stamp=episode.views[0].stamp + late // 2,
+                    received=episode.views[0].stamp + late // 2)
+    views = [replace(view, received={'view': view.stamp + late}, goal=view.goal and replace(
+        view.goal, stamp=view.stamp + 2 * late, received=view.stamp + 2 * late))
+        for view in episode.views]
+    written = replace(episode, first_goal=first, views=views)
+    write_run(replace(run, episodes=[written]), tmp_path / 'late')
+    (read,) = read_run(tmp_path / 'late').episodes
+    assert same_goal(read.first_goal, first)
+    for view, before in zip(read.views, views, strict=True):
+        assert same_goal(view.goal, before.goal)
+
+
 def test_a_goal_that_looks_aside_or_is_rolled_comes_back_as_it_was(run, tmp_path):
     pose = orbit_camera(2.0, 0.9, 3.0).pose.copy()
     pose[:3, :3] = pose[:3, :3] @ Rotation.from_euler('xyz', (0.1, -0.05, 1.0)).as_matrix()

@@ -23,7 +23,9 @@ def write_run(run: RecordedRun, folder: Path) -> None:
     Write a run as a new bag, atomically.
 
     Poses and clouds are in the run's own `object_frame`. Messages without a receive time get
-    their stamp. Raises RecordingError if the folder exists or the disk is full.
+    their stamp. They are published when they are received, since stamps do not tell their order:
+    an image may be older than the goal that it reaches. Raises RecordingError if the folder
+    exists or the disk is full.
     """
     with atomic_bag(folder) as bag:
         _write(run, bag)
@@ -35,29 +37,29 @@ def _write(run: RecordedRun, bag: BagWriter) -> None:
         bag.attach_parameters(node, parameters)
     frame = node_parameters(run, 'reconstructor').get('object_frame', OBJECT_FRAME)
     messages = (found for episode in run.episodes for found in _messages(episode, frame))
-    for received, topic, stamp, msg in sorted(messages, key=lambda found: found[0]):
+    for received, topic, msg in sorted(messages, key=lambda found: found[0]):
         qos = _STREAM if topic.startswith('camera/') else _LATCHED
-        write_message(bag, f'/{topic}', msg, received, stamp, qos)
+        write_message(bag, f'/{topic}', msg, received, received, qos)
 
 
-def _messages(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
-    """Yield receive time, topic, stamp and message."""
+def _messages(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, Any]]:
+    """Yield receive time, topic and message."""
     received = episode.begin
     for message in _of_views(episode, frame):
         received = max(received, message[0])
         yield message
     if episode.done and not any(map(episode.done_after, episode.views)):  # not after a view
-        yield received, 'done', received, done_to_msg(received, episode.done)
+        yield received, 'done', done_to_msg(received, episode.done)
 
 
-def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, int, Any]]:
+def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, Any]]:
     begin = Episode(episode.id or _UNNAMED, episode.begin)
     # Stamps may be a simulation's, where messages are received by the time of day
     goal = () if episode.first_goal is None else (episode.first_goal.received,)
     received = min([*goal, *(time for view in episode.views for time in view.received.values())],
                    default=episode.begin)
-    yield received, 'episode', episode.begin, episode_to_msg(begin)
-    yield received, 'done', episode.begin, done_to_msg(episode.begin, '')
+    yield received, 'episode', episode_to_msg(begin)
+    yield received, 'done', done_to_msg(episode.begin, '')
     yield from _of_goal(episode.first_goal, frame)
     for view in episode.views:
         messages = image_to_msgs(view.stamp, view.image, view.camera, frame) | view_to_msgs(
@@ -68,11 +70,11 @@ def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, 
         yield from _at(messages, view.stamp, view.received)
         if reason := episode.done_after(view):
             received = max([view.stamp, *view.received.values()])
-            yield received, 'done', view.stamp, done_to_msg(view.stamp, reason)
+            yield received, 'done', done_to_msg(view.stamp, reason)
         yield from _of_goal(view.goal, frame)
 
 
-def _of_goal(recorded: RecordedGoal | None, frame: str) -> Iterator[tuple[int, str, int, Any]]:
+def _of_goal(recorded: RecordedGoal | None, frame: str) -> Iterator[tuple[int, str, Any]]:
     for goal in () if recorded is None else (recorded, *recorded.replacements):
         scores = None if goal.candidates is None or goal.scores is None else (
             goal.candidates.positions, goal.candidates.azimuths, goal.scores)
@@ -81,6 +83,6 @@ def _of_goal(recorded: RecordedGoal | None, frame: str) -> Iterator[tuple[int, s
 
 
 def _at(messages: Mapping[str, Any], stamp: int,
-        received: Mapping[str, int]) -> Iterator[tuple[int, str, int, Any]]:
+        received: Mapping[str, int]) -> Iterator[tuple[int, str, Any]]:
     for topic, msg in messages.items():
-        yield received.get(topic, stamp), topic, stamp, msg
+        yield received.get(topic, stamp), topic, msg
