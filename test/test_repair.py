@@ -243,6 +243,26 @@ def test_a_disk_too_full_for_the_repair_leaves_all_as_it_was(tmp_path):
     assert state(bag.folder) == before
 
 
+def test_a_disk_that_fills_on_the_way_tells_what_was_repaired_until_then(cut_off):
+    first, second = cut_off / 'run_0.mcap', cut_off / 'run_1.mcap'
+    second.write_bytes(first.read_bytes())
+    content = first.read_bytes()
+    first.write_bytes(content[:content.rindex(b'zstd')])
+    with small_disk(len(content)), pytest.raises(DataError, match='only run_0.mcap was repaired'):
+        repair_bag(cut_off)
+    assert not errors_in(first) and second.read_bytes() == content
+
+
+def test_a_metadata_yaml_for_which_there_is_no_room_stays_as_it_was(tmp_path):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    metadata = bag.folder / 'metadata.yaml'
+    metadata.write_text('a: b')
+    with small_disk(100), pytest.raises(DataError, match='nothing was changed'):
+        repair_bag(bag.folder)
+    assert metadata.read_text() == 'a: b'
+
+
 def test_the_command_says_what_it_did_and_refuses_in_one_line(cut_off, tmp_path):
     def run(path):
         return subprocess.run([sys.executable, '-m', 'active_recon.cli.main', 'bag', 'repair',

@@ -57,19 +57,21 @@ def repair_bag(bag: Path, advance: Callable[[str], None] = lambda name: None
     Intact files are left unchanged. A damaged one is rewritten to a temporary file that replaces
     it once it is on the disk; the original is kept as `<name>.damaged`. `advance` is called with
     the name of each finished file. Returns the files and whether metadata.yaml was written.
-    Raises DataError if there is no bag, it is still being recorded, or the disk is full; the bag
-    is then unchanged.
+    Raises DataError if there is no bag, it is still being recorded, or the disk is full, which
+    names the files that were repaired before.
     """
     files = bag_files(bag)
+    repairs: list[Repair] = []
     try:
         found = [_open_finished(file) for file in files]
-        repairs = []
         for each in found:
             repairs.append(_repair_file(each))
             advance(each.path.name)
         return repairs, bag.is_dir() and _repair_metadata(bag, repairs)
     except OSError as error:
-        raise DataError(f'{bag}: cannot be repaired: {error}; nothing was changed',
+        done = ', '.join(each.path.name for each in repairs if each.kept_as)
+        raise DataError(f'{bag}: cannot be repaired: {error}; '
+                        f'{f"only {done} was repaired" if done else "nothing was changed"}',
                         'not_repaired') from error
 
 
@@ -138,13 +140,19 @@ def _survey(found: Salvage) -> Repair:
 
 def _replace(path: Path, repaired: Path) -> Path:
     """Replace a file and return the path of the original; one of them exists at any time."""
+    kept = _keep(path)
+    repaired.replace(path)
+    sync_folder(path.parent)
+    return kept
+
+
+def _keep(path: Path) -> Path:
+    """Return another path of a file that is to be replaced, under which it stays."""
     kept = free_name(path, 'damaged')
     try:
         os.link(path, kept)
     except OSError:  # a file system without hard links
         path.rename(kept)
-    repaired.replace(path)
-    sync_folder(path.parent)
     return kept
 
 
@@ -163,7 +171,7 @@ def _repair_metadata(folder: Path, repairs: Sequence[Repair]) -> bool:
             return False
         information |= {key: before[key] for key in _OF_THE_RECORDER if key in before
                         and not (packed and key.startswith('compression_'))}
-        path.rename(free_name(path, 'damaged'))
+        _keep(path)
     write_atomically(path, metadata_yaml(information))
     return True
 
