@@ -1,4 +1,4 @@
-"""Names of files as they are compared, whatever system wrote them."""
+"""Names of files as they are compared and told, whatever system wrote them."""
 
 from unicodedata import normalize
 
@@ -10,3 +10,8 @@ def comparable(path: str) -> str:
     macOS writes an umlaut as two characters, others as one.
     """
     return normalize('NFC', path.replace('\\', '/')).lower()
+
+
+def readable(name: str) -> str:
+    """Return a name with `?` for each byte that is not of UTF-8, as every reader takes it."""
+    return name.encode(errors='replace').decode()

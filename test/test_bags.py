@@ -1,5 +1,7 @@
 """Bags: what is written is what readers that we did not write read."""
 
+import os
+
 from active_recon.bags.storage import writer
 from active_recon.bags.storage.files import numbered_files
 from active_recon.bags.storage.opening import open_bag
@@ -133,6 +135,18 @@ def test_no_bag_is_written_over_another(bag):
     with pytest.raises(RecordingError, match='cannot start a bag.*already holds'):
         BagWriter(bag.folder)
     assert bag.path.read_bytes() == before
+
+
+def test_bytes_that_are_not_of_utf_8_leave_a_bag_readable_and_name_none(tmp_path):
+    bad = os.fsdecode(b'mug\xff')
+    with announced(tmp_path / 'run') as bag:
+        bag.add_provenance({'replay_of': bad})
+        bag.attach_parameters('/turntable_camera', {'mesh': bad})
+    summary = open_bag(bag.folder).summary()
+    assert summary.provenance['replay_of'] == summary.parameters['turntable_camera']['mesh']
+    assert summary.provenance['replay_of'].startswith('mug')
+    with pytest.raises(RecordingError, match='of UTF-8'):
+        announced(tmp_path / bad)
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):

@@ -26,6 +26,7 @@ from active_recon.bags.storage.metadata import (
     total,
 )
 from active_recon.errors import RecordingError
+from active_recon.file_names import readable
 
 MAX_CHUNKS = 20_000
 """Chunks in one file; their index takes 30 MB of memory until it is written."""
@@ -60,6 +61,8 @@ class BagWriter:
             folder.mkdir(parents=True, exist_ok=True)
             if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
                 raise FileExistsError(errno.EEXIST, 'it already holds a bag')
+            if readable(folder.name) != folder.name:
+                raise OSError(errno.EILSEQ, 'the name of a bag has to be of UTF-8')
             self._file = self._begin_file(0)
         except OSError as error:
             raise RecordingError(f'cannot start a bag in {folder}: {error}',
@@ -124,7 +127,7 @@ class BagWriter:
         Raises RecordingError as `write` does.
         """
         self._require_open()
-        self._provenance |= record
+        self._provenance |= {name: readable(text) for name, text in record.items()}
         try:
             self._file.add_metadata(PROVENANCE, self._provenance)
         except OSError as error:
@@ -134,7 +137,9 @@ class BagWriter:
     def attach_parameters(self, node: str, parameters: Mapping[str, object]) -> None:
         """Attach a node's parameters by its name, flushed at once; raises as `write` does."""
         self._require_open()
-        self._parameters[node] = as_yaml(dict(parameters)).encode()
+        self._parameters[node] = as_yaml({
+            name: readable(value) if isinstance(value, str) else value
+            for name, value in parameters.items()}).encode()
         try:
             self._attach(self._file, node)
         except OSError as error:
