@@ -239,3 +239,16 @@ def test_a_run_of_a_simulation_s_stamps_lasts_as_long_as_it_was_received(bag, tm
               tmp_path / 'simulated')
     times = [time for _, time, _ in messages_of(tmp_path / 'simulated')]
     assert max(times) - min(times) < 100 * SECOND
+
+
+def test_an_end_that_follows_no_view_stays_with_its_episode_in_a_simulation_s_stamps(
+        run, tmp_path):
+    (episode,) = run.episodes
+    view = replace(episode.views[0], received={'view': 10 ** 9 * SECOND})  # the time of day
+    first = replace(episode, first_goal=None, views=[view], done='no_reachable_azimuth')
+    second = replace(episode, id='second', begin=100 * SECOND, first_goal=None, views=[
+        replace(view, stamp=101 * SECOND, goal=None, received={'view': 10 ** 9 * SECOND + 1})],
+        done='')
+    write_run(replace(run, episodes=[first, second]), tmp_path / 'two')
+    ends = [each.done for each in read_run(tmp_path / 'two').episodes]
+    assert ends == ['no_reachable_azimuth', '']

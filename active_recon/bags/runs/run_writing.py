@@ -49,7 +49,10 @@ def _messages(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, 
         received = max(received, message[0])
         yield message
     if episode.done and not any(map(episode.done_after, episode.views)):  # not after a view
-        yield received, 'done', done_to_msg(received, episode.done)
+        goals = (episode.first_goal, *(view.goal for view in episode.views))
+        stamp = max([episode.begin, *(view.stamp for view in episode.views),
+                     *(goal.final.stamp for goal in goals if goal is not None)])
+        yield received, 'done', done_to_msg(stamp + 1, episode.done)
 
 
 def _of_views(episode: RecordedEpisode, frame: str) -> Iterator[tuple[int, str, Any]]:
