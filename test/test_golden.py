@@ -136,6 +136,21 @@ def test_what_was_recorded_otherwise_is_told_and_ends_with_code_1(
     assert code == 1
     assert re.search('entropy +4 compared  different +0 of 4 the same, at most 0.0099 apart', said)
     assert said.endswith('different: recording and replay\n')
+    assert 'assumed' not in said
+
+
+@of_one
+def test_a_replay_with_another_outcome_tells_what_it_had_to_assume(
+        run, tmp_path, monkeypatch, capsys):
+    (episode,) = run.episodes
+    views = [replace(view, entropy=view.entropy * 1.01) for view in episode.views]
+    unsized = {node: {name: value for name, value in values.items() if name != 'object_size'}
+               for node, values in run.parameters.items()}
+    write_run(replace(run, parameters=unsized, episodes=[replace(episode, views=views)]),
+              tmp_path / 'other')
+    code, said = told(monkeypatch, capsys, 'replay', tmp_path / 'other')
+    assert code == 1
+    assert "assumed: the object's cube has a side of 1 m (--object-size)" in said
 
 
 @of_one

@@ -182,8 +182,10 @@ def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: floa
     if 'weights_sha256' not in run.provenance:
         typer.echo('the bag does not name its network: that of the options, else the default, '
                    'was compared (--weights, --precision)')
-    typer.echo(f'hash {verified.hash}')
     verdict = verified.comparison.verdict
+    for assumption in run.assumed if verdict == DIFFERENT else ():
+        typer.echo(f'assumed: {assumption}')
+    typer.echo(f'hash {verified.hash}')
     typer.echo(f'{verdict}: recording and replay')
     if verdict == DIFFERENT:
         raise typer.Exit(1)
