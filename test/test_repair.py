@@ -9,6 +9,7 @@ import sys
 from active_recon.bags.storage.opening import open_bag
 from active_recon.bags.storage.repair import repair_bag
 from active_recon.bags.storage.writer import BagWriter
+from active_recon.batch.finding import is_bag_folder
 from active_recon.errors import DataError
 from mcap.reader import make_reader
 import pytest
@@ -276,6 +277,16 @@ def test_the_command_says_what_it_did_and_refuses_in_one_line(cut_off, tmp_path)
     refused = run(tmp_path / 'nowhere')
     assert refused.returncode == 2
     assert refused.stderr.count('\n') == 1 and 'no bag there' in refused.stderr
+
+
+def test_what_macos_leaves_beside_the_files_of_a_bag_is_none_of_them(cut_off):
+    left = b'\0\5\26\7\0\2\0\0Mac OS X'
+    for name in ('._run_0.mcap', '._run_0.mcap.zstd'):
+        (cut_off / name).write_bytes(left)
+    assert is_bag_folder(cut_off, [path.name for path in cut_off.iterdir()])
+    assert sum(topic.count for topic in open_bag(cut_off).summary().topics) == CHUNKS * IN_CHUNK
+    (repair,), _ = repair_bag(cut_off)
+    assert repair.kept_as and (cut_off / '._run_0.mcap').read_bytes() == left
 
 
 def test_what_only_the_recorder_knew_of_the_bag_is_kept(cut_off):

@@ -120,6 +120,7 @@ def is_bag_folder(folder: Place, names: Sequence[str]) -> bool:
     if 'metadata.yaml' in names:
         return True
     numbered = re.compile(rf'{re.escape(folder.name)}_\d+\.(mcap|db3)')
-    files = [name for name in names if name.endswith(('.mcap', '.db3'))]
+    files = [name for name in names
+             if name.endswith(('.mcap', '.db3')) and not name.startswith('._')]
     storages = {name.rpartition('.')[2] for name in files}
     return len(storages) == 1 and all(map(numbered.fullmatch, files))

@@ -21,20 +21,24 @@ def numbered_files(folder: Path, suffix: str = '.mcap') -> list[Path]:
     """
     Return the files of the bag in a folder, by the numbers that rosbag2 ends their names with.
 
-    Raises DataError where others are packed, as without them it would be a part of the bag, and
-    where the names are those of several bags.
+    What macOS leaves beside them, `._<name>`, is none. Raises DataError where others are packed,
+    as without them it would be a part of the bag, and where the names are those of several bags.
     """
-    if packed := sorted(folder.glob(f'*{suffix}.zstd')):
+    if packed := _files(folder, f'{suffix}.zstd'):
         raise DataError(
             f'{folder}: packed files, which are read only as metadata.yaml lists them: expected '
             f'{suffix} files, got {packed[0].name}; unpack it first, by `zstd -d --rm`',
             'compression')
-    files = sorted(folder.glob(f'*{suffix}'), key=_name_and_number)
+    files = sorted(_files(folder, suffix), key=_name_and_number)
     if len({_name_and_number(path)[0] for path in files}) > 1:
         raise DataError(f'{folder}: several bags in a folder without metadata.yaml: expected '
                         f'files of one name, got {", ".join(path.name for path in files)}; name '
                         'one of them', 'several_bags')
     return files
+
+
+def _files(folder: Path, suffix: str) -> list[Path]:
+    return sorted(path for path in folder.glob(f'*{suffix}') if not path.name.startswith('._'))
 
 
 def _name_and_number(path: Path) -> tuple[str, int]:
