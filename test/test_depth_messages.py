@@ -211,6 +211,16 @@ def test_a_depth_camera_s_own_info_is_its_lens_at_the_pose_of_the_image(tmp_path
     np.testing.assert_allclose(view.depth.camera.pose, camera.pose, atol=1e-9)
 
 
+def test_a_depth_image_has_the_lens_of_its_own_time(tmp_path):
+    sizes = (64, 48), (137, 137), (32, 24)
+    depths = [DepthImage(BAG_DEPTH[:height, :width], replace(
+        orbit_camera(0.0), intrinsics=CANONICAL_INTRINSICS.resized(width, height)))
+        for width, height in sizes]
+    views = run_with_depth(tmp_path / 'zoom', depths)
+    assert [view.depth.camera.intrinsics for view in views] == [
+        depth.camera.intrinsics for depth in depths]
+
+
 def test_an_info_of_no_calibrated_depth_camera_is_as_good_as_none(tmp_path, monkeypatch):
     def uncalibrated(stamp, depth):
         header = Header(stamp=stamp_from_nanoseconds(stamp), frame_id='camera')

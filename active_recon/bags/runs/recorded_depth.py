@@ -1,8 +1,10 @@
 """The depth images in a bag beside its views: those that the loop took in, or those of a topic."""
 
+from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from active_recon.bags.runs.camera_stream import CameraStream
@@ -50,11 +52,11 @@ def with_depth(episodes: Sequence[RecordedEpisode], bag: Bag, namespace: str,
     cameras = {view.stamp: view.camera for episode in episodes for view in episode.views}
     depth, info = (names.get(role, f'{namespace}{role}') for role in (DEPTH_ROLE, DEPTH_INFO_ROLE))
     kinds = {depth: IMAGE, f'{depth}{_COMPRESSED}': COMPRESSED_IMAGE, info: CAMERA_INFO}
-    nearest, lens = _nearest(bag, kinds, cameras, gap)
+    nearest, lenses = _nearest(bag, kinds, cameras, gap)
     found: dict[int, DepthImage] = {}
     for stamp, each in nearest.items():
         with suppress(MessageError):
-            found[stamp] = _image(each.msg, cameras[stamp], lens)
+            found[stamp] = _image(each, cameras[stamp], lenses)
     return [replace(episode, views=[replace(view, depth=found.get(view.stamp))
                                     for view in episode.views]) for episode in episodes]
 
@@ -71,12 +73,12 @@ def with_depth_of(depth: DepthTopics, episode: RecordedEpisode, bag: Bag, stream
     cameras = {view.stamp: view.camera for view in episode.views}
     kinds = {topic.name: topic.type_name for topic in (depth.images, depth.camera_info) if topic}
     gap = ReconstructorParameters.max_depth_gap
-    nearest, lens = _nearest(bag, kinds, cameras, gap, stream.are_images_unstamped)
+    nearest, lenses = _nearest(bag, kinds, cameras, gap, stream.are_images_unstamped)
     found: dict[int, DepthImage] = {}
     reason = f'expected some within {gap:g} s of an image, got none'
     for stamp, each in nearest.items():
         try:
-            image = _image(each.msg, cameras[stamp], lens)
+            image = _image(each, cameras[stamp], lenses)
             if stream.transforms:
                 image = _registered(image, stream.transformed(
                     each.msg.header.frame_id,
@@ -104,35 +106,42 @@ def _registered(image: DepthImage, pose: NDArray[np.float64]) -> DepthImage:
 
 
 def _nearest(bag: Bag, kinds: Mapping[str, str], views: Collection[int], gap: float,
-             by_receive_time: bool = False) -> tuple[dict[int, _Stamped], Intrinsics | None]:
+             by_receive_time: bool = False
+             ) -> tuple[dict[int, _Stamped], list[tuple[int, Intrinsics]]]:
     """
     Return the depth message nearest to each view's stamp, nanoseconds, if within `gap` seconds.
 
-    The second value is the depth camera's lens, None where it has none. `kinds` are the types of
-    the topics. Raises DataError on other types.
+    The second value are the depth camera's lenses in the order of their times. `kinds` are the
+    types of the topics. Raises DataError on other types.
     """
     nearest: dict[int, _Stamped] = {}
-    lens: Intrinsics | None = None
+    lenses: list[tuple[int, Intrinsics]] = []
     for message in bag.messages(set(kinds)):
         wanted = kinds[message.topic]
         if message.type_name != wanted:
             raise DataError(f'{message.topic}: not the type of a depth camera: expected {wanted}, '
                             f'got {message.type_name}', 'topics')
         msg = read_message(message)
+        stamp = message.received if by_receive_time else nanoseconds_from_stamp(msg.header.stamp)
         if wanted == CAMERA_INFO:
             with suppress(MessageError):
-                lens = lens or intrinsics_from_msg(msg)
+                lenses.append((stamp, intrinsics_from_msg(msg)))
             continue
-        stamp = message.received if by_receive_time else nanoseconds_from_stamp(msg.header.stamp)
         for view in views:
             away = abs(stamp - view)
             if away <= round(gap * 1e9) and (view not in nearest
                                              or away < abs(nearest[view].stamp - view)):
                 nearest[view] = _Stamped(stamp, message.received, msg)
-    return nearest, lens
+    return nearest, sorted(lenses, key=itemgetter(0))
 
 
-def _image(msg: Any, camera: Camera, lens: Intrinsics | None) -> DepthImage:
-    """Return a message's depth beside an image of a camera; raises MessageError."""
-    return DepthImage(metres_from_msg(msg),
-                      camera if lens is None else Camera(camera.pose, lens))
+def _image(depth: _Stamped, camera: Camera, lenses: Sequence[tuple[int, Intrinsics]]
+           ) -> DepthImage:
+    """
+    Return a message's depth beside an image of a camera; raises MessageError.
+
+    Its lens is the last at or before it; without any it is the image's.
+    """
+    known = max(bisect_right(lenses, depth.stamp, key=itemgetter(0)) - 1, 0)
+    return DepthImage(metres_from_msg(depth.msg),
+                      Camera(camera.pose, lenses[known][1]) if lenses else camera)
