@@ -292,6 +292,14 @@ def test_an_episode_that_began_before_the_recording_is_not_compared(loop, tmp_pa
     assert compare(replayed, 0.5).verdict == NOTHING_RECORDED
 
 
+def test_an_episode_that_goes_on_from_a_saved_state_began_before(loop, bag, tmp_path):
+    saved = voxel_grid_to_msg(loop.grids[0], loop.threshold, header(BEGIN, 'object'))
+    run = read_run(write_bag(tmp_path / 'run', [
+        *loop.messages[:2], (BEGIN + 1, '/occupancy', saved), *loop.messages[2:]]))
+    assert only(run).begun_before and not only(read_run(bag)).begun_before
+    assert [view.stamp for view in only(run).views] == loop.stamps
+
+
 def copied(bag, folder, storage, packed=None):
     """Copy a bag by a library that we did not write."""
     writer = Writer(folder, version=9, storage_plugin=storage)

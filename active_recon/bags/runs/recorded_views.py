@@ -30,12 +30,14 @@ def recorded_episodes(stream: CameraStream, record: LoopRecord,
 
     Views before the first episode form one without an id. Views from before the recording, known
     from latched messages, are left out. The background is removed as the scene says, unless the
-    loop did so. Raises DataError if the image or the camera of another view is missing, ViewError
-    if the object is not found in an image.
+    loop did so. What is occupied when an episode begins tells that it goes on from a saved state.
+    Raises DataError if the image or the camera of another view is missing, ViewError if the object
+    is not found in an image.
     """
     stamps = sorted(record.parts['view'])
     views = _taken_views(stream, record, stamps)
     before = set(stamps) - {view.stamp for view in views}
+    resumed = record.parts['occupancy'].keys() - stamps
     begun: list[Episode] = sorted(record.parts['episode'].values(), key=lambda each: each.begin)
     if views and (not begun or views[0].stamp < begun[0].begin):
         begun.insert(0, Episode('', views[0].stamp))
@@ -43,7 +45,8 @@ def recorded_episodes(stream: CameraStream, record: LoopRecord,
     return [replace(
         _episode(episode, [view for view in views if episode.begin <= view.stamp < end],
                  end, stream, record, scene),
-        begun_before=any(episode.begin <= stamp < end for stamp in before))
+        begun_before=episode.begin in resumed or any(
+            episode.begin <= stamp < end for stamp in before))
         for episode, end in zip(begun, ends, strict=True)]
 
 

@@ -126,7 +126,8 @@ class RecordedEpisode:
     """
     One object's views; `begin` in nanoseconds, `done` the reason for the end, '' if none.
 
-    `begun_before`: the episode had views before the recording, which lacks their images.
+    `begun_before`: the episode had views before the recording, which lacks their images, or goes
+    on from a saved state.
     """
 
     id: str
