@@ -7,6 +7,7 @@ import struct
 from typing import BinaryIO
 import zlib
 
+from active_recon.bags.storage.metadata import parameters_node
 from active_recon.errors import DataError
 from active_recon.reporting import Advance
 from lz4.frame import LZ4FrameDecompressor
@@ -159,13 +160,15 @@ def _parse(opcode: int, stream: BinaryIO, length: int, max_bytes: int) -> McapRe
         raise DataError(f'record too large: expected at most {max_bytes} bytes, got {length}',
                         'too_large')
     data = stream.read(length)
-    if opcode == Opcode.ATTACHMENT and int.from_bytes(data[-4:], 'little') not in (
-            0, zlib.crc32(data[:-4])):
-        raise DataError(f'damaged attachment: its {length} bytes do not match their checksum; '
-                        f'{_REPAIR}', 'damaged')
     content = ReadDataStream(BytesIO(data))
     if opcode != Opcode.MESSAGE:
-        return _PARSERS[opcode](content)
+        record = _PARSERS[opcode](content)
+        # Other attachments are not read, and their writers may reckon otherwise
+        if isinstance(record, Attachment) and parameters_node(record.name) and int.from_bytes(
+                data[-4:], 'little') not in (0, zlib.crc32(data[:-4])):
+            raise DataError(f'damaged attachment {record.name}: its {length} bytes do not match '
+                            f'their checksum; {_REPAIR}', 'damaged')
+        return record
     if length < _MIN_MESSAGE_BYTES:
         raise DataError(f'damaged message: expected at least {_MIN_MESSAGE_BYTES} bytes, got '
                         f'{length}', 'damaged')
