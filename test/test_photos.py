@@ -454,6 +454,12 @@ def test_options_of_the_command_that_contradict_each_other_are_refused(
     assert not (tmp_path / 'out').exists()
 
 
+def test_a_cube_of_another_side_than_the_size_is_refused_where_units_are_metres():
+    board = CameraFile('board', (), np.array([0.0, 0.0, 1.0]), metric=True)
+    with pytest.raises(ConfigError, match='box and size: .* got sides of 0.2 and 0.3 m'):
+        from_views([], board, Options(box=(0, 0, 0.1, 0.2), size=0.3))
+
+
 def test_a_file_in_place_of_the_folder_to_write_is_refused_before_any_work(tmp_path):
     out = tmp_path / 'out'
     out.touch()

@@ -240,6 +240,10 @@ def test_figure_that_is_not_finite_is_left_out(run):
     page = page_of(changed(run, views=views))
     json.dumps(drawn_in(page), allow_nan=False)
     assert 'nan' not in Elements(page).text
+    first = run.episodes[0].first_goal
+    astray = replace(first.candidates, azimuths=np.full_like(first.candidates.azimuths, np.nan))
+    page = page_of(changed(run, first_goal=replace(first, candidates=astray)))
+    json.dumps(drawn_in(page), allow_nan=False)
 
 
 def test_a_shape_without_any_doubt_has_an_entropy_of_0_and_not_of_minus_0(run):

@@ -170,6 +170,9 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
 
     `reconstructor` is one of the options' model that is already loaded; None: it is loaded here.
     """
+    if file.metric and options.box is not None and options.size not in (None, options.box[3]):
+        raise ConfigError(f'box and size: both in metres with a {file.source}: expected one of '
+                          f'them, got sides of {options.box[3]:g} and {options.size:g} m')
     reconstructor = reconstructor or load(options.model, threads=options.threads)
     poses = [view.camera for view in views]
     told = axis_direction(options.up) if options.up else file.up

@@ -121,7 +121,8 @@ def _decision(goal: RecordedGoal | None) -> list[dict[str, Any]]:
     chosen = _goal(goal.camera, 15, '--goal')
     if goal.candidates is None or goal.scores is None:
         return [chosen]
-    finite = np.isfinite(goal.scores) & np.isfinite(goal.candidates.positions).all(axis=1)
+    finite = (np.isfinite(goal.scores) & np.isfinite(goal.candidates.azimuths)
+              & np.isfinite(goal.candidates.positions).all(axis=1))
     if not finite.any():
         return [chosen]
     positions, scores = goal.candidates.positions[finite], goal.scores[finite].astype(np.float64)
