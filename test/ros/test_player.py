@@ -20,6 +20,7 @@ LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=1000)
 CAMERA = 'camera/image_raw,camera/camera_info,camera/pose'
 VIEWS = 3
+STANDS_S = 2.0  # the camera, before it moves: live nodes that hear the bag have to find it there
 PLAYED_WITHIN_S = 120.0  # two processes to start, and a bag as long as it took to record
 
 
@@ -43,9 +44,12 @@ def bag(shared_bench, start_shared_node, box, tmp_path_factory):
     bags = tmp_path_factory.mktemp('bags')
     nodes = [start_shared_node('recorder', output_dir=bags),
              start_shared_node('turntable_camera', mesh=box, speed=3.0),
-             start_shared_node('reconstructor', weights=ANY_WEIGHTS),
-             start_shared_node('view_planner', policy='farthest', max_views=VIEWS,
-                               entropy_tolerance=0.0)]
+             start_shared_node('reconstructor', weights=ANY_WEIGHTS)]
+    poses = shared_bench.subscribe(PoseStamped, 'camera/pose', STREAM_QOS)
+    shared_bench.until(lambda: poses, 'the camera')
+    shared_bench.within(STANDS_S, lambda: False)
+    nodes.append(start_shared_node('view_planner', policy='farthest', max_views=VIEWS,
+                                   entropy_tolerance=0.0))
     done = shared_bench.subscribe(Header, 'done', LATCHED_QOS)
     shared_bench.until(lambda: done and done[-1].frame_id, 'the end of the loop')
     shared_bench.within(1.0, lambda: False)  # the camera streams on
