@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 import time
 
 from active_recon.demo.table import loop_table, motion_line
+from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import wrap_azimuth
 from active_recon.interrupts import held_interrupts
 from active_recon.launching.demo_monitor import demo_monitor, DemoMonitor
@@ -25,6 +26,7 @@ import numpy as np
 from rich.console import Console, RenderableType
 from rich.live import Live
 
+_LAST = 'reconstructor'  # to become active: the bag is to hold all that it hears and tells
 _SPEED = 2.0  # rad/s of the turntable, twice as fast as by default: it is what most time goes to
 _START_S = 60.0  # also where the machine is busy
 _VIEW_S = 60.0
@@ -68,16 +70,9 @@ def run_demo(demo: Demo, console: Console) -> Path:
     os.environ.update(environment)  # for the observer in this process
     # A name that is longer would leave the picture
     title = f'{demo.mesh.stem:.40}: {counted(demo.views, "view")}, policy {demo.policy}'
-    network = {'precision': demo.precision, **({'weights': demo.model} if demo.model else {})}
     with (held_interrupts() as raise_if_asked, TemporaryDirectory() as logs,
           NodeProcesses(Path(logs), environment) as nodes):
-        nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
-                                 'record_at_start': False})
-        nodes.start('turntable_camera', {'mesh': demo.mesh, 'speed': _SPEED,
-                                         'start_azimuth': _start_azimuth(demo)})
-        # A tolerance of 0 prevents an early end: all requested views are taken.
-        nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
-                                     'max_views': demo.views, 'entropy_tolerance': 0.0, **network})
+        _start_nodes(nodes, demo)
         # The nodes start meanwhile: what reads and draws meshes takes half a second to import
         from active_recon.demo.known_object import KnownObject
 
@@ -90,26 +85,54 @@ def run_demo(demo: Demo, console: Console) -> Path:
             nodes.check()
 
         with demo_monitor(known.occupied) as monitor, ThreadPoolExecutor(1) as beside:
+            def bring(transition: str) -> None:
+                if not monitor.change_state(_LAST, transition, _START_S, check):
+                    raise nodes.failure(_LAST, f'failed to {transition}')
+
+            bring('configure')
             folder = Path(monitor.trigger('start', _START_S, check))
+            monitor.set_parameter(_LAST, 'output_dir', str(folder), _START_S, check)
             if demo.view:
                 _open_page(nodes, monitor, console, check)
+            monitor.until(monitor.is_recorded, _START_S, 'the recorder to subscribe', check)
+
+            def save_mesh() -> None:
+                saved = Path(monitor.trigger('save_mesh', _ANSWER_S, check))
+                saved.replace(folder / f'{demo.mesh.stem}{saved.suffix}')
+
+            def on_view(view: ViewResult) -> None:
+                beside.submit(known.draw, view)
+                if len(monitor.state.views) == 1:
+                    # A node's first mesh takes longest: it is made while the turntable moves
+                    with suppress(ActiveReconError):  # of one view there may be no surface yet
+                        save_mesh()
+
             try:
-                # Last: the bag is to hold all that it hears and tells.
-                # Goals only: `auto` takes views by separation until it has discovered the planner.
-                nodes.start('reconstructor', {'output_dir': folder, 'take_views': 'at_goal',
-                                              **network})
-                follow_loop(monitor, demo, title, console, check,
-                            lambda view: beside.submit(known.draw, view))
+                bring('activate')
+                follow_loop(monitor, demo, title, console, check, on_view)
             finally:  # what there is of a run that was interrupted, too
                 picture = beside.submit(known.save_picture, folder / 'run.png', title,
                                         monitor.state.views)
-            saved = Path(monitor.trigger('save_mesh', _ANSWER_S, check))
-            saved.replace(folder / f'{demo.mesh.stem}{saved.suffix}')
+            save_mesh()
             monitor.trigger('stop', _ANSWER_S, check)
             picture.result()
             if demo.view:
                 _keep_running(nodes, console)
     return demo.output_dir / folder.name
+
+
+def _start_nodes(nodes: NodeProcesses, demo: Demo) -> None:
+    """Start the loop, but for the node that waits for the recorder."""
+    network = {'precision': demo.precision, **({'weights': demo.model} if demo.model else {})}
+    nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
+                             'record_at_start': False})
+    nodes.start('turntable_camera', {'mesh': demo.mesh, 'speed': _SPEED,
+                                     'start_azimuth': _start_azimuth(demo)})
+    # A tolerance of 0 prevents an early end: all requested views are taken.
+    nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
+                                 'max_views': demo.views, 'entropy_tolerance': 0.0, **network})
+    # Goals only: `auto` takes views by separation until it has discovered the planner.
+    nodes.start(_LAST, {'autostart': False, 'take_views': 'at_goal', **network})
 
 
 def _open_page(nodes: NodeProcesses, monitor: DemoMonitor, console: Console,

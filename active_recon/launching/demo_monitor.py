@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+RECORDED = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'next_view', 'view')
+"""What the recorder has to hear from its first message on, for its bag to be replayed."""
 TrueCells = Callable[[int], NDArray[np.bool_]]
 """Returns the object's true cells, (N, N, N), for N cells a side."""
 
@@ -57,6 +59,12 @@ class DemoMonitor(LoopClient):
     def is_done(self) -> bool:
         """Return whether the planner has ended the episode."""
         return self.state.done != ''
+
+    def is_recorded(self) -> bool:
+        """Return whether the recorder has subscribed to all that the loop's nodes publish."""
+        return all('recorder' in {each.node_name for each in
+                                  self._node.get_subscriptions_info_by_topic(topic)}
+                   for topic in RECORDED)
 
     def within(self, condition: Callable[[], bool], budget_s: float,
                meanwhile: Callable[[], None]) -> bool:

@@ -3,12 +3,17 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import time
+from typing import Any
 
 from active_recon.errors import ActiveReconError
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.srv import SetParameters
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
@@ -42,15 +47,37 @@ class LoopClient:
 
     def trigger(self, service: str, budget_s: float, meanwhile: Callable[[], None]) -> str:
         """Call a Trigger service and return its message; ActiveReconError where it fails."""
-        client = self._node.create_client(Trigger, service)
-        self.until(client.service_is_ready, budget_s, f'the service {service}', meanwhile)
-        answer = client.call_async(Trigger.Request())
-        self.until(answer.done, budget_s, f'an answer of {service}', meanwhile)
-        result = answer.result()
-        self._node.destroy_client(client)
+        result = self._call(Trigger, service, Trigger.Request(), budget_s, meanwhile)
         if not result.success:
             raise ActiveReconError(f'{service} answered: {result.message}')
         return str(result.message)
+
+    def change_state(self, node: str, transition: str, budget_s: float,
+                     meanwhile: Callable[[], None]) -> bool:
+        """Let a lifecycle node 'configure' or 'activate'; return whether it did."""
+        service = f'{node}/change_state'
+        request = ChangeState.Request(transition=Transition(label=transition))
+        return bool(self._call(ChangeState, service, request, budget_s, meanwhile).success)
+
+    def set_parameter(self, node: str, name: str, value: str, budget_s: float,
+                      meanwhile: Callable[[], None]) -> None:
+        """Set a parameter of a node; ActiveReconError where it refuses the value."""
+        request = SetParameters.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()])
+        service = f'{node}/set_parameters'
+        result, = self._call(SetParameters, service, request, budget_s, meanwhile).results
+        if not result.successful:
+            raise ActiveReconError(f'{service} answered: {result.reason}')
+
+    def _call(self, kind: Any, service: str, request: Any, budget_s: float,
+              meanwhile: Callable[[], None]) -> Any:
+        """Call a service and return its response; ActiveReconError after the budget."""
+        client = self._node.create_client(kind, service)
+        self.until(client.service_is_ready, budget_s, f'the service {service}', meanwhile)
+        answer = client.call_async(request)
+        self.until(answer.done, budget_s, f'an answer of {service}', meanwhile)
+        self._node.destroy_client(client)
+        return answer.result()
 
 
 @contextmanager

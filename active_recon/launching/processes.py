@@ -23,7 +23,7 @@ _DOMAINS = range(41, 102)  # low numbers are for users and the tests
 
 
 class NodeError(ActiveReconError):
-    """A node that ended by itself."""
+    """A node that ended by itself, or that could not be started."""
 
 
 def private_environment() -> dict[str, str]:
@@ -97,14 +97,17 @@ class NodeProcesses:
         """Raise NodeError, with the last lines of its log, where a node has ended."""
         for node, process in self._running.items():
             code = process.poll()
-            if code is None:
-                continue
-            log = self._log(node)
-            if log is None:
-                raise NodeError(f'{node} ended with code {code}')
-            lines = log.read_text(errors='replace').splitlines()[-_LAST_LINES:]
-            log_lines = '\n  '.join(lines) or '(its log is empty)'
-            raise NodeError(f'{node} ended with code {code}. The end of its log:\n  {log_lines}')
+            if code is not None:
+                raise self.failure(node, f'ended with code {code}')
+
+    def failure(self, node: str, what: str) -> NodeError:
+        """Return the error that a node did `what`, with the last lines of its log."""
+        log = self._log(node)
+        if log is None:
+            return NodeError(f'{node} {what}')
+        lines = log.read_text(errors='replace').splitlines()[-_LAST_LINES:]
+        log_lines = '\n  '.join(lines) or '(its log is empty)'
+        return NodeError(f'{node} {what}. The end of its log:\n  {log_lines}')
 
     def stop(self) -> None:
         """Ask the nodes to stop, the last started first, and wait; kill those that do not end."""

@@ -47,7 +47,7 @@ class ReconstructorParameters(BackgroundParameters, CameraPoseParameters, FrontP
     stall_timeout: float = parameter(
         1.0, 'time that the camera may rest away from its goal before a warning that it has '
         'stalled, s', low=0.1, high=3600.0, dynamic=True)
-    output_dir: str = parameter('.', 'folder of saved meshes and states')
+    output_dir: str = parameter('.', 'folder of saved meshes and states', dynamic=True)
     mesh_format: str = parameter(
         'ply', 'format of saved meshes', choices=MESH_FORMATS, dynamic=True)
     publish_mesh: bool = parameter(

@@ -15,6 +15,7 @@ from active_recon.bags.replay.verification import verify
 from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.storage.opening import open_bag
+from active_recon.models.weights_files import find_weights
 from active_recon.objects import find_object
 from active_recon.runtimes import load_runtime
 from active_recon.volumes.meshes import load_mesh
@@ -27,6 +28,8 @@ from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from safetensors import safe_open
+from safetensors.numpy import load_file, save_file
 import trimesh
 
 pytestmark = pytest.mark.ros
@@ -245,6 +248,23 @@ def test_a_node_that_dies_is_told_with_its_last_words(start_demo):
     assert code == 2
     assert 'turntable_camera ended with code -9' in err
     assert '[turntable_camera]: ready' in err
+    assert 'Traceback' not in err
+    assert not demo.nodes()
+
+
+@pytest.mark.slow
+def test_a_reconstructor_that_cannot_be_configured_is_told_with_its_last_words(
+        start_demo, tmp_path):
+    tensors = load_file(find_weights('lifting'))
+    with safe_open(find_weights('lifting'), 'numpy') as weights:
+        metadata = weights.metadata()
+    tensors.popitem()
+    save_file(tensors, tmp_path / 'mine.safetensors', metadata)
+    demo = start_demo('--model', str(tmp_path / 'mine.safetensors'))
+    code, _, err = demo.end()
+    assert code == 2
+    assert 'reconstructor failed to configure. The end of its log' in err
+    assert 'its tensors do not fit its config' in err
     assert 'Traceback' not in err
     assert not demo.nodes()
 

@@ -7,6 +7,8 @@ from active_recon.nodes.loop.mesh_saver import MeshSaver
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 import pytest
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -33,7 +35,8 @@ def test_the_mesh_is_written_where_the_answer_says(start_node, bench, tmp_path, 
     assert len(trimesh.load(path, force='mesh').faces) > 0
 
 
-def test_a_mesh_that_cannot_be_written_is_said_and_survived(start_node, bench, tmp_path):
+def test_a_mesh_that_cannot_be_written_is_said_and_another_folder_may_be_set(
+        start_node, bench, tmp_path):
     (tmp_path / 'meshes').write_text('a file, where a folder is wanted')
     start_node('reconstructor', take_views='all', threshold=0.2, output_dir=tmp_path / 'meshes')
     camera = FakeCamera(bench)
@@ -42,6 +45,11 @@ def test_a_mesh_that_cannot_be_written_is_said_and_survived(start_node, bench, t
     assert not answer.success
     assert 'was not written' in answer.message
     camera.show()
+    request = SetParameters.Request(parameters=[
+        Parameter('output_dir', value=str(tmp_path / 'others')).to_parameter_msg()])
+    result, = bench.ask(SetParameters, 'reconstructor/set_parameters', request).results
+    assert result.successful
+    assert Path(bench.call('save_mesh').message).parent == tmp_path / 'others'
 
 
 def test_images_become_views_while_a_mesh_is_made(bench):
