@@ -3,7 +3,10 @@
 from dataclasses import replace
 import json
 from pathlib import Path
+import re
 import struct
+import subprocess
+import sys
 import unicodedata
 
 from active_recon.errors import ConfigError, DataError, ViewError
@@ -286,6 +289,24 @@ def test_poses_that_do_not_match_the_photos_are_refused(photos, tmp_path):
     path = write_opencv(tmp_path / 'cameras.yml', rig(count=3), named=False)
     with pytest.raises(DataError, match='expected .* six numbers for each of 4 photos, got 3'):
         read_cameras(path, photos)
+    path.write_text(re.sub(r'rows: 3\n( +)cols: 6', r'sizes: [ 18 ]', path.read_text()))
+    with pytest.raises(DataError, match='expected .* six numbers for each of 4 photos, got 18'):
+        read_cameras(path, photos)
+
+
+@pytest.mark.parametrize(('name', 'missing'), [
+    ('camera_matrix', 'cols: -3'), ('distortion_coefficients', '')])
+def test_a_matrix_without_a_size_is_refused_before_opencv_reads_it(name, missing, tmp_path):
+    path = write_opencv(tmp_path / 'cameras.yml', rig())
+    head, tail = path.read_text().split(f'{name}:', 1)
+    path.write_text(f'{head}{name}:' + re.sub(r'cols: \d', missing, tail, count=1))
+    reading = ('import sys; from pathlib import Path; '
+               'from active_recon.photos.opencv_yaml import read_opencv; '
+               'read_opencv(Path(sys.argv[1]), [])')  # where it may end another process
+    ended = subprocess.run([sys.executable, '-c', reading, path], capture_output=True, text=True,
+                           check=False)
+    assert 'expected rows and cols, 0 or more, of each matrix' in ended.stderr
+    assert name in ended.stderr.splitlines()[-1]
 
 
 def test_an_angle_of_view_that_no_lens_has_is_refused(tmp_path):

@@ -5,7 +5,8 @@ Cameras in OpenCV's YAML or JSON (`cv::FileStorage`), as its calibration samples
 `image_height`; and the poses, camera from world in OpenCV's axes, as either
 
     images                  a list of `name`, `rvec` and `tvec`
-    extrinsic_parameters    (N, 6): rvec and tvec of each photo, in the order of the photos' names
+    extrinsic_parameters    (N, 6): rvec and tvec of each photo, in the order of the photos, which
+                            is that of their names or of their times
 
 (0, 0) is the centre of the first pixel. z is up in the world; for a chessboard that lies on a
 table, whose z points down, give --up=-z.
@@ -53,8 +54,8 @@ def read_opencv(path: Path, photos: Sequence[PhotoFile]) -> CameraFile:
 
 
 def _lens(storage: Any, path: Path) -> Lens:
-    matrix = _matrix(storage, 'camera_matrix', 'K')
-    given = _matrix(storage, 'distortion_coefficients', 'D')
+    matrix = _matrix(storage, path, 'camera_matrix', 'K')
+    given = _matrix(storage, path, 'distortion_coefficients', 'D')
     width, height = (int(storage.getNode(name).real()) for name in ('image_width', 'image_height'))
     if (matrix is None or matrix.shape != (3, 3) or not np.isfinite(matrix).all()
             or min(width, height, *matrix.diagonal()) <= 0):
@@ -87,35 +88,46 @@ def _poses(storage: Any, path: Path, photos: Sequence[PhotoFile]
         found = []
         for number in range(listed.size()):
             node = listed.at(number)
-            rvec, tvec = (_vector(node.getNode(name)) for name in ('rvec', 'tvec'))
+            rvec, tvec = (_vector(node.getNode(name), path) for name in ('rvec', 'tvec'))
             name = node.getNode('name').string()
             if rvec is None or tvec is None or not name:
                 raise DataError(f'{path}: images[{number}]: no pose: expected name, rvec and tvec '
                                 'of three numbers each')
             found.append((name, (rvec, tvec)))
         return found
-    rows = _matrix(storage, 'extrinsic_parameters')
+    rows = _matrix(storage, path, 'extrinsic_parameters')
     if rows is None or rows.shape != (len(photos), 6):
-        got = 'none' if rows is None else f'{rows.shape[0]} rows of {rows.shape[1]}'
+        got = 'none' if rows is None else ' x '.join(map(str, rows.shape))
         raise DataError(f'{path}: poses do not match the photos: expected a list `images` of '
                         'name, rvec and tvec, or extrinsic_parameters with six numbers for each '
                         f'of {len(photos)} photos, got {got}')
     return [(photo.name, (row[:3], row[3:])) for photo, row in zip(photos, rows, strict=True)]
 
 
-def _matrix(storage: Any, *names: str) -> NDArray[np.float64] | None:
+def _matrix(storage: Any, path: Path, *names: str) -> NDArray[np.float64] | None:
     for name in names:
         node = storage.getNode(name)
         if not node.empty():
-            found = node.mat()
-            return None if found is None else np.asarray(found, np.float64)
+            return _numbers(node, path)
     return None
 
 
-def _vector(node: Any) -> NDArray[np.float64] | None:
+def _numbers(node: Any, path: Path) -> NDArray[np.float64] | None:
+    # OpenCV 5 writes beyond its memory where a size is missing, and ends the process
+    if node.isMap() and node.getNode('sizes').empty() and not all(
+            node.getNode(name).isInt() and node.getNode(name).real() >= 0
+            for name in ('rows', 'cols')):
+        raise DataError(f'{path}: no cameras: expected rows and cols, 0 or more, of each matrix, '
+                        f'got one without: {node.name()}')
+    found = node.mat()
+    return None if found is None else np.asarray(found, np.float64)
+
+
+def _vector(node: Any, path: Path) -> NDArray[np.float64] | None:
     """Return three numbers of a matrix or of a plain list."""
     if node.empty():
         return None
-    values = ([node.at(i).real() for i in range(node.size())] if node.isSeq() else node.mat())
+    values = [node.at(i).real() for i in range(node.size())] if node.isSeq() else (
+        _numbers(node, path))
     found = np.asarray([] if values is None else values, np.float64).ravel()
     return found if found.size == 3 and np.isfinite(found).all() else None
