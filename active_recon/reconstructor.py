@@ -100,6 +100,8 @@ class Reconstructor:
         self._judge = None if tables is None else Judge(tables)
         self._load_depth = load_depth
         self._depth: DepthRuntime | None = None
+        self.threads: int | None = None
+        """CPU threads that it was loaded for; None: the runtime's default."""
         self.no_quality = ''
         """Why quality is not judged, in words, where it might be expected."""
         self.reset()
@@ -120,7 +122,7 @@ class Reconstructor:
         reconstructor = cls(
             loaded, object_size, object_yaw, threshold, tables,
             lambda: load_depth_runtime(weights, runtime, device, threads, precision))
-        reconstructor.no_quality = without
+        reconstructor.threads, reconstructor.no_quality = threads, without
         return reconstructor
 
     @property

@@ -100,6 +100,6 @@ def on_white_by(shares: NDArray[np.float32], image: NDArray[np.uint8]) -> NDArra
 
 
 @cache
-def shipped_segmentation() -> Segmentation:
+def shipped_segmentation(threads: int | None = None) -> Segmentation:
     """Return the segmenter that ships, loaded when it is first needed; see `Segmentation.load`."""
-    return Segmentation.load()
+    return Segmentation.load(threads=threads)

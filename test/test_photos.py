@@ -27,6 +27,7 @@ from active_recon.photos.reconstruct import from_files, from_views, Options
 from active_recon.photos.saving import save_shape
 from active_recon.photos.transforms_json import FLIP
 from active_recon.photos.views import _mask, view_of
+from active_recon.segmentation import Segmentation, shipped_segmentation
 from active_recon.volumes.binvox import read_binvox
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import iou
@@ -184,6 +185,23 @@ def test_the_segmenter_looks_at_the_cube_of_the_size_that_is_given(views, clutte
     shape = from_views(photos, CameraFile('a table', (), metric=True),
                        Options(background='segment', size=2 * SIDE))
     assert looked_at == [shape.cube.side] == [2 * SIDE]
+
+
+def test_the_segmenter_has_the_threads_that_the_network_has(views, cluttered, monkeypatch):
+    shipped, asked = Segmentation.load(threads=1), set()
+
+    def load(threads=None):
+        asked.add(threads)
+        return shipped
+
+    monkeypatch.setattr('active_recon.segmentation.Segmentation.load', load)
+    shipped_segmentation.cache_clear()
+    photos = [view_of(str(number), *both)
+              for number, both in enumerate(zip(cluttered[:3], views[:3], strict=True))]
+    from_views(photos, CameraFile('a table', ()),
+               Options(background='segment', threads=1, ground=False))
+    shipped_segmentation.cache_clear()
+    assert asked == {1}
 
 
 def test_before_clutter_the_segmenter_finds_the_object_and_a_mask_of_one_photo_tells_otherwise(

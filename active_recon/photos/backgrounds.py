@@ -88,14 +88,15 @@ def off_plain(image: NDArray[np.uint8]) -> NDArray[np.bool_] | None:
     return found if found.mean() < _MOST_SHARE else None
 
 
-def shown_image(view: PhotoView, camera: Camera, size: float, background: str
-                ) -> tuple[NDArray[np.uint8], str]:
+def shown_image(view: PhotoView, camera: Camera, size: float, background: str,
+                threads: int | None = None) -> tuple[NDArray[np.uint8], str]:
     """
     Return the photo as the network is shown it, (H, W, 3) uint8 RGB, and what removed its back.
 
-    `camera` is the view's in the object frame, `size` the side of the cube there. The second is
-    'masks', 'alpha', 'board', 'plain', 'rembg', 'segmenter', 'grabcut', or 'network' where nothing
-    was removed, 'network and plain' where what only shows a plain background will be cut off.
+    `camera` is the view's in the object frame, `size` the side of the cube there, `threads` are
+    those of a segmenter. The second is 'masks', 'alpha', 'board', 'plain', 'rembg', 'segmenter',
+    'grabcut', or 'network' where nothing was removed, 'network and plain' where what only shows a
+    plain background will be cut off.
     """
     if view.mask_source == 'plain' and background == 'auto':
         return view.image, 'network and plain'
@@ -104,7 +105,7 @@ def shown_image(view: PhotoView, camera: Camera, size: float, background: str
     if view.mask_source == 'segmenter':  # on white since all photos were looked at
         return view.image, 'segmenter'
     if background == 'segment':
-        return shipped_segmentation().on_white(view.image, camera, size), 'segmenter'
+        return shipped_segmentation(threads).on_white(view.image, camera, size), 'segmenter'
     if background == 'grabcut':
         found = grabcut(view.image, camera, size)
         if found is not None:

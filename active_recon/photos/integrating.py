@@ -52,7 +52,8 @@ def integrate(views: Sequence[PhotoView], cube: Cube, size: float, reconstructor
     for view in views:
         camera = cube.camera(view.camera, size)
         try:
-            image, source = shown_image(view, camera, size, background)
+            image, source = shown_image(view, camera, size, background,
+                                        reconstructor.threads)
             depth = None if view.depth is None or not with_depth else DepthImage(view.depth)
             known = reconstructor.add_view(image, camera, depth)
             taken.append(TakenView(view.name, image, camera, source, known,
@@ -111,7 +112,8 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
             cells = hull(depth_in_masks(some, cameras, _HULL_CELLS))
             cells &= seen_cells(cameras, _HULL_CELLS)
         elif background == 'segment':
-            cells = segmented_cells(some, cube, shipped_segmentation(), ground)
+            cells = segmented_cells(
+                some, cube, shipped_segmentation(reconstructor.threads), ground)
             cells &= seen_cells(cameras, len(cells))
         else:
             taken, _ = integrate(some, cube, 1.0, reconstructor, background)

@@ -201,7 +201,8 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         cube = cube if file.board is None else BOARD_GROUND.under(cube)
     shown = views
     if background == 'segment':
-        shown, unfound = segmented_views(views, cube, shipped_segmentation(), ground)
+        shown, unfound = segmented_views(
+            views, cube, shipped_segmentation(reconstructor.threads), ground)
         empty = [*empty, *unfound]
         if not shown:
             raise DataError(f'object not found: {empty[0]}{no_table(ground)}', 'no_object')
