@@ -350,6 +350,21 @@ def test_of_cameras_of_one_name_the_photo_s_folder_tells_its_own(tmp_path):
     assert_same(path, photos, rig())
 
 
+def test_names_that_differ_by_capitals_only_are_told_apart(tmp_path):
+    cameras = rig(count=2)
+    folder = blank_photos(tmp_path / 'photos', cameras)
+    paths = [(folder / name).rename(folder / new)
+             for name, new in zip(names(cameras), ['a.png', 'A.png'], strict=True)]
+    file = tmp_path / 'transforms.json'
+    frames = [{**frame, 'file_path': f'./photos/{path.name}'}
+              for path, frame in zip(paths, transforms(cameras)['frames'], strict=True)]
+    file.write_text(json.dumps({**transforms(cameras), 'frames': frames}))
+    posed, left_out = posed_photos(read_cameras(file, []), open_photos(paths)[0])
+    assert not left_out and [each.photo.path for each in posed] == paths
+    for each, camera in zip(posed, cameras, strict=True):
+        np.testing.assert_allclose(each.pose, camera.pose, atol=1e-9)
+
+
 def test_photos_that_several_cameras_may_have_taken_are_left_out(tmp_path):
     photos, path = of_two_folders(tmp_path, 'a', 'b')
     moved = [replace(photo, path=tmp_path / photo.name) for photo in photos]

@@ -154,8 +154,9 @@ def _posed(entry: Entry, photo: PhotoFile, stored: bool) -> PosedPhoto:
 def _matched(entries: Iterable[Entry], photos: Sequence[PhotoFile]
              ) -> Mapping[Path, list[Entry]]:
     """Return the cameras that fit a photo best, by its path: by name, else by stem; by folders."""
-    # A camera's name may have no suffix, but dots
-    ways = ((_name, _name), (_name, _stem), (_stem, _stem))  # of camera and photo, the best first
+    # A camera's name may have no suffix, but dots; capitals count where they are the same
+    ways = ((_as_written, _as_written), (_name, _name), (_name, _stem),
+            (_stem, _stem))  # of camera and photo, the best first
     tables: list[dict[str, list[Path]]] = []
     for _, of_photo in ways:
         tables.append({})
@@ -180,6 +181,10 @@ def _folders_alike(name: str, path: Path) -> int:
     there = PurePosixPath(comparable(str(path.resolve()))).parts[-2::-1]
     unlike = (at for at, (a, b) in enumerate(zip(named, there, strict=False)) if a != b)
     return next(unlike, min(len(named), len(there)))
+
+
+def _as_written(path: str) -> str:
+    return PurePosixPath(path.replace('\\', '/')).name
 
 
 def _name(path: str) -> str:
