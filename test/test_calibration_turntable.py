@@ -236,6 +236,18 @@ def test_a_lens_comes_back_from_its_file(tmp_path):
         assert read_lens(tmp_path / 'camera_info.yaml') == lens
 
 
+@pytest.mark.parametrize('model', ['plumb_bob', ''])
+def test_an_ideal_lens_may_have_no_coefficients_as_a_camera_info(model, tmp_path):
+    path = tmp_path / 'camera_info.yaml'
+    write_lens(LENS, path)
+    text = path.read_text()
+    written = text.replace('cols: 5', 'cols: 0').replace('data: [0.0, 0.0, 0.0, 0.0, 0.0]',
+                                                         'data: []')
+    assert written != text
+    path.write_text(written.replace('plumb_bob', model or "''"))
+    assert read_lens(path) == LENS
+
+
 def test_a_lens_is_written_as_ros_counts_pixels_from_the_first_one_s_centre(tmp_path):
     write_lens(LENS, tmp_path / 'lens.yaml')
     text = (tmp_path / 'lens.yaml').read_text()

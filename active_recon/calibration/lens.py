@@ -9,7 +9,7 @@ from pathlib import Path
 from active_recon.calibration.board import Detection
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics
-from active_recon.geometry.lenses import Distortion
+from active_recon.geometry.lenses import Distortion, MODELS
 from active_recon.yaml_text import yaml_value
 import cv2
 import numpy as np
@@ -63,7 +63,10 @@ def read_lens(path: Path) -> Intrinsics:
         matrix = np.array(content['camera_matrix']['data'], np.float64).reshape(3, 3)
         coefficients = tuple(map(float, content['distortion_coefficients']['data']))
         size = int(content['image_width']), int(content['image_height'])
-        distortion = Distortion(content['distortion_model'], coefficients)
+        model = content['distortion_model']
+        # An ideal lens may have neither coefficients nor a model, as in a CameraInfo
+        distortion = None if not any(coefficients) and model in ('', *MODELS) else (
+            Distortion(model, coefficients))
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file: expected a YAML file of ROS's camera_calibration"
                         ) from error
@@ -75,7 +78,7 @@ def read_lens(path: Path) -> Intrinsics:
     if not np.isfinite(matrix).all() or min(matrix[0, 0], matrix[1, 1], *size) <= 0:
         raise DataError(f'{path}: camera not calibrated: expected focal lengths and sizes above '
                         f'0, got the matrix {matrix.tolist()} for images of {size[0]} x {size[1]}')
-    return _lens(matrix, distortion if any(coefficients) else None, size)
+    return _lens(matrix, distortion, size)
 
 
 @dataclass(frozen=True)
