@@ -2,6 +2,9 @@
 
 import os
 import signal
+import subprocess
+import sys
+import time
 
 from active_recon.interrupts import held_interrupts, stop_signals
 import pytest
@@ -29,3 +32,17 @@ def test_what_nohup_started_outlives_its_terminal(hangup):
     with held_interrupts() as raise_if_asked:
         os.kill(os.getpid(), hangup)
         raise_if_asked()
+
+
+@pytest.mark.parametrize('asked', [
+    signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)])
+def test_a_command_that_is_killed_leaves_nothing_unfinished(asked, tmp_path):
+    command = subprocess.Popen(
+        [sys.executable, '-m', 'active_recon.cli.main', 'record-sweep', 'chair', '--out',
+         tmp_path / 'bag'], stderr=subprocess.PIPE, text=True)
+    while not any(tmp_path.iterdir()) and command.poll() is None:
+        time.sleep(0.02)
+    command.send_signal(asked)
+    _, told = command.communicate(timeout=30)
+    assert command.returncode != 0 and 'Traceback' not in told
+    assert not list(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 import inspect
+import signal
 import sys
 from typing import Annotated, Any
 
@@ -32,6 +33,7 @@ from active_recon.cli.train_segmenter import train_segmenter
 from active_recon.cli.up import up
 from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
+from active_recon.interrupts import stop_signals
 import typer
 
 app = typer.Typer(
@@ -83,7 +85,13 @@ _flow(app)
 
 
 def main() -> None:
-    """Run the command; errors of the package and of files are one line and exit code 2."""
+    """
+    Run the command; errors of the package and of files are one line and exit code 2.
+
+    `kill` and a terminal that is closed end it as Ctrl-C does: nothing unfinished stays.
+    """
+    for asked in set(stop_signals()) - {signal.SIGINT}:  # which a shell may have them ignore
+        signal.signal(asked, signal.default_int_handler)
     try:
         app()
     except (ActiveReconError, OSError) as error:
