@@ -138,6 +138,15 @@ def test_a_compressed_message_that_decompresses_to_much_more_takes_no_memory(
     assert peak(tmp_path / 'run', 'message too large: .* decompress to more') < 2**24
 
 
+def test_a_compressed_message_that_is_cut_off_is_refused():
+    whole = bytes(range(256)) * 2000
+    packed = zstandard.ZstdCompressor().compress(whole)
+    files = compression.StoredFiles([], 'message')
+    assert files.decompressed_message(packed) == whole
+    with pytest.raises(DataError, match='damaged message: expected 512000 bytes'):
+        files.decompressed_message(packed[:-40])
+
+
 @pytest.mark.parametrize('storage', list(StoragePlugin))
 def test_a_compressed_file_that_decompresses_to_gigabytes_fills_no_disk(
         bag, tmp_path, monkeypatch, storage):

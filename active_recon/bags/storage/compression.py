@@ -55,6 +55,9 @@ class StoredFiles:
         if declared > limit or len(message) > limit:
             raise DataError(f'message too large: its {len(data)} bytes decompress to more than '
                             f'{limit}', 'too_large')
+        if len(message) < declared:
+            raise DataError(f'damaged message: expected {declared} bytes once decompressed, got '
+                            f'{len(message)}', 'damaged')
         return message
 
 
