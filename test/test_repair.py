@@ -6,11 +6,13 @@ import re
 import subprocess
 import sys
 
+from active_recon.bags.storage import repair as repair_module
 from active_recon.bags.storage.opening import open_bag
 from active_recon.bags.storage.repair import repair_bag
 from active_recon.bags.storage.writer import BagWriter
 from active_recon.batch.finding import is_bag_folder
 from active_recon.errors import DataError
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 import pytest
 from recorded_messages import (
@@ -156,6 +158,25 @@ def test_of_a_bag_with_an_index_a_spoilt_first_chunk_costs_no_other(tmp_path):
     assert_whole(bag.folder)
 
 
+@pytest.mark.parametrize('kind', [Opcode.MESSAGE_INDEX, 0x86, 0x46])
+def test_a_chunk_that_is_no_longer_known_as_one_is_missed_and_costs_no_other(tmp_path, kind):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    content = bytearray(bag.path.read_bytes())
+    third = [at for at in range(len(content)) if content[at:at + 4] == b'zstd'][2]
+    begin = third - 4 - 28 - 9
+    assert content[begin] == Opcode.CHUNK
+    content[begin] = kind
+    bag.path.write_bytes(content)
+    with pytest.raises(DataError, match='it lacks 1 of the chunks that its index counts'):
+        open_bag(bag.folder).summary()
+    (repair,), _ = repair_bag(bag.folder)
+    assert repair.kept_as and repair.lost == ['1 of the chunks that its index counts']
+    assert read(bag.folder) == [message(number) for number in range(CHUNKS * IN_CHUNK)
+                                if number // IN_CHUNK != 2]
+    assert_whole(bag.folder)
+
+
 def test_a_spoilt_summary_changes_nothing_of_a_bag_that_is_repaired(tmp_path):
     with announced(tmp_path / 'run') as bag:
         fill(bag)
@@ -214,6 +235,21 @@ def test_a_bag_that_is_being_recorded_is_refused(tmp_path):
         with pytest.raises(DataError, match='still being recorded'):
             repair_bag(bag.folder)
         assert state(bag.folder) == before
+
+
+def test_a_bag_that_grows_while_it_is_repaired_is_refused(cut_off, monkeypatch):
+    path = cut_off / 'run_0.mcap'
+
+    def surveyed(found):
+        with path.open('ab') as recorder:  # without a lock, as rosbag2
+            recorder.write(b'more')
+        return survey(found)
+
+    survey = repair_module._survey
+    monkeypatch.setattr(repair_module, '_survey', surveyed)
+    with pytest.raises(DataError, match='run_0.mcap: still being recorded'):
+        repair_bag(cut_off)
+    assert [each.name for each in cut_off.iterdir()] == [path.name]
 
 
 @pytest.mark.parametrize('content', [b'no MCAP at all', b'\0' * 1000, b'\x89MCAP1'])

@@ -24,6 +24,7 @@ from mcap.records import (
     Message,
     Metadata,
     Schema,
+    Statistics,
 )
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdDecompressor
@@ -40,6 +41,7 @@ _IN_CHUNK: dict[int, _Parser] = {Opcode.SCHEMA: Schema.read, Opcode.CHANNEL: Cha
 _PARSERS: dict[int, _Parser] = {
     **_IN_CHUNK, Opcode.HEADER: Header.read, Opcode.CHUNK: Chunk.read,
     Opcode.METADATA: Metadata.read, Opcode.ATTACHMENT: Attachment.read,
+    Opcode.STATISTICS: Statistics.read,
     Opcode.DATA_END: DataEnd.read, Opcode.FOOTER: Footer.read}
 
 
@@ -73,8 +75,8 @@ class RecordReader:
     Reads the top-level records of an MCAP file from its beginning.
 
     `size` is the file's, in bytes. `position` is the end of the last complete record. `skip` is
-    told in words of each record that cannot be understood, which is then left out; None: such a
-    record ends the reading with its error.
+    told in words of each record that cannot be understood, which is then left out, and of chunks
+    that are not there; None: that ends the reading with its error.
     """
 
     def __init__(self, file: BinaryIO, size: int,
@@ -99,8 +101,10 @@ class RecordReader:
         if self._file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise DataError('no MCAP file: wrong magic bytes at its beginning', 'no_mcap')
         self.position = self._file.tell()
+        chunks = 0
         for opcode, length in _heads(self._file, self._size):
             self._advance(_HEAD_BYTES + length, '')
+            chunks += opcode == Opcode.CHUNK
             wanted = opcode == Opcode.MESSAGE or opcode in _PARSERS
             if not wanted or (
                     opcode == Opcode.ATTACHMENT and length > self._max_attachment_bytes):
@@ -115,6 +119,9 @@ class RecordReader:
                            f'({str(error) or type(error).__name__})')
                 continue
             self.position = self._file.tell()
+            if isinstance(record, Statistics):
+                self._require_chunks(record.chunk_count - chunks)
+                continue
             if isinstance(record, Footer):
                 if self._file.read() != MCAP0_MAGIC:
                     break
@@ -125,6 +132,15 @@ class RecordReader:
             yield record
         raise DataError(f'incomplete: its end is missing, as after a killed recorder; {_REPAIR}',
                         'truncated')
+
+
+    def _require_chunks(self, missing: int) -> None:
+        """Tell of chunks that the index counts: what says that a record is one may be damaged."""
+        if missing > 0:
+            lost = f'{missing} of the chunks that its index counts'
+            if self._skip is None:
+                raise DataError(f'damaged: it lacks {lost}; {_REPAIR}', 'damaged')
+            self._skip(lost)
 
 
 def chunk_records(chunk: Chunk) -> Iterator[McapRecord]:

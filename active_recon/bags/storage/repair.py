@@ -100,6 +100,7 @@ def _open_finished(path: Path) -> Salvage:
 
 def _repair_file(found: Salvage) -> Repair:
     path = found.path
+    begun = path.stat().st_size
     repair = _survey(found)
     if found.indexed and not repair.lost:
         return repair
@@ -107,6 +108,9 @@ def _repair_file(found: Salvage) -> Repair:
     try:
         for record in found.records():
             rewritten.add(record)
+        if path.stat().st_size != begun:  # rosbag2's recorder has no lock
+            raise DataError(f'{path}: still being recorded, since it grew meanwhile; stop the '
+                            'recorder first', 'still_recorded')
         rewritten.finish()
     except BaseException:
         rewritten.discard()
