@@ -14,6 +14,8 @@ from active_recon.bags.replay.verification import verify
 from active_recon.bags.runs.loop_setup import recorded_setup
 from active_recon.bags.runs.reading import read_run
 from active_recon.bags.runs.run_writing import write_run
+from active_recon.bags.runs.topics import Topics
+from active_recon.errors import ConfigError
 from active_recon.geometry.view_distance import view_distance
 from active_recon.models.weights_files import find_weights, PAPER_MODEL, weights_hash
 from command_line import command
@@ -69,6 +71,14 @@ def told(monkeypatch, capsys, *arguments):
     code = command(monkeypatch, *arguments)
     said = capsys.readouterr()
     return code, said.out + said.err
+
+
+@of_one
+def test_what_the_loop_had_is_not_given_again(golden, run):
+    for topics, option in ((Topics(object_frame='table'), '--object-frame'),
+                           (Topics(max_pose_gap=5.0), '--max-pose-gap')):
+        with pytest.raises(ConfigError, match=f'^{option}: not needed: the bag has that of its'):
+            read_run(golden, topics)
 
 
 def test_it_is_small_and_says_what_made_it(golden, run):

@@ -72,8 +72,14 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
                               'that')
     node = parameters_among(summary.parameters, 'reconstructor')
     frame_given = topics.object_frame != _ANY_TOPICS.object_frame
-    topics = replace(topics, max_pose_gap=node.get('max_pose_gap', topics.max_pose_gap),
-                     object_frame=node.get('object_frame', topics.object_frame))
+    for name in ('object_frame', 'max_pose_gap'):
+        given = getattr(topics, name)
+        recorded = node.get(name, given)
+        if given == getattr(_ANY_TOPICS, name):
+            topics = replace(topics, **{name: recorded})
+        elif namespace is not None and given != recorded:
+            raise ConfigError(f'--{name.replace("_", "-")}: not needed: the bag has that of its '
+                              f'loop, {recorded}')
     scene = replace(scene, object_size=scene.object_size or {
         **parameters_among(summary.parameters, 'turntable_camera'), **node}.get('object_size'))
     camera = camera_topics(bag, summary, topics)
