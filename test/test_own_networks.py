@@ -230,6 +230,21 @@ class Turning(Net):
         turned = cameras.turned(torch.full((len(encoded),), 0.3)).azimuths
         return super().update(encoded + turned[:, None, None, None], cameras, state)
 
+class Learned(Net):
+    def __init__(self, config):
+        super().__init__(config)
+        self.prior = torch.nn.Parameter(torch.full((1, 32), 2.0))
+
+    def initial_state(self, batch):
+        return {**super().initial_state(batch), 'prior': torch.zeros(batch, 32)}
+
+    def update(self, encoded, cameras, state):
+        return super().update(encoded, cameras, state) | {
+            'prior': self.prior if len(encoded) == 1 else self.prior.expand(len(encoded), -1)}
+
+    def decode(self, state):
+        return super().decode(state) + state['prior'][:, :, None, None]
+
 class Needs(Net):
     @dataclass(frozen=True)
     class Config(Config):
@@ -323,10 +338,11 @@ def test_what_no_graph_can_run_is_not_exported(name, said, own_weights):
         export(own_weights(name))
 
 
-def test_norms_of_one_s_own_and_turned_cameras_are_exported_as_they_are(own_weights):
+@pytest.mark.parametrize('name', ['Turning', 'Learned'])
+def test_own_norms_turned_cameras_and_weights_in_states_are_exported(name, own_weights):
     pytest.importorskip('onnx')
     pytest.importorskip('openvino')
-    path = own_weights('Turning')
+    path = own_weights(name)
     export(path)
     camera = orbit_camera(1.2)
     image = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)

@@ -174,8 +174,10 @@ def _written(model: str, part: Part, told: GraphMetadata) -> bytes:
 def _join(graph: Any) -> None:
     """Leave out the second names of equal weights, which ONNX Runtime stumbles over."""
     stored = {each.name for each in graph.graph.initializer}
+    given = {each.name for each in graph.graph.output}  # a state may be a weight
     second = {node.output[0]: node.input[0] for node in graph.graph.node
-              if node.op_type == 'Identity' and node.input[0] in stored}
+              if node.op_type == 'Identity' and node.input[0] in stored
+              and node.output[0] not in given}
     nodes = [node for node in graph.graph.node if node.output[0] not in second]
     for node in nodes:
         for place, name in enumerate(node.input):
