@@ -31,7 +31,7 @@ from active_recon.models.weights_files import (
 )
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_policy_runtime, load_runtime, REMARK
-from active_recon.runtimes.compiled_cache import VARIABLE
+from active_recon.runtimes.compiled_cache import cache_folder, VARIABLE
 from active_recon.runtimes.graph_files import (
     DECODE_PART,
     graph_path,
@@ -536,6 +536,12 @@ def test_a_cache_may_be_read_by_others_as_what_else_is_written(exported, tmp_pat
     load_runtime(exported('ptn'), 'openvino', threads=1)
     assert {path.stat().st_mode for path in tmp_path.rglob('*') if path.is_file()} == {
         (tmp_path / 'other').stat().st_mode}
+
+
+def test_a_cache_may_be_named_from_the_user_s_home(tmp_path, monkeypatch):
+    monkeypatch.setenv('HOME', str(tmp_path))
+    monkeypatch.setenv(VARIABLE, '~/kept')
+    assert cache_folder() == tmp_path / 'kept'
 
 
 def test_a_user_without_a_home_keeps_nothing_that_was_compiled(exported, monkeypatch):

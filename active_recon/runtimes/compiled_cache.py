@@ -14,10 +14,11 @@ _DIGEST = hashlib.sha256().digest_size
 def cache_folder() -> Path | None:
     """Return the folder of what may be made anew, which need not exist; None for none."""
     chosen = os.environ.get(VARIABLE)
-    if chosen is not None:
-        return Path(chosen) if chosen else None
-    try:
-        return Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser() / 'active_recon'
+    if chosen == '':
+        return None
+    usual = Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache') / 'active_recon'
+    try:  # no shell reads what a launch file or systemd sets
+        return Path(chosen or usual).expanduser()
     except RuntimeError:  # a user without a home, as in a container
         return None
 
