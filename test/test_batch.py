@@ -25,6 +25,7 @@ from active_recon.batch.table import read_table, write_table
 from active_recon.batch.task import Task
 from active_recon.errors import ConfigError, DataError
 from active_recon.reconstructor import Reconstructor
+from active_recon.report.findings import stopped
 from command_line import command, refusal
 from foreign_recordings import images, joints
 from loop_bags import write_bag
@@ -135,6 +136,17 @@ def test_an_episode_that_ended_before_its_first_view_has_a_row_too(tmp_path, mon
     monkeypatch.setattr(work, 'read_run', lambda *_: both)
     rows = work.rows_of(Task('report', tmp_path, Topics(), Scene()), PAPER)
     assert [row['views'] for row in rows] == [len(whole.views), 0]
+
+
+def test_an_episode_without_a_planner_is_not_told_to_lack_its_end(tmp_path, monkeypatch):
+    run = read_run(PAPER)
+    [whole] = run.episodes
+    sweep = replace(whole, first_goal=None, done='', views=[
+        replace(view, goal=None) for view in whole.views])
+    cut_off = replace(whole, done='')
+    monkeypatch.setattr(work, 'read_run', lambda *_: replace(run, episodes=[sweep, cut_off]))
+    rows = work.rows_of(Task('report', tmp_path, Topics(), Scene()), PAPER)
+    assert [stopped(row['stopped']) for row in rows] == ['no planner', 'no end recorded']
 
 
 def test_the_verdict_of_an_episode_is_not_that_of_another(tmp_path, monkeypatch):

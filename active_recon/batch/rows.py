@@ -24,7 +24,8 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     'iou_lower_bound': ('double', 'IoU that nine of ten objects exceed'),
     'iou': ('double', 'IoU with the truth after the last view, if the truth is known'),
     'entropy': ('double', 'nats after the last view'),
-    'stopped': ('string', 'reason of the planner for the end; empty if there is none'),
+    'stopped': ('string', 'reason of the planner for the end; empty if there is none, no_planner '
+                          'without a planner'),
     'verdict': ('string', 'of a replay: same bits, within tolerance, different, nothing recorded'),
     'recorded': ('timestamp', 'first message of the bag, UTC'),
     'duration_s': ('double', 'from the first message of the bag to the last'),
@@ -63,7 +64,7 @@ def episode_row(bag: str, number: int, subject: Subject, verdict: str, report: s
         'iou_lower_bound': None if quality is None else _finite(quality.lower_bound),
         'iou': subject.ious[-1] if views else None,
         'entropy': subject.entropies[-1] if views else None,
-        'stopped': episode.done, 'verdict': verdict,
+        'stopped': subject.end, 'verdict': verdict,
         'recorded': run.begin // 1000 if run.begin > 0 else None,
         'duration_s': (run.end - run.begin) / 1e9,
         'image_to_goal_ms': median([each.total for each in timings(episode, subject.timed)]),

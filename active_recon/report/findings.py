@@ -27,6 +27,8 @@ _STOPPED = {
     'no_reachable_azimuth': ('no reachable goal', 'It stopped because no view was left that the '
                                                   'camera can reach.'),
     'stopped': ('stopped', 'It was stopped by a service call.'),
+    'no_planner': ('no planner', 'No planner was recorded: the views are those that the camera '
+                                 'passed.'),
     PHOTOS: ('last photo', 'It ended with the last photo.'),
     '': ('no end recorded', 'The episode is incomplete: the recording ends, or a new episode '
                             'begins, before it was done.'),
@@ -63,12 +65,8 @@ def _beginning(subject: Subject) -> Iterator[tuple[str, str]]:
 
 
 def _stop(subject: Subject) -> Iterator[tuple[str, str]]:
-    reason = subject.episode.done
-    if not subject.planned and not subject.of_photos:
-        yield 'note', 'No planner was recorded: the views are those that the camera passed.'
-        return
-    _, sentence = _STOPPED.get(reason, ('', f'It stopped for the reason “{reason}”.'))
-    yield 'note' if reason else 'warning', sentence
+    _, sentence = _STOPPED.get(subject.end, ('', f'It stopped for the reason “{subject.end}”.'))
+    yield 'note' if subject.end else 'warning', sentence
 
 
 def _counted(subject: Subject) -> Iterator[tuple[str, str]]:

@@ -99,8 +99,7 @@ def _panel(subject: Subject) -> dict[str, Any]:
         'timed': any(stage is not None for timing in times for stage in timing.stages[1:]),
         'image_to_goal_ms': median([timing.total for timing in times]),
         'travel_deg': math.degrees(subject.travel),
-        'stopped': (stopped(subject.episode.done) if subject.planned or subject.of_photos
-                    else 'no planner'),
+        'stopped': stopped(subject.end),
         'others': len(run.episodes) - 1,
     }
 

@@ -54,6 +54,11 @@ class Subject:
             goal is not None for goal in self.goals))
 
     @property
+    def end(self) -> str:
+        """Why the episode ended; '' where it has no end, `no_planner` where none decided it."""
+        return self.episode.done if self.planned or self.of_photos else 'no_planner'
+
+    @property
     def timed(self) -> bool:
         """Whether the times of its messages are a loop's: replays and photos have stamps alone."""
         return not self.of_photos and 'replay_of' not in self.run.provenance
