@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 from active_recon.errors import ConfigError
 from active_recon.meshes.collision import convex_parts, NO_COACD
+from active_recon.meshes.files import write_mesh
 from active_recon.meshes.urdf import write_urdf
 from active_recon.volumes.refinement import refined_mesh
 from active_recon.volumes.voxels import VoxelGrid
@@ -42,6 +43,22 @@ def test_mass_and_inertia_are_those_of_a_solid_block(tmp_path, without_coacd):
     assert inertia == pytest.approx({
         'ixx': 6 * (0.2 ** 2 + 0.3 ** 2) / 12, 'iyy': 6 * (0.1 ** 2 + 0.3 ** 2) / 12,
         'izz': 6 * (0.1 ** 2 + 0.2 ** 2) / 12, 'ixy': 0, 'ixz': 0, 'iyz': 0}, abs=1e-9)
+
+
+def test_a_description_that_cannot_be_written_leaves_the_one_before(
+        without_coacd, stool, tmp_path, monkeypatch):
+    def on_a_full_disk(mesh, path):
+        if path.name == 'collision_0.stl':
+            raise OSError(28, 'No space left on device')
+        write_mesh(mesh, path)
+
+    write_urdf(stool, tmp_path / 'stool.urdf')
+    before = {path: path.is_file() and path.read_bytes() for path in tmp_path.rglob('*')}
+    assert len(before) > 3
+    monkeypatch.setattr('active_recon.meshes.urdf.write_mesh', on_a_full_disk)
+    with pytest.raises(OSError, match='No space left'):
+        write_urdf(stool.copy().apply_scale(2), tmp_path / 'stool.urdf')
+    assert {path: path.is_file() and path.read_bytes() for path in tmp_path.rglob('*')} == before
 
 
 @pytest.mark.parametrize('density', [0, -1, math.nan, math.inf])

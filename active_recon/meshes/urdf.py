@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 import re
+from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -30,20 +31,23 @@ def write_urdf(mesh: trimesh.Trimesh, path: Path, density: float = DENSITY) -> s
     if not 0 < density < np.inf:
         raise ConfigError(f'density: out of range: expected kg/m^3 above 0, got {density:g}')
     folder = path.with_name(f'{path.stem}_meshes')
-    write_mesh(mesh, folder / 'visual.obj')
     parts, missing = convex_parts(mesh)
-    files = [folder / f'collision_{number}.stl' for number in range(len(parts))]
-    for stale in folder.glob('collision_*.stl'):
-        stale.unlink()
-    for part, file in zip(parts, files, strict=True):
-        write_mesh(part, file)
+    names = [f'collision_{number}.stl' for number in range(len(parts))]
     name = re.sub(r'\W', '_', path.stem)
-    robot = _robot(name, mesh, density, [file.relative_to(path.parent) for file in files],
-                   (folder / 'visual.obj').relative_to(path.parent))
+    robot = _robot(name, mesh, density, [Path(folder.name, each) for each in names],
+                   Path(folder.name, 'visual.obj'))
     ElementTree.indent(robot)
-    with whole_file(path) as unfinished:
-        unfinished.write_text(
+    folder.mkdir(parents=True, exist_ok=True)
+    # What stood there is left until all of the new is on the disk
+    with TemporaryDirectory(prefix='.', dir=folder) as unfinished, whole_file(path) as description:
+        description.write_text(
             f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n')
+        for part, each in zip((mesh, *parts), ('visual.obj', *names), strict=True):
+            write_mesh(part, Path(unfinished, each))
+        for stale in folder.glob('collision_*.stl'):
+            stale.unlink()
+        for file in Path(unfinished).iterdir():
+            file.replace(folder / file.name)
     return missing
 
 
