@@ -11,7 +11,7 @@ from active_recon.calibration.lens import write_lens
 from active_recon.calibration.picture import picture_of
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Intrinsics
-import cv2
+from active_recon.png_files import write_png
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -57,7 +57,7 @@ class Calibration:
             folder.mkdir(parents=True, exist_ok=True)
             (folder / 'calibration.yaml').write_text(self.as_yaml())
             write_lens(self.lens, folder / 'camera_info.yaml')
-            (folder / 'calibration.png').write_bytes(cv2.imencode('.png', picture)[1].tobytes())
+            write_png(folder / 'calibration.png', picture)
         except OSError as error:
             raise DataError(f'{folder}: calibration not written: expected a writable folder, got: '
                             f'{error}') from error

@@ -10,9 +10,9 @@ from active_recon.meshes.files import MESH_FORMATS, write_mesh
 from active_recon.meshes.urdf import write_urdf
 from active_recon.photos.picture import shape_picture
 from active_recon.photos.shape import Shape
+from active_recon.png_files import write_png
 from active_recon.volumes.binvox import write_binvox
 from active_recon.volumes.voxel_files import write_npz
-import cv2
 
 FORMATS = (*MESH_FORMATS, 'urdf')
 """Of the mesh; `urdf` is a robot description, see `write_urdf`."""
@@ -40,8 +40,7 @@ def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply'
             write_mesh(shape.mesh(), mesh)
         write_npz(shape.grid, voxels, shape.threshold)
         write_binvox(shape.grid, binvox, shape.threshold)
-        _, drawn = cv2.imencode('.png', shape_picture(shape)[..., ::-1])
-        picture.write_bytes(drawn.tobytes())
+        write_png(picture, shape_picture(shape)[..., ::-1])
         description.write_text(json.dumps(described(shape), indent=1) + '\n')
     except OSError as error:
         raise DataError(f'{folder}: not written: expected a folder with room, got: '
