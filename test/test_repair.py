@@ -177,6 +177,24 @@ def test_a_chunk_that_is_no_longer_known_as_one_is_missed_and_costs_no_other(tmp
     assert_whole(bag.folder)
 
 
+@pytest.mark.parametrize('byte', range(8))
+def test_a_spoilt_length_costs_one_chunk_of_a_bag_with_an_index(tmp_path, byte):
+    with announced(tmp_path / 'run') as bag:
+        fill(bag)
+    content = bytearray(bag.path.read_bytes())
+    third = [at for at in range(len(content)) if content[at:at + 4] == b'zstd'][2]
+    content[third - 4 - 28 - 8 + byte] ^= 1
+    bag.path.write_bytes(content)
+    with pytest.raises(DataError, match='bag repair'):
+        open_bag(bag.folder).summary()
+    (repair,), _ = repair_bag(bag.folder)
+    assert repair.lost
+    # Its own, or the next if it claims that one too
+    assert read(bag.folder) in [[message(number) for number in range(CHUNKS * IN_CHUNK)
+                                 if number // IN_CHUNK != lost] for lost in (2, 3)]
+    assert_whole(bag.folder)
+
+
 def test_a_spoilt_summary_changes_nothing_of_a_bag_that_is_repaired(tmp_path):
     with announced(tmp_path / 'run') as bag:
         fill(bag)

@@ -85,6 +85,7 @@ class RecordReader:
                  max_attachment_bytes: int = MAX_ATTACHMENT_BYTES,
                  skip: Callable[[str], None] | None = None) -> None:
         self.position = 0
+        self._chunks = 0
         self._file = file
         self._size = size
         self._advance = advance
@@ -96,15 +97,16 @@ class RecordReader:
         """
         Yield header, schemas, channels, messages, chunks, metadata, attachments and footer.
 
-        Raises DataError if the file is not MCAP, or ends before its footer and magic bytes.
+        They are those from `position` on. Raises DataError if the file is not MCAP, or ends before
+        its footer and magic bytes.
         """
-        if self._file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+        self._file.seek(self.position)
+        if not self.position and self._file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise DataError('no MCAP file: wrong magic bytes at its beginning', 'no_mcap')
         self.position = self._file.tell()
-        chunks = 0
         for opcode, length in _heads(self._file, self._size):
             self._advance(_HEAD_BYTES + length, '')
-            chunks += opcode == Opcode.CHUNK
+            self._chunks += opcode == Opcode.CHUNK
             wanted = opcode == Opcode.MESSAGE or opcode in _PARSERS
             if not wanted or (
                     opcode == Opcode.ATTACHMENT and length > self._max_attachment_bytes):
@@ -120,7 +122,7 @@ class RecordReader:
                 continue
             self.position = self._file.tell()
             if isinstance(record, Statistics):
-                self._require_chunks(record.chunk_count - chunks)
+                self._require_chunks(record.chunk_count - self._chunks)
                 continue
             if isinstance(record, Footer):
                 if self._file.read() != MCAP0_MAGIC:
@@ -133,6 +135,10 @@ class RecordReader:
         raise DataError(f'incomplete: its end is missing, as after a killed recorder; {_REPAIR}',
                         'truncated')
 
+
+    def go_on(self, position: int, chunks: int) -> None:
+        """Go on at the beginning of a record, so many chunks after the first, with `records`."""
+        self.position, self._chunks = position, chunks
 
     def _require_chunks(self, missing: int) -> None:
         """Tell of chunks that the index counts: what says that a record is one may be damaged."""

@@ -1,5 +1,6 @@
 """Reading what is intact of a damaged or incomplete MCAP file."""
 
+from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import suppress
 from os import SEEK_END
@@ -12,6 +13,7 @@ from active_recon.bags.storage.mcap_file import chunk_records, RecordReader
 from active_recon.errors import DataError
 from mcap.reader import SeekingReader
 from mcap.records import Chunk, DataEnd, Footer, Header, McapRecord
+from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
 _FOOTER = struct.Struct('<QQI')  # where summary and summary offsets begin, and the checksum
@@ -43,19 +45,26 @@ class Salvage:
         self.lost.clear()
         self.indexed = False
         size = self.path.stat().st_size
+        summary = self._summary()
+        begins = sorted(each.chunk_start_offset for each in summary.chunk_indexes
+                        ) if summary else []
         with self.path.open('rb') as file:
             reader = RecordReader(file, size, max_record_bytes=size, max_attachment_bytes=size,
                                   skip=self.lost.append)
-            try:
-                yield from self._content(reader)
-            except OSError:
-                raise
-            except Exception:  # the decoders raise all kinds of errors on damaged bytes
-                if size > reader.position:
-                    self.lost.append(f'the last {size - reader.position} bytes, from byte '
-                                     f'{reader.position}')
+            while reader.position < size:
+                try:
+                    yield from self._content(reader, summary)
+                except OSError:
+                    raise
+                except Exception:  # the decoders raise all kinds of errors on damaged bytes
+                    after = bisect_right(begins, reader.position)
+                    end = begins[after] if after < len(begins) else size
+                    if end > reader.position:
+                        self.lost.append(f'{"the last " * (end == size)}{end - reader.position} '
+                                         f'bytes, from byte {reader.position}')
+                    reader.go_on(end, after)
 
-    def _content(self, reader: RecordReader) -> Iterator[McapRecord]:
+    def _content(self, reader: RecordReader, summary: Summary | None) -> Iterator[McapRecord]:
         in_data = True
         for record in reader.records():
             if isinstance(record, Footer):
@@ -66,16 +75,16 @@ class Salvage:
                 yield from self._chunk(record)
             elif in_data:
                 yield record
-            if isinstance(record, Header):
-                yield from self._described()
+            if isinstance(record, Header) and summary:  # a damaged chunk may hold them
+                yield from (*summary.schemas.values(), *summary.channels.values())
 
-    def _described(self) -> list[McapRecord]:
-        """Return the schemas and channels of an intact summary: a damaged chunk may hold them."""
+    def _summary(self) -> Summary | None:
+        """Return the file's summary, if it is intact."""
         with suppress(Exception), self.path.open('rb') as file:
             summary = SeekingReader(file, record_size_limit=self.path.stat().st_size).get_summary()
-            if summary and _is_summary_intact(file):
-                return [*summary.schemas.values(), *summary.channels.values()]
-        return []
+            if _is_summary_intact(file):
+                return summary
+        return None
 
     def _chunk(self, chunk: Chunk) -> list[McapRecord]:
         """Return the records of a chunk, all or none."""
