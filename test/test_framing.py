@@ -100,7 +100,9 @@ def test_a_camera_that_looks_away_or_past_is_refused(camera):
     Camera(np.eye(4)), orbit_camera(0.0, 0.5, 1e-3), aimed(distance=0.7, turn_deg=(0, 90, 0)),
     orbit_camera(0.0, 0.0, 0.5), orbit_camera(math.pi / 4, math.atan(0.5**0.5), 0.9)])
 def test_a_camera_in_the_cube_or_beside_it_is_refused(camera):
-    assert "camera in the object's cube or beside it: expected a distance" in refusal(camera)
+    told = refusal(camera)
+    assert "camera in the object's cube or beside it: expected a distance" in told
+    assert told.endswith("set the cube's side (object_size; of photos --box)")
 
 
 @pytest.mark.parametrize('distance', [100, 2100, 1e5, 1e8, 9e8])

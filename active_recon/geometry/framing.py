@@ -12,6 +12,7 @@ _FEWEST_PIXELS = 4
 """Width of the cube's silhouette below which an image shows nothing of the object."""
 _NEAREST = 0.05
 """Sides of the cube that a camera has to be in front of its nearest corner, to see it framed."""
+_SIDE = "the cube's side (object_size; of photos --box)"
 _ALONG = np.linspace(-0.5, 0.5, 9)  # points along an edge, which a lens distorts
 
 
@@ -37,7 +38,7 @@ def require_in_image(camera: Camera, object_size: float,
         raise ViewError(
             "camera in the object's cube or beside it: expected a distance at which the whole "
             f'cube of {object_size:g} m is in front of the camera, got {camera.distance:.3g} m; '
-            'move it back or set object_size', 'out_of_image')
+            f'move it back, or set {_SIDE}', 'out_of_image')
     width = float(np.ptp(seen, axis=0).max())
     if width < _FEWEST_PIXELS:
         raise ViewError(
@@ -50,7 +51,7 @@ def require_in_image(camera: Camera, object_size: float,
         raise ViewError(
             f'object out of the image: expected its cube of {object_size:g} m in the image, got '
             f'{100 * outside:.0f} % of it outside; move the camera back, turn it to the object, '
-            'or set object_size', 'out_of_image')
+            f'or set {_SIDE}', 'out_of_image')
 
 
 def share_outside(camera: Camera, object_size: float) -> float:
