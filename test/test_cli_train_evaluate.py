@@ -354,7 +354,7 @@ def test_a_size_beside_given_weights_is_refused(dataset, tmp_path, monkeypatch, 
     assert '--size: small with given weights' in said
 
 
-def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given(
+def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given_and_tells_so(
         run, dataset, tmp_path, monkeypatch, capsys):
     out = tmp_path / 'further'
     given = load_file(run / 'weights.safetensors')
@@ -366,6 +366,10 @@ def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given(
     assert_close(after[name].float(), given[name].float(), rtol=2e-3, atol=1e-4)
     card = json.loads((out / 'weights.json').read_text())
     assert card['begun_with']['sha256'] == weights_hash(run / 'weights.safetensors')
+    assert command(monkeypatch, *training(dataset, tmp_path / 'policy', '--freeze-from',
+                                          out / 'weights.safetensors')) == 0
+    frozen = json.loads((tmp_path / 'policy' / 'weights.json').read_text())
+    assert frozen['begun_with'] == card['begun_with']
     assert 'both --freeze-from and --init-from' in refusal(monkeypatch, capsys, *training(
         dataset, tmp_path / 'none', '--init-from', run / 'weights.safetensors', '--freeze-from',
         run / 'weights.safetensors'))

@@ -8,7 +8,7 @@ from active_recon.errors import ConfigError, WeightsError
 from active_recon.models import weights_files as weights_module
 from active_recon.models.network_2d3d import SIZES
 from active_recon.models.weights import load_weights
-from active_recon.models.weights_files import FOLDER
+from active_recon.models.weights_files import FOLDER, read_card
 from active_recon.paper import systems
 from active_recon.paper.study import Study
 from active_recon.paper.systems import (
@@ -59,6 +59,15 @@ def test_what_is_fitted_in_one_go_sees_no_views():
     assert views_seen({'model': 'shape-basis', 'reconstruction': {
         'steps': 1, 'batch_size': 2, 'max_views': 5}}) is None
     assert views_seen({}) is None
+
+
+def test_views_of_the_weights_that_a_training_began_with_count_too():
+    assert views_seen(read_card(FOLDER / '2d3d.safetensors')) == 720_000
+    assert views_seen(read_card(FOLDER / '2d3d-attention.safetensors')) == 720_000 + 960_000
+    further = {'reconstruction': {'steps': 10, 'batch_size': 2, 'max_views': 1}}
+    assert views_seen(further) == 20
+    assert views_seen(further | {'begun_with': further}) == 40
+    assert views_seen(further | {'begun_with': {}}) is None
 
 
 def test_a_missing_system_is_trained_and_then_found(study, small_batches):

@@ -124,7 +124,11 @@ def _train(study: Study, training: Training) -> None:
 
 
 def views_seen(card: Mapping[str, Any]) -> int | None:
-    """Return the number of training views of a reconstruction by its card; None if unknown."""
+    """
+    Return the number of training views of a reconstruction by its card; None if unknown.
+
+    Those of the weights that its training began with count, too.
+    """
     if 'model' in card and network_entry(card['model']).fit:
         return None
     training = card.get('reconstruction') or {}
@@ -132,4 +136,8 @@ def views_seen(card: Mapping[str, Any]) -> int | None:
         return None
     length = (training['max_views'] if card.get('scheme') == 'joint'
               else mean_length(training['max_views'], training.get('curriculum_fraction', 0.5)))
-    return int(training['steps'] * training['batch_size'] * length)
+    own = int(training['steps'] * training['batch_size'] * length)
+    if 'begun_with' not in card:
+        return own
+    before = views_seen(card['begun_with'])
+    return None if before is None else before + own

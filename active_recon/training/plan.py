@@ -167,7 +167,9 @@ def _card(plan: Plan, training: ViewSet | MadeObjects) -> dict[str, Any]:
         'policy': plan.policy.to_dict() | plan.rewards.to_dict() if plan.policy else None,
     }
     if plan.begun and plan.frozen:
-        card['reconstruction'] = plan.begun.card.get('reconstruction', {})
+        kept = plan.begun.card
+        card['reconstruction'] = kept.get('reconstruction', {})
+        card |= {'begun_with': kept['begun_with']} if 'begun_with' in kept else {}
     elif plan.begun:
         card['begun_with'] = plan.begun.card
     return card
