@@ -2,9 +2,14 @@
 
 import json
 
-from active_recon.models.weights_files import DEFAULT_MODEL
+from active_recon.models.weights_files import (
+    DEFAULT_MODEL,
+    find_weights,
+    PAPER_MODEL,
+    weights_hash,
+)
 from benchmarks import views
-from benchmarks.lifting import DOCUMENTS, figures_by_set, with_tables
+from benchmarks.lifting import DOCUMENTS, figures_by_set, ROOT, with_tables
 import pytest
 
 
@@ -36,3 +41,15 @@ def test_a_table_of_view_policies_is_of_what_was_measured(path, table):
 def test_a_study_of_view_policies_was_run_as_it_is_listed(name):
     ran = json.loads((views.RESULTS / f'{name}.json').read_text())['command'].split()
     assert sorted(ran[2:]) == sorted([*views.STUDIES[name].split(), '--out', f'build/{name}'])
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'docs' / 'results').rglob('*.json')),
+                         ids=lambda path: str(path.relative_to(ROOT / 'docs' / 'results')))
+def test_a_result_of_one_network_was_measured_with_the_one_that_its_command_means(path):
+    found = json.loads(path.read_text())
+    words = found['command'].split()
+    usual = PAPER_MODEL if words[:2] == ['active-recon', 'evaluate'] else DEFAULT_MODEL
+    meant = words[words.index('--model') + 1] if '--model' in words else usual
+    if digest := found.get('weights_sha256') or found.get('weights'):
+        assert digest == weights_hash(find_weights(meant))
+    assert found.get('model', meant) == meant
