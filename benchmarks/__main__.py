@@ -4,6 +4,7 @@ Measure the parts named, or all but those that are measured by themselves; print
 `--keep` writes them to docs/results/benchmarks.json, and its table to doc/benchmarks.md.
 """
 
+import argparse
 from collections.abc import Callable, Mapping
 import platform
 import sys
@@ -47,7 +48,11 @@ BY_THEMSELVES = ('viewer', 'stream', 'bags')
 
 def main() -> None:
     """Print a row for each figure as it comes."""
-    named = [part for part in sys.argv[1:] if part != '--keep']
+    parser = argparse.ArgumentParser(prog='python -m benchmarks', description=__doc__)
+    parser.add_argument('parts', nargs='*', help=f'out of {", ".join(PARTS)}')
+    parser.add_argument('--keep', action='store_true')
+    options = parser.parse_args()
+    named = options.parts
     if unknown := [part for part in named if part not in PARTS]:
         sys.exit(f'expected parts out of {", ".join(PARTS)}, got {", ".join(unknown)}')
     reference = reference_ms()
@@ -58,7 +63,7 @@ def main() -> None:
         measured[part] = part_record(PARTS[part](), reference)
         for row in rows(measured[part]):
             print(row, flush=True)  # noqa: T201
-    if '--keep' in sys.argv[1:]:
+    if options.keep:
         keep(measured, list(PARTS), BY_THEMSELVES)
     missed = [figure['name'] for part in measured.values() for figure in part['figures']
               if not figure['reached']]

@@ -6,10 +6,10 @@ random views each, on one thread, in every precision in turns. It prints the IoU
 how much it differs from that in f32, and the time of a view as a ratio to that in f32.
 """
 
+import argparse
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-import sys
 import time
 
 from active_recon.datasets.layout import list_objects, ObjectFolder
@@ -36,11 +36,16 @@ def _precisions() -> Iterator[str]:
 
 def main() -> None:
     """Measure the dataset that is named on the command line, by a model's exports."""
+    parser = argparse.ArgumentParser(description='What bf16 and int8 do to the IoU and the time.')
+    parser.add_argument('dataset', type=Path, help="folder of a dataset in R2N2's layout")
+    parser.add_argument('model', nargs='?', help='a model that ships, or weights; default: the '
+                                                 'default network')
+    options = parser.parse_args()
     rng = np.random.default_rng(0)
-    folders = list_objects(Path(sys.argv[1]))
+    folders = list_objects(options.dataset)
     chosen = [folders[index] for index in rng.permutation(len(folders))[:_OBJECTS]]
     precisions = list(_precisions())
-    weights = find_weights(sys.argv[2] if len(sys.argv) > 2 else None)
+    weights = find_weights(options.model)
     runtimes = [load_runtime(weights, 'openvino', threads=1, precision=precision)
                 for precision in precisions]
     for runtime in runtimes:

@@ -1,5 +1,6 @@
 """Studies by commands of the package, run on the data in a folder, and tables of their results."""
 
+import argparse
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 import re
@@ -27,12 +28,22 @@ def chosen_studies(studies: Mapping[str, str]) -> tuple[Path, list[str]]:
     Return the folder of the data and the names of studies that the command line gives.
 
     Without names all studies are to be run; without a folder none, and the folder is this one. An
-    unknown name ends the program.
+    unknown name and a folder that is not there end the program.
     """
-    folder, *names = sys.argv[1:] or ['']
-    if unknown := sorted(set(names) - set(studies)):
+    parser = argparse.ArgumentParser(
+        description='Run studies, and write the tables of the documents.')
+    parser.add_argument('folder', type=Path, nargs='?',
+                        help='of the data; without it only the tables are written')
+    parser.add_argument('study', nargs='*', help=f'out of {", ".join(studies)}; default: all')
+    asked = parser.parse_args()
+    if unknown := sorted(set(asked.study) - set(studies)):
         sys.exit(f'unknown study: expected some of {", ".join(studies)}, got {", ".join(unknown)}')
-    return Path(folder), (names or list(studies)) if folder else []
+    if asked.folder is None:
+        return Path(), []
+    if not asked.folder.is_dir():
+        sys.exit(f'{asked.folder}: no such folder: expected that of the data, then names of '
+                 'studies')
+    return asked.folder, asked.study or list(studies)
 
 
 def run_study(command: str, arguments: str, stem: str, folder: Path, kept: Path) -> Path:

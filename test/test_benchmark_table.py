@@ -1,12 +1,18 @@
 """The table of doc/benchmarks.md is that of what was measured."""
 
+from importlib import import_module
 import json
+from pathlib import Path
+import sys
 
 from benchmarks.__main__ import BY_THEMSELVES, PARTS
 from benchmarks.figures import Figure
 from benchmarks.record import DOCUMENT, part_record, RESULTS, rows, with_table
 from benchmarks.stream import counting_lost
 import pytest
+
+BENCHMARKS = sorted(path.stem for path in RESULTS.parents[2].glob('benchmarks/*.py')
+                    if "__name__ == '__main__'" in path.read_text())
 
 
 def cells(figure):
@@ -37,3 +43,21 @@ def test_times_are_told_as_multiples_of_the_reference_and_nothing_else_is():
 def test_images_that_were_lost_are_among_the_slowest():
     some = Figure('p99', 'ms', counting_lost([0.01] * 147 + [0.0] * 3), 60, percentile=99)
     assert some.value == 1000 and not some.reached
+
+
+@pytest.mark.parametrize('name', BENCHMARKS)
+def test_every_benchmark_explains_itself(name, monkeypatch, capsys):
+    benchmark = import_module(f'benchmarks.{name}')
+    monkeypatch.setattr(sys, 'argv', [name, '--help'])
+    with pytest.raises(SystemExit) as ended:
+        benchmark.main()
+    assert not ended.value.code
+    assert 'usage: ' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('name', ['lifting', 'views'])
+def test_studies_without_their_folder_are_refused_in_one_line(name, monkeypatch):
+    benchmark = import_module(f'benchmarks.{name}')
+    monkeypatch.setattr(sys, 'argv', [name, str(Path('no', 'folder'))])
+    with pytest.raises(SystemExit, match='no such folder: expected that of the data'):
+        benchmark.main()
