@@ -43,6 +43,8 @@ def main() -> None:
     parser.add_argument('--out', type=Path, default=Path('depth.json'))
     options = parser.parse_args()
     folders = [folder for folder in list_objects(options.dataset) if folder.has_depth]
+    if not folders:
+        parser.error(f'{options.dataset}: no depth images: expected a dataset made with --depth')
     weights = find_weights(options.model)
     # One after the other, so that neither knows of the other
     ways = {way: Reconstructor.load(weights, threads=1) for way in WAYS}
