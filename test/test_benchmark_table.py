@@ -65,8 +65,9 @@ def test_studies_without_their_folder_are_refused_in_one_line(name, monkeypatch)
 
 def test_what_depth_adds_is_not_measured_where_there_is_none(
         dataset, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sys, 'argv', ['depth', str(dataset), '--out', str(tmp_path / 'depth.json')])
+    out = tmp_path / 'depth.json'
+    monkeypatch.setattr(sys, 'argv', ['depth', str(dataset), '--out', str(out)])
     with pytest.raises(SystemExit):
         import_module('benchmarks.depth').main()
     assert 'no depth images: expected a dataset made with --depth' in capsys.readouterr().err
-    assert not (tmp_path / 'depth.json').exists()
+    assert not out.exists()
