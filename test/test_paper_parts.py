@@ -73,6 +73,9 @@ def test_every_table_has_the_papers_own_figures_beside_ours(study):
     for name in ('table1', 'table2', 'table3', 'table4', 'table5'):
         columns = read(study, name)['tables'][0]['columns']
         assert {column['published'] for column in columns} == {True, False}
+        dataset = 'PASCAL3D+' if name in ('table2', 'table5') else 'ShapeNet'
+        assert all(column['heading'].startswith(f'{PUBLISHED}, {dataset}: ')
+                   for column in columns if column['published'])
 
 
 def test_a_second_run_does_no_work_and_changes_nothing(study, monkeypatch):

@@ -1,6 +1,11 @@
 """The paper's printed figures have the paper's shape."""
 
-from active_recon.paper import published
+import json
+from pathlib import Path
+
+from active_recon.evaluation.statistics import Interval
+from active_recon.paper import published, table2
+from active_recon.paper.results import Column
 from active_recon.shapes import CATEGORIES, UNSEEN_CATEGORIES
 import pytest
 
@@ -43,3 +48,20 @@ def test_table_5_has_the_unseen_categories_at_three_counts_of_views():
     for row in published.TABLE5.values():
         assert len(row) == len(published.TABLE5_VIEWS)
         assert sorted(row) == list(row)
+
+
+@pytest.mark.parametrize(('part', 'dataset'), [
+    ('table1', 'ShapeNet'), ('table2', 'PASCAL3D+'), ('table3', 'ShapeNet'),
+    ('table5', 'PASCAL3D+')])
+def test_printed_figures_stand_under_the_dataset_that_the_paper_measured(part, dataset):
+    results = Path(__file__).parents[1] / 'docs' / 'results' / f'{part}.json'
+    headings = [column['heading'] for table in json.loads(results.read_text())['tables']
+                for column in table['columns'] if column['published']]
+    assert headings
+    assert all(heading.startswith(f'published, {dataset}: ') for heading in headings)
+
+
+def test_a_column_of_printed_figures_names_their_dataset():
+    assert Column('1', [0.3], published=True, of='PASCAL3D+').title == 'published, PASCAL3D+: 1'
+    rows = {str(pair): (Interval(0.5, 0.4, 0.6),) * 2 for pair in published.TABLE2}
+    assert 'published, PASCAL3D+: test' in table2._table(rows).markdown()

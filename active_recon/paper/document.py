@@ -14,10 +14,10 @@ _INTRODUCTION = f"""\
 
 "Object Reconstruction Based on Attentive Recurrent Network from Single and Multiple Images". All
 figures are of this repository's own objects. Columns headed "{PUBLISHED}" hold what the paper
-printed: of other objects, of networks whose sizes it does not state, and so not to be compared
-with the figures beside them. Brackets are 95 % intervals. Whether a claim holds is decided by the
-program from the intervals of paired differences. The hashes of data and weights stand in full in
-each part's JSON."""
+printed, of the dataset that they name: of other objects, of networks whose sizes it does not
+state, and so not to be compared with the figures beside them. Brackets are 95 % intervals.
+Whether a claim holds is decided by the program from the intervals of paired differences. The
+hashes of data and weights stand in full in each part's JSON."""
 
 
 def write_document(study: Study) -> bool:

@@ -14,6 +14,7 @@ TABLE1: Mapping[str, Mapping[str, tuple[float, ...]]] = {
 }
 """Loss and IoU after 1 to 5 views, couch."""
 
+TABLE2_OF = 'PASCAL3D+'
 TABLE2: Mapping[tuple[float, float], tuple[float, float]] = {
     (0.0, 1.0): (0.592, 0.523),
     (0.2, 0.8): (0.604, 0.530),
@@ -53,6 +54,7 @@ TABLE4_TOTAL = 4.013
 """Seconds and percentage of the steps of a single-view reconstruction, and their sum."""
 
 TABLE5_VIEWS = (1, 3, 5)
+TABLE5_OF = 'PASCAL3D+'
 TABLE5: Mapping[str, tuple[float, float, float]] = {
     'bookshelf': (0.369, 0.417, 0.515),
     'bed': (0.140, 0.217, 0.228),

@@ -9,7 +9,7 @@ from active_recon.evaluation.statistics import Interval
 import numpy as np
 from numpy.typing import NDArray
 
-PUBLISHED = 'published, ShapeNet'
+PUBLISHED = 'published'
 Cell = Interval | float | int | str | None
 
 
@@ -18,13 +18,14 @@ class Column:
     """
     A column of a table; None is a cell that was not measured.
 
-    `published` marks the paper's own values, which its heading states. Raises ConfigError where
-    published and measured values are mixed.
+    `published` marks the paper's own values, which its heading states with the dataset that they
+    are `of`. Raises ConfigError where published and measured values are mixed.
     """
 
     heading: str
     cells: Sequence[Cell]
     published: bool = False
+    of: str = 'ShapeNet'
 
     def __post_init__(self) -> None:
         """Reject measured values under a published heading, and the reverse."""
@@ -36,8 +37,9 @@ class Column:
     @property
     def title(self) -> str:
         """The column's heading in the table."""
-        return ': '.join(filter(None, (PUBLISHED, self.heading))) if self.published else (
-            self.heading)
+        if not self.published:
+            return self.heading
+        return ': '.join(filter(None, (f'{PUBLISHED}, {self.of}', self.heading)))
 
 
 @dataclass(frozen=True)

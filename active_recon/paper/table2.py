@@ -112,7 +112,8 @@ def _table(rows: Mapping[str, tuple[Interval, Interval]]) -> Table:
     own = [Column(name, [row[part] for row in rows.values()])
            for part, name in enumerate(('training', 'test'))]
     return Table('Mean IoU by the weights of the losses', 'lambda_V / lambda_S', list(rows), [
-        *own, *(Column(name, cells, published=True) for name, cells in theirs.items())])
+        *own, *(Column(name, cells, published=True, of=published.TABLE2_OF)
+                for name, cells in theirs.items())])
 
 
 def _picture(rows: Mapping[str, tuple[Interval, Interval]]) -> Picture:

@@ -78,7 +78,7 @@ def _table(name: str, found: Mapping[str, Measured], views: list[int]) -> Table:
     for index, view in enumerate(published.TABLE5_VIEWS):
         columns.append(Column(str(view), [
             *(published.TABLE5[category][index] if category in published.TABLE5 else None
-              for category in names), None], published=True))
+              for category in names), None], published=True, of=published.TABLE5_OF))
     return Table(f'IoU by the number of views, {_NAMES[name]}', 'category', [*names, _ALL],
                  columns)
 
