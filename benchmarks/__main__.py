@@ -63,8 +63,9 @@ def main() -> None:
         measured[part] = part_record(PARTS[part](), reference)
         for row in rows(measured[part]):
             print(row, flush=True)  # noqa: T201
-    if options.keep:
-        keep(measured, list(PARTS), BY_THEMSELVES)
+    if options.keep and (others := keep(measured, list(PARTS), BY_THEMSELVES)):
+        print('kept beside these, of another machine or one that was not noted: '  # noqa: T201
+              f'{", ".join(others)}')
     missed = [figure['name'] for part in measured.values() for figure in part['figures']
               if not figure['reached']]
     print(f'missed: {", ".join(missed)}' if missed else 'every goal is reached')  # noqa: T201

@@ -2,6 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+import os
+from pathlib import Path
+import platform
+import re
 import time
 
 import numpy as np
@@ -60,6 +64,13 @@ def interleaved(tasks: Mapping[str, Callable[[], object]],
             if turn >= 2:
                 samples[name].append(1e3 * (time.perf_counter() - start))
     return samples
+
+
+def machine() -> str:
+    """Return the processor of this machine and the number of its threads, in words."""
+    file = Path('/proc/cpuinfo')
+    named = re.search(r'^model name\s*: (.*)$', file.read_text() if file.is_file() else '', re.M)
+    return f'{named[1] if named else platform.machine()}, {os.cpu_count()} threads'
 
 
 def reference_ms() -> float:

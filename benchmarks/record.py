@@ -6,7 +6,7 @@ from pathlib import Path
 import re
 from typing import Any
 
-from benchmarks.figures import Figure
+from benchmarks.figures import Figure, machine
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / 'docs' / 'results' / 'benchmarks.json'
@@ -16,24 +16,29 @@ _TABLE = re.compile(r'(<!-- bench: begin -->\n).*?(<!-- bench: end -->)', re.DOT
 _MS = {'ms': 1.0, 's': 1e3}
 
 Record = Mapping[str, Mapping[str, Any]]
-"""By the name of each part, its `reference_ms` and `figures`."""
+"""By the name of each part, its `machine`, `reference_ms` and `figures`."""
 
 
 def part_record(figures: Sequence[Figure], reference: float) -> dict[str, Any]:
     """Return what is kept of a part that was measured beside a reference, milliseconds."""
-    return {'reference_ms': reference, 'figures': [
+    return {'machine': machine(), 'reference_ms': reference, 'figures': [
         {'name': figure.name, 'unit': figure.unit, 'value': figure.value,
          'percentile': figure.percentile, 'low_high': figure.spread, 'goal': figure.goal,
          'more_is_better': figure.more_is_better, 'reached': figure.reached,
          'samples': len(figure.samples)} for figure in figures]}
 
 
-def keep(new: Record, order: Sequence[str], by_themselves: Sequence[str]) -> None:
-    """Write parts in the place of what was measured of them before, and the document's table."""
+def keep(new: Record, order: Sequence[str], by_themselves: Sequence[str]) -> list[str]:
+    """
+    Write parts in the place of what was measured of them before, and the document's table.
+
+    Return the parts that stay beside them and were not measured on this machine, as far as known.
+    """
     known = {**json.loads(RESULTS.read_text())['parts'], **new}
     parts = {name: known[name] for name in order if name in known}
     RESULTS.write_text(json.dumps({'command': 'make bench', 'parts': parts}, indent=1) + '\n')
     DOCUMENT.write_text(with_table(DOCUMENT.read_text(), parts, by_themselves))
+    return [name for name, part in parts.items() if part.get('machine') != machine()]
 
 
 def with_table(text: str, parts: Record, by_themselves: Sequence[str]) -> str:

@@ -5,9 +5,10 @@ import json
 from pathlib import Path
 import sys
 
+from benchmarks import record
 from benchmarks.__main__ import BY_THEMSELVES, PARTS
 from benchmarks.figures import Figure
-from benchmarks.record import DOCUMENT, part_record, RESULTS, rows, with_table
+from benchmarks.record import DOCUMENT, keep, part_record, RESULTS, rows, with_table
 from benchmarks.stream import counting_lost
 import pytest
 
@@ -71,3 +72,18 @@ def test_what_depth_adds_is_not_measured_where_there_is_none(
         import_module('benchmarks.depth').main()
     assert 'no depth images: expected a dataset made with --depth' in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_what_another_machine_measured_is_told_where_it_stays_in_the_table(tmp_path, monkeypatch):
+    files = {name: tmp_path / name for name in ('RESULTS', 'DOCUMENT')}
+    for name, file in files.items():
+        monkeypatch.setattr(record, name, file)
+    files['DOCUMENT'].write_text('<!-- bench: begin -->\n<!-- bench: end -->\n')
+    files['RESULTS'].write_text(json.dumps({'parts': {}}))
+    own = part_record([Figure('a view', 'ms', [3.0], 4)], 2.0)
+    elsewhere = {**own, 'machine': 'another'}
+    before = {key: value for key, value in own.items() if key != 'machine'}
+    order = ['here', 'elsewhere', 'before']
+    assert keep({'elsewhere': elsewhere, 'before': before}, order, []) == ['elsewhere', 'before']
+    assert keep({'here': own, 'before': own}, order, []) == ['elsewhere']
+    assert files['DOCUMENT'].read_text().count('| a view |') == 3
