@@ -5,7 +5,8 @@ The loop in operation for a long time: object after object, recorded, and what b
 
 A simulated turntable shows one object after another, each is an episode of five views, and all of
 it is recorded. Written are `soak.json` and `soak.md`: whether every episode was whole, how long
-the views took, and what each process held in memory. The exit code is 1 where a goal was missed.
+the views took, and what each process held in memory. The exit code is 1 where a goal was missed
+other than those of the latency, which depend on what else runs.
 """
 
 import argparse
@@ -77,7 +78,7 @@ class Soak:
 
     @property
     def missed(self) -> list[str]:
-        """What was not reached, in words; a latency counts on an idle machine alone."""
+        """What was not reached, in words, but for the latencies, which are of idle machines."""
         missed = [f'{name}: {count}' for name, count in self.lost.items()]
         if self.flagged > FALSE_ALARMS * self.views:
             missed.append(f'{self.flagged} views flagged as unusual')
@@ -93,6 +94,13 @@ class Soak:
         elif growth >= GROWTH_GOAL_MB:
             missed.append(f'the reconstructor grew by {growth:.1f} MB')
         return missed
+
+    @property
+    def slow(self) -> list[str]:
+        """Which goals of the latency were not reached, in words, however busy the machine was."""
+        return [f'{name} of the latency: {value:.1f} ms' for name, value, goal in (
+            ('p50', self.latency_p50_ms, P50_GOAL_MS), ('p99', self.latency_p99_ms, P99_GOAL_MS))
+            if value > goal]
 
 
 def soak(minutes: float) -> Soak:
@@ -162,7 +170,7 @@ def as_markdown(result: Soak) -> str:
     """Return the page that tells what was measured."""
     rows = [f'| `{name}` | {use.warm_mb:.1f} | {use.end_mb:.1f} | {use.growth_mb:+.1f} '
             f'| {use.peak_mb:.1f} |' for name, use in result.memory.items()]
-    missed = '; '.join(result.missed) or 'nothing'
+    missed = '; '.join([*result.missed, *result.slow]) or 'nothing'
     return '\n'.join([
         '# The loop over a long time', '',
         f'`{result.command}` on {result.cores} cores with {result.load:.1f} busy processes on '
