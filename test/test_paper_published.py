@@ -53,7 +53,7 @@ def test_table_5_has_the_unseen_categories_at_three_counts_of_views():
 @pytest.mark.parametrize(('part', 'dataset'), [
     ('table1', 'ShapeNet'), ('table2', 'PASCAL3D+'), ('table3', 'ShapeNet'),
     ('table5', 'PASCAL3D+')])
-def test_printed_figures_stand_under_the_dataset_that_the_paper_measured(part, dataset):
+def test_printed_figures_stand_under_the_dataset_that_the_paper_names(part, dataset):
     results = Path(__file__).parents[1] / 'docs' / 'results' / f'{part}.json'
     headings = [column['heading'] for table in json.loads(results.read_text())['tables']
                 for column in table['columns'] if column['published']]
