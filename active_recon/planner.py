@@ -249,7 +249,7 @@ class Planner:
 
     def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:
         """
-        Leave a goal's view out for the episode and decide on the next best.
+        Leave a goal's view out for the episode and decide on the next best, or that none is worth it.
 
         `camera` is where it is, None: where the last view was taken. Raises ViewError where
         nothing was asked for yet.
@@ -261,7 +261,8 @@ class Planner:
         if camera is None:
             camera = self._views[-1].camera if self._views else goal
         self._goal = self._best(camera)
-        return self.next_goal()
+        reason = self._stopping.reason_of_gain(self._goal and self._goal.worth)
+        return Decision(None, reason) if reason else self.next_goal()
 
     def stop(self) -> Decision:
         """End the episode for a reason from outside; `plan` still tells where next."""

@@ -571,6 +571,13 @@ def test_a_gain_out_of_reach_keeps_no_episode_going(best_in_reach, reason):
     assert decision.reason == reason
 
 
+def test_a_goal_given_up_ends_the_episode_where_no_other_gains_enough():
+    planner, decision = after_one_view(ring({180: 0.3, 90: 0.06}), min_gain=0.05)
+    decision = planner.give_up(decision.goal.camera)
+    assert math.degrees(decision.goal.camera.azimuth) == pytest.approx(90)
+    assert planner.give_up(decision.goal.camera).reason == 'gain_too_small'
+
+
 def test_a_gain_that_was_already_taken_keeps_no_episode_going():
     _, decision = after_one_view(ring({0: 0.3}), min_gain=0.05)
     assert decision.reason == 'gain_too_small'

@@ -255,8 +255,9 @@ class ViewPlannerNode(ManagedNode):
         if timeout == 0 or failed is None or not self._goals.open_for > timeout:
             return
         decision = self._planner.give_up(failed, self._first_view.camera)
-        instead = ('no reachable goal is left' if decision.goal is None else
-                   f'the next best is {_place_words(decision.goal.camera)}')
+        instead = (f'the next best is {_place_words(decision.goal.camera)}' if decision.goal else
+                   'no reachable goal is left' if decision.reason == 'no_reachable_azimuth' else
+                   f'the episode ends: {decision.reason}')
         self._diagnostics.warn('goal_timeout', (
             f'no view from {_place_words(failed)}: expected one within '
             f'{timeout:g} s, got none; it is left out of this episode, {instead}'))

@@ -60,9 +60,12 @@ class StoppingRule:
             return 'target_out_of_reach'
         if self._settled(entropies):
             return 'entropy_settled'
-        if self.min_gain and worth is not None and worth < self.min_gain:
-            return 'gain_too_small'
-        return ''
+        return self.reason_of_gain(worth)
+
+    def reason_of_gain(self, worth: float | None) -> str:
+        """Return 'gain_too_small' where the best further view is not worth it, '' elsewhere."""
+        is_small = self.min_gain and worth is not None and worth < self.min_gain
+        return 'gain_too_small' if is_small else ''
 
     def _settled(self, entropies: Sequence[float]) -> bool:
         """Whether the last two views each changed the entropy by no more than the tolerance."""
