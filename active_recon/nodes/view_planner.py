@@ -160,7 +160,7 @@ class ViewPlannerNode(ManagedNode):
             self._views.clear()
             self._reset_episode()
         elif self._goals.camera is not None:
-            self._publish_goal(self._planner.plan())  # with a stamp of the new time
+            self._follow(self._planner.next_goal(), now)  # with a stamp of the new time
             self._tell_reason()
 
     def _on_camera(self) -> None:

@@ -166,6 +166,20 @@ def test_a_planner_keeps_an_episode_that_came_before_it_heard_the_new_time(
     assert bench.counts('view_planner')['episodes'] == 2
 
 
+def test_a_goal_that_another_policy_has_none_instead_of_ends_where_the_clock_goes_back(
+        start_node, bench, latent):  # noqa: F811
+    start_node('view_planner', policy='uniform', max_views=24, start_azimuth=math.radians(58),
+               azimuth_range='[1.0, 1.3]', use_sim_time=True)  # of a single candidate
+    clock, fake = FakeClock(bench), FakeReconstructor(bench)
+    fake.begin('only', 20 * S)
+    clock.until(lambda: within(fake.goals, 110, 111), 'the first goal', 110.0)
+    fake.show(latent, math.radians(58), 110 * S + S // 2)
+    clock.until(lambda: view_goal_from_msg(fake.goals[-1]).azimuth == pytest.approx(
+        math.radians(73)), 'the goal between candidates', 111.0)
+    assert change(bench, 'view_planner', policy='farthest')['policy'].successful
+    clock.until(lambda: fake.done[-1].frame_id == 'no_reachable_azimuth', 'the end', 50.0)
+
+
 def test_a_first_goal_is_not_where_the_camera_stood_before_the_clock_went_back(start_node, bench):
     start_node('view_planner', policy='farthest', use_sim_time=True)
     clock, fake = FakeClock(bench), FakeReconstructor(bench)
