@@ -184,7 +184,8 @@ class ViewPlannerNode(ManagedNode):
 
     def _prepare(self, camera: Camera) -> None:
         """Let the policy prepare while the reconstructor makes its clouds."""
-        self._planner.expect_camera(camera, self._params.values.object_size)
+        with self._diagnostics.rejecting():  # a policy that fails here may still choose
+            self._planner.expect_camera(camera, self._params.values.object_size)
 
     def _expect(self, view: PlannerView) -> None:
         """Let the policy choose while the reconstructor judges the quality."""

@@ -248,3 +248,29 @@ def test_a_sweep_in_the_policy_s_place_is_told_while_views_are_unusual(start_nod
         bench.until(lambda: bench.state('view_planner').facts['Policy'] == told, told)  # noqa: B023
         bench.until(lambda: ('min_gain 0.01 has no effect' in bench.state('view_planner').problem)
                     != bool(suspect), 'that only scores of the policy are no gains')  # noqa: B023
+
+
+OWN_POLICY = """
+from active_recon.policies import POLICIES
+from active_recon.policies.geometric import FarthestPolicy
+from active_recon.policies.registry import PolicyEntry
+
+class Fails(FarthestPolicy):
+    def prepare(self, taken, candidates):
+        raise RuntimeError('a fault of its own')
+
+POLICIES['own'] = PolicyEntry(lambda options: Fails())
+from active_recon.nodes.view_planner import main
+main()
+"""
+
+
+def test_a_policy_that_fails_to_prepare_is_told_and_chooses(start_node, bench, latent, tmp_path):
+    (tmp_path / 'own.py').write_text(OWN_POLICY)
+    planner = start_node('view_planner', program=[str(tmp_path / 'own.py')], policy='own',
+                         start_azimuth=0.0)
+    fake = FakeReconstructor(bench)
+    fake.begin('only')
+    fake.wait_goal(0)
+    fake.wait_goal(fake.show(latent, 0.0))
+    assert planner.log('refused: policy: prepare fails with RuntimeError: a fault of its own')
