@@ -23,7 +23,7 @@ from active_recon.policies import (
     PolicyOptions,
 )
 from active_recon.policies.automatic import SWEEP
-from active_recon.policies.checked import chosen, telling_failures
+from active_recon.policies.checked import begun_by, chosen, telling_failures
 from active_recon.policies.planner_views import (
     cameras_of,
     observation,
@@ -122,8 +122,7 @@ class Planner:
     def reset(self) -> None:
         """Forget the episode; raises ViewError where a policy of one's own fails."""
         self._views: list[PlannerView] = []
-        with telling_failures('policy: initial_state'):
-            self._state = self._policy.initial_state(1)
+        self._state = begun_by(self._policy)
         self._choice: Choice | None = None
         self._first: Camera | None = None
         self._wanted: Wanted | None = None
@@ -249,7 +248,7 @@ class Planner:
 
     def give_up(self, goal: Camera, camera: Camera | None = None) -> Decision:
         """
-        Leave a goal's view out for the episode and decide on the next best, or that none is worth it.
+        Leave a goal's view out for the episode and decide on the next best, or to end it.
 
         `camera` is where it is, None: where the last view was taken. Raises ViewError where
         nothing was asked for yet.

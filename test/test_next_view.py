@@ -7,7 +7,7 @@ import math
 from active_recon.datasets.drawn_cameras import DOME_ELEVATIONS, Viewing
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
-from active_recon.errors import ConfigError, DataError
+from active_recon.errors import ConfigError, DataError, ViewError
 from active_recon.evaluation.next_view import study
 from active_recon.evaluation.next_view.choosing import (
     chosen_ahead,
@@ -208,6 +208,18 @@ def test_a_policy_s_views_are_where_it_goes(watched):
     assert chosen_by(UniformPolicy(4), watched, 5, 4) == (5, 11, 17, 23)
     assert chosen_by(FarthestPolicy(), watched, 0, 2) == (0, 12)
     assert sorted(chosen_by(FarthestPolicy(), watched, 3, 30)) == list(range(24))
+
+
+class Fails(FarthestPolicy):
+    """A policy with a fault of its own."""
+
+    def choose(self, seen, state):
+        return 1 / 0
+
+
+def test_a_policy_that_fails_is_told_where_its_views_are_chosen(watched):
+    with pytest.raises(ViewError, match='policy: fails with ZeroDivisionError: division'):
+        chosen_by(Fails(), watched, 5, 4)
 
 
 def test_a_sweep_of_more_views_than_there_are_takes_each_once():

@@ -47,6 +47,19 @@ def test_a_policy_without_finite_scores_is_refused_where_it_is_measured(network,
         list(roll_out(network, Undecided(), views, torch.arange(3), torch.zeros(3).long(), 2))
 
 
+class Fails(Undecided):
+    """A policy with a fault of its own."""
+
+    def __init__(self, where):
+        setattr(self, where, lambda *_: 1 / 0)
+
+
+@pytest.mark.parametrize(('where', 'said'), [('choose', ''), ('initial_state', ' initial_state')])
+def test_a_policy_that_fails_is_told_where_it_is_measured(network, views, where, said):
+    with pytest.raises(ViewError, match=f'policy:{said} fails with ZeroDivisionError: division'):
+        list(roll_out(network, Fails(where), views, torch.arange(3), torch.zeros(3).long(), 2))
+
+
 class Fond(Undecided):
     """A policy that likes the first views best, whatever was taken."""
 

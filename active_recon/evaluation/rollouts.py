@@ -10,7 +10,7 @@ from active_recon.evaluation.exported_network import ExportedNetwork
 from active_recon.geometry.cameras import azimuth_difference, pose_azimuths
 from active_recon.models.network import ReconstructionNetwork, State
 from active_recon.policies import Choice, Observation, Policy
-from active_recon.policies.checked import checked_choice
+from active_recon.policies.checked import begun_by, chosen
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +126,7 @@ def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, obj
     own = RenderedObjects(observer, objects)
     other = own if swapped is None else RenderedObjects(observer, swapped)
     other.reset()
-    memory = policy.initial_state(len(objects))
+    memory = begun_by(policy, len(objects))
 
     def choose(step: TimeStep[Tensor, Seen]) -> Tensor:
         nonlocal memory
@@ -136,9 +136,8 @@ def roll_out(network: ReconstructionNetwork, policy: Policy, views: ViewSet, obj
             given = other.step(nearest_views(views.azimuths[swapped].numpy(), at))
         volume = observer.occupancy(given.state) if policy.wants_volume else None
         latent = given.state['latent']
-        choice, memory = checked_choice(policy.choose(
-            own.observation(latent, step.known, volume), memory),
-            views.images.shape[1], len(objects))
+        choice, memory = chosen(
+            policy, own.observation(latent, step.known, volume), memory, len(objects))
         return own.view_of(choice)
 
     for step in run_episode(own, starts, choose, count):

@@ -35,11 +35,17 @@ def checked_choice(found: Any, count: int, batch: int = 1) -> tuple[Choice, Any]
     return replace(choice, scores=scores, azimuth=azimuth), state
 
 
-def chosen(policy: Policy, seen: Observation, state: Any) -> tuple[Choice, Any]:
-    """Return what a policy chooses for one episode; raises ViewError where it fails, too."""
+def begun_by(policy: Policy, batch: int = 1) -> Any:
+    """Return a policy's state of so many episodes before any view; raises ViewError likewise."""
+    with telling_failures('policy: initial_state'):
+        return policy.initial_state(batch)
+
+
+def chosen(policy: Policy, seen: Observation, state: Any, batch: int = 1) -> tuple[Choice, Any]:
+    """Return what a policy chooses for so many episodes; raises ViewError where it fails, too."""
     with telling_failures('policy:'):
         found = policy.choose(seen, state)
-    return checked_choice(found, seen.candidates.shape[1])
+    return checked_choice(found, seen.candidates.shape[1], batch)
 
 
 @contextmanager

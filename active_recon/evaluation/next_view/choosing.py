@@ -8,7 +8,7 @@ from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
 from active_recon.evaluation.next_view.watching import Ahead, Walk, WatchedObject
 from active_recon.geometry.cameras import Camera
 from active_recon.policies import Policy
-from active_recon.policies.checked import checked_choice
+from active_recon.policies.checked import begun_by, chosen
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,12 +24,11 @@ def chosen_by(policy: Policy, watched: WatchedObject, start: int, count: int,
     `motion_cost` of a second, at 1 rad/s around either axis, is taken off, see `TimedMotion`. What
     a policy proposes between the candidates is left out, since nothing was rendered there.
     """
-    walk, memory = watched.begin(start), policy.initial_state(1)
+    walk, memory = watched.begin(start), begun_by(policy)
     cost = MotionCost(timed=TimedMotion(motion_cost=motion_cost))
     cameras = cameras_of(watched)
     while len(walk.taken) < min(count, watched.count):
-        choice, memory = checked_choice(policy.choose(
-            watched.observation(walk, policy.wants_volume), memory), watched.count)
+        choice, memory = chosen(policy, watched.observation(walk, policy.wants_volume), memory)
         scores = cost.utility(choice.scores[0], choice.is_gain, cameras[walk.taken[-1]], cameras,
                               MotionLimits()).copy()
         scores[list(walk.taken)] = -np.inf
