@@ -8,7 +8,7 @@ import shutil
 
 from active_recon.models.network_2d3d import SIZES
 from active_recon.models.weights import load_weights
-from active_recon.models.weights_files import weights_hash
+from active_recon.models.weights_files import PAPER_MODEL, weights_hash
 from command_line import command, refusal
 import pytest
 from safetensors.torch import load_file
@@ -348,6 +348,20 @@ def test_options_of_losses_that_a_network_does_not_learn_by_are_refused(
     assert f'{option}: no effect: expected none, since {model} learns' in line
 
 
+@pytest.mark.parametrize(('more', 'said'), [
+    (('--freeze-from', PAPER_MODEL, '--steps', 9, '--no-augment'),
+     '--steps, --augment with --freeze-from, whose reconstruction is not trained: no effect'),
+    (('--scheme', 'joint', '--curriculum-fraction', 0), '--curriculum-fraction with --scheme jo'),
+    (('--scheme', 'joint', '--policy-steps', 9), '--policy-steps with --scheme joint: no effect'),
+    (('--model', 'carving', '--steps', 9), '--steps with carving, which learns all at once: no'),
+    (('--model', 'shape-basis', '--max-views', 3), '--max-views with shape-basis, which learns'),
+    (('--kept', 9, '--uses', 2), '--uses, --kept without --make: they are for it alone')])
+def test_options_of_what_is_not_trained_are_refused(
+        more, said, dataset, tmp_path, monkeypatch, capsys):
+    assert said in refusal(monkeypatch, capsys, 'train', dataset, '--validation', dataset,
+                           '--out', tmp_path / 'run', '--threads', 1, *more)
+
+
 def test_a_size_beside_given_weights_is_refused(dataset, tmp_path, monkeypatch, capsys):
     asked = training(dataset, tmp_path, '--model', '2d3d', '--size', 'small')
     said = refusal(monkeypatch, capsys, *asked, '--init-from', '2d3d')
@@ -387,8 +401,10 @@ def test_weights_of_another_network_are_refused(
 
 def test_a_policy_alone_leaves_its_reconstruction_as_it_was(run, dataset, tmp_path, monkeypatch):
     out = tmp_path / 'policy'
-    assert command(monkeypatch, *training(
-        dataset, out, '--freeze-from', run / 'weights.safetensors', '--seed', 3)) == 0
+    assert command(
+        monkeypatch, 'train', dataset, '--validation', dataset, '--out', out, '--policy-steps', 2,
+        '--policy-batch-size', 2, '--group-size', 2, '--threads', 1, '--seed', 3, '--freeze-from',
+        run / 'weights.safetensors') == 0
     before, after = (load_file(folder / 'weights.safetensors') for folder in (run, out))
     for name, tensor in before.items():
         same = bool((after[name] == tensor).all())

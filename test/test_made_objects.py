@@ -288,6 +288,7 @@ def test_a_training_on_made_objects_tells_them_in_its_card(
     (('--made-of', 'mesh=1'), 'a share of meshes and no meshes'),
     (('--made-cameras', 'arm=1'), 'cameras: invalid shares'),
     (('--uses', 0), '--uses: expected a number above 0, got 0'),
+    (('--meshes', 'any', '--made-of', 'thing=1'), '--meshes: no effect: expected a share of mesh'),
     (('--meshes', 'nowhere'), 'nowhere: no such file or folder')])
 def test_options_that_make_nothing_are_refused(
         validation, tmp_path, monkeypatch, capsys, more, told):

@@ -77,6 +77,14 @@ def test_training_images_are_those_of_a_dataset(tmp_path, monkeypatch, capsys):
     assert '--model without --training' in line
 
 
+@pytest.mark.parametrize(('shown', 'option'), [('--training', '--azimuth-deg'),
+                                                ('--meshes', '--count')])
+def test_an_option_that_changes_nothing_of_what_is_shown_is_refused(
+        shown, option, tmp_path, monkeypatch, capsys):
+    line = refused(monkeypatch, capsys, 'sheet', tmp_path / 'x.png', shown, tmp_path, option, 3)
+    assert f'{option} with {shown}' in line and 'no effect there' in line
+
+
 def test_a_folder_without_meshes_or_objects_is_refused(tmp_path):
     with pytest.raises(DataError, match='no mesh files: expected some'):
         run(tmp_path / 'none.png', '--meshes', tmp_path)

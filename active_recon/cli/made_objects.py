@@ -76,6 +76,9 @@ class MadeOptions:
         elif self.meshes is None:
             recipe = replace(recipe, sources={name: share for name, share
                                               in recipe.sources.items() if name != MESH})
+        if self.meshes and not recipe.sources.get(MESH):
+            raise ConfigError('--meshes: no effect: expected a share of mesh in --made-of, got '
+                              f'{self.sources}')
         if self.cameras:
             recipe = replace(recipe, cameras=_shares('--made-cameras', self.cameras))
         batch = training.batch_size // world

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.needed_options import refuse_idle
 from active_recon.errors import ConfigError, DataError
 from active_recon.whole_files import writable
 import typer
@@ -15,6 +16,7 @@ _TRAINING_VIEWS = 8
 
 
 def sheet(
+    context: typer.Context,
     out: Annotated[Path, typer.Argument(help='PNG file to write.')],
     category: Annotated[list[str] | None, typer.Option(
         help='Parametric category to show (may be given several times); default: all.')] = None,
@@ -48,6 +50,8 @@ def sheet(
     if model is not None and training is None:
         raise ConfigError('sheet: --model without --training: expected a dataset whose training '
                           'images are shown as the network sees them, got none')
+    refuse_idle(context, 'with --training', training is not None, 'azimuth_deg')
+    refuse_idle(context, 'with --meshes, which shows all of them', meshes is not None, 'count')
     if out.suffix.lower() != '.png':
         raise ConfigError(f'{out}: no PNG file: expected a path that ends with .png')
     writable(out)

@@ -20,6 +20,7 @@ from active_recon.cli.made_objects import (
     Uses,
     warn_of_meshes,
 )
+from active_recon.cli.needed_options import refuse_idle, refuse_lone
 from active_recon.cli.reading import read_objects, Split, warn_of_shared_objects
 from active_recon.errors import ConfigError
 import typer
@@ -29,7 +30,13 @@ if TYPE_CHECKING:
     from active_recon.models.weights import Bundle
 
 
+_OF_STEPS = ('steps', 'batch_size', 'learning_rate', 'curriculum_fraction', 'warmup_steps',
+             'checkpoint_every', 'validate_every', 'augment')
+"""Options of a reconstruction that is trained step by step."""
+
+
 def train(
+    context: typer.Context,
     validation: Annotated[list[Path], typer.Option(
         help='Folder of validation objects, on which the threshold is chosen. May be given '
              'several times.')],
@@ -153,14 +160,23 @@ def train(
     if bool(data) == (make is not None):
         raise ConfigError('training objects: expected folders of them, or --make to make them '
                           f'during the training, got {"both" if data else "neither"}')
+    refuse_lone(context, '--make', make is not None, 'uses', 'kept')
     making = MadeOptions(make or 0, meshes, made_of, made_cameras, uses, kept)
     if freeze_from and init_from:
         raise ConfigError('both --freeze-from and --init-from: give one of them')
     if widen_to and not init_from:
         raise ConfigError('--widen-to without --init-from: expected weights to begin with')
+    refuse_idle(context, 'with --freeze-from, whose reconstruction is not trained',
+                freeze_from is not None, *_OF_STEPS, 'volume_loss', 'volume_weight',
+                'silhouette_weight')
+    joint = scheme == 'joint'
+    refuse_idle(context, 'with --scheme joint', joint, 'curriculum_fraction', 'policy_steps',
+                'policy_batch_size', 'policy_learning_rate')
     begun = freeze_from or init_from
     own_file, model = model, named_network(model)
     entry = network_entry(model)
+    refuse_idle(context, f'with {model}, which learns all at once', entry.fit is not None,
+                *_OF_STEPS, 'max_views')
     loss = LossConfig(
         entry.loss.volume_weight if volume_weight is None else volume_weight,
         entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
@@ -170,7 +186,6 @@ def train(
     second = TrainingConfig(
         max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed, bf16,
         augment=False, warmup_steps=20, checkpoint_every=50, validate_every=250)
-    joint = scheme == 'joint'
     if group_size is None:
         group_size = 1 if joint else 6
     if view_separation_deg is None:
