@@ -335,6 +335,16 @@ def test_the_command_writes_the_files_where_it_is_told_or_says_why_not(
         capsys.readouterr().err)
 
 
+def test_a_folder_without_objects_to_take_ranges_of_is_refused_before_anything_is_written(
+        exported, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, 'nncf', ModuleType('nncf'))
+    (tmp_path / 'new').mkdir()
+    assert command(monkeypatch, 'export', exported('lifting'), tmp_path / 'new', '--int8',
+                   tmp_path / 'none') == 2
+    assert "none: no dataset in R2N2's layout" in capsys.readouterr().err
+    assert not list((tmp_path / 'new').iterdir())
+
+
 def test_graphs_are_written_whole_or_those_before_stay(exported):
     weights = exported('ptn')
     before = {path: path.read_bytes() for path in weights.parent.glob('ptn*')}

@@ -31,13 +31,12 @@ def export(
 
     file = find_weights(weights)
     if int8 is not None:  # before anything is written
-        from active_recon.exporting.quantization import require_quantisable
+        from active_recon.datasets.layout import list_objects
+        from active_recon.exporting.quantization import quantize, require_quantisable
 
         require_quantisable(file)
+        objects = list_objects(int8)
     for path in written(file, out):
         typer.echo(f'wrote {path}')
     if int8 is not None:
-        from active_recon.datasets.layout import list_objects
-        from active_recon.exporting.quantization import quantize
-
-        typer.echo(f'wrote {quantize(file, list_objects(int8), out)}')
+        typer.echo(f'wrote {quantize(file, objects, out)}')
