@@ -125,7 +125,7 @@ def image_without_a_stamp(camera):
     (image_that_arrives_twice, 'duplicate', 'duplicate image: got that of'),
     (image_older_than_the_last, 'out_of_order', 'expected increasing stamps, got .* after'),
     (image_of_the_last_episode, 'last_episode', 'image of another episode: expected one of this '
-                                                'episode.*got one of'),
+                                                'episode.*got one of 1.000 s; for a record'),
     (image_without_a_stamp, 'no_stamp', 'image without a stamp: .*got 0; let its publisher fill'),
 ], ids=lambda value: value.__name__ if callable(value) else '')
 def test_bad_input_is_said_once_counted_and_survived(
@@ -154,6 +154,7 @@ def test_what_is_late_of_the_last_episode_never_reaches_the_new_one(
         return shared_bench.counts('reconstructor').get('refused/last_episode', 0) > refused
 
     shared_bench.until(was_refused, 'the refusal of the late image')
+    assert 'on its way when that began' in shared_bench.state('reconstructor').problem
     taken = camera.show()
     shared_bench.until(
         lambda: shared_bench.state('reconstructor').facts.get('Views of the episode') == '1',

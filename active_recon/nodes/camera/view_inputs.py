@@ -25,6 +25,8 @@ from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.views import NOT_BEGUN, View, ViewJoiner
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+_ON_ITS_WAY_S = 2.0
+"""Longest way of an image of a camera that runs, seconds."""
 CLOCK_AHEAD_S = 5.0
 """Time ahead of the node's clock from which an image's stamp is warned of."""
 
@@ -98,11 +100,13 @@ class ViewInputs:
                 raise MessageError(
                     'image without a stamp: expected that of when it was taken, got 0; let its '
                     'publisher fill in header.stamp', 'no_stamp')
-            if stamp < self._begin or self._node.clock_monitor.is_ahead(stamp):
+            early = self._begin - stamp
+            if early > 0 or self._node.clock_monitor.is_ahead(stamp):
                 raise MessageError(
                     'image of another episode: expected one of this episode, which began at '
-                    f'{self._begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; for a '
-                    'recording, play its clock and set use_sim_time', 'last_episode')
+                    f'{self._begin / 1e9:.3f} s, got one of {stamp / 1e9:.3f} s; '
+                    + ('it was on its way when that began' if 0 < early < _ON_ITS_WAY_S * 1e9 else
+                       'for a recording, play its clock and set use_sim_time'), 'last_episode')
             self._check_clock(stamp)
             self._joiner.add_image(stamp, msg, time.monotonic())
             self._poses.on_image(msg.header)
