@@ -30,7 +30,8 @@ class TurntableCameraParameters(CubeParameters):
     rate: float = parameter(10.0, 'image rate, Hz', low=0.1, high=1000.0, dynamic=True)
     camera_frame: str = parameter('camera_optical_frame', 'frame of the images', needed=True)
     faults: tuple[str, ...] = parameter(
-        (), 'simulated faults, each as NAME:AMOUNT, such as drop_images:0.3', dynamic=True)
+        (), "simulated faults, each as NAME:AMOUNT in quotes, such as ['drop_images:0.3']",
+        dynamic=True)
     faults_seed: int = parameter(
         0, 'seed of random faults', low=0, high=2**32 - 1)
 
