@@ -260,7 +260,7 @@ class Planner:
         if camera is None:
             camera = self._views[-1].camera if self._views else goal
         self._goal = self._best(camera)
-        reason = self._stopping.reason_of_gain(self._goal and self._goal.worth)
+        reason = self._stopping.reason_of_gain(None if self._goal is None else self._goal.worth)
         return Decision(None, reason) if reason else self.next_goal()
 
     def stop(self) -> Decision:
