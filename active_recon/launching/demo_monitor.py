@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
+from active_recon.errors import ActiveReconError
 from active_recon.launching.loop_client import joined_domain, LoopClient
 from active_recon.nodes.loop.followed_loop import Loop
 from active_recon.nodes.loop.loop_subscriber import LoopSubscriber
@@ -11,10 +12,14 @@ from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.viewer.state import LoopState, Observer
 from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.voxels import iou, VoxelGrid
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 import numpy as np
 from numpy.typing import NDArray
+from rcl_interfaces.srv import SetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 RECORDED = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'next_view', 'view')
 """What the recorder has to hear from its first message on, for its bag to be replayed."""
@@ -65,6 +70,23 @@ class DemoMonitor(LoopClient):
         return all('recorder' in {each.node_name for each in
                                   self._node.get_subscriptions_info_by_topic(topic)}
                    for topic in RECORDED)
+
+    def change_state(self, node: str, transition: str, budget_s: float,
+                     meanwhile: Callable[[], None]) -> bool:
+        """Let a lifecycle node 'configure' or 'activate'; return whether it did."""
+        service = f'{node}/change_state'
+        request = ChangeState.Request(transition=Transition(label=transition))
+        return bool(self._call(ChangeState, service, request, budget_s, meanwhile).success)
+
+    def set_parameter(self, node: str, name: str, value: str, budget_s: float,
+                      meanwhile: Callable[[], None]) -> None:
+        """Set a parameter of a node; ActiveReconError where it refuses the value."""
+        request = SetParameters.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()])
+        service = f'{node}/set_parameters'
+        result, = self._call(SetParameters, service, request, budget_s, meanwhile).results
+        if not result.successful:
+            raise ActiveReconError(f'{service} answered: {result.reason}')
 
     def within(self, condition: Callable[[], bool], budget_s: float,
                meanwhile: Callable[[], None]) -> bool:

@@ -6,14 +6,10 @@ import time
 from typing import Any
 
 from active_recon.errors import ActiveReconError
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
-from rcl_interfaces.srv import SetParameters
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
@@ -51,23 +47,6 @@ class LoopClient:
         if not result.success:
             raise ActiveReconError(f'{service} answered: {result.message}')
         return str(result.message)
-
-    def change_state(self, node: str, transition: str, budget_s: float,
-                     meanwhile: Callable[[], None]) -> bool:
-        """Let a lifecycle node 'configure' or 'activate'; return whether it did."""
-        service = f'{node}/change_state'
-        request = ChangeState.Request(transition=Transition(label=transition))
-        return bool(self._call(ChangeState, service, request, budget_s, meanwhile).success)
-
-    def set_parameter(self, node: str, name: str, value: str, budget_s: float,
-                      meanwhile: Callable[[], None]) -> None:
-        """Set a parameter of a node; ActiveReconError where it refuses the value."""
-        request = SetParameters.Request(
-            parameters=[Parameter(name, value=value).to_parameter_msg()])
-        service = f'{node}/set_parameters'
-        result, = self._call(SetParameters, service, request, budget_s, meanwhile).results
-        if not result.successful:
-            raise ActiveReconError(f'{service} answered: {result.reason}')
 
     def _call(self, kind: Any, service: str, request: Any, budget_s: float,
               meanwhile: Callable[[], None]) -> Any:
