@@ -276,6 +276,16 @@ def test_without_faults_to_learn_nothing_is_fitted():
         fit(made_up(20, 9), made_up(20, 10), 'abc')
 
 
+@pytest.mark.filterwarnings('error')
+def test_a_fault_that_was_not_measured_is_never_suspected():
+    faults = [made_up(60, 2, fault) for fault in FAULTS if fault != 'pose']
+    few = fit(made_up(400, 0), Measured.joined([made_up(400, 1), *faults]), 'abc')
+    assert few.suspects == tuple(fault for fault in FAULTS if fault != 'pose')
+    found = study(Measured.joined([made_up(40, 4, fault) for fault in FAULTS]), few)['faults']
+    assert {fault: after['3']['named'] > 0.9 for fault, after in found.items()} == {
+        fault: fault != 'pose' for fault in FAULTS}
+
+
 def test_a_single_known_reconstruction_is_refused():
     known = made_up(1, 0)
     with pytest.raises(DataError, match='a single known reconstruction: expected two or more'):
@@ -416,9 +426,13 @@ def test_the_commands_fit_tables_and_test_them_on_the_other_half(
     made_up(200, 1, weights=shipped).write(tmp_path / 'real.npz')
     faults = Measured.joined([made_up(60, 1, fault, weights=shipped) for fault in FAULTS])
     faults.write(tmp_path / 'faults.npz')
-    assert command(monkeypatch, 'quality', 'fit', '--known', tmp_path / 'known.npz',
-                   '--calibration', tmp_path / 'real.npz', '--calibration',
-                   tmp_path / 'faults.npz', '--out', tmp_path / 'tables.json') == 0
+    asked = ('quality', 'fit', '--known', tmp_path / 'known.npz', '--calibration',
+             tmp_path / 'real.npz', '--out', tmp_path / 'tables.json', '--calibration')
+    made_up(60, 1, 'mask', weights=shipped).write(tmp_path / 'one.npz')
+    assert command(monkeypatch, *asked, tmp_path / 'one.npz') == 0
+    assert 'no objects with the fault unknown, pose, object_size in' in capsys.readouterr().err
+    assert command(monkeypatch, *asked, tmp_path / 'faults.npz') == 0
+    assert not capsys.readouterr().err
     tables = QualityTables.read(tmp_path / 'tables.json')
     assert tables.weights_sha256 == shipped
     assert command(monkeypatch, 'quality', 'study', tmp_path / 'known.npz', '--halved',

@@ -112,6 +112,7 @@ def fit(
     To calibrate tables for objects and cameras of your own: active-recon quality fit
     --calibration mine.npz
     """
+    from active_recon.evaluation.quality.faults import FAULTS
     from active_recon.evaluation.quality.fitting import calibrated
     from active_recon.evaluation.quality.fitting import fit as fitted
     from active_recon.evaluation.quality.measuring import halves, Measured
@@ -126,6 +127,9 @@ def fit(
     if known:
         first, notes = together.rows(halves(together)), {}
         tables = fitted(Measured.read_all(known, sha256), first, sha256)
+        if lacking := [name for name in FAULTS if name not in tables.suspects]:
+            typer.echo(f'warning: no objects with the fault {", ".join(lacking)} in the half that '
+                       'is used: it is never suspected; measure some, see --fault', err=True)
     else:
         heads, earlier = needed_tables(weights, sha256), read_card(tables_path(weights))
         first = together.rows(halves(together, earlier.get(_SOURCES, ())))

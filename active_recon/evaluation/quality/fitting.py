@@ -31,8 +31,9 @@ def fit(known: Measured, calibration: Measured, sha256: str) -> QualityTables:
 
     `known` objects, without faults, and of which the network may have seen some, give the
     latents, the head, and what usual views are like beside those with a fault. The faults of
-    `calibration` are learned; its other rows calibrate, see `calibrated`. Raises DataError where
-    one of the parts is empty, `known` is a single row, has faults, or all of it is hollow.
+    `calibration` are learned, and those that it lacks never suspected; its other rows calibrate,
+    see `calibrated`. Raises DataError where one of the parts is empty, `known` is a single row,
+    has faults, or all of it is hollow.
     """
     faulty = calibration.rows(calibration.fault != '')
     for name, part in (('known', known), ('known solid', known.solid), ('faulty', faulty)):
@@ -50,7 +51,7 @@ def fit(known: Measured, calibration: Measured, sha256: str) -> QualityTables:
     centre, scale = _plain(given.mean(axis=0)), _plain(given.std(axis=0) + 1e-6)
     known_z = standardised(given, centre, scale)
     head, intercepts = _head(known_z[known.hollow <= HOLLOW], known.solid, counts)
-    suspects = tuple(FAULTS)
+    suspects = tuple(name for name in FAULTS if (faulty.fault == name).any())
     fault_head = _softmax_head(
         [known_z, *(standardised(numbers_of(faulty.rows(faulty.fault == name), latents),
                                  centre, scale) for name in suspects)])

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from active_recon.evaluation.quality.faults import FAULTS
 from active_recon.evaluation.quality.fitting import numbers_of
 from active_recon.evaluation.quality.measuring import LEARNED, Measured
 from active_recon.evaluation.quality.promises import Episodes, kept_at_least, one_of_each
@@ -47,7 +48,7 @@ def study(measured: Measured, tables: QualityTables) -> dict[str, Any]:
             fault, [judged[row] for row in np.flatnonzero(
                 (measured.fault == fault) & (measured.count == count))])
             for count in np.unique(measured.count[measured.fault == fault]).tolist()}
-            for fault in tables.suspects if (measured.fault == fault).any()},
+            for fault in FAULTS if (measured.fault == fault).any()},
         'promises': {kind: {f'{target:g}': _promise(
             measured.rows(solid & (measured.kind == kind)),
             expected[solid & (measured.kind == kind)], target, needed, tables)
