@@ -156,6 +156,23 @@ def test_views_of_the_learned_policy_have_promises_of_their_own():
     assert min(both.needed_learned) < min(both.needed)
 
 
+def test_bounds_hold_in_every_kind_of_views(tables):
+    def of(seed, noise, kind):
+        drawn = made_up(400, seed, noise=noise, kind=kind)
+        return replace(drawn, episode=np.char.add(drawn.episode, kind))
+
+    sure, vague = of(1, 0.2, 'random'), of(5, 1.2, 'even')
+    alone = [calibrated(tables, each) for each in (sure, vague)]
+    both = calibrated(tables, Measured.joined([sure, vague]))
+    for name in ('margin', 'growth'):
+        assert getattr(both, name) == [max(pair) for pair in zip(
+            *(getattr(each, name) for each in alone), strict=True)]
+    after = study(of(6, 1.2, 'even'), both)['views']
+    assert all(0.85 < found['solid']['covered'] < 0.95 for found in after.values())
+    short = calibrated(tables, Measured.joined([vague, sure.rows(sure.count < COUNTS)]))
+    assert short.margin[-1] == alone[1].margin[-1]
+
+
 def of_any_cameras(measured):
     """Return episodes of any cameras, whose latents are all far from the known ones."""
     kind = np.array([f'{each}, any' for each in measured.kind])

@@ -68,8 +68,9 @@ def calibrated(heads: Heads, calibration: Measured) -> QualityTables:
     Nothing may have been fitted to the objects; rows with a fault are left out, and all but one
     episode of an object in one kind of views: the others are not independent. What is said of
     the IoU is calibrated on objects that are not hollow: of others no view tells what is inside.
-    What is usual is told apart for turntables and for any cameras. Raises DataError where there
-    is no object, or there are fewer views than the heads have numbers of views for.
+    Bounds and promises hold in every kind of views by itself; what is usual is told apart for
+    turntables and for any cameras. Raises DataError where there is no object, or there are fewer
+    views than the heads have numbers of views for.
     """
     counts = range(1, len(heads.intercepts) + 1)
     usual = calibration.rows((calibration.fault == '') & (calibration.count <= counts[-1]))
@@ -87,16 +88,20 @@ def calibrated(heads: Heads, calibration: Measured) -> QualityTables:
               for kind in np.unique(right.kind).tolist()}
     of_turntable = usual.around if usual.around.any() else np.ones(len(usual), np.bool_)
 
+    def bound(over: Matrix, miss: float) -> list[float]:
+        """Return what few of any kind of views exceed after each number of them, (K,)."""
+        return _plain([min(1.0, max(upper_quantile(over[rows], miss) for kind in needed if (
+            rows := (right.kind == kind) & (right.count == number)).any())) for number in counts])
+
     def ordered(values: Matrix, chosen: NDArray[np.bool_]) -> list[list[float]]:
         return [_plain(np.sort(values[chosen & (usual.count == number)]))
                 for number in counts] if chosen.any() else []
 
     return QualityTables(
         **{each.name: getattr(heads, each.name) for each in fields(Heads)},
-        margin=_plain([min(upper_quantile((ahead - right.iou)[right.count == number], MISS), 1.0)
-                       for number in counts]),
+        margin=bound(ahead - right.iou, MISS),
         targets=TARGETS, needed=_plain(np.max(list(needed.values()), axis=0)),
-        growth=_growth(right, ahead),
+        growth=bound(_best_from_then(right) - ahead, TOP),
         usual_scores=ordered(scores, of_turntable),
         usual_distances=ordered(own[:, -1], of_turntable),
         needed_learned=_plain(needed.get(LEARNED, [])),
@@ -155,12 +160,11 @@ def _needed(usual: Measured, expected: Matrix) -> list[float]:
     return [needed_for(target, episodes) for target in TARGETS]
 
 
-def _growth(usual: Measured, expected: Matrix) -> list[float]:
-    """Return what the best IoU from then on exceeds the expected one by in 5 % of episodes."""
-    episodes = Episodes.of(usual, expected)
-    best = np.fmax.accumulate(episodes.iou[:, ::-1], axis=1)[:, ::-1]
-    ahead = best - episodes.expected
-    return _plain([min(upper_quantile(column[~np.isnan(column)], TOP), 1.0) for column in ahead.T])
+def _best_from_then(usual: Measured) -> Matrix:
+    """Return the best IoU of each row's episode from its view on, (N,)."""
+    _, rows = np.unique(usual.episode, return_inverse=True)
+    iou = Episodes.of(usual, usual.iou).iou
+    return np.asarray(np.fmax.accumulate(iou[:, ::-1], axis=1)[:, ::-1][rows, usual.count - 1])
 
 
 def _with_one(z: Matrix) -> Matrix:
