@@ -13,7 +13,7 @@ PACKAGES = ('active_recon', 'msg_tools')
 ROWS: tuple[set[str], ...] = (
     {'errors'},
     {'config', 'file_names', 'freed_memory', 'geometry', 'interrupts', 'json_text',
-     'objects', 'plugins', 'reporting', 'view_colors', 'whole_files', 'yaml_text'},
+     'npz_files', 'objects', 'plugins', 'reporting', 'view_colors', 'whole_files', 'yaml_text'},
     {'cluster', 'png_files', 'volumes'},
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},
     {'datasets', 'runtimes'},

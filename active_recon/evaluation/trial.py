@@ -6,7 +6,6 @@ import hashlib
 import json
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import DataError
@@ -15,6 +14,7 @@ from active_recon.evaluation.metrics import episodes
 from active_recon.evaluation.rollouts import batches
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.models.weights import state_hash
+from active_recon.npz_files import read_npz
 from active_recon.plugins import code_hash
 from active_recon.policies import Policy
 from active_recon.whole_files import whole_file
@@ -123,9 +123,8 @@ def data_hash(views: ViewSet) -> str:
 def read_arrays(path: Path, names: set[str]) -> dict[str, NDArray[np.float64]]:
     """Read cached arrays; raises DataError where the file is damaged or lacks one of them."""
     try:
-        with np.load(path) as stored:
-            return {name: stored[name] for name in names}
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        return read_npz(path, names)
+    except (OSError, ValueError) as error:
         raise DataError(f'{path}: no readable result of an earlier run: expected the arrays '
                         f'{", ".join(sorted(names))}, got: {error}; delete it to measure '
                         'again') from error

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from zipfile import BadZipFile
 
 from active_recon.datasets.views import ViewSet
 from active_recon.errors import DataError
 from active_recon.evaluation.next_view.watching import Walk, WatchedObject
+from active_recon.npz_files import read_npz
 from active_recon.policies import Observation, Policy
 from active_recon.whole_files import whole_file
 import numpy as np
@@ -61,10 +61,8 @@ class ViewGains:
     def load(cls, path: Path) -> 'ViewGains':
         """Read a file; raises DataError where it is not whole."""
         try:
-            with path.open('rb') as file, np.load(file, allow_pickle=False) as stored:
-                return cls(*(stored[name] for name in
-                             ('poses', 'occupancy', 'taken', 'iou', 'after')))
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+            return cls(**read_npz(path, ('poses', 'occupancy', 'taken', 'iou', 'after')))
+        except (OSError, ValueError) as error:
             raise DataError(f'{path}: no readable gains: expected a file that `train-policy` '
                             f'wrote, got: {error}; remove it') from error
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self
-from zipfile import BadZipFile
 
 from active_recon.datasets.views import ViewSet
 from active_recon.environment import run_episode, TimeStep
@@ -16,6 +15,7 @@ from active_recon.evaluation.rollouts import Observer, RenderedObjects, Seen
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.geometry.view_distance import on_one_ring, pose_directions
 from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.npz_files import read_npz
 from active_recon.policies import Policy
 from active_recon.quality.features import features
 from active_recon.quality.latents import pooled
@@ -94,11 +94,10 @@ class Measured:
     def read(cls, path: Path) -> Self:
         """Read it again; raises DataError where it cannot be read."""
         try:
-            with path.open('rb') as file, np.load(file, allow_pickle=False) as stored:
-                return cls(**{each.name: stored[each.name] for each in fields(cls)})
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+            return cls(**read_npz(path, [each.name for each in fields(cls)]))
+        except (OSError, ValueError) as error:
             raise DataError(f'{path}: no measured qualities: expected a file that `active-recon '
-                            f'quality measure` wrote, got: {error!r}') from error
+                            f'quality measure` wrote, got: {error}') from error
 
     @classmethod
     def read_all(cls, paths: Sequence[Path], weights_sha256: str) -> Self:
