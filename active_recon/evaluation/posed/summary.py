@@ -1,7 +1,8 @@
 """Means and intervals of the measured values, ready for JSON, and tables in Markdown."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from active_recon.evaluation.calibration import calibration_error
@@ -100,7 +101,8 @@ def _beside(found: Sequence[Found]) -> dict[str, Any]:
 def markdown(result: Mapping[str, Any]) -> str:
     """Return a Markdown document with all tables of a study's result."""
     parts = ['# Measured on posed views', f'`{result["command"]}`',
-             'Means with 95 % intervals over objects.']
+             'Means with 95 % intervals over objects; "of N": of so many objects alone, since the '
+             'others have none, such as thin parts.']
     for figures in result.get('sets', []):
         parts += _set_tables(figures)
     if 'photographs' in result:
@@ -116,17 +118,18 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _set_tables(figures: Mapping[str, Any]) -> list[str]:
     counts, models = [str(count) for count in figures['counts']], figures['models']
+    cell = partial(_cell, objects=figures['objects'])
     parts = [f'## {figures["data"]}', f'{figures["objects"]} objects of {figures["views"]} views.']
     parts += [f'{name} is left out: {why}.' for name, why in figures['left_out'].items()]
     for kind in ('random', 'even'):
         for side in (64, 32):
-            rows = _rows(models, kind, f'iou_{side}')
+            rows = _rows(models, kind, f'iou_{side}', cell)
             for name, values in figures.get('baselines', {}).items():
                 if kind == 'random' and f'iou_{side}' in values:
-                    rows.append([name, _cell(values[f'iou_{side}']),
+                    rows.append([name, cell(values[f'iou_{side}']),
                                  *['-'] * (len(counts) - 1)])
             for name, ahead in figures['ahead'].items():
-                rows += [[f'ahead of {name}', *map(_cell, ahead[kind][f'iou_{side}'])]
+                rows += [[f'ahead of {name}', *map(cell, ahead[kind][f'iou_{side}'])]
                          ] if f'iou_{side}' in ahead.get(kind, {}) else []
             if rows:
                 parts += [f'### IoU at {side} cells, {kind} views', table(['views', *counts],
@@ -147,8 +150,8 @@ def _set_tables(figures: Mapping[str, Any]) -> list[str]:
             ('tempered_expected_iou', 'IoU that the network expects there, under temperatures'),
             ('brier', 'Brier score near the surface'),
             ('tempered_brier', 'Brier score near the surface, under temperatures')):
-        if rows := _rows(models, 'random', name):
-            rows += [[f'{model}, ahead of a fixed one', *map(_cell, own['own_ahead'][name])]
+        if rows := _rows(models, 'random', name, cell):
+            rows += [[f'{model}, ahead of a fixed one', *map(cell, own['own_ahead'][name])]
                      for model, own in models.items() if name in own['own_ahead']]
             parts += [f'### {title}', table(['random views', *counts], rows)]
     errors = [[f'{model}{" under temperatures" * name.startswith("tempered")}',
@@ -160,8 +163,9 @@ def _set_tables(figures: Mapping[str, Any]) -> list[str]:
     return parts + _robustness_tables(figures.get('robustness', {}))
 
 
-def _rows(models: Mapping[str, Any], kind: str, name: str) -> list[list[str]]:
-    return [[model, *map(_cell, own[kind][name])] for model, own in models.items()
+def _rows(models: Mapping[str, Any], kind: str, name: str,
+          cell: Callable[[Figure], str]) -> list[list[str]]:
+    return [[model, *map(cell, own[kind][name])] for model, own in models.items()
             if name in own.get(kind, {})]
 
 
@@ -198,6 +202,9 @@ def _of_starts(values: Mapping[str, Sequence[float]]) -> list[str]:
         values['iou'], values['least'], values['greatest'], strict=True)]
 
 
-def _cell(values: Figure) -> str:
-    return '-' if values is None else (
-        f'{values["mean"]:.3f} [{values["low"]:.3f}, {values["high"]:.3f}]')
+def _cell(values: Figure, objects: int = 0) -> str:
+    """Return a figure in words, and of how many objects it is where that is fewer than all."""
+    if values is None:
+        return '-'
+    few = f' of {values["objects"]}' if values['objects'] < objects else ''
+    return f'{values["mean"]:.3f} [{values["low"]:.3f}, {values["high"]:.3f}]{few}'
