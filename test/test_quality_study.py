@@ -537,6 +537,29 @@ def test_objects_that_cannot_be_read_are_left_out_by_name(tmp_path, monkeypatch,
     assert refusal(monkeypatch, capsys, *asked).endswith('expected at least one, got none')
 
 
+def test_each_object_is_measured_in_its_own_views_however_many_others_have(
+        tmp_path, monkeypatch, capsys):
+    data, config = tmp_path / 'data', LiftingConfig((8, 8, 8, 8), 8, 8, 4, 4, (8, 8, 8), 8)
+    for seeds, views in ((range(2), 6), (range(2, 3), 1), (range(3, 5), 3)):
+        list(make_dataset(shape_jobs('lamp', seeds, data), 1, fine=True,
+                          viewing=Viewing('any', views)))
+    save_weights(tmp_path / 'lifting.safetensors', Bundle(
+        Lifting.from_config(config).eval(), None, config, 0.4, model='lifting'))
+    asked = ('quality', 'measure', data, tmp_path / 'm.npz', '--model',
+             tmp_path / 'lifting.safetensors', '--threads', 1, '--views')
+    first, _, few, *_ = list_objects(data)
+    own = []
+    for views, count in ((2, 2 * 4), (4, 4 * 2)):
+        assert command(monkeypatch, *asked, views) == 0
+        assert f'{few.images_folder}: too few views: expected {views} or more, got 1' in (
+            capsys.readouterr().err)
+        found = Measured.read(tmp_path / 'm.npz')
+        assert len(found) == count
+        own.append(found.rows((found.count == 2) & (found.object == first.full_name)))
+        assert len(own[-1]) == 1
+    np.testing.assert_allclose(own[0].numbers, own[1].numbers, atol=1e-5)
+
+
 def test_more_episodes_of_the_same_objects_make_no_narrower_interval(tables):
     once = made_up(200, 3)
     thrice = Measured.joined([

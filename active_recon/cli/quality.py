@@ -1,7 +1,7 @@
 """`active-recon quality`: measures, fits and tests how the quality of a shape is judged."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
@@ -9,6 +9,9 @@ from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError, DataError
 from active_recon.whole_files import writable
 import typer
+
+if TYPE_CHECKING:
+    from active_recon.datasets.layout import ObjectFolder
 
 quality = typer.Typer(help='How good a shape is, judged without the truth.', no_args_is_help=True)
 
@@ -63,23 +66,29 @@ def measure(
     policy = load_policy(LEARNED, PolicyOptions(
         views=views, weights=weights, threads=threads)) if kind == LEARNED else None
     writable(out)  # tells before minutes of measuring
-    folders = chosen_folders(list_objects(data), None, objects, seed)
-    parts, left_out = [], []
-    with progress_bar(f'measuring {data.name}', len(folders)) as advance:
-        for at in range(0, len(folders), _BATCH):
-            few = folders[at:at + _BATCH]
+    alike: dict[int, list[ObjectFolder]] = {}  # all of a batch are shown from as many views
+    for folder in chosen_folders(list_objects(data), None, objects, seed):
+        alike.setdefault(_views_of(folder), []).append(folder)
+    if views > (most := max(alike)) > 0:
+        raise ConfigError(f'--views: too many: expected at most the {most} of the objects, got '
+                          f'{views}')
+    left_out = [f'{folder.images_folder}: too few views: expected {views} or more, got {count}'
+                for count in sorted(alike) if 0 < count < views for folder in alike.pop(count)]
+    batches = [some[low:low + _BATCH] for _, some in sorted(alike.items(), reverse=True)
+               for low in range(0, len(some), _BATCH)]
+    parts, done = [], 0
+    with progress_bar(f'measuring {data.name}', sum(map(len, batches))) as advance:
+        for few in batches:
             try:
-                some = read_views(few, resolution=network.resolution,
-                                  image_size=network.image_size, framed=True)
+                shown = read_views(few, resolution=network.resolution,
+                                   image_size=network.image_size, framed=True)
             except DataError as error:  # of these few no one; perhaps of the others
                 left_out.append(str(error))
             else:
-                if views > (most := some.poses.shape[1]):
-                    raise ConfigError(f'--views: too many: expected at most the {most} of the '
-                                      f'objects, got {views}')
-                left_out += some.unreadable
-                parts.append(measured(some, network, bundle.threshold, views, kind, fault or '',
-                                      seed + at, policy, sha256))
+                left_out += shown.unreadable
+                parts.append(measured(shown, network, bundle.threshold, views, kind, fault or '',
+                                      seed + done, policy, sha256))
+            done += len(few)
             advance(len(few), '')
     for reason in left_out:
         typer.echo(f'left out: {reason}', err=True)
@@ -87,6 +96,14 @@ def measure(
         raise DataError(f'{data}: no readable object: expected at least one, got none')
     Measured.joined(parts).write(out)
     typer.echo(f'wrote {out}')
+
+
+def _views_of(folder: 'ObjectFolder') -> int:
+    """Return the number of an object's views, 0 where it cannot be read."""
+    try:
+        return len(folder.cameras())
+    except DataError:
+        return 0
 
 
 @quality.command()
