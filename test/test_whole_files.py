@@ -63,3 +63,14 @@ def test_what_cannot_be_written_is_told_before_anything_is_measured(
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'file').touch()
     assert 'cannot be written' in refusal(monkeypatch, capsys, *asked)
+
+
+@pytest.mark.parametrize('asked', [
+    ('study', 'data', '--counts', 'two'), ('study', 'data', '--models', 'carving,carving'),
+    ('study', 'data', '--models', 'carving', '--validation', 'data'),
+    ('policies', 'data', '--policies', 'luck'), ('policies', 'data', '--policies', 'sequence'),
+    ('quality', 'study', 'none.npz')], ids=' '.join)
+def test_a_study_whose_options_are_refused_makes_no_folder(asked, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    refusal(monkeypatch, capsys, *asked, '--out', 'new')
+    assert not list(tmp_path.iterdir())

@@ -78,7 +78,6 @@ def policies(
     from active_recon.models.weights_files import scorer_path
     import torch
 
-    require_writable_study(out, 'policies')  # tells before hours of measuring
     torch.set_num_threads(threads)
     entrant, *others = load_entrants(model, runtime, bf16, threads)
     if others:
@@ -92,6 +91,7 @@ def policies(
         raise ConfigError('policies: no training objects: expected --training with a folder, on '
                           'which a sequence is found, got none; give one, or leave sequence out')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, bf16)
+    require_writable_study(out, 'policies')  # tells before hours of measuring
     result: dict[str, Any] = {
         'command': command_line(), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}

@@ -90,7 +90,6 @@ def study(
     if not data and photos is None:
         raise ConfigError('study: nothing to measure: expected folders of objects, or --photos '
                           'with a folder of photographs, got neither')
-    require_writable_study(out, 'study')  # tells before hours of measuring
     torch.set_num_threads(threads)
     plan = Plan(_numbers('counts', counts),
                 _numbers('surfaces', '1,5' if surfaces is None else surfaces), seed, bf16)
@@ -99,10 +98,12 @@ def study(
                           f'{counts}, got {surfaces}')
     extent = Extent(category, objects, disturbed_views, disturbed_objects)
     entrants = load_entrants(models or _those_that_ship(), runtime, bf16, threads)
+    if validation is not None and any(validation.resolve() == each.resolve()
+                                      for each in data or []):
+        raise ConfigError('validation: same objects twice: expected other objects than those '
+                          f'measured, got {validation} for both')
+    require_writable_study(out, 'study')  # tells before hours of measuring
     if validation is not None:
-        if any(validation.resolve() == each.resolve() for each in data or []):
-            raise ConfigError('validation: same objects twice: expected other objects than those '
-                              f'measured, got {validation} for both')
         entrants = choose_on(validation, entrants, plan, Extent(most=objects), progress_bar)
     library = None
     if training and data:
