@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 import json
 import math
+from shutil import copytree
 
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.layout import list_objects
@@ -134,6 +135,20 @@ def test_coarse_cells_are_full_where_any_of_theirs_is():
 def test_a_scene_has_the_truth_of_both_sizes(scene):
     assert scene.truths[64].shape == (3, 64, 64, 64) and scene.truths[32].shape == (3, 32, 32, 32)
     assert scene.view_count == 5 and not scene.turntable
+
+
+def test_an_object_whose_coarse_voxels_cannot_be_read_is_left_out_of_a_scene(
+        made, scene, tmp_path):
+    first, *others = list_objects(copytree(made, tmp_path / 'chairs'))
+    first.voxels_path(32).write_bytes(b'#binvox 1')
+    some = read_scene([first, *others], [Carving(0)])
+    assert some.views.folders == tuple(others)
+    assert [str(first.voxels_path(32)) in reason for reason in some.views.unreadable] == [True]
+    for side, truth in some.truths.items():
+        assert (truth == scene.truths[side][1:]).all()
+    assert (some.views.images == scene.views.images[1:]).all()
+    with pytest.raises(DataError, match='no readable object: .*\n.*no whole binvox file'):
+        read_scene([first], [Carving(0)])
 
 
 def test_random_views_measure_what_a_loop_by_hand_does(scene, carving):

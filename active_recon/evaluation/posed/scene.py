@@ -1,13 +1,13 @@
 """A set of objects to measure on: posed views, true voxels, views for the paper's networks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from active_recon.datasets.layout import ObjectFolder
 from active_recon.datasets.views import read_views, ViewSet
 from active_recon.errors import ConfigError, DataError
-from active_recon.evaluation.posed.walking import on_turntable
+from active_recon.evaluation.posed.walking import on_turntable, some_objects
 from active_recon.models.network import ReconstructionNetwork
 from active_recon.reporting import Reporting, silent
 from active_recon.volumes.voxels import FINE_RESOLUTION, RESOLUTION
@@ -79,17 +79,17 @@ def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[Reconstructio
     """
     Read objects with the images and voxels that the networks need.
 
-    If no object has voxels at 64 cells a side, only 32 are measured. Raises DataError where no
-    object can be read.
+    If no object has voxels at 64 cells a side, only 32 are measured; objects that lack one of the
+    two are left out. Raises DataError where no object can be read.
     """
     fine = any(folder.voxels_path(FINE_RESOLUTION).is_file() for folder in folders)
     resolution = FINE_RESOLUTION if fine else RESOLUTION
     with reporting(f'reading {title}', len(folders)) as advance:
         views = read_views(folders, lambda: advance(1, ''), resolution, IMAGE_SIZE, framed=True)
-    truths = {views.resolution: views.voxels}
+    truths = {}
     if fine:
-        truths[RESOLUTION] = torch.from_numpy(np.stack(
-            [folder.voxels(RESOLUTION).occupied(0.5) for folder in views.folders]))
+        views, truths[RESOLUTION] = _with_coarse_voxels(views)
+    truths[views.resolution] = views.voxels
 
     def again(size: int, resolution: int, framed: bool) -> ViewSet:
         what = f'reading {title} at {size} pixels'
@@ -106,3 +106,21 @@ def read_scene(folders: Sequence[ObjectFolder], networks: Sequence[Reconstructio
                  } if on_turntable(views) else {}
     framed = {size: again(size, resolution, framed=True) for size in sorted(free - {IMAGE_SIZE})}
     return Scene({IMAGE_SIZE: views, **framed}, truths, turntable)
+
+
+def _with_coarse_voxels(views: ViewSet) -> tuple[ViewSet, Tensor]:
+    """Return the objects with voxels of 32 cells a side too, and these, (N, 32, 32, 32) bool."""
+    kept, coarse, lacking = [], [], []
+    for row, folder in enumerate(views.folders):
+        try:
+            coarse.append(folder.voxels(RESOLUTION).occupied(0.5))
+            kept.append(row)
+        except DataError as error:
+            lacking.append(str(error))
+    if not kept:
+        raise DataError('no readable object: expected at least one in the dataset, got none'
+                        + ''.join(f'\n  {error}' for error in lacking[:5]))
+    if lacking:
+        views = replace(some_objects(views, torch.tensor(kept)),
+                        unreadable=(*views.unreadable, *lacking))
+    return views, torch.from_numpy(np.stack(coarse))
