@@ -17,6 +17,7 @@ from active_recon.runtimes.torch import TorchPolicyRuntime
 from active_recon.volumes.voxels import entropy, paper_entropy, turned
 import numpy as np
 import pytest
+from recorded_messages import small_disk
 from shown_views import part_of
 import torch
 from torch import nn
@@ -44,6 +45,17 @@ def test_rows_tell_azimuths_just_beside_0_as_0(network, views, tmp_path):
     write_rows(tmp_path / 'rows.csv', {'one': (trial, {'uniform': [run]})})
     with (tmp_path / 'rows.csv').open() as file:
         assert [row['azimuth_deg'] for row in csv.DictReader(file)] == ['0.0', '0.0', '359.4']
+
+
+def test_rows_that_a_full_disk_does_not_hold_leave_those_that_were_there(
+        network, views, tmp_path):
+    trial = Trial(network, 0.1, part_of(views, slice(1)), starts=1, count=3)
+    run = some_episodes(np.zeros((1, 3)), np.zeros((1, 3)))
+    path = tmp_path / 'rows.csv'
+    path.write_text('those of before')
+    with small_disk(50), pytest.raises(OSError):
+        write_rows(path, {'one': (trial, {'uniform': [run]})})
+    assert path.read_text() == 'those of before' and list(tmp_path.iterdir()) == [path]
 
 
 def test_a_run_measures_iou_both_entropies_and_azimuths_of_every_view(network, views):

@@ -21,6 +21,7 @@ from active_recon.volumes.occupancy_threshold import expected_iou
 from judged_quality import CHANNELS, COUNTS, quality_of, some_tables
 import numpy as np
 import pytest
+from recorded_messages import small_disk
 import torch
 
 LENS = Intrinsics(75, 75, 32, 32, 64, 64)
@@ -278,6 +279,15 @@ def test_tables_come_back_from_their_file_and_judge_the_same(tmp_path):
     numbers = np.random.default_rng(6).normal(size=len(FEATURES) + 1)
     assert judged(numbers, tables=again) == judged(numbers)
     assert json.loads((tmp_path / 'tables.json').read_text())['command'] == 'fit'
+
+
+def test_tables_that_a_full_disk_does_not_hold_leave_those_that_were_there(tmp_path):
+    some_tables().write(tmp_path / 'tables.json')
+    before = (tmp_path / 'tables.json').read_text()
+    with small_disk(len(before) // 2), pytest.raises(OSError):
+        some_tables().write(tmp_path / 'tables.json', command='fit')
+    assert (tmp_path / 'tables.json').read_text() == before
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 @pytest.mark.parametrize(('field', 'value'), [

@@ -10,6 +10,7 @@ from active_recon.errors import DataError
 from active_recon.evaluation.measure import Episodes
 from active_recon.evaluation.statistics import by_object, difference
 from active_recon.evaluation.trial import Trial
+from active_recon.whole_files import whole_file
 import numpy as np
 from torch import Tensor
 
@@ -45,13 +46,13 @@ def paired(runs: Sequence[Episodes], others: Sequence[Episodes],
 def write_rows(path: Path, trials: Mapping[str, tuple[Trial, Mapping[str, Sequence[Episodes]]]]
                ) -> None:
     """
-    Write a CSV file with one row for each model, policy, seed, object, start and view.
+    Write a CSV file, whole or not at all: a row for each model, policy, seed, object, start, view.
 
     `trials` has the trial and the runs of each model by its name. The column `start` is the index
     of the first view in the dataset; `view` counts from 1.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open('w', newline='') as file:
+    with whole_file(path) as unfinished, unfinished.open('w', newline='') as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for model, (trial, runs) in trials.items():

@@ -11,6 +11,7 @@ from active_recon.json_text import json_value
 from active_recon.quality.features import FEATURES
 from active_recon.quality.latents import KnownLatents
 from active_recon.quality.quality import SUSPECTS
+from active_recon.whole_files import whole_file
 import numpy as np
 
 
@@ -117,8 +118,9 @@ class QualityTables(Heads):
         return min(map(len, (*self.usual_scores, *self.usual_scores_any)))
 
     def write(self, path: Path, **notes: Any) -> None:
-        """Write the tables, and notes on how they were made, as JSON."""
-        path.write_text(json.dumps({**asdict(self), **notes}) + '\n')
+        """Write the tables, and notes on how they were made, as JSON, whole or not at all."""
+        with whole_file(path) as unfinished:
+            unfinished.write_text(json.dumps({**asdict(self), **notes}) + '\n')
 
     @classmethod
     def read(cls, path: Path) -> Self:
