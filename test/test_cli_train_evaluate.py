@@ -380,8 +380,10 @@ def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given_
     assert_close(after[name].float(), given[name].float(), rtol=2e-3, atol=1e-4)
     card = json.loads((out / 'weights.json').read_text())
     assert card['begun_with']['sha256'] == weights_hash(run / 'weights.safetensors')
-    assert command(monkeypatch, *training(dataset, tmp_path / 'policy', '--freeze-from',
-                                          out / 'weights.safetensors')) == 0
+    assert command(
+        monkeypatch, 'train', dataset, '--validation', dataset, '--out', tmp_path / 'policy',
+        '--policy-steps', 2, '--policy-batch-size', 2, '--group-size', 2, '--threads', 1,
+        '--freeze-from', out / 'weights.safetensors') == 0
     frozen = json.loads((tmp_path / 'policy' / 'weights.json').read_text())
     assert frozen['begun_with'] == card['begun_with']
     assert 'both --freeze-from and --init-from' in refusal(monkeypatch, capsys, *training(
