@@ -1,6 +1,8 @@
 """Camera images, raw or compressed; their size is read without decoding them."""
 
+import array
 from io import BytesIO
+import re
 
 from active_recon.errors import MessageError
 import cv2
@@ -14,6 +16,8 @@ MAX_PIXELS = 1 << 26
 """Larger compressed images are rejected: a small file may claim any size."""
 _REDUCED = {2: cv2.IMREAD_REDUCED_COLOR_2, 4: cv2.IMREAD_REDUCED_COLOR_4,
             8: cv2.IMREAD_REDUCED_COLOR_8}
+_GREY = ('L', 'I;16', 'I')
+_BAYER = re.compile(r'\s*(bayer_(?:rggb|bggr|gbrg|grbg))(?:8|16)\s*;')
 _UNREADABLE = (OSError, ValueError, SyntaxError, PIL.Image.DecompressionBombError,
                PIL.Image.DecompressionBombWarning)
 
@@ -32,7 +36,7 @@ def reduced_from_msg(msg: Image | CompressedImage, by: int) -> NDArray[np.uint8]
     """
     if by > 1 and is_compressed(msg):
         image = _open(msg)
-        if image.format == 'JPEG' and image.mode in ('RGB', 'L'):
+        if image.format == 'JPEG' and image.mode in ('RGB', 'L') and not _bayer(msg, image):
             return _decoded(msg, _REDUCED[by])
     return pixels_from_msg(msg)
 
@@ -53,12 +57,18 @@ def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
     """
     Return a camera's image, (height, width, 3) uint8 RGB, laid on white where transparent.
 
-    Reads JPEG and PNG. Raises MessageError on other formats, and on images of more than
-    `MAX_PIXELS` before they are decoded.
+    Reads JPEG and PNG, and interpolates the missing colours of a raw sensor's Bayer pattern, which
+    image_transport compresses as a grey image. Raises MessageError on other formats, and on images
+    of more than `MAX_PIXELS` before they are decoded.
     """
     image = _open(msg)
+    if encoding := _bayer(msg, image):
+        values = _decoded(msg)[..., 0]
+        return image_from_msg(Image(
+            height=image.height, width=image.width, encoding=encoding, step=image.width,
+            data=array.array('B', values.tobytes())))
     # Of 16 bits OpenCV takes the upper 8, Pillow white for all that is above 255
-    if image.mode in ('RGB', 'L', 'I;16', 'I') and not image.has_transparency_data:
+    if image.mode in ('RGB', *_GREY) and not image.has_transparency_data:
         return _decoded(msg)
     try:
         if image.has_transparency_data:
@@ -72,6 +82,12 @@ def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
 def is_compressed(msg: Image | CompressedImage) -> bool:
     """Return whether a message is a CompressedImage, by its fields."""
     return hasattr(msg, 'format')  # messages from a bag are of another class
+
+
+def _bayer(msg: CompressedImage, image: PIL.Image.Image) -> str:
+    """Return the encoding of a raw sensor's values in a grey image, '' where it has none."""
+    named = _BAYER.match(msg.format)
+    return f'{named[1]}8' if named and image.mode in _GREY else ''
 
 
 def _open(msg: CompressedImage) -> PIL.Image.Image:

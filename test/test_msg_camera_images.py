@@ -6,12 +6,17 @@ import zlib
 
 from active_recon.errors import MessageError
 import cv2
-from msg_tools.camera_images import compressed_image_from_msg, pixels_from_msg, size_from_msg
-from msg_tools.images import image_to_msg
+from msg_tools.camera_images import (
+    compressed_image_from_msg,
+    pixels_from_msg,
+    reduced_from_msg,
+    size_from_msg,
+)
+from msg_tools.images import image_from_msg, image_to_msg
 import numpy as np
 import PIL.Image
 import pytest
-from sensor_msgs.msg import CompressedImage
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 RGB = np.random.default_rng(0).integers(0, 256, (4, 6, 3), np.uint8)
@@ -55,6 +60,34 @@ def test_a_compressed_image_of_16_bits_is_that_of_its_upper_8():
         np.testing.assert_array_equal(
             compressed_image_from_msg(CompressedImage(format='png', data=data)),
             bgr[..., ::-1] >> 8)
+
+
+@pytest.mark.parametrize('kind', ['PNG', 'JPEG'])
+@pytest.mark.parametrize('pattern', ['rggb', 'bggr', 'gbrg', 'grbg'])
+def test_a_compressed_bayer_pattern_has_the_colours_of_the_raw_one(pattern, kind):
+    values = np.random.default_rng(0).integers(0, 256, (24, 32), np.uint8)
+    msg = packed(values, kind)
+    kept = np.asarray(PIL.Image.open(BytesIO(msg.data)))  # JPEG loses some
+    raw = image_from_msg(Image(height=24, width=32, encoding=f'bayer_{pattern}8', step=32,
+                               data=kept.tobytes()))
+    msg.format = f'bayer_{pattern}8; {kind.lower()} compressed '
+    np.testing.assert_array_equal(pixels_from_msg(msg), raw)
+    np.testing.assert_array_equal(reduced_from_msg(msg, 2), raw)
+
+
+def test_a_bayer_pattern_of_16_bits_has_the_colours_of_its_upper_8():
+    values = np.random.default_rng(0).integers(0, 1 << 16, (24, 32), np.uint16)
+    deep = CompressedImage(format='bayer_gbrg16; png compressed ',
+                           data=cv2.imencode('.png', values)[1].tobytes())
+    flat = packed((values >> 8).astype(np.uint8))
+    flat.format = 'bayer_gbrg8; png compressed '
+    np.testing.assert_array_equal(pixels_from_msg(deep), pixels_from_msg(flat))
+
+
+def test_a_bayer_pattern_that_was_interpolated_before_it_was_compressed_stays():
+    msg = packed(RGB)
+    msg.format = 'bayer_rggb8; png compressed bgr8'
+    np.testing.assert_array_equal(pixels_from_msg(msg), RGB)
 
 
 @pytest.mark.parametrize('msg', [
