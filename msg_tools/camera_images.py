@@ -94,6 +94,8 @@ def _open(msg: CompressedImage) -> PIL.Image.Image:
     """Return the image with its header read and checked."""
     try:
         image = PIL.Image.open(BytesIO(msg.data), formats=('JPEG', 'PNG'))
+    except PIL.UnidentifiedImageError as error:  # it names an object in memory
+        raise _decoding_error(msg, f'{len(msg.data)} bytes of neither') from error
     except _UNREADABLE as error:
         raise _decoding_error(msg, str(error)) from error
     if image.width * image.height > MAX_PIXELS:

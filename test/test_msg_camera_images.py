@@ -99,6 +99,16 @@ def test_what_is_no_compressed_image_is_refused(msg):
         pixels_from_msg(msg)
 
 
+@pytest.mark.parametrize(('msg', 'got'), [
+    (CompressedImage(), "'': 0 bytes of neither"),
+    (CompressedImage(format='h264', data=b'hello'), "'h264': 5 bytes of neither")])
+def test_data_of_neither_format_are_refused_alike_each_time(msg, got):
+    with pytest.raises(MessageError) as caught:
+        size_from_msg(msg)
+    assert str(caught.value) == (
+        f'compressed image not readable: expected JPEG or PNG, got {got}')
+
+
 def cut(msg, by):
     return CompressedImage(format=msg.format, data=bytes(msg.data)[:-by])
 
