@@ -12,7 +12,7 @@ from active_recon.errors import MessageError
 from active_recon.volumes.depth_images import MM_PER_METRE
 import cv2
 from msg_tools.camera_images import is_compressed, MAX_PIXELS
-from msg_tools.images import depth_from_msg
+from msg_tools.images import DEPTH_ENCODINGS, depth_from_msg
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CompressedImage, Image
@@ -34,12 +34,12 @@ def depth_from_compressed_msg(msg: CompressedImage) -> NDArray[np.float32]:
     """
     Return depth in metres, (height, width); 0 is no value.
 
-    Raises MessageError unless the format is '16UC1; compressedDepth' or '32FC1; compressedDepth',
-    with or without 'png' at its end, the data are a header and a PNG image of 16 bits and one
-    channel, and it has at most `MAX_PIXELS`.
+    Raises MessageError unless the format is '16UC1; compressedDepth' (or mono16, as of raw images)
+    or '32FC1; compressedDepth', with or without 'png' at its end, the data are a header and a PNG
+    image of 16 bits and one channel, and it has at most `MAX_PIXELS`.
     """
     encoding, _, transport = (part.strip() for part in msg.format.partition(';'))
-    if encoding not in ('16UC1', '32FC1') or transport.split() not in (
+    if encoding not in DEPTH_ENCODINGS or transport.split() not in (
             ['compressedDepth'], ['compressedDepth', 'png']):
         hint = '; set png as the format of its publisher' if transport.endswith('rvl') else ''
         raise MessageError("unknown compressed depth: expected '16UC1; compressedDepth png' or "
@@ -58,7 +58,7 @@ def depth_from_compressed_msg(msg: CompressedImage) -> NDArray[np.float32]:
         raise MessageError('compressed depth unreadable: expected a PNG image of 16 bits and one '
                            'channel', 'depth')
     stored = np.asarray(values, np.float32)
-    if encoding == '16UC1':
+    if DEPTH_ENCODINGS[encoding] == np.uint16:
         return stored / np.float32(MM_PER_METRE)
     _, scale, offset = _HEADER.unpack_from(data)
     if not (0 < scale < np.inf and np.isfinite(offset)):

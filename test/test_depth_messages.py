@@ -278,10 +278,13 @@ def test_floats_come_back_within_half_a_step_of_their_inverse():
     assert (np.abs(1 / found[there] - 1 / metres[there]) <= 0.5 / scale + 1e-6).all()
 
 
-def test_either_message_gives_the_same_metres():
+@pytest.mark.parametrize('encoding', ['16UC1', 'mono16'])
+def test_either_message_gives_the_same_metres(encoding):
     raw = in_millimetres(METRES)
-    np.testing.assert_array_equal(metres_from_msg(raw), metres_from_msg(
-        depth_to_compressed_msg(depth_from_msg(raw), Header())))
+    raw.encoding = encoding
+    packed = depth_to_compressed_msg(depth_from_msg(raw), Header())
+    packed.format = f'{encoding}; compressedDepth png'  # as image_transport names it
+    np.testing.assert_array_equal(metres_from_msg(raw), metres_from_msg(packed))
 
 
 @pytest.mark.parametrize(('change', 'said'), [
