@@ -3,6 +3,7 @@
 import math
 
 from active_recon.errors import ViewError
+from active_recon.geometry.cameras import Intrinsics
 from active_recon.geometry.lenses import Distortion
 import cv2
 import numpy as np
@@ -100,6 +101,20 @@ def test_coefficients_that_are_0_but_for_rounding_are_0(tiny):
             ('rational_polynomial', (0, 0, 0, 0, 0, -4, 0, 0), (0, 0, 0, 0, tiny, -4, tiny, 0))):
         np.testing.assert_allclose(Distortion(model, nearly).distort(points(3)),
                                    Distortion(model, bent).distort(points(3)), atol=1e-6)
+
+
+@pytest.mark.parametrize('shape', [(5,), (1, 5), (5, 1)])
+def test_coefficients_in_an_array_are_those_of_a_tuple(shape):
+    lens = LENSES['barrel']
+    given = np.array(lens.coefficients).reshape(shape)
+    own = Distortion('plumb_bob', given)
+    given[:] = 0  # what is filled anew changes no lens of before
+    assert own == lens and hash(own) == hash(lens)
+
+
+def test_coefficients_without_a_model_are_no_lens():
+    with pytest.raises(ViewError, match='expected a Distortion of .*, with its model, got a list'):
+        Intrinsics(300, 300, 160, 120, 320, 240, [-0.2, 0.1, 0, 0, 0])
 
 
 @pytest.mark.parametrize(('model', 'coefficients', 'said'), [

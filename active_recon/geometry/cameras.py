@@ -70,6 +70,10 @@ class Intrinsics:
 
     def __post_init__(self) -> None:
         """Reject focal lengths and sizes that are not above 0, and what is not finite."""
+        if not isinstance(self.distortion, Distortion | None):
+            raise ViewError('invalid distortion: expected a Distortion of '
+                            'active_recon.geometry.lenses, with its model, got a '
+                            f'{type(self.distortion).__name__}', 'camera_info')
         if not (0 < self.fx < math.inf and 0 < self.fy < math.inf and self.width > 0
                 and self.height > 0 and math.isfinite(self.cx) and math.isfinite(self.cy)):
             raise ViewError('invalid intrinsics: expected focal lengths and sizes above 0 and a '

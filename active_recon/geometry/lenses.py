@@ -29,18 +29,21 @@ class Distortion:
     """
     A distortion model of `MODELS` and its coefficients.
 
-    It maps normalised image points, (N, 2), x right and y down at depth 1. Raises ViewError on an
-    unknown model, a wrong number of coefficients, and coefficients that are not finite.
+    It maps normalised image points, (N, 2), x right and y down at depth 1. Coefficients may be in
+    an array of any shape, as OpenCV returns them. Raises ViewError on an unknown model, a wrong
+    number of coefficients, and coefficients that are not finite.
     """
 
     model: str
     coefficients: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Reject unknown models and invalid coefficients."""
+        """Keep a tuple of the coefficients; reject unknown models and invalid coefficients."""
         if self.model not in MODELS:
             raise ViewError(f'unknown distortion model: expected one of {", ".join(MODELS)}, got '
                             f'{self.model!r}; publish rectified images instead', 'camera_info')
+        object.__setattr__(
+            self, 'coefficients', tuple(map(float, np.ravel(self.coefficients))))
         counts, given = MODELS[self.model], len(self.coefficients)
         if given not in counts:
             raise ViewError('wrong number of distortion coefficients: expected '
