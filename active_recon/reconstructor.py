@@ -219,6 +219,10 @@ class Reconstructor:
         ViewError, and WeightsError where a state that was taken up needs a depth refiner; they
         leave the state unchanged.
         """
+        if not isinstance(depth, DepthImage | None):
+            raise ViewError('wrong depth: expected a DepthImage of active_recon.volumes.'
+                            f'depth_images, got a {type(depth).__name__}; DepthImage(metres) '
+                            'makes one', 'depth')
         if self._evidence is not None:
             self._depth_runtime()
         shown, seen_by = network_image(image, camera, self._runtime.spec, self.object_size)

@@ -85,6 +85,13 @@ def test_a_view_that_is_refused_changes_nothing(runtime, wrong):
                                   add(undisturbed, 1).grid.occupancy)
 
 
+def test_depth_that_is_no_depth_image_is_refused_and_changes_nothing(runtime):
+    reconstructor = Reconstructor(runtime)
+    with pytest.raises(ViewError, match=r'a DepthImage .*got a ndarray; DepthImage\(metres\)'):
+        reconstructor.add_view(image_of(0), orbit_camera(1.0), np.ones((137, 137), np.float32))
+    assert reconstructor.view_count == 0
+
+
 @pytest.mark.parametrize('part', ['occupancy', 'latent'])
 def test_a_network_s_answer_that_is_not_finite_is_refused_and_changes_nothing(
         runtime, monkeypatch, part):
