@@ -51,8 +51,10 @@ def joint_position_from_msg(msg: JointState, joint: str = '') -> float:
     if joint and joint in msg.name and msg.name.index(joint) < len(msg.position):
         return float(msg.position[msg.name.index(joint)])
     if joint or len(msg.position) != 1:
+        hint = '; name the turntable with joint_name' if not joint and len(msg.position) else ''
         raise MessageError(f'no joint position: expected one of {joint or "a single joint"}, got '
-                           f'{len(msg.position)} of {", ".join(msg.name)}', 'joint')
+                           f'{len(msg.position)} of {", ".join(msg.name) or "no names"}{hint}',
+                           'joint')
     return float(msg.position[0])
 
 

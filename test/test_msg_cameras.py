@@ -25,6 +25,7 @@ from msg_tools.cameras import (
 from msg_tools.goals import (
     azimuth_goal_from_msg,
     azimuth_goal_to_msg,
+    joint_position_from_msg,
     scores_from_msg,
     scores_to_msg,
     view_goal_from_msg,
@@ -205,6 +206,18 @@ def test_a_goal_that_is_written_and_read_back_is_the_same_camera(elevation):
 
 def test_an_azimuth_goal_is_wrapped():
     assert azimuth_goal_from_msg(JointState(position=[-1.0])) == pytest.approx(math.tau - 1)
+
+
+@pytest.mark.parametrize(('joint', 'names', 'positions', 'said'), [
+    ('', ['table', 'arm'], [1.0, 2.0],
+     'expected one of a single joint, got 2 of table, arm; name the turntable with joint_name'),
+    ('', ['table'], [], 'expected one of a single joint, got 0 of table'),
+    ('table', ['arm'], [1.0], 'expected one of table, got 1 of arm'),
+    ('table', [], [1.0], 'expected one of table, got 1 of no names')])
+def test_a_joint_that_is_not_there_is_told_beside_those_that_are(joint, names, positions, said):
+    with pytest.raises(MessageError) as caught:
+        joint_position_from_msg(JointState(name=names, position=positions), joint)
+    assert str(caught.value) == f'no joint position: {said}'
 
 
 @pytest.mark.parametrize('positions', [[math.nan], [math.inf], [-math.inf], [], [1.0, 2.0]])
