@@ -286,8 +286,9 @@ def orbit_camera(
                         f'got azimuth {azimuth}, elevation {elevation}, distance '
                         f'{distance}', 'pose')
     if abs(elevation) >= math.pi / 2 - 1e-6:
-        raise ViewError(f'invalid elevation: expected one within +-90 degrees, got {elevation} '
-                        'rad', 'pose')
+        raise ViewError('invalid elevation: expected one within +-90 degrees, at which upright '
+                        f'is undefined, got {math.degrees(elevation):.6g} degrees; move the '
+                        'camera aside', 'pose')
     backward = np.array([math.cos(elevation) * math.cos(azimuth),
                          math.cos(elevation) * math.sin(azimuth), math.sin(elevation)])
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
