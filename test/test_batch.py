@@ -22,7 +22,7 @@ from active_recon.batch.results import BagResult
 from active_recon.batch.rows import COLUMNS, refusal_row
 from active_recon.batch.summary import MOST_SHOWN, Summary
 from active_recon.batch.table import read_table, write_table
-from active_recon.batch.task import Task
+from active_recon.batch.task import Task, TruthSource
 from active_recon.errors import ConfigError, DataError
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.findings import stopped
@@ -178,6 +178,22 @@ def test_a_truth_that_is_fitted_turns_with_the_yaw_that_is_told(tmp_path, monkey
                             '--object-yaw-deg', 90, '--truth', *truth)[0]['iou']
                       for truth in ((bar, '--fit'), (turned_bar,)))
     assert turned == placed > 0
+
+
+def test_only_the_first_episode_of_a_dataset_s_camera_is_of_the_object_that_the_bag_names(
+        tmp_path, monkeypatch):
+    run = read_run(PAPER)
+    [first] = run.episodes
+    shown = replace(run, episodes=[first, replace(first)],
+                    provenance={**run.provenance, 'object': 'seat/one'},
+                    parameters={'turntable_camera': {'dataset': 'seats'}})
+    monkeypatch.setattr(work, 'read_run', lambda *_: shown)
+    (tmp_path / 'seat').mkdir()
+    trimesh.creation.box((0.5, 0.5, 0.5)).export(tmp_path / 'seat' / 'one.ply')
+    task = Task('measure', tmp_path, Topics(), Scene(), truth=TruthSource(tmp_path))
+    one, another = work.rows_of(task, PAPER)
+    assert (one['object'], another['object']) == ('seat/one', '')
+    assert one['iou'] > 0 and another['iou'] is None
 
 
 def test_a_second_start_keeps_what_is_finished_and_unchanged(

@@ -7,9 +7,8 @@ from typing import Any
 
 from active_recon.errors import ActiveReconError
 from active_recon.report.findings import findings
-from active_recon.report.page import object_name
 from active_recon.report.stages import median, timings
-from active_recon.report.subject import shown_grid, Subject
+from active_recon.report.subject import object_of, shown_grid, Subject
 
 COLUMNS: Mapping[str, tuple[str, str]] = {
     'bag': ('string', 'path of the bag'),
@@ -58,7 +57,7 @@ def episode_row(bag: str, number: int, subject: Subject, verdict: str, report: s
     quality = None if last is None else last.quality
     return {
         'bag': _text(bag), 'refused': '', 'refused_kind': '', 'episode': number,
-        'episode_id': episode.id, 'object': object_name(run.provenance.get('object', '')),
+        'episode_id': episode.id, 'object': object_of(run, episode),
         'policy': run.provenance.get('policy', ''), 'views': len(views),
         'expected_iou': None if quality is None else _finite(quality.expected_iou),
         'iou_lower_bound': None if quality is None else _finite(quality.lower_bound),

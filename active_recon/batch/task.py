@@ -18,7 +18,6 @@ from active_recon.errors import DataError
 from active_recon.models.weights_files import depth_path, scorer_path, weights_hash
 from active_recon.policies import policy_code, PolicyOptions
 from active_recon.quality.tables import tables_path
-from active_recon.report.page import object_name
 from active_recon.report.truth import known_truth, Truth, TruthFile
 
 KINDS = ('replay', 'report', 'measure')
@@ -38,12 +37,15 @@ class TruthSource:
     up: str | None = None
     front: str | None = None
 
-    def read(self, run: RecordedRun, object_size: float | None,
+    def read(self, run: RecordedRun, name: str, object_size: float | None,
              object_yaw: float | None = None) -> Truth | None:
-        """Return a run's true shape; None where a folder has none, and none is known."""
+        """
+        Return the true shape of a run's object; None where a folder has none, and none is known.
+
+        `name` is the object's, '' where it is not known.
+        """
         path = self.path
         if path.is_dir():
-            name = object_name(run.provenance.get('object', ''))
             own = [file for suffix in _SHAPES if (file := path / f'{name}{suffix}').is_file()]
             if not own:
                 return known_truth(run)

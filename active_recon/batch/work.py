@@ -23,8 +23,8 @@ from active_recon.cluster.stores import at_hand, Place, whole
 from active_recon.errors import ActiveReconError, DataError, WorkError
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.page import MAX_SUBJECTS, report_page
-from active_recon.report.subject import letters, Subject
-from active_recon.report.truth import known_truth
+from active_recon.report.subject import letters, object_of, Subject
+from active_recon.report.truth import known_truth, Truth
 
 PASSING = {'file', 'not_seen', 'worker_died'}
 """Kinds of refusals that may be over at a second start, which tries again."""
@@ -83,15 +83,24 @@ def rows_of(task: Task, bag: Place) -> list[Row]:
         run, computed, verdicts = _considered(task, run)
         if not run.episodes:
             raise DataError(f'{path}: no episode: expected one or more, got none', 'no_episode')
-        true = (known_truth(run) if task.truth is None
-                else task.truth.read(run, task.scene.object_size, task.scene.object_yaw))
-        cells, placed = (true.cells, true.placed) if true else (None, '')
-        subjects = [Subject(letter, run, episode, cells, computed, placed)
-                    for letter, episode in zip(letters(), run.episodes, strict=False)]
+        names = [object_of(run, episode) for episode in run.episodes]
+        truths = {name: _truth(task, run, name) for name in dict.fromkeys(names)}
+        subjects = [
+            Subject(letter, run, episode, true.cells if true else None, computed,
+                    true.placed if true else '')
+            for letter, episode, true in zip(
+                letters(), run.episodes, map(truths.get, names), strict=False)]
         pages = _write_pages(task, bag, [each for each in subjects if each.views])
         return [episode_row(str(bag), number, subject, verdict, pages.get(subject.letter, ''))
                 for number, (subject, verdict) in enumerate(
                     zip(subjects, verdicts or repeat(''), strict=False), 1)]
+
+
+def _truth(task: Task, run: RecordedRun, name: str) -> Truth | None:
+    """Return the true shape of a run's object of a name; None where it is not known."""
+    if task.truth is None:
+        return known_truth(run)
+    return task.truth.read(run, name, task.scene.object_size, task.scene.object_yaw)
 
 
 def _considered(task: Task, run: RecordedRun) -> tuple[RecordedRun, str, Sequence[str]]:

@@ -35,6 +35,7 @@ from std_srvs.srv import Trigger
 
 ANSWER_S = 2.0
 """Time to wait for the reconstructor to begin an episode."""
+_OBJECT = 'name of the object that is shown'
 
 
 class TurntableCameraNode(QosWarnings):
@@ -51,7 +52,7 @@ class TurntableCameraNode(QosWarnings):
         self._index = 0
         first = self._objects[0]()
         self._shown: Shown | None = first
-        set_read_only_parameter(self, 'object', first.name, 'name of the first object')
+        set_read_only_parameter(self, 'object', first.name, _OBJECT)
         self._diagnostics = Diagnostics(self)
         self._info_pub = self.create_publisher(CameraInfo, 'camera/camera_info', STREAM_QOS)
         self._pose_pub = self.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
@@ -153,6 +154,7 @@ class TurntableCameraNode(QosWarnings):
                                 f'{refusal}; the object is still the same')
             return response
         self._index, self._shown = index, following
+        set_read_only_parameter(self, 'object', following.name, _OBJECT)
         response.success = True
         response.message = f'{following.name} ({index + 1} of {len(self._objects)})'
         return response

@@ -17,7 +17,7 @@ from active_recon.report.images import data_uri
 from active_recon.report.introduction import introduction
 from active_recon.report.scene import scene
 from active_recon.report.stages import median, STAGES, timings
-from active_recon.report.subject import elevation_degrees, Subject
+from active_recon.report.subject import elevation_degrees, object_of, Subject
 from active_recon.report.surface import colored_surface
 from active_recon.report.turntable_map import turntable_map
 from active_recon.report.words import key_words
@@ -86,7 +86,7 @@ def _panel(subject: Subject) -> dict[str, Any]:
     recorded = datetime.fromtimestamp(run.begin / 1e9, UTC)
     return {
         'subject': subject,
-        'object': '' if subject.of_photos else object_name(run.provenance.get('object', '')),
+        'object': '' if subject.of_photos else object_of(run, subject.episode),
         'policy': run.provenance.get('policy', ''),
         'recorded': f'{recorded:%Y-%m-%d %H:%M} UTC' if run.begin > 0 else '',
         'duration_s': (run.end - run.begin) / 1e9,
@@ -102,12 +102,6 @@ def _panel(subject: Subject) -> dict[str, Any]:
         'stopped': stopped(subject.end),
         'others': len(run.episodes) - 1,
     }
-
-
-def object_name(provenance: str) -> str:
-    """Return the object's name; of a mesh file its stem."""
-    path = Path(provenance)
-    return path.stem if path.suffix else provenance
 
 
 def _number(value: float | None, places: int = 0) -> str:

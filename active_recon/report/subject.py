@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import count, product
 import math
+from pathlib import Path
 from string import ascii_uppercase
 
+from active_recon.bags.runs.parameters import node_parameters
 from active_recon.bags.runs.run import (
     PHOTOS,
     RecordedEpisode,
@@ -111,6 +113,20 @@ class Subject:
 def shown_grid(view: RecordedView) -> VoxelGrid | None:
     """Return the probabilities after a view, else its occupied cells, else None."""
     return view.reconstruction if view.reconstruction is not None else view.occupied
+
+
+def object_of(run: RecordedRun, episode: RecordedEpisode) -> str:
+    """
+    Return the name of an episode's object, of a mesh file its stem; '' where it is not known.
+
+    A bag has the name of the object that its camera showed first; one of a dataset may have shown
+    another in each later episode.
+    """
+    if episode is not run.episodes[0] and node_parameters(run, 'turntable_camera').get('dataset'):
+        return ''
+    name = run.provenance.get('object', '')
+    path = Path(name)
+    return path.stem if path.suffix else name
 
 
 def letters() -> Iterator[str]:

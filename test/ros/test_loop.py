@@ -14,6 +14,7 @@ from msg_tools.stamps import nanoseconds_from_stamp
 from msg_tools.voxels import voxel_grid_from_msg
 import numpy as np
 import pytest
+from rcl_interfaces.srv import GetParameters
 import rosless
 from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
@@ -148,6 +149,9 @@ def test_next_object_begins_an_episode_and_shows_another_object(bench, watch):
     answer = bench.call('next_object')
     assert answer.success
     assert answer.message == 'box/tall (2 of 2)'
+    shown, = bench.ask(GetParameters, 'turntable_camera/get_parameters',
+                       GetParameters.Request(names=['object'])).values
+    assert shown.string_value == 'box/tall'  # which a recording that begins now has
     bench.until(lambda: watch.episode().frame_id != episode, 'a new episode')
     begin = stamp_of(watch.episode())
     after = bench.until(lambda: next((msg for msg in images if stamp_of(msg) > begin), None),
