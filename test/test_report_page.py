@@ -10,6 +10,7 @@ import math
 import os
 from pathlib import Path
 import pickle
+import re
 import subprocess
 import sys
 
@@ -105,6 +106,13 @@ def test_each_view_says_why_it_was_asked_for(shapeless, page):
 
 def test_page_of_five_views_is_small(page):
     assert len(page.encode()) < 6e6
+
+
+def test_every_drawing_has_a_name_for_who_hears_the_page(page):
+    drawings = re.findall(r'<div class="(?:scene|map|chart)"[^>]*>', page)
+    assert len(drawings) == 5
+    for drawing in drawings:
+        assert 'role="img"' in drawing and re.search(r'aria-label="\w', drawing), drawing
 
 
 def test_nothing_is_fetched(page):

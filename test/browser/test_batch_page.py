@@ -21,6 +21,8 @@ def test_the_charts_are_drawn_without_complaint(chromium, tmp_path):
     opened(chromium, tmp_path, *(refusal_row(f'{number}.mcap', 'damaged', kind)
                                  for number, kind in enumerate(('data', 'data', 'version'))))
     assert chromium.run(BARS) == 2
+    assert chromium.run('return document.querySelector("[data-chart]").ariaLabel') == (
+        'Counts, why it was refused')
     assert chromium.errors() == []
 
 
@@ -38,3 +40,16 @@ def test_the_charts_turn_dark_with_their_reader(chromium, tmp_path):
     assert light == chromium.run(ink)
     chromium.prefer('dark')
     chromium.until(lambda: chromium.run(words) == chromium.run(ink) != light, 'the other ink')
+
+
+def test_the_grids_of_the_charts_stand_back_in_light_and_dark(chromium, tmp_path):
+    opened(chromium, tmp_path, refusal_row('1.mcap', 'damaged', 'data'))
+    for scheme in ('light', 'dark'):
+        chromium.prefer(scheme)
+        chromium.until(lambda: chromium.run(
+            'const colour = (of, what) => getComputedStyle(document.querySelector(of))[what]'
+            '.match(/\\d+/g).slice(0, 3).reduce((sum, each) => sum + Number(each), 0);'
+            'const paper = colour("body", "backgroundColor");'
+            'const away = (each) => Math.abs(each - paper);'
+            'return 3 * away(colour(".ygrid", "stroke")) < away(colour(".xtick text", "fill"))'),
+            f'a quiet grid in {scheme}', 5)
