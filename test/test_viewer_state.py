@@ -184,6 +184,12 @@ def test_the_own_threshold_of_occupied_cells_keeps_all_of_them(threshold):
     assert (fine.occupied(found) >= fine.occupied(threshold)).all()
 
 
+@pytest.mark.parametrize('certain', [1.0, 0.5, 0.4])
+def test_the_own_threshold_keeps_cells_that_are_all_as_certain(certain):
+    cube = VoxelGrid(np.full((4, 4, 4), certain, np.float32))
+    assert cube.occupied(own_threshold(cube)).all()
+
+
 def test_a_grid_without_occupied_cells_has_no_own_threshold():
     assert own_threshold(VoxelGrid(np.zeros((4, 4, 4), np.float32))) is None
 

@@ -183,10 +183,14 @@ def own_threshold(occupied: VoxelGrid) -> float | None:
     """
     Return the threshold of a grid that holds only occupied cells, rounded down to two digits.
 
-    It is the largest that keeps all of them; None where no cell is above 0.
+    It is the largest that keeps all of them, below 1 also where all are certain; None where no
+    cell is above 0.
     """
     cells = occupied.occupancy[occupied.occupancy > 0]
-    return math.floor(100 * float(cells.min())) / 100 if cells.size else None
+    if not cells.size:
+        return None
+    least = np.nextafter(cells.min(), np.float32(0))  # cells at a threshold are not above it
+    return math.floor(100 * float(least)) / 100
 
 
 def entropy_lines(views: Sequence[ViewResult], missed: int = 0
