@@ -8,6 +8,8 @@ from active_recon.policies.reasons import GoalReason
 from active_recon.report.page import report_page, write_page
 from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
+from active_recon.volumes.voxels import VoxelGrid
+import numpy as np
 import pytest
 from report_runs import changed, recorded_run
 
@@ -185,6 +187,18 @@ def test_higher_threshold_leaves_fewer_cells(page, changed_share):
 def test_at_the_recorded_threshold_just_the_recorded_cells_are_drawn(opened):
     recorded = recorded_run('chair').episodes[0].views[-1].occupied
     assert cells(opened()) == recorded.occupied(0).sum()
+
+
+def test_a_recorded_threshold_beyond_the_slider_holds_until_it_is_moved(chromium, tmp_path):
+    run = recorded_run('car', views=1)
+    [view] = run.episodes[0].views
+    sure = VoxelGrid(np.where(view.reconstruction.occupied(0.985), 1, 0).astype(np.float32))
+    run = changed(run, views=[replace(view, occupied=sure)])
+    write_page(report_page([Subject('A', run, run.episodes[0])]), tmp_path / 'page.html')
+    page = drawn(chromium, (tmp_path / 'page.html').as_uri())
+    assert cells(page) == sure.occupied(0).sum() > 0
+    slide(page, 0.5)
+    assert cells(page) == view.reconstruction.occupied(0.5).sum()
 
 
 @pytest.mark.slow

@@ -29,6 +29,7 @@
     const place = panel.querySelector('.scene');
     const turn = panel.querySelector('.turn');
     const slider = panel.querySelector('input[type=range]');
+    const own = slider.value; // the recorded threshold, which may lie beyond the slider's ends
     const self = { place, turning: !still.matches, visible: false, angle: 0.6, at: grids.length - 1 };
 
     const chosen = () => panel.querySelector('.after input:checked').value;
@@ -43,10 +44,9 @@
         return;
       }
       const cells = chosen() === 'truth' ? truth : grids[self.at];
-      const threshold = Number(slider.value) === Number(slider.defaultValue)
-        ? scene.threshold : Number(slider.value);
+      const threshold = slider.value === own ? scene.threshold : Number(slider.value);
       const mesh = surface(cells ?? [], scene.side, chosen() === 'truth' ? 0.5 : threshold);
-      panel.querySelector('output').textContent = Number(slider.value).toFixed(2);
+      panel.querySelector('output').textContent = threshold.toFixed(2);
       const fit = truth && cells && chosen() !== 'truth'
         ? ` · IoU ${overlap(cells, truth, threshold).toFixed(2)}` : '';
       panel.querySelector('.count').textContent = cells
