@@ -36,7 +36,8 @@ def test_what_nohup_started_outlives_its_terminal(hangup):
 
 @pytest.mark.parametrize('asked', [
     signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)])
-def test_a_command_that_is_killed_leaves_nothing_unfinished(asked, tmp_path):
+def test_a_command_that_is_killed_leaves_nothing_unfinished(asked, hangup, tmp_path):
+    signal.signal(hangup, signal.SIG_DFL)  # tests that nohup started ignore it
     command = subprocess.Popen(
         [sys.executable, '-m', 'active_recon.cli.main', 'record-sweep', 'chair', '--out',
          tmp_path / 'bag'], stderr=subprocess.PIPE, text=True)
