@@ -157,6 +157,12 @@ def read_views(folders: Sequence[ObjectFolder], progress: Callable[[], None] = l
                    tuple(np.array(folders, object)[kept]), unreadable)
 
 
+def no_readable(errors: Sequence[str]) -> DataError:
+    """Return the error of a dataset without an object that can be read, with some of theirs."""
+    return DataError('no readable object: expected at least one in the dataset, got none'
+                     + ''.join(f'\n  {error}' for error in errors[:5]))
+
+
 def _read_all(read: Callable[[int], str], count: int) -> tuple[slice | list[int], tuple[str, ...]]:
     """Read `count` objects; return the indices of those read, and the errors of the others."""
     with ThreadPoolExecutor() as pool:
@@ -164,8 +170,7 @@ def _read_all(read: Callable[[int], str], count: int) -> tuple[slice | list[int]
     good = [index for index in range(count) if not errors[index]]
     unreadable = tuple(filter(None, errors))
     if not good:
-        raise DataError('no readable object: expected at least one in the dataset, got none'
-                        + ''.join(f'\n  {error}' for error in unreadable[:5]))
+        raise no_readable(unreadable)
     return slice(None) if len(good) == count else good, unreadable
 
 
@@ -178,8 +183,7 @@ def _read_framed(folders: Sequence[ObjectFolder], progress: Callable[[], None], 
     lacking += tuple(f'{folder.depth_path(0)}: no depth images: expected those that `render` or '
                      '`dataset build` makes with `--depth`' for folder in without)
     if not folders:
-        raise DataError('no readable object: expected at least one in the dataset, got none'
-                        + ''.join(f'\n  {error}' for error in lacking[:5]))
+        raise no_readable(lacking)
     views = FramedViews(folders, shown, sides, resolution, image_size)
     poses, intrinsics = torch.from_numpy(views.poses), torch.from_numpy(views.intrinsics)
     image_shape, seen_shape = views.image_shapes

@@ -49,14 +49,22 @@ class LoopClient:
         return str(result.message)
 
     def _call(self, kind: Any, service: str, request: Any, budget_s: float,
-              meanwhile: Callable[[], None]) -> Any:
-        """Call a service and return its response; ActiveReconError after the budget."""
+              meanwhile: Callable[[], None], settle_s: float = 0.0) -> Any:
+        """
+        Call a service and return its response; ActiveReconError after the budget.
+
+        The call is made `settle_s` seconds after the service was found.
+        """
         client = self._node.create_client(kind, service)
-        self.until(client.service_is_ready, budget_s, f'the service {service}', meanwhile)
-        answer = client.call_async(request)
-        self.until(answer.done, budget_s, f'an answer of {service}', meanwhile)
-        self._node.destroy_client(client)
-        return answer.result()
+        try:
+            self.until(client.service_is_ready, budget_s, f'the service {service}', meanwhile)
+            if settle_s:
+                self.within(lambda: False, settle_s, meanwhile)
+            answer = client.call_async(request)
+            self.until(answer.done, budget_s, f'an answer of {service}', meanwhile)
+            return answer.result()
+        finally:
+            self._node.destroy_client(client)
 
 
 @contextmanager

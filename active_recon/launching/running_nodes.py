@@ -141,15 +141,7 @@ class RunningNodes(LoopClient):
             f'{domain}; start the nodes, or set ROS_DOMAIN_ID to the domain that they are on')
 
     def _ask(self, kind: Any, service: str, request: Any) -> Any:
-        client = self._node.create_client(kind, service)
-        try:
-            self.until(client.service_is_ready, _ANSWER_S, f'the service {service}', _nothing)
-            self.within(lambda: False, _SETTLE_S, _nothing)
-            answer = client.call_async(request)
-            self.until(answer.done, _ANSWER_S, f'an answer of {service}', _nothing)
-            return answer.result()
-        finally:
-            self._node.destroy_client(client)
+        return self._call(kind, service, request, _ANSWER_S, _nothing, _SETTLE_S)
 
     def _value(self, node: str, name: str) -> ParameterValue:
         values = self._ask(GetParameters, f'{node}/get_parameters',

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 from active_recon.datasets.layout import ObjectFolder
-from active_recon.datasets.views import read_views, ViewSet
+from active_recon.datasets.views import no_readable, read_views, ViewSet
 from active_recon.errors import ConfigError, DataError
 from active_recon.evaluation.posed.walking import on_turntable, some_objects
 from active_recon.models.network import ReconstructionNetwork
@@ -118,8 +118,7 @@ def _with_coarse_voxels(views: ViewSet) -> tuple[ViewSet, Tensor]:
         except DataError as error:
             lacking.append(str(error))
     if not kept:
-        raise DataError('no readable object: expected at least one in the dataset, got none'
-                        + ''.join(f'\n  {error}' for error in lacking[:5]))
+        raise no_readable(lacking)
     if lacking:
         views = replace(some_objects(views, torch.tensor(kept)),
                         unreadable=(*views.unreadable, *lacking))
