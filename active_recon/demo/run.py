@@ -122,7 +122,7 @@ def run_demo(demo: Demo, console: Console) -> Path:
 
 
 def _start_nodes(nodes: NodeProcesses, demo: Demo) -> None:
-    """Start the loop, but for the node that waits for the recorder."""
+    """Start the loop's nodes; the one that waits for the recorder stays unconfigured."""
     network = {'precision': demo.precision, **({'weights': demo.model} if demo.model else {})}
     nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
                              'record_at_start': False})

@@ -135,7 +135,6 @@ class RecordReader:
         raise DataError(f'incomplete: its end is missing, as after a killed recorder; {_REPAIR}',
                         'truncated')
 
-
     def go_on(self, position: int, chunks: int) -> None:
         """Go on at the beginning of a record, so many chunks after the first, with `records`."""
         self.position, self._chunks = position, chunks
