@@ -1,6 +1,7 @@
 """The command `active-recon`; subcommands import their modules when they run."""
 
 from collections.abc import Callable
+import gc
 import inspect
 import signal
 import sys
@@ -97,6 +98,9 @@ def main() -> None:
     except (ActiveReconError, OSError) as error:
         sys.stderr.write(f'active-recon: {error}\n')
         sys.exit(2)
+    finally:
+        # All that was imported ends with the process: looking through it takes 0.2 s
+        gc.freeze()
 
 
 if __name__ == '__main__':

@@ -72,10 +72,12 @@ def run_demo(demo: Demo, console: Console) -> Path:
     title = f'{demo.mesh.stem:.40}: {counted(demo.views, "view")}, policy {demo.policy}'
     with (held_interrupts() as raise_if_asked, TemporaryDirectory() as logs,
           NodeProcesses(Path(logs), environment) as nodes):
-        _start_nodes(nodes, demo)
-        # The nodes start meanwhile: what reads and draws meshes takes half a second to import
+        _start_loop(nodes, demo)
+        # They start meanwhile: what reads and draws meshes takes a second to import, once here
         from active_recon.demo.known_object import KnownObject
 
+        nodes.fork('turntable_camera', {'mesh': demo.mesh, 'speed': _SPEED,
+                                        'start_azimuth': _start_azimuth(demo)})
         known = KnownObject(demo.mesh)
         console.print('starting the recorder, the turntable camera, the reconstructor and the '
                       f'view planner on ROS domain {environment["ROS_DOMAIN_ID"]}')
@@ -85,11 +87,6 @@ def run_demo(demo: Demo, console: Console) -> Path:
             nodes.check()
 
         with demo_monitor(known.occupied) as monitor, ThreadPoolExecutor(1) as beside:
-            def bring(transition: str) -> None:
-                if not monitor.change_state(_LAST, transition, _START_S, check):
-                    raise nodes.failure(_LAST, f'failed to {transition}')
-
-            bring('configure')
             folder = Path(monitor.trigger('start', _START_S, check))
             monitor.set_parameter(_LAST, 'output_dir', str(folder), _START_S, check)
             if demo.view:
@@ -108,7 +105,8 @@ def run_demo(demo: Demo, console: Console) -> Path:
                         save_mesh()
 
             try:
-                bring('activate')
+                if not monitor.change_state(_LAST, 'activate', _START_S, check):
+                    raise nodes.failure(_LAST, 'failed to activate')
                 follow_loop(monitor, demo, title, console, check, on_view)
             finally:  # what there is of a run that was interrupted, too
                 picture = beside.submit(known.save_picture, folder / 'run.png', title,
@@ -121,18 +119,16 @@ def run_demo(demo: Demo, console: Console) -> Path:
     return demo.output_dir / folder.name
 
 
-def _start_nodes(nodes: NodeProcesses, demo: Demo) -> None:
-    """Start the loop's nodes; the one that waits for the recorder stays unconfigured."""
+def _start_loop(nodes: NodeProcesses, demo: Demo) -> None:
+    """Start the loop's nodes but its camera; one waits, configured, for the recorder."""
     network = {'precision': demo.precision, **({'weights': demo.model} if demo.model else {})}
-    nodes.start('recorder', {'output_dir': demo.output_dir.absolute(),
-                             'record_at_start': False})
-    nodes.start('turntable_camera', {'mesh': demo.mesh, 'speed': _SPEED,
-                                     'start_azimuth': _start_azimuth(demo)})
-    # A tolerance of 0 prevents an early end: all requested views are taken.
-    nodes.start('view_planner', {'policy': demo.policy, 'seed': demo.seed,
-                                 'max_views': demo.views, 'entropy_tolerance': 0.0, **network})
     # Goals only: `auto` takes views by separation until it has discovered the planner.
-    nodes.start(_LAST, {'autostart': False, 'take_views': 'at_goal', **network})
+    nodes.fork(_LAST, {'activate_at_start': False, 'take_views': 'at_goal', **network})
+    nodes.fork('recorder', {'output_dir': demo.output_dir.absolute(),
+                            'record_at_start': False})
+    # A tolerance of 0 prevents an early end: all requested views are taken.
+    nodes.fork('view_planner', {'policy': demo.policy, 'seed': demo.seed,
+                                'max_views': demo.views, 'entropy_tolerance': 0.0, **network})
 
 
 def _open_page(nodes: NodeProcesses, monitor: DemoMonitor, console: Console,

@@ -14,6 +14,7 @@ import time
 from types import TracebackType
 
 from active_recon.errors import ActiveReconError
+from active_recon.launching.forked import ForkedNode
 from active_recon.nodes.runtime.shared_memory import PROFILE
 
 _LAST_LINES = 8
@@ -64,7 +65,7 @@ class NodeProcesses:
         if log_folder is not None:
             self._environment |= {
                 'ROS_LOG_DIR': str(log_folder), 'RCUTILS_COLORIZED_OUTPUT': '0'}
-        self._running: dict[str, subprocess.Popen[bytes]] = {}
+        self._running: dict[str, subprocess.Popen[bytes] | ForkedNode] = {}
 
     def start(self, node: str, parameters: Mapping[str, object], namespace: str = '',
               arguments: Sequence[str] = (), names: Sequence[str] = ()) -> None:
@@ -74,8 +75,7 @@ class NodeProcesses:
         `names` are its own arguments, before those of ROS: the nodes that `composed` runs.
         In a namespace, for example '/cell_1', it is known here as 'cell_1.<node>'.
         """
-        words = [*arguments, *(word for name, value in parameters.items()
-                                  for word in ('-p', f'{name}:={_as_yaml(value)}'))]
+        words = [*arguments, *_as_words(parameters)]
         full_name = node
         if namespace:
             words += ['-r', f'__ns:={namespace}']
@@ -88,6 +88,17 @@ class NodeProcesses:
                 [sys.executable, '-m', f'active_recon.nodes.{node}', *names, '--ros-args', *words],
                 stdin=subprocess.DEVNULL, stdout=output, stderr=output and subprocess.STDOUT,
                 env=self._environment, start_new_session=True)
+
+    def fork(self, node: str, parameters: Mapping[str, object]) -> None:
+        """
+        Start a node in a fork of this process, which spares it what is imported here.
+
+        This process has no threads yet, of ROS or others, and a log folder.
+        """
+        log = self._log(node)
+        assert log is not None
+        self._running[node] = ForkedNode(
+            node, ['--ros-args', *_as_words(parameters)], self._environment, log)
 
     def pid(self, node: str) -> int:
         """Return the process id of a node that was started."""
@@ -133,6 +144,12 @@ class NodeProcesses:
                  trace: TracebackType | None) -> None:
         """Stop the nodes."""
         self.stop()
+
+
+def _as_words(parameters: Mapping[str, object]) -> list[str]:
+    """Return parameters as ROS takes them on a command line."""
+    return [word for name, value in parameters.items()
+            for word in ('-p', f'{name}:={_as_yaml(value)}')]
 
 
 def _as_yaml(value: object) -> str:

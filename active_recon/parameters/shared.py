@@ -14,6 +14,9 @@ class ManagedParameters:
 
     autostart: bool = parameter(
         True, 'whether the node configures and activates itself')
+    activate_at_start: bool = parameter(
+        True, 'whether autostart activates the node, too; false: configured, with its network in '
+        'memory, it waits to be activated')
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,6 @@
 """Processes of nodes: programs, and forks of a process that has imported what all nodes import."""
 
 from collections.abc import Sequence
-import gc
-from importlib import import_module
 import inspect
 import multiprocessing
 import os
@@ -10,8 +8,8 @@ from pathlib import Path
 import subprocess
 import sys
 
+from active_recon.launching.forked import run_as_program
 import pytest
-import rclpy.utilities
 
 ROOT = Path(__file__).parents[2]
 _NODES = ('reconstructor', 'view_planner', 'turntable_camera', 'camera', 'recorder', 'player')
@@ -55,7 +53,7 @@ class Forked:
 
     def __init__(self, name: str, options: Sequence[str], folder: Path, log: Path) -> None:
         self._process = _FORKS.Process(target=_run, daemon=True, args=(
-            name, [f'{name}.py', *options], folder, log, _environment()))
+            name, options, folder, log, _environment()))
         with pytest.MonkeyPatch.context() as patch:  # for the process that is forked
             patch.setenv('PYTHONPATH', f'{ROOT}{os.pathsep}{ROOT / "test"}')
             self._process.start()
@@ -76,19 +74,8 @@ def _environment() -> dict[str, str]:
     return {**os.environ, 'PYTHONPATH': str(ROOT)}
 
 
-def _run(name: str, argv: list[str], folder: Path, log: Path, environment: dict[str, str]) -> None:
-    gc.freeze()  # what was imported is no garbage
-    output = os.open(log, os.O_WRONLY | os.O_APPEND)
-    for descriptor in (1, 2):
-        os.dup2(output, descriptor)
-    os.environ.clear()
-    os.environ.update(environment)
+def _run(name: str, options: Sequence[str], folder: Path, log: Path,
+         environment: dict[str, str]) -> None:
     os.chdir(folder)
     sys.path.insert(0, str(folder))  # as `python -m` has it
-    sys.argv = argv
-    try:
-        import_module(f'active_recon.nodes.{name}').main()
-    finally:
-        # A fork ends without destroying its context, and would leave its shared memory behind
-        rclpy.utilities.g_default_context = None
-        gc.collect()
+    run_as_program(name, options, environment, log)

@@ -77,6 +77,20 @@ def test_what_a_transition_makes_its_opposite_destroys(start_node, bench, name):
     assert not node.log('Traceback|ERROR|FATAL')
 
 
+@pytest.mark.parametrize('name', NODES)
+def test_a_node_that_does_not_activate_itself_is_configured_and_waits_for_it(
+        start_node, bench, name):
+    node = start_node(name, ready=False, activate_at_start=False, **NODES[name])
+    supervisor = Supervisor(bench, name)
+    assert supervisor.state() == 'inactive'
+    assert node.log('INFO.* configured; waiting to be activated$')
+    bench.until(lambda: on_topic(bench, 'publishers', OFFERS[name]), 'a publisher')
+    assert not on_topic(bench, 'subscribers', HEARS[name])
+    assert supervisor.set('activate')
+    bench.until(lambda: on_topic(bench, 'subscribers', HEARS[name]), 'a subscription')
+    assert node.log('ready$')
+
+
 @pytest.mark.parametrize(('transitions', 'state'), [
     ([], 'unconfigured'), (['configure'], 'inactive'),
     (['configure', 'activate', 'shutdown'], 'finalized'), (['shutdown'], 'finalized'),

@@ -58,10 +58,10 @@ class ManagedNode(QosWarnings, LifecycleNode, ABC):
         assert self._cleanups is not None
         self._cleanups.callback(cleanup)
 
-    def start(self) -> None:
-        """Configure and activate the node itself; raises the error that prevents it."""
+    def start(self, to_active: bool) -> None:
+        """Configure and, `to_active`, activate itself; raises the error that prevents it."""
         self._is_starting = True
-        for trigger in (self.trigger_configure, self.trigger_activate):
+        for trigger in (self.trigger_configure, self.trigger_activate)[:1 + to_active]:
             trigger()
             if self._failure is not None:
                 raise self._failure
@@ -201,15 +201,19 @@ def managed(make_node: Callable[[], ManagedNode]) -> Callable[[], ManagedNode]:
     """
     Return what makes a lifecycle node, which with `autostart` configures and activates itself.
 
-    An autostart that fails raises; a transition that is requested and fails does not.
+    Without `activate_at_start` it only configures itself. An autostart that fails raises; a
+    transition that is requested and fails does not.
     """
     def started() -> ManagedNode:
         node = make_node()
         try:
-            if node.get_parameter('autostart').value:
-                node.start()
-            else:
+            to_active = bool(node.get_parameter('activate_at_start').value)
+            if not node.get_parameter('autostart').value:
                 node.get_logger().info('unconfigured; waiting to be configured and activated')
+            else:
+                node.start(to_active)
+                if not to_active:
+                    node.get_logger().info('configured; waiting to be activated')
         except BaseException:
             node.destroy_node()
             raise
