@@ -11,7 +11,6 @@ import signal
 import sys
 
 from active_recon.interrupts import stop_signals
-import rclpy.utilities
 
 _FORKS = multiprocessing.get_context('fork')
 
@@ -66,6 +65,8 @@ def run_as_program(name: str, arguments: Sequence[str], environment: Mapping[str
     os.environ.clear()
     os.environ.update(environment)
     sys.argv = [f'{name}.py', *arguments]
+    import rclpy.utilities  # not by who starts programs
+
     try:
         import_module(f'active_recon.nodes.{name}').main()
     finally:
