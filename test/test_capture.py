@@ -263,8 +263,13 @@ def test_the_command_hands_its_options_to_the_node_as_they_are(monkeypatch):
     CliRunner().invoke(app, ['camera', '📷/a "b".mp4'])
     (source,) = (word for word in begun[1] if word.startswith('source:='))
     assert '📷' in source and yaml.safe_load(source.removeprefix('source:=')) == '📷/a "b".mp4'
-    wrong = CliRunner().invoke(app, ['camera', '0', '--size', 'large'])
-    assert 'expected WIDTHxHEIGHT' in str(wrong.exception)
+
+
+@pytest.mark.parametrize('size', ['large', '640', '640x', '0x0', '640x0', '0x480'])
+def test_a_size_that_is_none_is_refused_by_the_command(monkeypatch, size):
+    monkeypatch.setattr(os, 'execv', lambda *_: pytest.fail('the node was begun'))
+    wrong = CliRunner().invoke(app, ['camera', '0', '--size', size])
+    assert f'expected WIDTHxHEIGHT above 0, e.g. 1280x720, got {size!r}' in str(wrong.exception)
 
 
 def test_a_calibration_for_another_size_is_refused():

@@ -41,9 +41,10 @@ def camera(
     from active_recon.errors import ConfigError
 
     width, _, height = size.lower().partition('x')
-    if size and not (width.isdecimal() and height.isdecimal()):
-        raise ConfigError('--size: invalid size: expected WIDTHxHEIGHT, e.g. 1280x720, got '
-                          f'{size!r}')
+    # 0 would ask for the device's own, as no --size does
+    if size and not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise ConfigError('--size: invalid size: expected WIDTHxHEIGHT above 0, e.g. 1280x720, '
+                          f'got {size!r}')
     parameters = {
         'source': source, 'camera_info': '' if camera_info is None else str(camera_info),
         'camera_frame': frame, 'rate': rate, 'loop': loop, 'width': int(width or 0),
