@@ -20,7 +20,7 @@ from active_recon.geometry.cameras import orbit_camera
 from active_recon.policies.reasons import GoalReason
 from active_recon.report.page import MAX_SUBJECTS, report_page, write_page
 from active_recon.report.scene import encoded, STEPS
-from active_recon.report.subject import letters, Subject
+from active_recon.report.subject import letters, object_of, Subject
 from active_recon.report.truth import known_truth
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
@@ -292,6 +292,15 @@ def test_an_object_keeps_the_capitals_of_its_file(shapeless):
     named = replace(shapeless, provenance={**shapeless.provenance, 'object': 'lampA2.ply'})
     for count in (1, 2):
         assert '>LampA2' in page_of(*[named] * count)
+
+
+@pytest.mark.parametrize(('recorded', 'name'), [
+    ('my.part.v2.stl', 'my.part.v2'), ('tools/my.part.v2', 'tools/my.part.v2'),
+    ('no.1/mug', 'no.1/mug'), ('photos', 'photos'), ('', '')])
+def test_only_the_suffix_of_a_mesh_file_is_no_part_of_the_name_of_an_object(
+        run, recorded, name):
+    shown = replace(run, provenance={**run.provenance, 'object': recorded})
+    assert object_of(shown, shown.episodes[0]) == name
 
 
 def test_letters_go_on_beyond_the_alphabet():

@@ -119,14 +119,14 @@ def object_of(run: RecordedRun, episode: RecordedEpisode) -> str:
     """
     Return the name of an episode's object, of a mesh file its stem; '' where it is not known.
 
-    A bag has the name of the object that its camera showed first; one of a dataset may have shown
-    another in each later episode.
+    That of a dataset is CATEGORY/NAME, in which a dot begins no suffix. A bag has the name of the
+    object that its camera showed first; one of a dataset may have shown another in each later
+    episode.
     """
     if episode is not run.episodes[0] and node_parameters(run, 'turntable_camera').get('dataset'):
         return ''
     name = run.provenance.get('object', '')
-    path = Path(name)
-    return path.stem if path.suffix else name
+    return name if '/' in name else Path(name).stem
 
 
 def letters() -> Iterator[str]:
