@@ -79,6 +79,18 @@ def test_what_a_dying_worker_had_is_done_again_and_no_item_is_lost_or_doubled(
     assert (tmp_path / '2-1').exists()
 
 
+@pytest.mark.parametrize('kind', ['alone', 'local', pytest.param('ray', marks=pytest.mark.slow)])
+def test_an_item_that_asks_its_process_to_end_ends_no_other(crews, kind):
+    opened = crews.get(kind, lambda: crew_of(None, 1))
+    with opened() as crew:
+        found = results(crew, cluster_items.ending, range(8))
+    assert [result.value for result in found if result.index not in (1, 2)] == [0, 3, 4, 5, 6, 7]
+    asked = (DIED, 'worker_died') if kind == 'ray' else (
+        'RuntimeError: it asked its process to end: SystemExit: of a parser', 'unexpected')
+    assert found[1] == Result(1, None, *asked)
+    assert found[2] == Result(2, None, 'Panic: of a library', 'unexpected')
+
+
 def test_ctrl_c_and_a_closed_terminal_are_the_driver_s():
     kinds = [signal.SIGINT, signal.SIGHUP]
     assert [result.value for result in results(LocalCrew(2), cluster_items.signalled, kinds)

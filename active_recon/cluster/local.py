@@ -5,6 +5,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 import multiprocessing
 import os
 import signal
@@ -32,6 +33,7 @@ class LocalCrew:
     def map(self, function: Callable[[Any], Any], items: Iterable[Any],
             shared: Place | None = None, reads: Sequence[Place] = ()) -> Iterator[Result]:
         """Yield the results in the order of their completion; see `crew.Crew`."""
+        function = partial(_staying, function)
         if self.workers == 1:
             for index, item in enumerate(items):
                 yield attempt(function, item).result(index)
@@ -105,6 +107,14 @@ class _Errand:
         except BrokenProcessPool:
             self.hand.renew()
             return None
+
+
+def _staying(function: Callable[[Any], Any], item: Any) -> Any:
+    """Call the function; where it asks its process to end, as parsers do, it has failed."""
+    try:
+        return function(item)
+    except SystemExit as error:
+        raise RuntimeError(f'it asked its process to end: SystemExit: {error}') from error
 
 
 _function: Callable[[Any], Any] | None = None

@@ -67,7 +67,9 @@ def attempt(function: Callable[[Any], Any], item: Any) -> Outcome:
     except OSError as error:
         return _no_room(error) if is_no_room(error) else Outcome(
             refusal=f'cannot be read or written: {error}', kind=FILE)
-    except Exception as error:  # an archive outlives a fault that only one of its items shows
+    except (KeyboardInterrupt, SystemExit):  # the latter is how Ray ends its workers
+        raise
+    except BaseException as error:  # an archive outlives a fault that only one of its items shows
         return Outcome(refusal=f'{type(error).__name__}: {error}', kind=UNEXPECTED)
 
 
