@@ -8,14 +8,14 @@ from types import SimpleNamespace
 
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
-from active_recon.photos.files import open_photos
+from active_recon.photos.files import open_photo, open_photos
 from active_recon.photos.reconstruct import from_files, Options
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 from active_recon.policies.stopping import StoppingRule
 from active_recon.runtimes import precision
 from active_recon.volumes.voxels import VoxelGrid
 from active_recon.watching.advice import Adviser, ELEVATIONS, ENOUGH
-from active_recon.watching.arrivals import Arrivals, SETTLED_S
+from active_recon.watching.arrivals import Arrivals, EMPTY_S, SETTLED_S
 from active_recon.watching.collection import Collection
 from active_recon.watching.directions import where_to_stand
 from active_recon.watching.sketch import NEXT_COLOR, SIDE, sketch
@@ -174,6 +174,24 @@ def test_a_file_has_arrived_once_it_no_longer_changes(tmp_path):
     assert arrivals.arrived(101.0) == [path]
     path.unlink()
     assert arrivals.gone() == [path] and arrivals.gone() == []
+
+
+def test_a_file_that_stays_without_bytes_is_told_once_and_a_copy_that_has_begun_is_not(
+        tmp_path):
+    arrivals = Arrivals(tmp_path)
+    failed, begun = tmp_path / 'failed.jpg', tmp_path / 'begun.jpg'
+    failed.touch()
+    assert arrivals.arrived(0.0) == arrivals.arrived(2 * SETTLED_S) == []
+    begun.touch()
+    assert arrivals.arrived(EMPTY_S - 1) == []
+    begun.write_bytes(b'all of it')
+    assert arrivals.arrived(EMPTY_S) == [failed]
+    assert arrivals.arrived(EMPTY_S + SETTLED_S) == [begun] and arrivals.gone() == []
+    with pytest.raises(DataError, match='failed.jpg: not readable: .* got: a file of 0 bytes$'):
+        open_photo(failed, {})
+    failed.write_bytes(b'copied again')
+    assert arrivals.gone() == [failed] and arrivals.arrived(30.0) == []
+    assert arrivals.arrived(31.0) == [failed]
 
 
 def test_photos_that_were_there_come_in_the_order_of_their_age(tmp_path):

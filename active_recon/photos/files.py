@@ -126,7 +126,10 @@ def open_photo(path: Path, known: dict[bytes, Path]) -> PhotoFile:
     if path.suffix.lower() in HEIC_ENDINGS:
         raise DataError(f'{path.name}: {HEIC_ADVICE}', _UNREADABLE)
     try:
-        digest = hashlib.sha256(path.read_bytes()).digest()
+        stored = path.read_bytes()
+        if not stored:
+            raise DataError('a file of 0 bytes')
+        digest = hashlib.sha256(stored).digest()
         photo = _opened(path)
     except (DataError, OSError) as error:
         raise DataError(f'{path.name}: not readable: expected a whole image, got: '

@@ -10,6 +10,8 @@ from active_recon.photos.files import is_photo
 
 SETTLED_S = 0.8
 """A file is whole once it has not changed for so long, seconds."""
+EMPTY_S = 10.0
+"""The same of a file without bytes: copies may be that at first, and one that failed stays so."""
 
 
 @dataclass
@@ -58,7 +60,7 @@ class Arrivals:
             seen = self._known.get(path)
             if seen is None or (seen.size, seen.changed) != (size, changed):
                 self._known[path] = _Seen(size, changed, now)
-            elif not seen.told and size and now - seen.since >= SETTLED_S:
+            elif not seen.told and now - seen.since >= (SETTLED_S if size else EMPTY_S):
                 seen.told = True
                 whole.append(path)
         return sorted(whole, key=lambda path: (self._known[path].changed, in_order(path)))
