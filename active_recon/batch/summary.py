@@ -11,6 +11,7 @@ from active_recon.batch.rows import Row
 from active_recon.cluster.stores import Place, whole
 from active_recon.report.embedding import compressed, plotly_script
 from active_recon.report.findings import stopped
+from active_recon.report.words import counted
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 MOST_SHOWN = 1000
@@ -82,26 +83,30 @@ class Summary:
 
     def _charts(self) -> Mapping[str, dict[str, Any]]:
         """Return the plots that have something to show, by their titles."""
-        drawn: list[tuple[str, Sequence[Any], list[int]]] = [
-            (title, [(number + 0.5) / _BINS for number in range(_BINS)],
-             [self._ious[name][number] for number in range(_BINS)])
+        middles = [(number + 0.5) / _BINS for number in range(_BINS)]
+        ranges = [f'{number / _BINS:.2f} to {(number + 1) / _BINS:.2f}' for number in range(_BINS)]
+        drawn: list[tuple[str, Sequence[Any], Sequence[str], list[int]]] = [
+            (title, middles, ranges, [self._ious[name][number] for number in range(_BINS)])
             for title, name in (('expected IoU', 'expected_iou'), ('IoU with the truth', 'iou'))]
         for title, counts in (('views', self._views), ('why it stopped', self._stops),
                               ('why it was refused', self._refusals)):
             found = sorted(counts.items())
-            drawn.append((title, [escape(str(name), quote=False) for name, _ in found],
-                          [count for _, count in found]))  # Plotly takes texts for HTML
-        return {title: _bars(title, x, y) for title, x, y in drawn if any(y)}
+            # Plotly takes texts for HTML
+            names = [escape(str(name), quote=False) for name, _ in found]
+            drawn.append((title, names, names, [count for _, count in found]))
+        return {title: _bars(title, x, names, y) for title, x, names, y in drawn if any(y)}
 
 
-def _bars(title: str, x: Sequence[Any], y: Sequence[int]) -> dict[str, Any]:
-    """Return the plot of a count for each of some values."""
-    number = 'bags' if 'refused' in title else 'episodes'
+def _bars(title: str, x: Sequence[Any], names: Sequence[str], y: Sequence[int]) -> dict[str, Any]:
+    """Return the plot of a count for each of some values, with their names in words."""
+    number = 'bag' if 'refused' in title else 'episode'
     return {
         'data': [{'type': 'bar', 'x': list(x), 'y': list(y),
-                  'hovertemplate': f'%{{x}}: %{{y}} {number}<extra></extra>'}],
+                  'customdata': [f'{name}: {counted(count, number)}'
+                                 for name, count in zip(names, y, strict=True)],
+                  'hovertemplate': '%{customdata}<extra></extra>'}],
         'layout': {'height': 260, 'margin': {'l': 58, 'r': 12, 't': 12, 'b': 44},
                    'xaxis': {'title': {'text': title}, 'fixedrange': True,
                              'type': 'category' if isinstance(x[0], str) else 'linear'},
-                   'yaxis': {'title': {'text': number}, 'fixedrange': True,
+                   'yaxis': {'title': {'text': f'{number}s'}, 'fixedrange': True,
                              **({'dtick': 1} if max(y) < _FEW else {})}}}

@@ -1,6 +1,6 @@
 """The page of an archive in a real browser."""
 
-from active_recon.batch.rows import refusal_row
+from active_recon.batch.rows import COLUMNS, refusal_row
 from active_recon.batch.summary import Summary
 import pytest
 
@@ -24,6 +24,24 @@ def test_the_charts_are_drawn_without_complaint(chromium, tmp_path):
     assert chromium.run('return document.querySelector("[data-chart]").ariaLabel') == (
         'Counts, why it was refused')
     assert chromium.errors() == []
+
+
+def test_a_bar_under_the_pointer_tells_of_which_values_it_is_the_count(chromium, tmp_path):
+    row = {**dict.fromkeys(COLUMNS), 'bag': '1.mcap', 'refused': '', 'verdict': '', 'views': 4,
+           'stopped': 'gain_too_small', 'warnings': [], 'expected_iou': 0.93, 'iou': 0.5}
+    opened(chromium, tmp_path, row)
+    told = {}
+    for name in ('expected IoU', 'IoU with the truth', 'views'):
+        chromium.run("""
+            const place = [...document.querySelectorAll('[data-chart]')].find(
+              (each) => each.dataset.chart === arguments[0]);
+            const pointNumber = place.data[0].y.indexOf(1);
+            Plotly.Fx.hover(place, [{ curveNumber: 0, pointNumber }]);""", name)
+        told[name] = chromium.until(lambda: chromium.run(
+            'return document.querySelector(`[data-chart="${arguments[0]}"] .hovertext .nums`)'
+            '?.textContent', name), f'what is told of {name}', 5)  # noqa: B023
+    assert told == {'expected IoU': '0.90 to 0.95: 1 episode',
+                    'IoU with the truth': '0.50 to 0.55: 1 episode', 'views': '4: 1 episode'}
 
 
 def test_the_page_fits_the_narrowest_window(chromium, tmp_path):
