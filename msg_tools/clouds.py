@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
+_TYPES = {getattr(PointField, name.upper()): name for name in (
+    'int8', 'uint8', 'int16', 'uint16', 'int32', 'uint32', 'float32', 'float64')}
+
 
 def cloud_from_msg(msg: PointCloud2, names: Sequence[str]) -> NDArray[np.float32]:
     """
@@ -19,8 +22,13 @@ def cloud_from_msg(msg: PointCloud2, names: Sequence[str]) -> NDArray[np.float32
     offsets = {field.name: field.offset for field in msg.fields
                if field.datatype == PointField.FLOAT32}
     if missing := [name for name in names if name not in offsets]:
+        types = {field.name: field.datatype for field in msg.fields}
+        got = [f'{name} in {_TYPES.get(types[name], types[name])}' for name in missing
+               if name in types]
+        if absent := [name for name in missing if name not in types]:
+            got.append(f'none named {", ".join(absent)}')
         raise MessageError(f'missing cloud fields: expected float32 fields {", ".join(names)}, '
-                           f'got none named {", ".join(missing)}', 'cloud')
+                           f'got {", ".join(got)}', 'cloud')
     count = msg.width * msg.height
     row_bytes = msg.width * msg.point_step
     step = max(msg.row_step, row_bytes) if msg.height > 1 else row_bytes

@@ -15,6 +15,7 @@ from msg_tools.stamps import nanoseconds_from_stamp, stamp_from_nanoseconds
 from msg_tools.voxels import voxel_grid_from_msg, voxel_grid_to_msg
 import numpy as np
 import pytest
+from sensor_msgs.msg import PointField
 from std_msgs.msg import Header
 
 GRID = VoxelGrid(np.random.default_rng(0).random((32, 32, 32), np.float32), size=0.4)
@@ -96,6 +97,16 @@ def test_a_cloud_that_lacks_fields_or_bytes_is_refused():
     msg.width = 4
     with pytest.raises(MessageError, match='expected 32 bytes for 4 points, got 24'):
         cloud_from_msg(msg, 'ab')
+
+
+def test_a_cloud_of_other_numbers_is_refused_by_what_they_are():
+    msg = cloud_to_msg(np.zeros((3, 4), np.float32), ('x', 'y', 'z', 'w'), Header())
+    for field, datatype in zip(msg.fields, (PointField.FLOAT64, PointField.UINT16, 77),
+                               strict=False):
+        field.datatype = datatype
+    with pytest.raises(MessageError, match='expected float32 fields x, y, z, occupancy, got x in '
+                                           'float64, y in uint16, z in 77, none named occupancy$'):
+        voxel_grid_from_msg(msg)
 
 
 @pytest.mark.parametrize('nanoseconds', [0, 1, 999_999_999, 10**9, 1_795_000_000_123_456_789])
