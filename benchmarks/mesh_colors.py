@@ -25,7 +25,7 @@ from active_recon.datasets.manifest import manifest_jobs, read_manifest
 from active_recon.geometry.cameras import Camera
 from active_recon.meshes import coloring
 from active_recon.meshes.photos import Photo
-from active_recon.models.weights_files import find_weights
+from active_recon.models.weights_files import find_weights, weights_hash
 from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.refinement import refined_mesh
 from active_recon.volumes.rendering import composite, Renderer
@@ -52,7 +52,8 @@ def main() -> None:
     rows = [row for row in read_manifest(options.manifest) if row.split == options.split]
     order = np.random.default_rng(0).permutation(len(rows))
     jobs = manifest_jobs([rows[index] for index in order], Path())
-    reconstructor = Reconstructor.load(find_weights(None), threads=1)
+    weights = find_weights(None)
+    reconstructor = Reconstructor.load(weights, threads=1)
     found: list[dict[str, Any]] = []
     for job in jobs:
         if len(found) == options.objects:
@@ -66,6 +67,7 @@ def main() -> None:
         print(found[-1], file=sys.stderr, flush=True)  # noqa: T201
         options.out.write_text(json.dumps({
             'command': shlex.join(['python', '-m', 'benchmarks.mesh_colors', *sys.argv[1:]]),
+            'weights_sha256': weights_hash(weights),
             'mean': _means(found), 'objects': found}, indent=1) + '\n')
     print(_means(found))  # noqa: T201
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from active_recon.datasets.layout import list_objects, ObjectFolder
 from active_recon.evaluation.self_intersections import self_intersections
-from active_recon.models.weights_files import find_weights
+from active_recon.models.weights_files import find_weights, weights_hash
 from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.refinement import refined_mesh
 from active_recon.volumes.rendering import composite
@@ -44,13 +44,15 @@ def main() -> None:
     options = parser.parse_args()
     folders = list_objects(options.dataset)
     drawn = np.random.default_rng(0).permutation(len(folders))[:options.objects]
-    reconstructor = Reconstructor.load(find_weights(None), threads=1)
+    weights = find_weights(None)
+    reconstructor = Reconstructor.load(weights, threads=1)
     found: dict[str, list[dict[str, Any]]] = {}
     for number, folder in enumerate(folders[index] for index in drawn):
         for way, said in _of_object(folder, reconstructor, number % options.every == 0):
             found.setdefault(way, []).append(said)
         options.out.write_text(json.dumps({
             'command': shlex.join(['python', '-m', 'benchmarks.watertight', *sys.argv[1:]]),
+            'weights_sha256': weights_hash(weights),
             'counts': {way: _counts(said) for way, said in found.items()},
             'failed': {way: [each for each in said if not _holds(each)]
                        for way, said in found.items()},

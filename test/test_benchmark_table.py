@@ -5,12 +5,14 @@ import json
 from pathlib import Path
 import sys
 
+from active_recon.models.weights_files import find_weights, weights_hash
 from benchmarks import record
 from benchmarks.__main__ import BY_THEMSELVES, PARTS
 from benchmarks.figures import Figure
 from benchmarks.record import DOCUMENT, keep, part_record, RESULTS, rows, with_table
 from benchmarks.stream import counting_lost
 import pytest
+from trimesh.creation import box
 
 BENCHMARKS = sorted(path.stem for path in RESULTS.parents[2].glob('benchmarks/*.py')
                     if "__name__ == '__main__'" in path.read_text())
@@ -72,6 +74,21 @@ def test_what_depth_adds_is_not_measured_where_there_is_none(
         import_module('benchmarks.depth').main()
     assert 'no depth images: expected a dataset made with --depth' in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_the_meshes_of_the_default_network_are_measured_under_the_hash_of_its_weights(
+        dataset, tmp_path, monkeypatch):
+    benchmark = import_module('benchmarks.watertight')
+    monkeypatch.setattr(benchmark.Reconstructor, 'load', lambda weights, threads: None)
+    said = benchmark._said(box((1, 1, 1)))
+    monkeypatch.setattr(benchmark, '_of_object', lambda folder, _, seen: iter([
+        ('true cells', {'object': folder.name, 'true_bodies': 1, **said})]))
+    out = tmp_path / 'watertight.json'
+    monkeypatch.setattr(sys, 'argv', ['watertight', str(dataset), '--out', str(out)])
+    benchmark.main()
+    written = json.loads(out.read_text())
+    assert written['weights_sha256'] == weights_hash(find_weights(None))
+    assert written['counts']['true cells']['all three'] > 0
 
 
 def test_what_another_machine_measured_is_told_where_it_stays_in_the_table(tmp_path, monkeypatch):
