@@ -8,10 +8,13 @@ from active_recon.bags.runs.topics import Topics
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import CANONICAL_INTRINSICS
 from foreign_recordings import AZIMUTHS, cameras, IMAGES, images, joints, png, TIMES
-from loop_bags import BEGIN, DELAY, header, PERIOD, write_bag
+from loop_bags import BEGIN, DELAY, header, PERIOD, type_name, write_bag
+from mcap.writer import Writer as McapWriter
 from msg_tools.images import image_to_msg
 import numpy as np
 import pytest
+from rclpy.serialization import serialize_message
+from recorded_messages import definition
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header
 
@@ -37,6 +40,28 @@ def test_images_and_the_joint_of_a_turntable_are_views(tmp_path, make):
         lens = view.camera.intrinsics  # the shorter side is what the canonical camera sees
         assert lens.fy / 24 == pytest.approx(CANONICAL_INTRINSICS.fy / 137)
         assert (lens.fx, lens.cx, lens.cy) == (lens.fy, 16, 12)
+
+
+def test_types_of_an_mcap_file_may_be_named_without_msg(tmp_path):
+    messages = sorted(images() + joints(), key=lambda entry: entry[0])
+    with (tmp_path / 'bag.mcap').open('wb') as file:
+        writer = McapWriter(file)
+        writer.start('ros2', 'a test')
+        channels = {}
+        for time, topic, msg in messages:
+            if topic not in channels:
+                name = type_name(msg)
+                schema = writer.register_schema(
+                    name.replace('/msg/', '/'), 'ros2msg', definition(name).encode())
+                channels[topic] = writer.register_channel(topic, 'cdr', schema)
+            writer.add_message(channels[topic], time, serialize_message(msg), time)
+        writer.finish()
+    named = read_run(write_bag(tmp_path / 'run', messages))
+    shortly = read_run(tmp_path / 'bag.mcap')
+    assert [(topic.name, topic.type_name) for topic in shortly.topics] == [
+        (topic.name, topic.type_name) for topic in named.topics]
+    assert [view.stamp for view in shortly.episodes[0].views] == [
+        view.stamp for view in named.episodes[0].views] != []
 
 
 def test_a_turned_object_is_a_camera_that_goes_the_other_way(tmp_path):

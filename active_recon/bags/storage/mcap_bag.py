@@ -1,6 +1,7 @@
 """A bag of one or several consecutive MCAP files."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +73,10 @@ class McapBag:
         channels: dict[int, Topic] = {}
         for record in records:
             if isinstance(record, Schema):
-                schemas[record.id] = record
                 if record.encoding == 'ros2msg':
+                    record = replace(record, name=_full_name(record.name))
                     require_standard(record.name, record.data, name)
+                schemas[record.id] = record
             elif isinstance(record, Channel):
                 channels[record.id] = topics[record.topic] = Topic(
                     record.topic, _type_name(record, schemas),
@@ -109,6 +111,12 @@ def new_in_bag(files: Iterable[Iterator[_Record]]) -> Iterator[_Record]:
                     continue
                 last[record.topic] = message
             yield record
+
+
+def _full_name(name: str) -> str:
+    """Return a type's name as ROS 2 has it: other writers may leave `msg` out, as in ROS 1."""
+    package, slash, kind = name.partition('/')
+    return f'{package}/msg/{kind}' if slash and '/' not in kind else name
 
 
 def _type_name(channel: Channel, schemas: Mapping[int, Schema]) -> str:
