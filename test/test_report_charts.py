@@ -1,10 +1,12 @@
 """Figures: Plotly knows every word of them, and they draw what is known and no more."""
 
 from dataclasses import replace
+from itertools import islice
 
 from active_recon.report.charts import entropy_chart, iou_chart, stage_chart, view_color
+from active_recon.report.page import MAX_SUBJECTS
 from active_recon.report.stages import STAGES, timings
-from active_recon.report.subject import Subject
+from active_recon.report.subject import letters, Subject
 from active_recon.report.truth import known_truth
 from active_recon.report.turntable_map import turntable_map
 import plotly.graph_objects as go
@@ -57,6 +59,16 @@ def test_runs_side_by_side_have_a_curve_each_under_their_letter(subject):
     curves = entropy_chart([subject, other])['data']
     assert [curve['name'] for curve in curves] == ['A', 'B']
     assert curves[0]['line']['color'] != curves[1]['line']['color']
+
+
+@pytest.mark.parametrize('draw', [entropy_chart, iou_chart])
+def test_curves_of_as_many_runs_as_a_page_takes_differ_in_more_than_colour(subject, draw):
+    runs = [replace(subject, letter=letter) for letter in islice(letters(), MAX_SUBJECTS)]
+    curves = draw(runs)['data']
+    assert len({curve['marker']['symbol'] for curve in curves}) == MAX_SUBJECTS
+    for run, curve in zip(runs, curves, strict=True):
+        assert curve['hovertemplate'].startswith(f'{run.letter}, after view')
+    assert draw([subject])['data'][0]['hovertemplate'].startswith('after view')
 
 
 def test_bars_of_a_view_are_its_stages(subject):

@@ -62,9 +62,11 @@ def _progress(subjects: Sequence[Subject], title: str,
             'type': 'scatter', 'mode': 'lines+markers', 'name': subject.letter,
             'x': list(range(1, len(subject.views) + 1)), 'y': list(values(subject)),
             'line': {'color': view_color(index if several else 1), 'width': 2.5},
-            'marker': {'size': 9, 'color': view_color(index) if several else [
+            # Colours repeat, and not every eye tells them apart
+            'marker': {'size': 9, 'symbol': index - 1, 'color': view_color(index) if several else [
                 view_color(number) for number in range(1, len(subject.views) + 1)]},
-            'hovertemplate': f'after view %{{x}}: {hover}<extra></extra>',
+            'hovertemplate': (f'{subject.letter}, ' if several else '')
+                             + f'after view %{{x}}: {hover}<extra></extra>',
         } for index, subject in enumerate(subjects, 1)],
         'layout': {
             'height': 240, 'showlegend': several,
