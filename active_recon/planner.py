@@ -152,7 +152,7 @@ class Planner:
                 self._choice, self._state = other._choice, other._state
             elif self._policy.wants_volume and self._views[-1].volume is None:
                 self._choice, _ = self._sweep.choose(observation(
-                    self._views, self._candidates, self._yaw, wants_volume=False), {})
+                    self._views, self._candidates, self._yaw, False, self._limits), {})
             else:
                 whole = len(self._views)
                 for count in range(whole if self._policy.wants_volume else 1, whole + 1):
@@ -328,7 +328,8 @@ class Planner:
     def _observed(self, views: Sequence[PlannerView],
                   candidates: Sequence[OrbitCamera]) -> Observation:
         """Return what the policy sees after the last of some views."""
-        return observation(views, candidates, self._yaw, self._policy.wants_volume)
+        return observation(
+            views, candidates, self._yaw, self._policy.wants_volume, self._limits)
 
     def _aim_first(self, camera: Camera) -> None:
         """Make the best of a camera that no policy chose."""

@@ -2,6 +2,7 @@
 
 import math
 
+from active_recon.acquisition.motion import MotionLimits
 from active_recon.errors import ViewError
 from active_recon.geometry.cameras import AZIMUTHS, nearest_view, orbit_camera
 from active_recon.planner import Planner
@@ -93,6 +94,24 @@ def test_goals_keep_away_from_views_taken_as_long_as_they_can(name):
             Observation(LATENT[None], poses(taken), poses(AZIMUTHS))).max()
         assert away[0, 0] >= min(math.radians(60), 0.75 * farthest) - 1e-3
         taken.append(goal)
+
+
+@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('half', [math.radians(30), math.radians(45)])
+def test_goals_keep_apart_within_the_azimuths_that_the_camera_can_reach(name, half):
+    planner = Planner.load(name, max_views=4, entropy_tolerance=0.0,
+                           limits=MotionLimits((-half, half)))
+    camera, taken = orbit_camera(-half, 0.5), []
+    while camera is not None:
+        taken.append(camera.azimuth)
+        goal = planner.add_view(
+            LATENT, camera, 10.0, VoxelGrid(block_with_a_doubtful_side(), 1.0)).goal
+        camera = goal and goal.camera
+        if goal:
+            away = distance_to_taken(Observation(LATENT[None], poses(taken), poses(
+                [each.azimuth for each in (camera, *goal.candidates)])))[0]
+            assert away[0] >= 0.75 * away.max() - 1e-3
+    assert len(taken) == 4
 
 
 @pytest.mark.parametrize('name', NAMES)

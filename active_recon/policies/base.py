@@ -18,6 +18,7 @@ class Observation:
     - taken: (B, t, 4, 4), the poses of the cameras of all views so far, in order
     - candidates: (B, K, 4, 4), poses of cameras; one set for all where B is 1 there
     - occupancy: (B, R, R, R), the published probabilities, for policies of `wants_volume`
+    - reachable: (K,), whether the camera can go to each candidate; None: to all of them
 
     Poses are object from optical frame, in the frame in which the network predicts. Where there is
     an occupancy, their lengths count in sides of its grid.
@@ -27,6 +28,7 @@ class Observation:
     taken: NDArray[np.float64]
     candidates: NDArray[np.float64]
     occupancy: NDArray[np.float32] | None = None
+    reachable: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from active_recon.acquisition.motion import MotionLimits
 from active_recon.errors import ViewError
 from active_recon.geometry.cameras import Camera
 from active_recon.policies.base import Observation
@@ -39,11 +40,11 @@ class PlannerView:
 
 
 def observation(views: Sequence[PlannerView], candidates: Sequence[Camera], yaw: float,
-                wants_volume: bool) -> Observation:
+                wants_volume: bool, limits: MotionLimits) -> Observation:
     """
     Return what a policy sees after the last of some views of one episode.
 
-    `yaw` is the azimuth of the object's front, radians. Raises ViewError where the policy wants
+    `yaw` is the azimuth of the object's front, radians, `limits` are the camera's. Raises ViewError where the policy wants
     the probabilities and the last view has none.
     """
     last = views[-1]
@@ -55,7 +56,8 @@ def observation(views: Sequence[PlannerView], candidates: Sequence[Camera], yaw:
     # Copies: a policy that works in place leaves the reconstruction as it is
     volume = None if last.volume is None else turned(last.volume.occupancy.copy(), -yaw)[None]
     return Observation(
-        last.latent[None].copy(), taken[None], policy_poses(candidates, yaw, unit)[None], volume)
+        last.latent[None].copy(), taken[None], policy_poses(candidates, yaw, unit)[None], volume,
+        limits.allows([camera.azimuth for camera in candidates]))
 
 
 def cameras_of(views: Sequence[PlannerView]) -> list[Camera]:

@@ -33,10 +33,11 @@ class RenderedPolicy:
     Goes where most is to be seen of what is not known, apart from where it has been.
 
     `worth` returns how much that is of each candidate, (B, K), 0 or more. Candidates within 60
-    degrees of a view taken come after all others; where every one is, those less than three
-    quarters as far from the views as the farthest. Views taken come last. Smith et al. leave out
-    candidates within 63 degrees, or less where too few are left. Without such a rule the policies
-    here were no better than random: doubt inside an object looks the same after every view.
+    degrees of a view taken come after all others; where every one in reach is, those less than
+    three quarters as far from the views as the farthest of them. Views taken come last. Smith et
+    al. leave out candidates within 63 degrees, or less where too few are left. Without such a rule
+    the policies here were no better than random: doubt inside an object looks the same after every
+    view.
     """
 
     wants_volume = True
@@ -53,7 +54,8 @@ class RenderedPolicy:
         assert seen.occupancy is not None
         worth = self._worth(seen, coarse_volume(seen.occupancy))
         gaps = distance_to_taken(seen)
-        enough = np.minimum(_APART, _SHARE * gaps.max(axis=1, keepdims=True))
+        in_reach = gaps if seen.reachable is None else gaps[:, seen.reachable]
+        enough = np.minimum(_APART, _SHARE * in_reach.max(axis=1, keepdims=True, initial=0))
         rank = (gaps < enough - _ROUNDING).astype(np.float32) + ~is_fresh(seen)
         return Choice(worth - rank * (worth.max(axis=1, keepdims=True) + _LESS)), state
 
