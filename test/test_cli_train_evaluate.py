@@ -38,11 +38,14 @@ def as_many_threads_as_before():
     torch.set_num_threads(before)
 
 
-def training(dataset, out, *more):
+def reconstructing(dataset, out, *more):
     return ('train', dataset, '--validation', dataset, '--out', out, '--steps', 2,
-            '--policy-steps', 2, '--batch-size', 2, '--policy-batch-size', 2,
-            '--group-size', 2, '--threads', 1,
-            *more)
+            '--batch-size', 2, '--threads', 1, *more)
+
+
+def training(dataset, out, *more):
+    return reconstructing(dataset, out, '--policy-steps', 2, '--policy-batch-size', 2,
+                          '--group-size', 2, *more)
 
 
 @pytest.fixture(scope='module')
@@ -61,8 +64,9 @@ def plain(dataset, tmp_path_factory):
     copied = shutil.copytree(dataset, out / 'copy')
     told, warned = StringIO(), StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(told), redirect_stderr(warned):
-        assert command(patch, *training(dataset, out, '--policy-steps', 0, '--silhouette-weight',
-                                        0, '--validation', copied)) == 0
+        assert command(patch, *reconstructing(
+            dataset, out, '--policy-steps', 0, '--silhouette-weight', 0, '--validation',
+            copied)) == 0
     return out, told.getvalue(), warned.getvalue()
 
 
@@ -129,7 +133,8 @@ def test_a_training_that_is_interrupted_says_where_and_how_to_go_on(
     from active_recon.cli.training_log import SummaryLog
 
     monkeypatch.setattr(SummaryLog, 'show', lambda *told: os.kill(os.getpid(), signal.SIGINT))
-    asked = training(dataset, tmp_path, '--validate-every', 1, '--policy-steps', 0, '--steps', 3)
+    asked = reconstructing(
+        dataset, tmp_path, '--validate-every', 1, '--policy-steps', 0, '--steps', 3)
     assert command(monkeypatch, *asked) == 130
     assert 'stopped at step 2 of 3; continue with --resume' in capsys.readouterr().out
     monkeypatch.undo()
@@ -139,7 +144,7 @@ def test_a_training_that_is_interrupted_says_where_and_how_to_go_on(
 @pytest.mark.slow
 def test_the_paper_s_network_with_cameras_goes_from_data_to_figures(
         dataset, tmp_path, monkeypatch):
-    asked = training(dataset, tmp_path, '--model', '2d3d-posed')
+    asked = reconstructing(dataset, tmp_path, '--model', '2d3d-posed')
     assert command(monkeypatch, *asked) == 0
     card = json.loads((tmp_path / 'weights.json').read_text())
     assert (card['reconstruction']['volume_loss'], card['policy']) == ('bce+dice', None)
@@ -353,6 +358,11 @@ def test_options_of_losses_that_a_network_does_not_learn_by_are_refused(
      '--steps, --augment with --freeze-from, whose reconstruction is not trained: no effect'),
     (('--scheme', 'joint', '--curriculum-fraction', 0), '--curriculum-fraction with --scheme jo'),
     (('--scheme', 'joint', '--policy-steps', 9), '--policy-steps with --scheme joint: no effect'),
+    (('--policy-steps', 0, '--group-size', 2, '--view-separation-deg', 9),
+     '--group-size, --view-separation-deg with --policy-steps 0, which trains no view policy: no'),
+    (('--model', 'lifting', '--policy-batch-size', 9, '--policy-learning-rate', 1),
+     '--policy-batch-size, --policy-learning-rate with lifting, which has no view policy: no'),
+    (('--model', '2d3d', '--policy-steps', 9), '--policy-steps with 2d3d, which has no view poli'),
     (('--model', 'carving', '--steps', 9), '--steps with carving, which learns all at once: no'),
     (('--model', 'shape-basis', '--max-views', 3), '--max-views with shape-basis, which learns'),
     (('--kept', 9, '--uses', 2), '--uses, --kept without --make: they are for it alone')])
@@ -363,7 +373,7 @@ def test_options_of_what_is_not_trained_are_refused(
 
 
 def test_a_size_beside_given_weights_is_refused(dataset, tmp_path, monkeypatch, capsys):
-    asked = training(dataset, tmp_path, '--model', '2d3d', '--size', 'small')
+    asked = reconstructing(dataset, tmp_path, '--model', '2d3d', '--size', 'small')
     said = refusal(monkeypatch, capsys, *asked, '--init-from', '2d3d')
     assert '--size: small with given weights' in said
 
@@ -372,7 +382,7 @@ def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given_
         run, dataset, tmp_path, monkeypatch, capsys):
     out = tmp_path / 'further'
     given = load_file(run / 'weights.safetensors')
-    assert command(monkeypatch, *training(
+    assert command(monkeypatch, *reconstructing(
         dataset, out, '--init-from', run / 'weights.safetensors', '--learning-rate', 1e-9,
         '--policy-steps', 0)) == 0
     name = 'reconstruction.encoder.memory.gates.weight'
@@ -395,7 +405,7 @@ def test_a_reconstruction_that_is_trained_further_begins_with_what_it_was_given_
                                               ('lifting', '2d3d-attention')])
 def test_weights_of_another_network_are_refused(
         dataset, tmp_path, monkeypatch, capsys, model, begun):
-    line = refusal(monkeypatch, capsys, *training(
+    line = refusal(monkeypatch, capsys, *reconstructing(
         dataset, tmp_path, '--model', model, '--init-from', begun))
     assert f'{model}: begun with weights of another network' in line
     assert f'got those of {begun}; name it by --model' in line

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 _OF_STEPS = ('steps', 'batch_size', 'learning_rate', 'curriculum_fraction', 'warmup_steps',
              'checkpoint_every', 'validate_every', 'augment')
 """Options of a reconstruction that is trained step by step."""
+_OF_POLICY = ('policy_batch_size', 'policy_learning_rate', 'group_size', 'view_separation_deg')
+"""Options of a view policy that is trained."""
 
 
 def train(
@@ -177,6 +179,10 @@ def train(
     entry = network_entry(model)
     refuse_idle(context, f'with {model}, which learns all at once', entry.fit is not None,
                 *_OF_STEPS, 'max_views')
+    no_policy = ('with --policy-steps 0, which trains no view policy' if entry.policy else
+                 f'with {model}, which has no view policy')
+    refuse_idle(context, no_policy, not (joint or entry.policy and policy_steps), *_OF_POLICY)
+    refuse_idle(context, no_policy, entry.policy is None and policy_steps > 0, 'policy_steps')
     loss = LossConfig(
         entry.loss.volume_weight if volume_weight is None else volume_weight,
         entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
