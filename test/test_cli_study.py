@@ -69,6 +69,19 @@ def test_objects_that_cannot_be_read_are_named(made, tmp_path, monkeypatch, caps
     assert 'some lamps: 1 read, 0 missing, 1 left out\n' in told
 
 
+@pytest.mark.parametrize('asked', [
+    ('study', 'none', '--models', 'carving'), ('study', '--photos', 'none', '--models', 'carving'),
+    ('study', 'made', '--models', 'carving', '--validation', 'none'),
+    ('study', 'made', '--models', 'carving', '--training', 'none'),
+    ('study', 'made', '--models', 'carving', '--category', 'ship'),
+    ('policies', 'made', 'none', '--model', 'carving', '--policies', 'uniform')])
+def test_where_objects_are_missing_no_folder_is_made(made, tmp_path, monkeypatch, capsys, asked):
+    places = {'made': made, 'none': tmp_path / 'none'}
+    refusal(monkeypatch, capsys, *(places.get(part, part) for part in asked), '--threads', 1,
+            '--out', tmp_path / 'out')
+    assert not (tmp_path / 'out').exists()
+
+
 def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypatch, capsys):
     def refused(*arguments):
         return refusal(monkeypatch, capsys, 'study', *arguments, '--out', tmp_path)

@@ -72,8 +72,10 @@ def policies(
 
       active-recon policies data/test --policies random,uniform,farthest --objects 60
     """
+    from active_recon.datasets.layout import list_objects
     from active_recon.evaluation.next_view.study import Episodes
     from active_recon.evaluation.posed.entrants import load_entrants
+    from active_recon.evaluation.posed.scene import chosen_folders
     from active_recon.evaluation.posed.study import Extent
     from active_recon.models.weights_files import scorer_path
     import torch
@@ -91,7 +93,9 @@ def policies(
         raise ConfigError('policies: no training objects: expected --training with a folder, on '
                           'which a sequence is found, got none; give one, or leave sequence out')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, bf16)
-    require_writable_study(out, 'policies')  # tells before hours of measuring
+    for folder in (*data, *([training] if training is not None and has_sequence else [])):
+        chosen_folders(list_objects(folder), category)
+    require_writable_study(out, 'policies')  # all of this is told before hours of measuring
     result: dict[str, Any] = {
         'command': command_line(), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TYPE_CHECKING
 
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
@@ -12,6 +12,9 @@ from active_recon.cli.study_files import require_writable_study, write_study
 from active_recon.errors import ConfigError
 from active_recon.models.weights_files import DEFAULT_MODEL, PAPER_MODEL, SMALL_MODEL
 import typer
+
+if TYPE_CHECKING:
+    from active_recon.datasets.middlebury import PosedPhotographs
 
 _SHIPPED = (DEFAULT_MODEL, SMALL_MODEL, 'carving', PAPER_MODEL)
 
@@ -84,6 +87,7 @@ def study(
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.evaluation.posed.measuring import Plan
     from active_recon.evaluation.posed.retrieval import read_library
+    from active_recon.evaluation.posed.scene import chosen_folders
     from active_recon.evaluation.posed.study import choose_on, Extent, study_set
     import torch
 
@@ -102,7 +106,12 @@ def study(
                                       for each in data or []):
         raise ConfigError('validation: same objects twice: expected other objects than those '
                           f'measured, got {validation} for both')
-    require_writable_study(out, 'study')  # tells before hours of measuring
+    for folder in data or []:
+        chosen_folders(list_objects(folder), category)
+    for folder in (*([] if validation is None else [validation]), *(training or [])):
+        list_objects(folder)
+    photographs = None if photos is None else _read_photographs(photos, box, up)
+    require_writable_study(out, 'study')  # all of this is told before hours of measuring
     if validation is not None:
         entrants = choose_on(validation, entrants, plan, Extent(most=objects), progress_bar)
     library = None
@@ -120,8 +129,8 @@ def study(
                        f'{found["views"]}', err=True)
         result['sets'].append(found)
         _write(result, out)  # keeps the results if a later folder fails
-    if photos is not None:
-        result['photographs'] = _photographs(photos, box, up, entrants)
+    if photographs is not None:
+        result['photographs'] = _photograph_figures(photographs, entrants)
     for path in _write(result, out):
         typer.echo(f'wrote {path}')
 
@@ -140,15 +149,19 @@ def _numbers(option: str, text: str) -> tuple[int, ...]:
                           f'got {text!r}') from error
 
 
-def _photographs(folder: Path, box: str | None, up: str, entrants: list[Any]) -> dict[str, Any]:
+def _read_photographs(folder: Path, box: str | None, up: str) -> 'PosedPhotographs':
     from active_recon.datasets.middlebury import read_photographs
-    from active_recon.evaluation.posed.photographs import BACKGROUNDS, photograph_figures
 
     try:
         corners = None if box is None else [float(part) for part in box.replace(',', ' ').split()]
     except ValueError as error:
         raise ConfigError(f'box: invalid corners: expected six numbers, got {box!r}') from error
-    photographs = read_photographs(folder, corners, up)
+    return read_photographs(folder, corners, up)
+
+
+def _photograph_figures(photographs: 'PosedPhotographs', entrants: list[Any]) -> dict[str, Any]:
+    from active_recon.evaluation.posed.photographs import BACKGROUNDS, photograph_figures
+
     with progress_bar('photographs', len(entrants) * len(BACKGROUNDS)) as advance:
         return photograph_figures(photographs, entrants, advance=lambda done: advance(done, ''))
 
