@@ -69,6 +69,17 @@ def test_objects_that_cannot_be_read_are_named(made, tmp_path, monkeypatch, caps
     assert 'some lamps: 1 read, 0 missing, 1 left out\n' in told
 
 
+def test_training_objects_that_cannot_be_read_are_named(made, tmp_path, monkeypatch, capsys):
+    last = list_objects(copytree(made, tmp_path / 'known'))[-1]
+    (last.images_folder / '01.png').write_bytes(b'')
+    assert command(monkeypatch, 'study', made, '--models', 'carving', '--counts', 1, '--training',
+                   tmp_path / 'known', '--disturbed-views', 0, '--threads', 1, '--out',
+                   tmp_path) == 0
+    told = capsys.readouterr().err
+    assert f'left out: {last.images_folder / "01.png"}: no readable image' in told
+    assert 'training images: 1 read, 0 missing, 1 left out\n' in told
+
+
 @pytest.mark.parametrize('asked', [
     ('study', 'none', '--models', 'carving'), ('study', '--photos', 'none', '--models', 'carving'),
     ('study', 'made', '--models', 'carving', '--validation', 'none'),

@@ -119,6 +119,7 @@ def study(
         folders = [folder for root in training for folder in list_objects(root)]
         with progress_bar('reading training images', len(folders)) as advance:
             library = read_library(folders, lambda done: advance(done, ''))
+        print_left_out('training images', len(library.folders), (), library.unreadable)
     result: dict[str, Any] = {'command': command_line(),
                               'sets': []}
     for folder in data or []:

@@ -24,12 +24,14 @@ class Library:
     - images: thumbnails of all views of all objects, (M, 1024)
     - azimuths: of their cameras, radians, (M,)
     - owners: index of the object in `folders`, (M,)
+    - unreadable: why other objects were left out
     """
 
     folders: Sequence[ObjectFolder]
     images: NDArray[np.float32]
     azimuths: NDArray[np.float64]
     owners: NDArray[np.int64]
+    unreadable: Sequence[str] = ()
 
     def nearest(self, asked: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return the rows (E,) of the images nearest to thumbnails (E, 1024)."""
@@ -41,16 +43,19 @@ def read_library(folders: Sequence[ObjectFolder],
                  advance: Callable[[int], None] = lambda done: None) -> Library:
     """Read the framed images of objects as thumbnails; raises DataError as `read_views` does."""
     kept: list[ObjectFolder] = []
+    unreadable: list[str] = []
     images, azimuths, owners = [], [], []
     for low in range(0, len(folders), _AT_ONCE):
         views = read_views(folders[low:low + _AT_ONCE], lambda: advance(1), RESOLUTION, IMAGE_SIZE,
                            framed=True)
+        unreadable += views.unreadable
         small = thumbnails(views)
         images.append(small.reshape(-1, small.shape[-1]))
         azimuths.append(views.azimuths.double().numpy().ravel())
         owners.append(len(kept) + np.repeat(np.arange(len(views)), small.shape[1]))
         kept += views.folders
-    return Library(kept, np.concatenate(images), np.concatenate(azimuths), np.concatenate(owners))
+    return Library(kept, np.concatenate(images), np.concatenate(azimuths), np.concatenate(owners),
+                   unreadable)
 
 
 def nearest_image_scores(library: Library, scene: Scene,
