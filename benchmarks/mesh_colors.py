@@ -50,6 +50,9 @@ def main() -> None:
     """Measure, write JSON, and print the means."""
     options = _options()
     rows = [row for row in read_manifest(options.manifest) if row.split == options.split]
+    if not rows:
+        sys.exit(f'{options.manifest}: no model of the split {options.split!r}: expected one or '
+                 'more; name another with --split')
     order = np.random.default_rng(0).permutation(len(rows))
     jobs = manifest_jobs([rows[index] for index in order], Path())
     weights = find_weights(None)
@@ -69,6 +72,9 @@ def main() -> None:
             'command': shlex.join(['python', '-m', 'benchmarks.mesh_colors', *sys.argv[1:]]),
             'weights_sha256': weights_hash(weights),
             'mean': _means(found), 'objects': found}, indent=1) + '\n')
+    if not found:
+        sys.exit(f'{options.manifest}: no model of the split {options.split!r} has more than one '
+                 'colour: expected one or more; name another with --split')
     print(_means(found))  # noqa: T201
 
 

@@ -49,6 +49,9 @@ def main() -> None:
     """Measure, print a table, and write JSON."""
     options = _options()
     rows = [row for row in read_manifest(options.manifest) if row.split == options.split]
+    if not rows:
+        sys.exit(f'{options.manifest}: no model of the split {options.split!r}: expected one or '
+                 'more; name another with --split')
     drawn = np.random.default_rng(0).choice(
         len(rows), min(options.objects, len(rows)), replace=False)
     jobs = manifest_jobs([rows[index] for index in drawn], Path())

@@ -91,6 +91,16 @@ def test_the_meshes_of_the_default_network_are_measured_under_the_hash_of_its_we
     assert written['counts']['true cells']['all three'] > 0
 
 
+@pytest.mark.parametrize('name', ['meshes', 'mesh_colors'])
+def test_a_split_without_models_is_refused_in_one_line(name, tmp_path, monkeypatch):
+    manifest, out = tmp_path / 'models.csv', tmp_path / 'out.json'
+    manifest.write_text('category,file,split,source,licence,licence_evidence,front_axis,sha256\n')
+    monkeypatch.setattr(sys, 'argv', [name, str(manifest), '--out', str(out)])
+    with pytest.raises(SystemExit, match="no model of the split 'val': expected one or more"):
+        import_module(f'benchmarks.{name}').main()
+    assert not out.exists()
+
+
 def test_what_another_machine_measured_is_told_where_it_stays_in_the_table(tmp_path, monkeypatch):
     files = {name: tmp_path / name for name in ('RESULTS', 'DOCUMENT')}
     for name, file in files.items():
