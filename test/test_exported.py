@@ -10,7 +10,7 @@ import shutil
 import sys
 from types import ModuleType
 
-from active_recon.datasets.layout import list_objects
+from active_recon.datasets.layout import list_objects, RENDERING
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.errors import ConfigError, WeightsError
 from active_recon.exporting.export import export
@@ -342,6 +342,10 @@ def test_a_folder_without_objects_to_take_ranges_of_is_refused_before_anything_i
     assert command(monkeypatch, 'export', exported('lifting'), tmp_path / 'new', '--int8',
                    tmp_path / 'none') == 2
     assert "none: no dataset in R2N2's layout" in capsys.readouterr().err
+    (tmp_path / 'empty' / RENDERING).mkdir(parents=True)
+    assert command(monkeypatch, 'export', exported('lifting'), tmp_path / 'new', '--int8',
+                   tmp_path / 'empty') == 2
+    assert 'empty: no objects: expected some training objects' in capsys.readouterr().err
     assert not list((tmp_path / 'new').iterdir())
 
 

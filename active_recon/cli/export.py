@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+from active_recon.errors import DataError
 import typer
 
 
@@ -36,6 +37,9 @@ def export(
 
         require_quantisable(file)
         objects = list_objects(int8)
+        if not objects:
+            raise DataError(f'{int8}: no objects: expected some training objects, whose views tell '
+                            'the integer ranges, got none')
     for path in written(file, out):
         typer.echo(f'wrote {path}')
     if int8 is not None:
