@@ -190,6 +190,15 @@ def test_views_after_those_that_are_best_together_are_the_oracles(few):
         lambda ahead: ahead.iou, few, 5, 2)
 
 
+def test_pairs_are_not_tried_where_there_are_two_views(few, monkeypatch):
+    looked = []
+    ahead = type(few).ahead
+    monkeypatch.setattr(type(few), 'ahead', lambda own, walk: (
+        looked.append(walk.taken), ahead(own, walk))[1])
+    chosen_together(few, 5, 2)
+    assert looked == [(5,)]
+
+
 def test_the_more_motion_costs_the_less_a_policy_moves_and_no_view_is_taken_twice(watched):
     orders = [chosen_by(load_policy('visible_entropy'), watched, 5, 6, cost)
               for cost in (0.0, 0.2, 100.0)]

@@ -69,13 +69,15 @@ def chosen_together(watched: WatchedObject, start: int, count: int) -> Order:
     reconstructions as there are ordered pairs.
     """
     first = watched.begin(start)
+    if count < 3:
+        return _continued(lambda ahead: ahead.iou, watched, first, count)
     alone = watched.ahead(first).iou
     # The better of two alone comes first; the IoU of a pair does not depend on the order
     pairs = {(view, int(np.nanargmax(after))): float(np.nanmax(after))
              for view in np.flatnonzero(np.isfinite(alone)).tolist()
              if np.isfinite(after := watched.ahead(watched.step(first, view)).iou).any()}
     order = [start]
-    if pairs and count > 2:
+    if pairs:
         best = max(pairs, key=lambda pair: pairs[pair])
         order += sorted(best, key=lambda view: -float(alone[view]))
     walk = first
