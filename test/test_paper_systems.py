@@ -9,7 +9,8 @@ from active_recon.models import weights_files as weights_module
 from active_recon.models.network_2d3d import SIZES
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import FOLDER, read_card
-from active_recon.paper import systems
+from active_recon.paper import comparison, systems
+from active_recon.paper.comparison import Compared, cost_table
 from active_recon.paper.study import Study
 from active_recon.paper.systems import (
     find_system,
@@ -59,6 +60,18 @@ def test_what_is_fitted_in_one_go_sees_no_views():
     assert views_seen({'model': 'shape-basis', 'reconstruction': {
         'steps': 1, 'batch_size': 2, 'max_views': 5}}) is None
     assert views_seen({}) is None
+
+
+def test_only_what_is_fitted_in_one_go_is_told_to_be(study, tiny, tmp_path, monkeypatch):
+    monkeypatch.setattr(comparison, '_million_operations', lambda study, row: None)
+    unknown = untrained(tmp_path / 'unknown', tiny, 0)
+    card = read_card(unknown)
+    unknown.with_suffix('.json').write_text(json.dumps({**card, 'begun_with': {}}))
+    table = cost_table(study, [Compared('fitted', FOLDER / 'carving.safetensors'),
+                               Compared('trained', untrained(tmp_path / 'known', tiny, 0)),
+                               Compared('unknown', unknown)])
+    seen = next(column for column in table.columns if column.heading == 'views seen in training')
+    assert seen.cells[0] == 'fitted' and seen.cells[1] > 0 and seen.cells[2] is None
 
 
 def test_views_of_the_weights_that_a_training_began_with_count_too():

@@ -131,9 +131,11 @@ def cost_table(study: Study, rows: list[Compared]) -> Table:
     costs: dict[str, list[Any]] = {}
     for row in rows:
         bundle, card = load_weights(row.weights), read_card(row.weights)
+        is_fitted = network_entry(bundle.model).fit is not None
         parameters = sum(part.numel() for part in bundle.reconstruction.parameters())
         costs[row.label] = [
-            parameters or None, _million_operations(study, row), views_seen(card) or 'fitted',
+            parameters or None, _million_operations(study, row),
+            'fitted' if is_fitted else views_seen(card),
             row.resolution, f'{bundle.threshold:.2f}', weights_hash(row.weights)[:12]]
     headings = ('parameters', 'multiply-adds a view, million', 'views seen in training',
                 'cells a side', 'threshold', 'weights')
