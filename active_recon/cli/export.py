@@ -38,8 +38,8 @@ def export(
         require_quantisable(file)
         objects = list_objects(int8)
         if not objects:
-            raise DataError(f'{int8}: no objects: expected some training objects, whose views tell '
-                            'the integer ranges, got none')
+            raise DataError(f'{int8}: no objects: expected some training objects, whose views '
+                            'tell the integer ranges, got none')
     for path in written(file, out):
         typer.echo(f'wrote {path}')
     if int8 is not None:

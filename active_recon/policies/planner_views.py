@@ -44,8 +44,8 @@ def observation(views: Sequence[PlannerView], candidates: Sequence[Camera], yaw:
     """
     Return what a policy sees after the last of some views of one episode.
 
-    `yaw` is the azimuth of the object's front, radians; `limits` are the camera's. Raises ViewError
-    where the policy wants the probabilities and the last view has none.
+    `yaw` is the azimuth of the object's front, radians; `limits` are the camera's. Raises
+    ViewError where the policy wants the probabilities and the last view has none.
     """
     last = views[-1]
     if last.volume is None and wants_volume:
