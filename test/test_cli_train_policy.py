@@ -69,6 +69,9 @@ def test_a_policy_is_learned_in_two_rounds_and_chooses(
     assert "begun_with: expected '' as before" in capsys.readouterr().err
     assert command(monkeypatch, 'train-policy', *arguments, '--epochs', 3) == 2
     assert 'epochs: expected 2 as before, got 3' in capsys.readouterr().err
+    other = shutil.copytree(dataset, tmp_path / 'other')
+    assert command(monkeypatch, 'train-policy', other, *arguments) == 2
+    assert f"data: expected ['{dataset}'] as before, got [" in capsys.readouterr().err
     assert command(monkeypatch, 'train-policy', *arguments, '--model', 'lifting') == 2
     assert 'network_sha256: expected' in capsys.readouterr().err
     assert command(monkeypatch, 'policies', dataset, '--model', weights, '--policies',

@@ -120,7 +120,7 @@ def train_policy(
         train, test = joined(learned), joined(held_out)
         with progress_bar(f'training, round {number}', epochs) as advance:
             scorer = train_scorer(train, config, training, partial(advance, 1), begun)
-        chosen_by['training'] = training.to_dict()
+        chosen_by.update(training=training.to_dict(), data=sorted(map(str, data)))
         calibrate(scorer, test)
         shares = gap_shares(scorer, test)
         told.append({'train_states': sum(map(len, train)),
