@@ -3,11 +3,13 @@
 from dataclasses import fields, replace
 import json
 
+from active_recon.cli import quality
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.layout import list_objects
 from active_recon.datasets.making import make_dataset, shape_jobs
 from active_recon.datasets.views import read_views
 from active_recon.errors import DataError
+from active_recon.evaluation.quality import measuring
 from active_recon.evaluation.quality.faults import (
     broken_masks,
     FAULTS,
@@ -434,6 +436,18 @@ def test_a_policy_chooses_the_views_after_the_first(seen):
     assert (other.numbers[at_two] != drawn.numbers[at_two]).any()
     np.testing.assert_allclose(other.iou[drawn.count == 3], drawn.iou[drawn.count == 3],
                                atol=1e-6)  # the same views, in another order
+
+
+def test_no_batch_of_objects_is_measured_by_the_seed_of_another_measurement_s(
+        seen, tmp_path, monkeypatch):
+    taken = []
+    monkeypatch.setattr(quality, '_BATCH', 1)
+    monkeypatch.setattr(measuring, 'measure', lambda *told: (
+        taken.append(told[6]), made_up(1, len(taken)))[1])
+    for seed in (0, 1):
+        assert command(monkeypatch, 'quality', 'measure', seen.folders[0].root,
+                       tmp_path / 'out.npz', '--views', 2, '--seed', seed, '--threads', 1) == 0
+    assert taken[:2] == [0, 1] and len(set(taken)) == 4
 
 
 def test_the_commands_fit_tables_and_test_them_on_the_other_half(

@@ -18,6 +18,8 @@ quality = typer.Typer(help='How good a shape is, judged without the truth.', no_
 Model = Annotated[str | None, typer.Option(
     help='The network: a model that ships, or a weights file.')]
 _BATCH = 4
+_APART = 2 ** 32
+"""How far the seeds of two measurements are apart: of one, each batch of objects has its own."""
 _SOURCES, _FITTED_BY = 'calibrated_on', 'heads_fitted_by'
 """What tables tell of the first half's sources, and of the command that fitted what was kept."""
 
@@ -87,7 +89,7 @@ def measure(
             else:
                 left_out += shown.unreadable
                 parts.append(measured(shown, network, bundle.threshold, views, kind, fault or '',
-                                      seed + done, policy, sha256))
+                                      seed * _APART + done, policy, sha256))
             done += len(few)
             advance(len(few), '')
     for reason in left_out:
