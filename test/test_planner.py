@@ -63,6 +63,19 @@ def test_a_tolerance_of_zero_never_settles():
     assert views_until_done(planner, [5.0] * 6) == (6, 'max_views')
 
 
+@pytest.mark.parametrize('half', [0.6, 1.0, 1.5])
+@pytest.mark.parametrize('first', [-1.0, 0.0, 1.0])
+def test_an_even_sweep_is_even_within_the_azimuths_that_the_camera_can_reach(half, first):
+    planner = Planner(UniformPolicy(5), 5, 0, limits=MotionLimits((-half, half)))
+    goal, taken = planner.first_goal(orbit_camera(first * half)), []
+    while goal is not None:
+        taken.append(float(azimuth_difference(goal.camera.azimuth, 0.0)))
+        goal = planner.add_view(np.zeros((1, 4, 4), np.float32), goal.camera, 10.0).goal
+    assert len(taken) == 5
+    # Each is at the candidate nearest to its place, and those are 15 degrees apart
+    assert np.diff(sorted(taken)).max() <= 2 * half / 4 + math.pi / 12
+
+
 def test_the_first_view_is_where_it_is_asked_for():
     goal = Planner(FarthestPolicy()).first_goal(orbit_camera(-1.0))
     assert goal.camera.azimuth == pytest.approx(math.tau - 1.0)

@@ -2,7 +2,7 @@
 
 import math
 
-from active_recon.geometry.cameras import pose_azimuths, TURN
+from active_recon.geometry.cameras import azimuth_difference, pose_azimuths, TURN
 from active_recon.geometry.view_distance import (
     at_one_elevation,
     direction_distance,
@@ -53,7 +53,9 @@ class UniformPolicy(HeuristicPolicy):
     points of a Fibonacci lattice, which gives equal areas of a sphere about equally many. They are
     taken in steps of about 137 degrees, so that few of them are spread too, as are more than 24
     at one elevation: an episode of so many is meant to end earlier. Where elevations differ the
-    best candidate is the goal, and no azimuth between candidates is preferred.
+    best candidate is the goal, and no azimuth between candidates is preferred. Where the camera
+    cannot go around, the sweep is from end to end of the candidates in reach, the best of which
+    is the goal then too; it begins with the place nearest to the first view.
     """
 
     def __init__(self, views: int) -> None:
@@ -70,13 +72,36 @@ class UniformPolicy(HeuristicPolicy):
         is_ring = at_one_elevation(directions)
         spread = turns * self._views + self._order[rest]
         place = np.where(is_ring & (self._views <= _MOST_IN_TURN), count, spread)
-        target = (pose_azimuths(first) + place * self._step) % TURN
+        target, is_between = self._azimuths(seen, place)
         height = np.where(is_ring, pose_directions(first)[:, 2],
                           _risen(pose_directions(first)[:, 2], directions[..., 2], place))
         across = np.sqrt(np.maximum(1 - height ** 2, 0))
         wanted = np.stack([across * np.cos(target), across * np.sin(target), height], axis=-1)
         away = direction_distance(directions, wanted[:, None])
-        return Choice((-away).astype(np.float32), np.where(is_ring, target, np.nan)), state
+        between = np.where(is_ring & is_between, target, np.nan)
+        return Choice((-away).astype(np.float32), between), state
+
+    def _azimuths(self, seen: Observation,
+                  place: NDArray[np.int64]) -> tuple[NDArray[np.float64], bool]:
+        """
+        Return the azimuths so many places after the first view's, (B,).
+
+        And whether they may be goals between the candidates: within limits there are few, and each
+        is worth a view.
+        """
+        first = pose_azimuths(seen.taken[:, 0])
+        around = np.asarray((first + place * self._step) % TURN)
+        if seen.reachable is None or seen.reachable.all():
+            return around, True
+        ends = np.unique(pose_azimuths(seen.candidates[0, seen.reachable]))
+        gaps = np.diff(ends, append=ends[:1] + TURN)
+        width = TURN - gaps.max(initial=0)
+        if TURN - width <= self._step:
+            return around, True
+        low, last = ends[(gaps.argmax() + 1) % len(ends)], max(self._views - 1, 1)
+        inside = azimuth_difference(first, low + width / 2).clip(-width / 2, width / 2)
+        begun = np.rint((inside / max(width, 1e-9) + 0.5) * last)
+        return np.asarray((low + (begun + place) % self._views * width / last) % TURN), False
 
 
 def _risen(first: NDArray[np.float64], heights: NDArray[np.float64],
