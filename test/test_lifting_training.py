@@ -12,6 +12,7 @@ from active_recon.models.lifting import Lifting, LiftingConfig
 from active_recon.models.network import Cameras
 from active_recon.models.network_2d3d_posed import Network2d3dPosed, Network2d3dPosedConfig
 from active_recon.models.volume_unet import depth_to_space
+from active_recon.training import calibration
 from active_recon.training.calibration import calibrate
 from active_recon.training.lifting import LiftingLearner, train_lifting
 from active_recon.training.loop import make_fabric, Run, TrainingConfig
@@ -218,3 +219,18 @@ def test_calibration_twice_gives_what_it_gave_once(seen_four_times):
     once = network.calibration.clone()
     calibrate(network, seen_four_times)
     assert_close(network.calibration, once)
+
+
+@pytest.mark.parametrize('has', [True, False])
+def test_calibration_is_in_mixed_precision_only_where_the_processor_has_it(
+        seen_four_times, monkeypatch, has):
+    kinds = set()
+
+    class Told(Lifting):
+        def encode(self, images, cameras):
+            kinds.add(torch.is_autocast_enabled('cpu'))
+            return super().encode(images, cameras)
+
+    monkeypatch.setattr(calibration, 'has_bf16', lambda: has)
+    calibrate(Told.from_config(TINY), part_of(seen_four_times, slice(1), slice(2)))
+    assert kinds == {has}

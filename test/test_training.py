@@ -165,6 +165,14 @@ def test_a_checkpoint_that_does_not_tell_its_data_is_taken_up(begun, views, tiny
     assert [step for step, _ in steps] == [4, 5, 6, 7]
 
 
+def test_a_training_goes_on_where_the_processor_computes_in_another_precision(
+        whole, views, tiny, tmp_path):
+    path = tmp_path / 'run.safetensors'
+    train(replace(CONFIG, bfloat16=True), views, tiny, path, until=3)
+    _, told = train(CONFIG, views, tiny, path, resume=True)
+    assert [step for step, _ in told] == [step for step, _ in whole[1][3:]]
+
+
 def test_a_finished_training_that_is_resumed_does_nothing(whole, finished, views, tiny):
     resumed, told = train(CONFIG, views, tiny, finished, seed=9, resume=True)
     assert told == []

@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.bf16_option import Bf16, in_bf16
 from active_recon.cli.cluster_option import (
     Cluster,
     ClusterWorkers,
@@ -80,9 +81,7 @@ def evaluate(
                                "policy when it gets another object's latent.")] = False,
     cache: Annotated[Path | None, typer.Option(
         help='Folder that caches episodes, so that an interrupted run can continue.')] = None,
-    bf16: Annotated[bool, typer.Option(
-        help='Mixed precision, bfloat16: takes less time; means differ by less than '
-             '0.0001.')] = True,
+    bf16: Bf16 = None,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     runtime: MeasuredIn = 'torch',
     cluster: Cluster = None,
@@ -126,7 +125,7 @@ def evaluate(
         writable(path)  # tells before hours of measuring
     torch.set_num_threads(threads)
     plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
-                          split_file, bf16, threads, runtime)
+                          split_file, in_bf16(bf16), threads, runtime)
 
     def measure(weights: Path, folder: Path | None, crew: 'Crew | None',
                 swapped: bool = False) -> _Measured:

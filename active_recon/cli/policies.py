@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.bf16_option import Bf16, in_bf16
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import print_left_out
@@ -53,8 +54,7 @@ def policies(
         min=0, help='Draws objects, first views, renderings and random views.')] = 0,
     out: Annotated[Path, typer.Option(
         help='Folder where policies.json and policies.md go.')] = Path('study'),
-    bf16: Annotated[bool, typer.Option(
-        help='Half precision where it is safe: takes less time.')] = True,
+    bf16: Bf16 = None,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     runtime: MeasuredIn = 'torch',
 ) -> None:
@@ -81,7 +81,8 @@ def policies(
     import torch
 
     torch.set_num_threads(threads)
-    entrant, *others = load_entrants(model, runtime, bf16, threads)
+    half = in_bf16(bf16)
+    entrant, *others = load_entrants(model, runtime, half, threads)
     if others:
         raise ConfigError(f'model: several networks: expected one, got {model!r}')
     learned = _LEARNED if scorer_path(entrant.path).is_file() else []
@@ -92,7 +93,7 @@ def policies(
     if has_sequence and training is None:
         raise ConfigError('policies: no training objects: expected --training with a folder, on '
                           'which a sequence is found, got none; give one, or leave sequence out')
-    episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, bf16)
+    episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, half)
     for folder in (*data, *([training] if training is not None and has_sequence else [])):
         chosen_folders(list_objects(folder), category)
     require_writable_study(out, 'policies')  # all of this is told before hours of measuring

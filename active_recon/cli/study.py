@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.bf16_option import Bf16, in_bf16
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import print_left_out
@@ -65,8 +66,7 @@ def study(
     out: Annotated[Path, typer.Option(
         help='Folder for study.json, study.md and a PNG file for each set.')] = Path('study'),
     seed: Annotated[int, typer.Option(min=0, help='Seed of objects, views and disturbances.')] = 0,
-    bf16: Annotated[bool, typer.Option(
-        help='Mixed precision, bfloat16: takes less time.')] = True,
+    bf16: Bf16 = None,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     runtime: MeasuredIn = 'torch',
 ) -> None:
@@ -96,12 +96,12 @@ def study(
                           'with a folder of photographs, got neither')
     torch.set_num_threads(threads)
     plan = Plan(_numbers('counts', counts),
-                _numbers('surfaces', '1,5' if surfaces is None else surfaces), seed, bf16)
+                _numbers('surfaces', '1,5' if surfaces is None else surfaces), seed, in_bf16(bf16))
     if surfaces is not None and not set(plan.surfaces) <= set(plan.counts):
         raise ConfigError('surfaces: not measured: expected numbers of views out of --counts '
                           f'{counts}, got {surfaces}')
     extent = Extent(category, objects, disturbed_views, disturbed_objects)
-    entrants = load_entrants(models or _those_that_ship(), runtime, bf16, threads)
+    entrants = load_entrants(models or _those_that_ship(), runtime, plan.bfloat16, threads)
     if validation is not None and any(validation.resolve() == each.resolve()
                                       for each in data or []):
         raise ConfigError('validation: same objects twice: expected other objects than those '

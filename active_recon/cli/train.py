@@ -7,6 +7,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.bf16_option import Bf16, in_bf16, training_device
 from active_recon.cli.command_line import command_line
 from active_recon.cli.made_objects import (
     Kept,
@@ -114,7 +115,7 @@ def train(
     kept: Kept = 2000,
     seed: Annotated[int, typer.Option(
         min=0, help='Seed of the weights, of the batches and of what --make makes.')] = 0,
-    bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
+    bf16: Bf16 = None,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     devices: Annotated[int, typer.Option(
         min=1, help='Number of GPUs of each machine, or of processes without a GPU.')] = 1,
@@ -187,10 +188,11 @@ def train(
         entry.loss.volume_weight if volume_weight is None else volume_weight,
         entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
         volume_loss or entry.loss.volume_loss)
-    first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, augment,
+    half = in_bf16(bf16, training_device())
+    first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, half, augment,
                            curriculum_fraction, warmup_steps, checkpoint_every, validate_every)
     second = TrainingConfig(
-        max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed, bf16,
+        max(policy_steps, 1), policy_batch_size, policy_learning_rate, max_views, seed, half,
         augment=False, warmup_steps=20, checkpoint_every=50, validate_every=250)
     if group_size is None:
         group_size = 1 if joint else 6
@@ -206,7 +208,7 @@ def train(
                 frozen=init_from is None, view_separation=math.radians(view_separation_deg))
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
-    fabric = make_fabric(bf16, devices, nodes)
+    fabric = make_fabric(half, devices, nodes)
     fabric.launch()
     network = entry.build(plan.config)
     if own_file != model:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+from active_recon.cli.bf16_option import Bf16, in_bf16, training_device
 from active_recon.cli.command_line import command_line
 from active_recon.cli.one_training import checkpoint_in, shown_steps
 from active_recon.cli.reading import read_objects, warn_of_shared_objects
@@ -37,7 +38,7 @@ def train_depth(
     augment: Annotated[bool, typer.Option(
         help='Augment backgrounds, light and poses; --no-augment: plain white.')] = True,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and of the batches.')] = 0,
-    bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
+    bf16: Bf16 = None,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads.')] = 2,
     resume: Annotated[bool, typer.Option(
         help='Continue from the checkpoint in the run folder.')] = False,
@@ -71,9 +72,10 @@ def train_depth(
     checkpoint = checkpoint_in(out, resume)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
-    training = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, bf16, augment, 0,
+    half = in_bf16(bf16, training_device())
+    training = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, half, augment, 0,
                               warmup_steps, checkpoint_every, validate_every=steps)
-    fabric = make_fabric(bf16)
+    fabric = make_fabric(half)
     fabric.launch()
     views = read_objects(data, 'training data', network.spec, at_once=False, depth=True)
     held_out = read_objects([validation], 'validation data', network.spec, depth=True)

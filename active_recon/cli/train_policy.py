@@ -4,6 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.bf16_option import Bf16, in_bf16
 from active_recon.cli.cluster_option import Cluster, reachable, workers_of
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
@@ -48,8 +49,7 @@ def train_policy(
     batch_size: Annotated[int, typer.Option(min=1, help='States of a batch.')] = 32,
     learning_rate: Annotated[float, typer.Option(help='Peak learning rate.')] = 1.5e-3,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and batches.')] = 0,
-    bf16: Annotated[bool, typer.Option(
-        help='Half precision of the network where it is safe.')] = True,
+    bf16: Bf16 = None,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
     workers: Annotated[int, typer.Option(
         min=1, help='Processes that measure gains; with --cluster so many of its cores.')] = 1,
@@ -92,11 +92,12 @@ def train_policy(
     import torch
 
     torch.set_num_threads(threads)
-    entrant, *others = load_entrants(model, runtime, bf16, threads)
+    half = in_bf16(bf16)
+    entrant, *others = load_entrants(model, runtime, half, threads)
     if others or entrant.network.needs_front:
         raise ConfigError('--model: no such network: expected one that takes any cameras, such as '
                           f'lifting, got {model!r}')
-    collecting = Collecting(objects, candidates, starts, views, bf16)
+    collecting = Collecting(objects, candidates, starts, views, half)
     counts: dict[str, int] = {}
     config = ScorerConfig()
     training = ScorerTraining(epochs, batch_size, learning_rate, seed=seed)

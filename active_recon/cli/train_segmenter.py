@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+from active_recon.cli.bf16_option import Bf16, in_bf16, training_device
 from active_recon.cli.command_line import command_line
 from active_recon.cli.one_training import checkpoint_in, shown_steps
 from active_recon.cli.reading import read_objects, warn_of_shared_objects
@@ -29,7 +30,7 @@ def train_segmenter(
     checkpoint_every: Annotated[int, typer.Option(
         min=1, help='Steps between two checkpoints.')] = 100,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the weights and of the batches.')] = 0,
-    bf16: Annotated[bool, typer.Option(help='Mixed precision, bfloat16.')] = True,
+    bf16: Bf16 = None,
     devices: Annotated[int, typer.Option(
         min=1, help='Processes that share the batches.')] = 1,
     threads: Annotated[int, typer.Option(min=1, help='CPU threads of each process.')] = 2,
@@ -60,9 +61,10 @@ def train_segmenter(
     checkpoint = checkpoint_in(out, resume)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
-    training = TrainingConfig(steps, batch_size, learning_rate, 1, seed, bf16, True, 0,
+    half = in_bf16(bf16, training_device())
+    training = TrainingConfig(steps, batch_size, learning_rate, 1, seed, half, True, 0,
                               warmup_steps, checkpoint_every, validate_every=steps)
-    fabric = make_fabric(bf16, devices)
+    fabric = make_fabric(half, devices)
     fabric.launch()
     spec = NetworkSpec(IMAGE_SIZE, FINE_RESOLUTION, needs_front=False)
     views = read_objects(data, 'training data', spec, at_once=False)

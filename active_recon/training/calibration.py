@@ -6,6 +6,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.evaluation.calibration import fit_logistic
 from active_recon.models.lifting import Lifting
 from active_recon.models.volume_unet import depth_to_space
+from active_recon.runtimes.precision import has_bf16
 import numpy as np
 import torch
 
@@ -24,6 +25,7 @@ def calibrate(network: Lifting, validation: ViewSet,
     stay confident. `advance` is called with the number of objects done.
     """
     network.eval()
+    in_half = network.device.type == 'cpu' and has_bf16()  # a GPU takes seconds in any case
     rng = np.random.default_rng(0)
     shown = validation.images.shape[1]
     counts = range(1, min(len(network.calibration), shown) + 1)
@@ -38,7 +40,7 @@ def calibrate(network: Lifting, validation: ViewSet,
         state = network.initial_state(len(objects))
         for count in counts:
             view = order[:, count - 1]
-            with torch.autocast('cpu', torch.bfloat16, enabled=network.device.type == 'cpu'):
+            with torch.autocast('cpu', torch.bfloat16, enabled=in_half):
                 state = network.step(
                     validation.white(objects, view).to(network.device),
                     validation.cameras(objects, view).to(network.device), state)

@@ -93,12 +93,16 @@ def resume_checkpoint(path: Path, module: nn.Module, optimizer: Optimizer,
 
 
 def differences(made: dict[str, Any], asked: dict[str, Any]) -> Iterator[str]:
-    """Yield in words how settings differ, those within settings each by itself."""
+    """
+    Yield in words how settings differ, those within settings each by itself.
+
+    Mixed precision may: it is what suits the machine, and another may go on with what one began.
+    """
     for name in sorted(made.keys() | asked.keys()):
         one, other = made.get(name), asked.get(name)
         if isinstance(one, dict) and isinstance(other, dict):
             yield from differences(one, other)
-        elif one != other:
+        elif one != other and name != 'bfloat16':
             yield f'{name}: expected {_short(one)} as before, got {_short(other)}'
 
 
