@@ -6,7 +6,7 @@ import json
 import math
 import shutil
 
-from active_recon.cli.bf16_option import in_bf16, training_device
+from active_recon.cli.bf16_option import trained_in_bf16
 from active_recon.models.network_2d3d import SIZES
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import PAPER_MODEL, weights_hash
@@ -84,7 +84,7 @@ def test_a_training_writes_checkpoints_a_log_and_weights_with_a_card(run, datase
     assert card['data'] == {str(dataset): 2}
     assert card['reconstruction']['steps'] == card['policy']['steps'] == 2
     assert card['reconstruction']['silhouette_weight'] == 0.6
-    assert card['reconstruction']['bfloat16'] is in_bf16(None, training_device())
+    assert card['reconstruction']['bfloat16'] is trained_in_bf16(None)
     assert len(card['generators_sha256']) == 64
 
 

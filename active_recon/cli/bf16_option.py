@@ -11,13 +11,15 @@ Bf16 = Annotated[bool | None, typer.Option(
                              'takes many times as long.')]
 
 
-def in_bf16(asked: bool | None, device: str = 'cpu') -> bool:
-    """Return whether to compute in mixed precision, as asked for or as suits the device."""
-    return (device != 'cpu' or has_bf16()) if asked is None else asked
+def in_bf16(asked: bool | None) -> bool:
+    """Return whether to measure in mixed precision: as asked for, else as the processor does."""
+    return has_bf16() if asked is None else asked
 
 
-def training_device() -> str:
-    """Return what a training runs on: the GPU where there is one."""
+def trained_in_bf16(asked: bool | None) -> bool:
+    """Return the same of a training, which runs on a GPU where there is one."""
     import torch
 
-    return 'cuda' if torch.cuda.is_available() else 'cpu'
+    if asked is None and torch.cuda.is_available():
+        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
+    return in_bf16(asked)

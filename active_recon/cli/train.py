@@ -7,7 +7,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.bf16_option import Bf16, in_bf16, training_device
+from active_recon.cli.bf16_option import Bf16, trained_in_bf16
 from active_recon.cli.command_line import command_line
 from active_recon.cli.made_objects import (
     Kept,
@@ -188,7 +188,7 @@ def train(
         entry.loss.volume_weight if volume_weight is None else volume_weight,
         entry.loss.silhouette_weight if silhouette_weight is None else silhouette_weight,
         volume_loss or entry.loss.volume_loss)
-    half = in_bf16(bf16, training_device())
+    half = trained_in_bf16(bf16)
     first = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, half, augment,
                            curriculum_fraction, warmup_steps, checkpoint_every, validate_every)
     second = TrainingConfig(

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from active_recon.cli.bf16_option import Bf16, in_bf16, training_device
+from active_recon.cli.bf16_option import Bf16, trained_in_bf16
 from active_recon.cli.command_line import command_line
 from active_recon.cli.one_training import checkpoint_in, shown_steps
 from active_recon.cli.reading import read_objects, warn_of_shared_objects
@@ -72,7 +72,7 @@ def train_depth(
     checkpoint = checkpoint_in(out, resume)
     torch.set_num_threads(threads)
     torch.manual_seed(seed)
-    half = in_bf16(bf16, training_device())
+    half = trained_in_bf16(bf16)
     training = TrainingConfig(steps, batch_size, learning_rate, max_views, seed, half, augment, 0,
                               warmup_steps, checkpoint_every, validate_every=steps)
     fabric = make_fabric(half)
