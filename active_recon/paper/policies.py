@@ -71,10 +71,11 @@ def make(study: Study) -> Result:
                    [*paths, study.objects('test').root], study.progress)
     found = policy_study(trial, attentions, study.policy_seeds, study.subset_objects,
                          study.progress)
+    precision = 'bfloat16' if study.bfloat16 else 'float32'
     text = (
-        f'All policies on one frozen network, in bfloat16, from {study.policy_starts} first views '
-        f'of each of {found["objects"]} parametric test objects. Attention was trained under '
-        f'{len(attentions)} seeds{learned_from(paths)}, random drawn under '
+        f'All policies on one frozen network, in {precision}, from {study.policy_starts} first '
+        f'views of each of {found["objects"]} parametric test objects. Attention was trained '
+        f'under {len(attentions)} seeds{learned_from(paths)}, random drawn under '
         f'{study.policy_seeds}. The greedy oracle knows the truth and takes the view with the '
         'highest IoU after it; it is not a usable policy, but shows the possible '
         'gain. `area` is the mean IoU over the views; differences are paired by object, '
@@ -88,7 +89,7 @@ def _trial(study: Study, paths: Sequence[Path]) -> tuple[Trial, list[nn.Module]]
     """Return the trial of the study's network, and the policies that were learned on it."""
     first, *others = [load_weights(path, study.device) for path in paths]
     trial = Trial(first.reconstruction, first.threshold, study.read(study.objects('test')),
-                  study.policy_starts, study.views, study.seed, bfloat16=True,
+                  study.policy_starts, study.views, study.seed, study.bfloat16,
                   cache=study.models / 'measured')
     return trial, [bundle.attention for bundle in (first, *others)
                    if bundle.attention is not None]

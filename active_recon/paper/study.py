@@ -14,6 +14,7 @@ from active_recon.datasets.views import read_views, ViewSet
 from active_recon.errors import DataError, WeightsError
 from active_recon.models.weights_files import find_weights, PAPER_MODEL
 from active_recon.reporting import Reporting, silent
+from active_recon.runtimes.precision import has_bf16
 from active_recon.volumes.voxels import RESOLUTION
 
 SAMPLES = 75_000
@@ -78,6 +79,8 @@ class Study:
     - device: device on which IoU is measured; table 4 and figure 10 always time a CPU
     - policy_seeds: number of trainings of the view policy, and of runs of random
     - subset_objects: number of objects on which every sequence of three views is measured
+    - bfloat16: whether policies are compared, and systems trained without a GPU, in mixed
+      precision: where this machine's processor has it
     - crew: the workers of a cluster that train and measure; None: this process
     """
 
@@ -96,6 +99,7 @@ class Study:
     subset_objects: int = 60
     device: str = 'cpu'
     views: int = 5
+    bfloat16: bool = field(default_factory=has_bf16)
     progress: Reporting = field(default=silent, compare=False)
     crew: Crew | None = field(default=None, compare=False)
 

@@ -113,9 +113,10 @@ def _train(study: Study, training: Training) -> None:
             yield report
 
     plan, seed = training.plan, training.seed
+    fabric = make_fabric(torch.cuda.is_available() or study.bfloat16)
     bundle = train_plan(
         seeded(plan, seed), study.read(*training.training), study.read(training.validation),
-        training.out, reporting, make_fabric(bfloat16=True), resume=True)
+        training.out, reporting, fabric, resume=True)
     bundle.card.update(
         command=study.command('systems'), generators_sha256=study.generators(), seed=seed,
         objects=[objects.identity() for objects in training.training],
