@@ -59,9 +59,10 @@ def test_a_folder_at_the_place_of_a_file_or_a_file_at_that_of_its_folder_is_refu
     ('paper', 'table1', '--out', 'file'), ('quality', 'measure', 'data', 'file/it.npz')],
     ids=' '.join)
 def test_what_cannot_be_written_is_told_before_anything_is_measured(
-        asked, tmp_path, monkeypatch, capsys):
+        asked, dataset, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'file').touch()
+    (tmp_path / 'data').symlink_to(dataset)
     assert 'cannot be written' in refusal(monkeypatch, capsys, *asked)
 
 

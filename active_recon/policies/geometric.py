@@ -54,8 +54,9 @@ class UniformPolicy(HeuristicPolicy):
     taken in steps of about 137 degrees, so that few of them are spread too, as are more than 24
     at one elevation: an episode of so many is meant to end earlier. Where elevations differ the
     best candidate is the goal, and no azimuth between candidates is preferred. Where the camera
-    cannot go around, the sweep is from end to end of the candidates in reach, the best of which
-    is the goal then too; it begins with the place nearest to the first view.
+    cannot go around, and as many candidates as views are in reach, the sweep is from end to end of
+    those, the best of which is the goal then too; it begins with the place nearest to the first
+    view.
     """
 
     def __init__(self, views: int) -> None:
@@ -91,7 +92,7 @@ class UniformPolicy(HeuristicPolicy):
         """
         first = pose_azimuths(seen.taken[:, 0])
         around = np.asarray((first + place * self._step) % TURN)
-        if seen.reachable is None or seen.reachable.all():
+        if seen.reachable is None or seen.reachable.all() or seen.reachable.sum() < self._views:
             return around, True
         ends = np.unique(pose_azimuths(seen.candidates[0, seen.reachable]))
         gaps = np.diff(ends, append=ends[:1] + TURN)

@@ -168,12 +168,13 @@ def test_a_goal_without_a_stamp_is_refused(start_node, bench):
     goals = bench.advertise(PoseStamped, 'next_view')
     _, pose = camera_to_msgs(orbit_camera(0.5), Header())
     said = 'refused: goal without a stamp: expected that of when it was published, got 0'
-    for _ in range(round(BUDGET_S / SEND_AGAIN_S)):
+    for sent in range(1, round(BUDGET_S / SEND_AGAIN_S)):
         goals.publish(pose)  # the listener that was found may be of a node that has just ended
         if bench.within(SEND_AGAIN_S, lambda: node.log(said)):
             break
     assert node.log(said)
-    assert bench.counts('reconstructor').get('refused/no_stamp', 1) == 1
+    # A busy machine hears the first only after the second was sent
+    assert 1 <= bench.counts('reconstructor').get('refused/no_stamp', 1) <= sent
     assert 'goals_unused' not in bench.counts('reconstructor')
 
 
