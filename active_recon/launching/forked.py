@@ -5,6 +5,7 @@ from contextlib import suppress
 import gc
 from importlib import import_module
 import multiprocessing
+from multiprocessing.process import BaseProcess
 import os
 from pathlib import Path
 import signal
@@ -16,17 +17,10 @@ _FORKS = multiprocessing.get_context('fork')
 
 
 class ForkedNode:
-    """
-    A node as `python -m active_recon.nodes.NAME` would run it, with imports done before.
+    """A fork that runs a node, as `subprocess.Popen` has a program; it is started with this."""
 
-    `arguments` are its own and, after `--ros-args`, those of ROS; its output goes to the file
-    `log`. Fork before this process has threads, of ROS or others: they are missing in the node.
-    """
-
-    def __init__(self, name: str, arguments: Sequence[str], environment: Mapping[str, str],
-                 log: Path) -> None:
-        self._process = _FORKS.Process(
-            target=run_as_program, args=(name, arguments, environment, log), daemon=True)
+    def __init__(self, process: BaseProcess) -> None:
+        self._process = process
         self._process.start()
 
     @property
@@ -48,6 +42,19 @@ class ForkedNode:
         """Return the exit code, None where it still runs after that time, in seconds."""
         self._process.join(timeout)
         return self._process.exitcode
+
+
+def forked(name: str, arguments: Sequence[str], environment: Mapping[str, str],
+           log: Path) -> ForkedNode:
+    """
+    Start a node as `python -m active_recon.nodes.NAME` would run it, with imports done before.
+
+    `arguments` are its own and, after `--ros-args`, those of ROS; its output goes to the file
+    `log`. Fork before this process has threads, of ROS or others: they are missing in the node.
+    """
+    log.write_bytes(b'')  # now: it is read, too, of a fork that has not begun to write
+    return ForkedNode(_FORKS.Process(
+        target=run_as_program, args=(name, arguments, environment, log), daemon=True))
 
 
 def run_as_program(name: str, arguments: Sequence[str], environment: Mapping[str, str],

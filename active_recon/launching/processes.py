@@ -14,7 +14,7 @@ import time
 from types import TracebackType
 
 from active_recon.errors import ActiveReconError
-from active_recon.launching.forked import ForkedNode
+from active_recon.launching.forked import forked, ForkedNode
 from active_recon.nodes.runtime.shared_memory import PROFILE
 
 _LAST_LINES = 8
@@ -97,7 +97,7 @@ class NodeProcesses:
         """
         log = self._log(node)
         assert log is not None
-        self._running[node] = ForkedNode(
+        self._running[node] = forked(
             node, ['--ros-args', *_as_words(parameters)], self._environment, log)
 
     def pid(self, node: str) -> int:

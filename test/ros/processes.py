@@ -8,7 +8,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from active_recon.launching.forked import run_as_program
+from active_recon.launching.forked import ForkedNode, run_as_program
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +44,7 @@ class Started:
             return None
 
 
-class Forked:
+class Forked(ForkedNode):
     """
     A node as `python -m active_recon.nodes.NAME` would run it, with all imports done before.
 
@@ -52,22 +52,10 @@ class Forked:
     """
 
     def __init__(self, name: str, options: Sequence[str], folder: Path, log: Path) -> None:
-        self._process = _FORKS.Process(target=_run, daemon=True, args=(
-            name, options, folder, log, _environment()))
         with pytest.MonkeyPatch.context() as patch:  # for the process that is forked
             patch.setenv('PYTHONPATH', f'{ROOT}{os.pathsep}{ROOT / "test"}')
-            self._process.start()
-
-    @property
-    def pid(self) -> int:
-        pid = self._process.pid
-        assert pid is not None
-        return pid
-
-    def wait(self, timeout_s: float) -> int | None:
-        """Return the exit code, None if it still runs after that time."""
-        self._process.join(timeout_s)
-        return self._process.exitcode
+            super().__init__(_FORKS.Process(target=_run, daemon=True, args=(
+                name, options, folder, log, _environment())))
 
 
 def _environment() -> dict[str, str]:
