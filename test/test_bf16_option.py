@@ -2,6 +2,7 @@
 
 from active_recon.cli import bf16_option
 from active_recon.cli.bf16_option import in_bf16, trained_in_bf16
+from active_recon.training import loop
 import pytest
 import torch
 
@@ -9,7 +10,8 @@ import torch
 @pytest.fixture(params=[True, False])
 def processor(request, monkeypatch):
     """Return whether the processor has bfloat16."""
-    monkeypatch.setattr(bf16_option, 'has_bf16', lambda: request.param)
+    for module in (bf16_option, loop):
+        monkeypatch.setattr(module, 'has_bf16', lambda: request.param)
     return request.param
 
 

@@ -18,8 +18,6 @@ def in_bf16(asked: bool | None) -> bool:
 
 def trained_in_bf16(asked: bool | None) -> bool:
     """Return the same of a training, which runs on a GPU where there is one."""
-    import torch
+    from active_recon.training.loop import trains_in_bfloat16
 
-    if asked is None and torch.cuda.is_available():
-        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
-    return in_bf16(asked)
+    return trains_in_bfloat16() if asked is None else asked

@@ -79,8 +79,8 @@ class Study:
     - device: device on which IoU is measured; table 4 and figure 10 always time a CPU
     - policy_seeds: number of trainings of the view policy, and of runs of random
     - subset_objects: number of objects on which every sequence of three views is measured
-    - bfloat16: whether policies are compared, and systems trained without a GPU, in mixed
-      precision: where this machine's processor has it
+    - bfloat16: whether policies are compared in mixed precision; by default where this machine's
+      processor has it
     - crew: the workers of a cluster that train and measure; None: this process
     """
 

@@ -15,7 +15,7 @@ from active_recon.models.weights_files import read_card
 from active_recon.paper.study import Objects, Study
 from active_recon.reporting import by_step
 from active_recon.training.checkpoints import differences
-from active_recon.training.loop import make_fabric, Measured
+from active_recon.training.loop import make_fabric, Measured, trains_in_bfloat16
 from active_recon.training.plan import Plan, Report, seeded, train_plan
 from active_recon.training.supervised import mean_length
 import torch
@@ -113,10 +113,9 @@ def _train(study: Study, training: Training) -> None:
             yield report
 
     plan, seed = training.plan, training.seed
-    fabric = make_fabric(torch.cuda.is_available() or study.bfloat16)
     bundle = train_plan(
         seeded(plan, seed), study.read(*training.training), study.read(training.validation),
-        training.out, reporting, fabric, resume=True)
+        training.out, reporting, make_fabric(trains_in_bfloat16()), resume=True)
     bundle.card.update(
         command=study.command('systems'), generators_sha256=study.generators(), seed=seed,
         objects=[objects.identity() for objects in training.training],

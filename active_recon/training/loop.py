@@ -12,6 +12,7 @@ from active_recon.datasets.views import ViewSet
 from active_recon.errors import ActiveReconError, ConfigError
 from active_recon.freed_memory import give_back_freed_memory
 from active_recon.interrupts import held_interrupts
+from active_recon.runtimes.precision import has_bf16
 from active_recon.training.ahead import drawn_ahead
 from active_recon.training.allocation import keep_freed_memory
 from active_recon.training.checkpoints import Checkpoint, resume_checkpoint, save_checkpoint
@@ -107,6 +108,13 @@ class Run:
     show: Callable[[int], None] = lambda step: None
     draw_threads: int | None = None
     begun_with: str = ''
+
+
+def trains_in_bfloat16() -> bool:
+    """Return whether what trains here, the GPU where there is one, computes with bfloat16."""
+    if torch.cuda.is_available():
+        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
+    return has_bf16()
 
 
 def make_fabric(bfloat16: bool, devices: int = 1, nodes: int = 1) -> Fabric:
