@@ -61,7 +61,8 @@ class ManagedNode(QosWarnings, LifecycleNode, ABC):
     def start(self, to_active: bool) -> None:
         """Configure and, `to_active`, activate itself; raises the error that prevents it."""
         self._is_starting = True
-        for trigger in (self.trigger_configure, self.trigger_activate)[:1 + to_active]:
+        then = [self.trigger_activate] if to_active else []
+        for trigger in (self.trigger_configure, *then):
             trigger()
             if self._failure is not None:
                 raise self._failure
@@ -207,13 +208,12 @@ def managed(make_node: Callable[[], ManagedNode]) -> Callable[[], ManagedNode]:
     def started() -> ManagedNode:
         node = make_node()
         try:
-            to_active = bool(node.get_parameter('activate_at_start').value)
-            if not node.get_parameter('autostart').value:
-                node.get_logger().info('unconfigured; waiting to be configured and activated')
-            else:
-                node.start(to_active)
-                if not to_active:
+            if node.get_parameter('autostart').value:
+                node.start(bool(node.get_parameter('activate_at_start').value))
+                if not node.is_active:
                     node.get_logger().info('configured; waiting to be activated')
+            else:
+                node.get_logger().info('unconfigured; waiting to be configured and activated')
         except BaseException:
             node.destroy_node()
             raise
