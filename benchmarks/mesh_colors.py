@@ -21,7 +21,7 @@ import sys
 from typing import Any
 
 from active_recon.datasets.drawn_cameras import draw_camera
-from active_recon.datasets.manifest import manifest_jobs, read_manifest
+from active_recon.datasets.manifest import manifest_jobs
 from active_recon.geometry.cameras import Camera
 from active_recon.meshes import coloring
 from active_recon.meshes.photos import Photo
@@ -30,6 +30,7 @@ from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.refinement import refined_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxelisation import voxelise
+from benchmarks.meshes import rows_of
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 import numpy as np
@@ -49,10 +50,7 @@ _VARIED = 8.0
 def main() -> None:
     """Measure, write JSON, and print the means."""
     options = _options()
-    rows = [row for row in read_manifest(options.manifest) if row.split == options.split]
-    if not rows:
-        sys.exit(f'{options.manifest}: no model of the split {options.split!r}: expected one or '
-                 'more; name another with --split')
+    rows = rows_of(options.manifest, options.split)
     order = np.random.default_rng(0).permutation(len(rows))
     jobs = manifest_jobs([rows[index] for index in order], Path())
     weights = find_weights(None)

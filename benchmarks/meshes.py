@@ -21,7 +21,7 @@ from typing import Any
 
 from active_recon.datasets.drawn_cameras import Viewing
 from active_recon.datasets.making import Job
-from active_recon.datasets.manifest import manifest_jobs, read_manifest
+from active_recon.datasets.manifest import manifest_jobs, ModelRow, read_manifest
 from active_recon.evaluation.statistics import difference, mean_interval
 from active_recon.evaluation.surfaces import (
     recall,
@@ -48,10 +48,7 @@ Scores = Mapping[str, Mapping[str, float]]
 def main() -> None:
     """Measure, print a table, and write JSON."""
     options = _options()
-    rows = [row for row in read_manifest(options.manifest) if row.split == options.split]
-    if not rows:
-        sys.exit(f'{options.manifest}: no model of the split {options.split!r}: expected one or '
-                 'more; name another with --split')
+    rows = rows_of(options.manifest, options.split)
     drawn = np.random.default_rng(0).choice(
         len(rows), min(options.objects, len(rows)), replace=False)
     jobs = manifest_jobs([rows[index] for index in drawn], Path())
@@ -69,6 +66,15 @@ def main() -> None:
     for count, measures in views.items():
         for measure, said in measures.items():
             print(f'{count} views, {measure}: {_told(said)}')  # noqa: T201
+
+
+def rows_of(manifest: Path, split: str) -> list[ModelRow]:
+    """Return the models of a split; ends in one line where there are none."""
+    rows = [row for row in read_manifest(manifest) if row.split == split]
+    if not rows:
+        sys.exit(f'{manifest}: no model of the split {split!r}: expected one or more; name '
+                 'another with --split')
+    return rows
 
 
 def _options() -> argparse.Namespace:
