@@ -125,6 +125,20 @@ def test_what_is_not_there_is_said_to_be_the_worst(carving):
     assert scores['chamfer'] == pytest.approx(math.sqrt(3))
 
 
+def test_what_no_camera_can_tell_costs_nothing_of_the_iou_of_filled_truths(carving):
+    solid = np.zeros((64, 64, 64), bool)
+    solid[10:50, 10:50, 10:50] = True
+    hollow = solid.copy()
+    hollow[14:46, 14:46, :46] = False  # open below
+    truth = target({64: hollow}, surface=False)
+    scores, _ = scored(sure_logits(solid), truth, carving, 1, surfaces=False)
+    assert scores['iou_64'] == pytest.approx(hollow.sum() / solid.sum())
+    assert scores['filled_iou_64'] > 0.9
+    own, _ = scored(sure_logits(hollow), truth, carving, 1, surfaces=False)
+    assert own['iou_64'] == 1 and own['filled_iou_64'] == pytest.approx(
+        hollow.sum() / truth.filled[64].sum())
+
+
 def test_coarse_cells_are_full_where_any_of_theirs_is():
     cells = np.random.default_rng(0).random((8, 8, 8)) < 0.1
     blocks = cells.reshape(4, 2, 4, 2, 4, 2).transpose(0, 2, 4, 1, 3, 5).reshape(4, 4, 4, 8)
@@ -177,7 +191,8 @@ def test_a_network_that_needs_the_front_joins_in_on_a_turntable_alone(dataset, s
     plan = Plan((1, 3), ())
     found = measure(turntable, [coarse, paper], plan)
     for measured in found.values():
-        assert set(measured.values['even']) == {'iou_32'}  # there are no finer voxels
+        # There are no finer voxels
+        assert set(measured.values['even']) == {'iou_32', 'filled_iou_32'}
         assert np.isfinite(measured.values['random']['iou_32']).all()
 
 

@@ -7,7 +7,7 @@ from active_recon.errors import ConfigError
 from active_recon.evaluation.calibration import BINS
 from active_recon.evaluation.posed.entrants import Entrant
 from active_recon.evaluation.posed.scene import Scene
-from active_recon.evaluation.posed.scoring import iou_scores, scored, Target, target
+from active_recon.evaluation.posed.scoring import fixed_scores, scored, Target, target
 from active_recon.evaluation.posed.walking import (
     even_orders,
     Order,
@@ -133,8 +133,7 @@ def measure(scene: Scene, entrants: Sequence[Entrant], plan: Plan,
                     for row, one, truth in zip(rows.tolist(), logits, targets, strict=True):
                         result = (scored(one, truth, entrant, counts[step],
                                          counts[step] in plan.surfaces) if kind == 'random' else
-                                  (iou_scores(expit(one), truth, entrant.sides,
-                                              entrant.thresholds), {}))
+                                  (fixed_scores(expit(one), truth, entrant), {}))
                         _note(found[entrant.name], kind, shape, (row, step), result)
             advance(len(rows))
     return found

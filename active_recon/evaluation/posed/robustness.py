@@ -198,6 +198,6 @@ def _iou(block: Block, entrant: Entrant, observer: Observer, order: NDArray[np.i
         occupancy = turned_back(expit(one), yaw)
         # The maximum with NaN is NaN, so a coarse cell that is partly unknown is unknown
         unknown = {side: np.isnan(pooled(occupancy, side)) for side in entrant.sides}
-        known = replace(truth, cells={side: cells & ~unknown.get(side, np.False_)
-                                      for side, cells in truth.cells.items()})
+        known = {side: cells & ~unknown.get(side, np.False_)
+                 for side, cells in truth.cells.items()}
         yield iou_scores(occupancy, known, entrant.sides, entrant.thresholds)

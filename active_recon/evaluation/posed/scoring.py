@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 
 from active_recon.evaluation.calibration import brier, near_surface, reliability
 from active_recon.evaluation.posed.entrants import Entrant
@@ -12,6 +13,7 @@ from active_recon.evaluation.surfaces import (
     thin_cells,
     voxel_surface,
 )
+from active_recon.volumes.hidden import hidden_cells
 from active_recon.volumes.occupancy_threshold import best_threshold
 from active_recon.volumes.voxels import iou
 import numpy as np
@@ -41,6 +43,15 @@ class Target:
         """Cells a side of the finest truth."""
         return max(self.cells)
 
+    @cached_property
+    def filled(self) -> Mapping[int, NDArray[np.bool_]]:
+        """
+        True voxels by R in which cells that no camera can tell (see `hidden_cells`) are occupied.
+
+        So are those of truths that were made watertight from outside (Mescheder et al. 2019).
+        """
+        return {side: cells | hidden_cells(cells) for side, cells in self.cells.items()}
+
 
 def target(cells: Mapping[int, NDArray[np.bool_]], surface: bool = True) -> Target:
     """Return an object's truth of its voxels by resolution, with its surface if `surface`."""
@@ -62,12 +73,19 @@ def pooled(values: NDArray[np.floating], side: int) -> NDArray[np.floating]:
     return values
 
 
-def iou_scores(values: NDArray[np.floating], truth: Target, sides: tuple[int, ...],
-               thresholds: Mapping[int, float], name: str = 'iou') -> Scores:
+def iou_scores(values: NDArray[np.floating], cells: Mapping[int, NDArray[np.bool_]],
+               sides: tuple[int, ...], thresholds: Mapping[int, float],
+               name: str = 'iou') -> Scores:
     """Return the IoU of values (R, R, R) above thresholds, named `<name>_<cells a side>`."""
-    return {f'{name}_{side}': float(iou(pooled(values, side) > thresholds[side],
-                                        truth.cells[side]))
-            for side in sides if side in truth.cells}
+    return {f'{name}_{side}': float(iou(pooled(values, side) > thresholds[side], cells[side]))
+            for side in sides if side in cells}
+
+
+def fixed_scores(occupancy: NDArray[np.float32], truth: Target, entrant: Entrant) -> Scores:
+    """Return `iou_*` and `filled_iou_*` of probabilities (R, R, R) at the entrant's thresholds."""
+    return {name: value for kind, cells in (('iou', truth.cells), ('filled_iou', truth.filled))
+            for name, value in iou_scores(occupancy, cells, entrant.sides, entrant.thresholds,
+                                          kind).items()}
 
 
 def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: int,
@@ -75,8 +93,8 @@ def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: 
     """
     Return the scores of logits (R, R, R) after `count` views, and reliability diagrams.
 
-    - `iou_*`: at the entrant's threshold; `own_iou_*`: at the threshold chosen for the object;
-      `expected_iou`: the expected IoU there
+    - `iou_*`: at the entrant's threshold, `filled_iou_*`: with the filled truth; `own_iou_*`: at
+      the threshold chosen for the object; `expected_iou`: the expected IoU there
     - `brier` and the diagram `calibration_error`, near the surface, `thin_recall`, and
       `precision` (NaN where no cell is said to be occupied) and `recall` of all occupied cells:
       if the truth has the resolution of the logits
@@ -99,7 +117,7 @@ def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: 
             occupancy = expit(near / np.float32(temperature))
             scores[f'{prefix}brier'] = brier(occupancy, full)
             diagrams[f'{prefix}calibration_error'] = reliability(occupancy, full)
-    scores |= iou_scores(whole, truth, entrant.sides, entrant.thresholds)
+    scores |= fixed_scores(whole, truth, entrant)
     threshold = entrant.thresholds[max(entrant.sides)]
     if len(logits) == truth.finest:
         found, wanted = whole > threshold, truth.cells[truth.finest]
@@ -114,5 +132,6 @@ def _own_scores(occupancy: NDArray[np.float32], truth: Target, entrant: Entrant,
                 prefix: str) -> Scores:
     """Return the scores of probabilities (R, R, R) at their own best threshold."""
     own, expected = best_threshold(occupancy)
+    thresholds = dict.fromkeys(entrant.sides, own)
     return {f'{prefix}expected_iou': expected, **iou_scores(
-        occupancy, truth, entrant.sides, dict.fromkeys(entrant.sides, own), f'{prefix}own_iou')}
+        occupancy, truth.cells, entrant.sides, thresholds, f'{prefix}own_iou')}

@@ -135,6 +135,8 @@ def _set_tables(figures: Mapping[str, Any]) -> list[str]:
                 parts += [f'### IoU at {side} cells, {kind} views', table(['views', *counts],
                                                                           rows)]
     for name, title in (
+            ('filled_iou_64', 'IoU at 64 cells, true cells that no camera can tell filled'),
+            ('filled_iou_32', 'IoU at 32 cells, true cells that no camera can tell filled'),
             ('f_score_1', 'F-score at 1 % of the cube'), ('f_score_2', 'F-score at 2 %'),
             ('chamfer', 'Chamfer distance, sides of the cube'),
             ('normal_consistency', 'Normal consistency'), ('thin_recall', 'Recall of thin parts'),
