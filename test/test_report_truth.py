@@ -114,6 +114,18 @@ def test_a_mesh_with_a_hole_is_a_shell_and_the_page_says_so(run, tmp_path):
     assert 'surface' not in whole.placed
 
 
+def test_a_mesh_without_an_underside_is_as_solid_as_cameras_can_tell(run, tmp_path):
+    box = trimesh.creation.box((0.6, 0.6, 0.6))
+    box.export(tmp_path / 'whole.ply')
+    box.update_faces(box.face_normals[:, 2] > -0.5)
+    box.export(tmp_path / 'scan.ply')
+    whole, scan = (TruthFile(tmp_path / f'{name}.ply').read(run) for name in ('whole', 'scan'))
+    assert scan.cells.sum() > 0.85 * whole.cells.sum()  # the lowest cameras see the walls' edge
+    assert not (scan.cells & ~whole.cells).any()
+    assert 'count as solid, since no camera could see that they are not' in scan.placed
+    assert 'count as solid' not in whole.placed
+
+
 def test_axes_of_the_true_mesh_are_options(run, tmp_path):
     box = trimesh.creation.box(bounds=[(0, 0, 0), (0.1, 0.1, 0.4)])
     box.export(tmp_path / 'stick.ply')

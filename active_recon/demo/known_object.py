@@ -1,13 +1,14 @@
 """The demo's object, which is known: its true cells, and the picture of a run that it ends."""
 
 from collections.abc import Sequence
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 from active_recon.demo.picture import run_picture, voxel_tile
 from active_recon.png_files import write_png
 from active_recon.viewer.view_result import ViewResult
 from active_recon.volumes.boxes import height_range
+from active_recon.volumes.hidden import filled
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.voxelisation import voxelise
 import numpy as np
@@ -18,14 +19,14 @@ _LIKELY_RESOLUTION = 64
 
 class KnownObject:
     """
-    The object of a mesh file, in voxels of whatever resolution is asked for.
+    The object of a mesh file, in voxels of whatever resolution is asked for, see `filled`.
 
     What it has voxelised and drawn it keeps. Raises MeshError where the file is no mesh.
     """
 
     def __init__(self, mesh_file: Path) -> None:
         self._mesh = load_mesh(mesh_file)
-        self._voxels = cache(partial(voxelise, self._mesh))
+        self._voxels = cache(lambda resolution: filled(voxelise(self._mesh, resolution)))
         self._tile = cache(voxel_tile)
         self._voxels(_LIKELY_RESOLUTION)  # later it would delay the loop's messages
 

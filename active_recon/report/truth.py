@@ -9,6 +9,7 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.objects import find_object, shipped_objects
 from active_recon.report.subject import shown_grid
 from active_recon.volumes.binvox import read_binvox
+from active_recon.volumes.hidden import hidden_cells
 from active_recon.volumes.meshes import fit_to_grid, load_mesh, read_mesh
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import RESOLUTION, turned, VoxelGrid
@@ -20,6 +21,7 @@ import trimesh
 _SAME_SIDE = 0.01  # of a binvox and of the run's cube, as a share
 _ROUNDING = 1e-6  # of a file's numbers, in cubes
 _SAMPLES = 10_000  # of a surface
+_TOLD = 0.005  # share of cells that were filled, of the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +64,8 @@ class TruthFile:
         file = find_object(str(self.path))
         if self.fit or ships:
             cells = _fitted(load_mesh(file, self.up, self.front), run, object_yaw)
-            return Truth(cells, f'The true shape is {file.name}, centred, and scaled so that its '
-                                "longest side is the cube's.")
+            return _filled(cells, f'The true shape is {file.name}, centred, and scaled so that '
+                                  "its longest side is the cube's.")
         mesh = read_mesh(file, self.up, self.front)
         low, high = (np.round(bound, 3).tolist() for bound in mesh.bounds)
         mesh.apply_transform(np.diag([1 / size, 1 / size, 1 / size, 1]))
@@ -74,12 +76,14 @@ class TruthFile:
                 f"reaches from {low} to {high} m. Meshes are in metres and in the object's "
                 'frame; --fit centres and scales one, --object-size sets the cube')
         outside = f' {100 * (1 - inside):.0f} % of its surface is outside of the cube.'
-        cells = _in_place(mesh, _resolution(run))
-        hollow = ('' if mesh.is_watertight or binary_erosion(cells).any() else
-                  ' The mesh has holes and encloses nothing: only its surface counts as solid, '
-                  'and the IoU is too low; close its holes.')
-        return Truth(cells, f'The true shape is {file.name}, in metres and in the '
-                            f"object's frame.{outside if inside < 1 else ''}{hollow}")
+        truth = _filled(_in_place(mesh, _resolution(run)),
+                        f'The true shape is {file.name}, in metres and in the '
+                        f"object's frame.{outside if inside < 1 else ''}")
+        if mesh.is_watertight or binary_erosion(truth.cells).any():
+            return truth
+        return Truth(truth.cells, f'{truth.placed} The mesh has holes and encloses nothing: only '
+                                  'its surface counts as solid, and the IoU is too low; close its '
+                                  'holes.')
 
     def _of_binvox(self, run: RecordedRun, size: float, object_yaw: float | None) -> Truth:
         grid, resolution = read_binvox(self.path), _resolution(run)
@@ -115,9 +119,18 @@ def known_truth(run: RecordedRun) -> Truth | None:
         return TruthFile(Path(mesh.stem)).read(run, object_yaw=0.0)
     scaled = load_mesh(find_object(mesh.stem))
     scaled.apply_transform(np.diag([*[shown / size] * 3, 1.0]))
-    cells = _in_place(scaled, _resolution(run))
-    return Truth(cells, f'The true shape is {mesh.stem}, whose longest side was {shown:g} m; the '
-                        f"run's cube is {size:g} m.")
+    return _filled(_in_place(scaled, _resolution(run)),
+                   f'The true shape is {mesh.stem}, whose longest side was {shown:g} m; the '
+                   f"run's cube is {size:g} m.")
+
+
+def _filled(cells: NDArray[np.bool_], placed: str) -> Truth:
+    """Return the true cells and those that no camera can tell: no image says that they are not."""
+    hidden = hidden_cells(cells)
+    share = hidden.sum() / max(cells.sum(), 1)
+    told = (f' The mesh is open where no camera looks in: {100 * share:.0f} % more cells than '
+            'its own count as solid, since no camera could see that they are not.')
+    return Truth(cells | hidden, f'{placed}{told if share > _TOLD else ""}')
 
 
 def _fitted(mesh: trimesh.Trimesh, run: RecordedRun, yaw: float | None) -> NDArray[np.bool_]:
