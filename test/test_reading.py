@@ -339,6 +339,25 @@ def test_a_namespace_before_the_topics_is_found(loop, bag, tmp_path):
     assert same(read_run(write_bag(tmp_path / 'run', moved)), read_run(bag))
 
 
+@pytest.mark.parametrize('remapped', [
+    {'next_view': '/arm/goal'},
+    {'view': '/robot/shots', 'next_view': '/arm/goal', 'entropy': '/doubt'}])
+def test_remapped_topics_of_the_loop_are_found_by_the_names_that_the_recorder_keeps(
+        loop, bag, tmp_path, remapped):
+    with BagWriter(tmp_path / 'run') as writer:
+        writer.add_provenance(remapped)
+        writer.attach_parameters('/robot/reconstructor', {})
+        for time, topic, msg in loop.messages:
+            name = remapped.get(topic[1:], f'/robot{topic}')
+            writer.add_topic(name, type_name(msg), definition(type_name(msg)))
+            writer.write(name, serialize_message(msg), time + DELAY, time)
+    run, usual = read_run(tmp_path / 'run'), read_run(bag)
+    assert same(run, usual)
+    goals, known = ([view.goal.stamp for view in only(each).views if view.goal]
+                    for each in (run, usual))
+    assert goals == known != []
+
+
 def test_the_parameters_and_the_provenance_are_read(loop, tmp_path):
     with BagWriter(tmp_path / 'run') as writer:
         writer.add_provenance({'version': '1', 'policy': 'random'})

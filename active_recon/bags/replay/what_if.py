@@ -9,6 +9,7 @@ from typing import Any
 from active_recon import __version__
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.bags.replay.replay import decide
+from active_recon.bags.runs.loop_record import LOOP
 from active_recon.bags.runs.loop_setup import LoopSetup, Overrides
 from active_recon.bags.runs.parameters import node_parameters
 from active_recon.bags.runs.recorded_object import RecordedObject, replay_views
@@ -57,7 +58,7 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
     made_by = dict(reconstructor.provenance)
     # The new bag has the topics under their own names
     kept = {name: text for name, text in run.provenance.items()
-            if not ('/' in name and text.startswith('/'))}
+            if not (text.startswith('/') and ('/' in name or name in LOOP))}
     provenance = {**kept, **made_by, 'version': __version__,
                   'replay_of': run.path.resolve().name}
     parameters: dict[str, Mapping[str, Any]] = {'/reconstructor': {

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from active_recon.bags.runs.run import Candidates
+from active_recon.bags.runs.topics import LoopTopics
 from active_recon.bags.storage.bag import Bag, RawMessage
 from active_recon.bags.storage.message_types import (
     CLOUD,
@@ -39,7 +40,7 @@ _DIAGNOSTICS = '/diagnostics'
 
 class LoopRecord:
     """
-    The content of the loop's topics in a namespace such as '/'; all is read at once.
+    The content of the loop's topics; all is read at once.
 
     - parts: the converted messages by topic name in the loop, then by stamp in nanoseconds
     - published, received: their times, by the same keys; a message published again counts once
@@ -51,7 +52,8 @@ class LoopRecord:
     DataError on messages that the loop's nodes do not write.
     """
 
-    def __init__(self, bag: Bag, namespace: str, object_size: float, object_frame: str) -> None:
+    def __init__(self, bag: Bag, topics: LoopTopics, object_size: float,
+                 object_frame: str) -> None:
         self.parts: dict[str, dict[int, Any]] = {role: {} for role in LOOP}
         self.published: dict[str, dict[int, int]] = {role: {} for role in LOOP}
         self.received: dict[str, dict[int, int]] = {role: {} for role in LOOP}
@@ -72,7 +74,7 @@ class LoopRecord:
             'goal_reason': goal_reason_from_msg,
             'done': done_from_msg,
         }
-        roles = {namespace + role: role for role in LOOP}
+        roles = {topics.full_name(role): role for role in LOOP}
         unstamped = False
         for message in bag.messages({*roles, _DIAGNOSTICS}):
             if message.topic == _DIAGNOSTICS:

@@ -14,7 +14,7 @@ from active_recon.bags.runs.recorded_views import gated_views, recorded_episodes
 from active_recon.bags.runs.run import RecordedEpisode, RecordedRun
 from active_recon.bags.runs.scene import Scene
 from active_recon.bags.runs.topic_search import camera_topics
-from active_recon.bags.runs.topics import loop_namespace, POSE_TYPES, Topics
+from active_recon.bags.runs.topics import loop_topics, POSE_TYPES, Topics
 from active_recon.bags.storage.bag import Bag, BagSummary
 from active_recon.bags.storage.opening import open_bag
 from active_recon.errors import ActiveReconError, ConfigError, DataError
@@ -64,10 +64,10 @@ def run_in(bag: Bag, summary: BagSummary, path: Path, topics: Topics, scene: Sce
 
 def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
           reporting: Reporting) -> _Read:
-    namespace = None if topics.azimuth else loop_namespace(summary.topics)
+    loop = None if topics.azimuth else loop_topics(summary)
     for option, given in (('--object-position', scene.object_position is not None),
                           ('--depth', topics.depth)):
-        if given and namespace is not None:
+        if given and loop is not None:
             raise ConfigError(f'{option}: not needed: the bag has the views of a loop, which knew '
                               'that')
     node = parameters_among(summary.parameters, 'reconstructor')
@@ -77,7 +77,7 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
         recorded = node.get(name, given)
         if given == getattr(_ANY_TOPICS, name):
             topics = replace(topics, **{name: recorded})
-        elif namespace is not None and given != recorded:
+        elif loop is not None and given != recorded:
             raise ConfigError(f'--{name.replace("_", "-")}: not needed: the bag has that of its '
                               f'loop, {recorded}')
     scene = replace(scene, object_size=scene.object_size or {
@@ -87,7 +87,7 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
         raise ConfigError(f'--object-frame: not for {camera.azimuth.type_name}, which the bag has '
                           f'on {camera.azimuth.name}{camera.advice}')
     stream = CameraStream(bag, camera, topics, scene, reporting)
-    if namespace is None:
+    if loop is None:
         episode, counters = gated_views(stream, ViewGate(), scene)
         if camera.depth:
             if stream.assumed:
@@ -96,14 +96,14 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
             episode = with_depth_of(camera.depth, episode, bag, stream)
         gaps = _gaps(stream)
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
-    record = LoopRecord(bag, namespace, node.get('object_size', scene.size), topics.object_frame)
-    episodes = with_depth(recorded_episodes(stream, record, scene), bag, namespace,
+    record = LoopRecord(bag, loop, node.get('object_size', scene.size), topics.object_frame)
+    episodes = with_depth(recorded_episodes(stream, record, scene), bag, loop.namespace,
                           summary.provenance, node)
     if camera.of_views:  # the images between the views were not recorded
         return _Read(episodes, record.counters, ImageGaps(), _assumed(stream, scene))
     gaps = _gaps(stream)
     uncounted = uncounted_images([received for _, received in stream.images], record.counted.get(
-        f'{namespace}reconstructor'.strip('/'), ()))
+        f'{loop.namespace}reconstructor'.strip('/'), ()))
     return _Read(episodes, record.counters, replace(gaps, uncounted=uncounted),
                  _assumed(stream, scene))
 

@@ -1,10 +1,11 @@
 """The topics of the camera, its poses and the loop in a bag."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
 from active_recon.bags.runs.run import TopicSummary
+from active_recon.bags.storage.bag import BagSummary
 from active_recon.bags.storage.message_types import (
     JOINT_STATE,
     POSE,
@@ -92,11 +93,34 @@ class CameraTopics:
     advice: str = ''
 
 
-def loop_namespace(present: Sequence[TopicSummary]) -> str | None:
-    """Return the namespace of the loop's topics, '/' or '/robot/'; None: no view was taken."""
-    namespaces = [topic.name.removesuffix('view') for topic in present
+@dataclass(frozen=True)
+class LoopTopics:
+    """
+    The loop's own topics: those in its namespace, '/' or '/robot/', unless they were remapped.
+
+    `remapped` has full names by the names in the loop.
+    """
+
+    namespace: str
+    remapped: Mapping[str, str]
+
+    def full_name(self, name: str) -> str:
+        """Return the full name that a topic of the loop has in the bag."""
+        return self.remapped.get(name, f'{self.namespace}{name}')
+
+
+def loop_topics(summary: BagSummary) -> LoopTopics | None:
+    """Return the loop's topics in a bag; None: no view was taken."""
+    present = {topic.name for topic in summary.topics if topic.count}
+    remapped = {name: full for name, full in summary.provenance.items() if full in present}
+    if 'view' in remapped:  # names are remapped from those in the namespace of the loop's nodes
+        node = next((name for name in summary.parameters
+                     if name.rpartition('/')[2] == 'reconstructor'), remapped['view'])
+        namespace = f'/{node.strip("/")}'.rpartition('/')[0]
+        return LoopTopics(f'{namespace}/', remapped)
+    namespaces = [topic.name.removesuffix('view') for topic in summary.topics
                   if topic.name.endswith('/view') and topic.type_name == POSE and topic.count]
     if len(namespaces) > 1:
         raise DataError(f'views of several loops, in {", ".join(namespaces)}: expected one loop '
                         'in a bag')
-    return namespaces[0] if namespaces else None
+    return LoopTopics(namespaces[0], remapped) if namespaces else None
