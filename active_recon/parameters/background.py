@@ -21,7 +21,7 @@ class BackgroundParameters:
         'capture_background, or those of background_color',
         choices=BACKGROUNDS)
     segmenter: str = parameter(
-        '', 'weights file of the segmenter (.safetensors); empty: the one that ships')
+        '', 'weights file of the segmenter (.safetensors); empty: the one that ships', path=True)
     background_color: tuple[int, ...] = parameter(
         GREEN_SCREEN, 'RGB color of the background', low=0, high=255, dynamic=True)
     background_tolerance: float = parameter(

@@ -12,10 +12,10 @@ class CameraParameters(ManagedParameters):
 
     source: str = parameter(
         '', 'what is published: a video device such as /dev/video0, a video file, or a folder of '
-        'images')
+        'images', path=True)
     camera_info: str = parameter(
         '', "lens in the YAML format of ROS's camera_calibration, as camera_info_manager and "
-        'calibrate write it; empty for a camera that is not calibrated')
+        'calibrate write it; empty for a camera that is not calibrated', path=True)
     camera_frame: str = parameter('camera_optical_frame', 'frame of the images', needed=True)
     rate: float = parameter(
         0.0, 'images per second; 0 for those of the device or file, and 10 for a folder',

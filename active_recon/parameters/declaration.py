@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 import math
+from os.path import expanduser
 from typing import Any, get_args, get_origin, get_type_hints
 
 from active_recon.errors import ConfigError
@@ -18,18 +19,18 @@ NEW_START = 'a change requires a restart'
 
 def parameter(default: object, description: str, *, low: float | None = None,
               high: float | None = None, choices: Sequence[str] = (),
-              dynamic: bool = False, needed: bool = False) -> Any:
+              dynamic: bool = False, needed: bool = False, path: bool = False) -> Any:
     """
     Return the field of a parameter: bool, int, float, str, or a tuple of floats or strings.
 
     `low` and `high` are the inclusive ends of its range, given together; for a tuple they hold
     for each element. `choices` are the allowed strings. A default of NaN means 'not given', and
     NaN is then an allowed value. A `dynamic` parameter can change while the node runs. A string
-    that is `needed` cannot be empty.
+    that is `needed` cannot be empty; in one that is a `path`, a leading ~ is the home folder.
     """
     return field(default=default, metadata={
         'description': description, 'low': low, 'high': high, 'choices': tuple(choices),
-        'dynamic': dynamic, 'needed': needed})
+        'dynamic': dynamic, 'needed': needed, 'path': path})
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Declared:
     choices: tuple[str, ...]
     dynamic: bool
     needed: bool
+    path: bool
 
     @property
     def expected(self) -> str:
@@ -76,7 +78,8 @@ class Declared:
             if not isinstance(value, str) and all(map(self._allows, elements)):
                 return elements
         elif self.of is None and self._allows(_as(self.kind, value)):
-            return _as(self.kind, value)
+            # No shell expands what is in a parameters file, or behind `:=`
+            return expanduser(value) if self.path else _as(self.kind, value)
         given = list(value) if isinstance(value, array) else value
         raise ConfigError(
             f'parameter {self.name}: invalid value: expected {self.expected}, got {given!r}')

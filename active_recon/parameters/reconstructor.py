@@ -47,10 +47,11 @@ class ReconstructorParameters(BackgroundParameters, CameraPoseParameters, FrontP
     stall_timeout: float = parameter(
         1.0, 'time that the camera may rest away from its goal before a warning that it has '
         'stalled, s', low=0.1, high=3600.0, dynamic=True)
-    output_dir: str = parameter('.', 'folder of saved meshes and states', dynamic=True)
+    output_dir: str = parameter(
+        '.', 'folder of saved meshes and states', dynamic=True, path=True)
     mesh_format: str = parameter(
         'ply', 'format of saved meshes', choices=MESH_FORMATS, dynamic=True)
     publish_mesh: bool = parameter(
         False, 'whether the coloured surface is published as a Marker, at most once a second')
     state_file: str = parameter(
-        '', 'file that load_state goes on from, relative to output_dir', dynamic=True)
+        '', 'file that load_state goes on from, relative to output_dir', dynamic=True, path=True)

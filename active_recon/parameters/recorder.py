@@ -16,7 +16,8 @@ TOPICS = ('camera/image_raw', 'camera/image_raw/compressed', 'camera/camera_info
 class RecorderParameters:
     """Parameters of the recorder."""
 
-    output_dir: str = parameter('bags', 'folder in which each recording creates its own')
+    output_dir: str = parameter(
+        'bags', 'folder in which each recording creates its own', path=True)
     record_at_start: bool = parameter(True, 'whether to record from the start')
     stop_when_done: bool = parameter(
         False, 'whether a recording ends when an episode is done')

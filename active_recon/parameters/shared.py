@@ -24,7 +24,8 @@ class NetworkParameters:
     """Parameters of a node that runs a network."""
 
     weights: str = parameter(
-        '', 'weights file, or a model whose weights ship; empty for the default model')
+        '', 'weights file, or a model whose weights ship; empty for the default model',
+        path=True)
     threads: int = parameter(1, 'number of CPU threads of the network', low=1, high=256)
     runtime: str = parameter(
         AUTO, 'library that runs the network; auto is openvino where its weights are exported, '

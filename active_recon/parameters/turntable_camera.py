@@ -12,8 +12,10 @@ from active_recon.parameters.shared import CubeParameters
 class TurntableCameraParameters(CubeParameters):
     """Parameters of the simulated turntable; ConfigError where its object is ambiguous."""
 
-    mesh: str = parameter('', 'mesh to show: the name of a model that ships, or a mesh file')
-    dataset: str = parameter('', 'folder of rendered objects to show instead of a mesh')
+    mesh: str = parameter(
+        '', 'mesh to show: the name of a model that ships, or a mesh file', path=True)
+    dataset: str = parameter(
+        '', 'folder of rendered objects to show instead of a mesh', path=True)
     up: str = parameter('', 'up axis of the mesh file; empty for that of its format')
     front: str = parameter('', 'front axis of the mesh file; empty for that of its format')
     background: float = parameter(255.0, 'gray value of the background', low=0.0, high=255.0)

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 from active_recon.errors import ConfigError
 from active_recon.nodes.runtime.parameters import Parameters, set_read_only_parameter
-from active_recon.parameters.declaration import NEW_START, parameter
+from active_recon.parameters.declaration import declared, NEW_START, parameter
+from active_recon.parameters.node_parameters import NODE_PARAMETERS
 import pytest
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -85,6 +86,29 @@ def test_the_ends_of_a_range_are_inside_and_an_integer_may_stand_for_a_number(
 def test_a_number_that_is_not_given_is_nan(make_node):
     assert math.isnan(Parameters(make_node(), parameters_of(it=NOT_GIVEN)).values.it)
     assert math.isnan(Parameters(make_node(it=math.nan), parameters_of(it=NOT_GIVEN)).values.it)
+
+
+@pytest.mark.parametrize(('given', 'value'), [
+    ('~/bags', '/home/me/bags'), ('', ''), ('bags/~', 'bags/~'), ('/bags', '/bags')])
+def test_a_leading_tilde_of_a_path_is_the_home_folder_and_ros_is_told_what_was_given(
+        make_node, monkeypatch, given, value):
+    monkeypatch.setenv('HOME', '/home/me')
+    node = make_node(it=given)
+    parameters = Parameters(node, parameters_of(
+        it=(str, parameter('', 'a folder', dynamic=True, path=True))))
+    assert parameters.values.it == value
+    assert node.get_parameter('it').value == given
+    node.set_parameters([Parameter('it', value='~')])
+    assert parameters.values.it == '/home/me'
+
+
+@pytest.mark.parametrize(('node', 'names'), [
+    ('reconstructor', ('weights', 'segmenter', 'output_dir', 'state_file')),
+    ('view_planner', ('weights',)), ('turntable_camera', ('mesh', 'dataset')),
+    ('camera', ('source', 'camera_info')), ('recorder', ('output_dir',)), ('player', ('bag',)),
+    ('viewer', ())])
+def test_files_and_folders_of_every_node_may_be_below_the_home_folder(node, names):
+    assert tuple(each.name for each in declared(NODE_PARAMETERS[node]) if each.path) == names
 
 
 def test_ros_is_told_the_range_the_choices_and_what_needs_a_new_start(make_node):
