@@ -62,7 +62,7 @@ class ReconstructorNode(ManagedNode):
         super().__init__('reconstructor')
         self._params = Parameters(self, ReconstructorParameters)
         self._params.on_change(self._change)
-        self._capture = ReferenceCapture(self)
+        self._capture = ReferenceCapture(self, self._params.values.background)
         self._saver = MeshSaver(self, self._mesh_writer)
 
     def configure(self) -> None:

@@ -13,7 +13,7 @@ S = 10**9
 
 @pytest.fixture
 def capture(bench):
-    return ReferenceCapture(bench.node)
+    return ReferenceCapture(bench.node, 'reference')
 
 
 @pytest.fixture
@@ -61,4 +61,12 @@ def test_a_call_without_an_image_is_answered_and_changes_nothing(bench, capture,
     bench.until(asked.done, 'the answer')
     assert not asked.result().success
     assert 'none came within 2 s; is the camera running' in asked.result().message
+    assert capture.reference is None
+
+
+def test_an_image_that_no_background_is_compared_with_is_refused_at_once(bench):
+    capture = ReferenceCapture(bench.node, 'as_is')
+    answer = bench.call('capture_background')
+    assert not answer.success
+    assert 'expected the parameter background to be reference, got as_is' in answer.message
     assert capture.reference is None

@@ -18,10 +18,12 @@ class ReferenceCapture:
     """
     Serves `capture_background` and holds the image of the empty scene.
 
-    It lives as long as its node: a service that is destroyed while it waits cannot answer.
+    It lives as long as its node: a service that is destroyed while it waits cannot answer. Where
+    `background` is not reference, nothing would use the image, and the service says so.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, background: str) -> None:
+        self._background = background
         self.reference: NDArray[np.uint8] | None = None
         self._node = node
         self._called_at = 0
@@ -46,6 +48,11 @@ class ReferenceCapture:
     async def _on_capture(self, _request: Trigger.Request,
                           response: Trigger.Response) -> Trigger.Response:
         """Answer when the image has arrived, or after the timeout."""
+        if self._background != 'reference':
+            response.message = ('the image of the empty scene would change nothing: expected the '
+                                f'parameter background to be reference, got {self._background}; '
+                                'start the node with background:=reference')
+            return response
         self._called_at = self._node.get_clock().now().nanoseconds
         image = self._image = Future()
         late = self._node.create_timer(
