@@ -155,10 +155,16 @@ class ViewPlannerNode(ManagedNode):
         self._goals.reset_stamps()
         self._diagnostics.count('clock_jumps')
         self.get_logger().warning(f'{how}: waiting for a new episode')
-        if self._episode is not None and self._episode.begin > now + AHEAD_S * 1e9:
+        ahead = now + AHEAD_S * 1e9
+        if self._episode is not None and self._episode.begin > ahead:
             self._episode = None
             self._views.clear()
             self._reset_episode()
+        elif self._episode is not None and self._views.has_taken_up_after(ahead):
+            self._views.clear()  # but not the episode, which came before the new time
+            self._reset_episode()
+            self._views.begin_episode(self._episode.begin)
+            self._first_goal_timer.wake()
         elif self._goals.camera is not None:
             self._follow(self._planner.next_goal(), now)  # with a stamp of the new time
             self._tell_reason()

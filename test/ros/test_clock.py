@@ -166,6 +166,27 @@ def test_a_planner_keeps_an_episode_that_came_before_it_heard_the_new_time(
     assert bench.counts('view_planner')['episodes'] == 2
 
 
+@pytest.mark.parametrize(('begin', 'order'), [
+    (0, 'the clock first'), (0, 'the episode first'), (20, 'the clock first')])
+def test_views_of_an_episode_that_began_at_an_earlier_stamp_are_not_of_the_one_after_a_jump(
+        start_node, bench, latent, begin, order):  # noqa: F811
+    start_node('view_planner', policy='farthest', start_azimuth=1.0, use_sim_time=True)
+    clock, fake = FakeClock(bench), FakeReconstructor(bench)
+    fake.begin('of before', begin * S)
+    clock.until(lambda: within(fake.goals, 110, 111), 'the first goal', 110.0)
+    fake.show(latent, 1.0, 110 * S)
+    bench.until(lambda: bench.counts('view_planner').get('views') == 1, 'its view')
+    if order == 'the clock first':
+        clock.until(lambda: bench.counts('view_planner').get('clock_jumps') == 1, 'a jump', 50.0)
+    fake.begin('of now', 50 * S)
+    bench.until(lambda: bench.counts('view_planner').get('episodes') == 2, 'the new episode')
+    clock.until(lambda: bench.counts('view_planner').get('clock_jumps') == 1, 'the jump', 50.0)
+    fake.goals.clear()
+    clock.until(lambda: within(fake.goals, 50, 51), 'its first goal', 50.0)
+    assert view_goal_from_msg(fake.goals[-1]).azimuth == pytest.approx(1.0)
+    wait_second(bench, fake, latent)
+
+
 def test_a_goal_that_another_policy_has_none_instead_of_ends_where_the_clock_goes_back(
         start_node, bench, latent):  # noqa: F811
     start_node('view_planner', policy='uniform', max_views=24, start_azimuth=math.radians(58),

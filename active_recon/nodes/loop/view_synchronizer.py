@@ -57,7 +57,7 @@ class ViewSynchronizer:
         self._joiner = StampJoiner(['latent', 'camera', 'entropy'])
         self._has_volume = False
         self._frame = frame
-        self._begin, self._heard = 0, -1
+        self._begin, self._heard, self._taken_up = 0, -1, -1
         self._matched_at: float | None = None
         self.last: tuple[int, PlannerView] | None = None
         self._inputs = [node.create_subscription(kind, topic, self._on(name, read), LATCHED_QOS)
@@ -88,7 +88,8 @@ class ViewSynchronizer:
 
     def begin_episode(self, stamp: int) -> None:
         """Drop what is stamped before the begin of an episode, nanoseconds."""
-        if stamp < self._begin:  # the clock jumped back: later stamps are older
+        # Where the clock jumped back, later stamps are older
+        if stamp < self._begin or self._node.clock_monitor.is_ahead(self._heard):
             self.clear()
         self._begin = stamp
         self._joiner.forget_before(stamp)
@@ -97,15 +98,20 @@ class ViewSynchronizer:
                 del parts[old]
         if self.last is not None and self.last[0] < stamp:
             self.last = None
+        self._taken_up = self._heard
 
     def clear(self) -> None:
         """Forget the messages and the episode."""
-        self._begin, self._heard = 0, -1
+        self._begin, self._heard, self._taken_up = 0, -1, -1
         self._joiner.clear()
         self._waiting.clear()
         self._qualities.clear()
         self._listed = 0, PoseArray()
         self.last = None
+
+    def has_taken_up_after(self, stamp: float) -> bool:
+        """Whether a view from before the episode's message is stamped after a time, ns."""
+        return self._taken_up > stamp
 
     def is_caught_up(self) -> bool:
         """Whether any view latched before this node started has been handed over by now."""
