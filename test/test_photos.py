@@ -241,6 +241,19 @@ def test_masks_of_files_and_an_alpha_channel_say_the_same(views, rgba, tmp_path)
     np.testing.assert_array_equal(alpha.occupancy, files.occupancy)
 
 
+@pytest.mark.parametrize(('count', 'model'), [(2, 'lifting'), (4, 'carving')])
+def test_masks_that_contradict_are_told_of_with_two_photos_and_without_tables_of_quality(
+        count, model, views, rgba):
+    images = [image.copy() for image in rgba[:count]]
+    images[1][..., 3] = np.roll(images[1][..., 3], 40, 0)
+    placed = [Camera(view.pose, view.intrinsics) for view in views[:count]]
+    posed = [view_of(f'photo{number}', image, camera)
+             for number, (image, camera) in enumerate(zip(images, placed, strict=True))]
+    shape = from_views(posed, CameraFile('cameras', ()), Options(
+        box=BOX, up='z', model=model, ground=False))
+    assert any('masks contradict each other' in warning for warning in shape.warnings)
+
+
 def test_the_size_sets_the_scale_alone(plain, shape, mesh):
     twice = active_recon.reconstruct(plain, size=2 * shape.size)
     np.testing.assert_allclose(twice.occupancy, shape.occupancy, atol=1e-4)

@@ -34,19 +34,23 @@ def doubts(taken: Sequence[TakenView], views: Sequence[PhotoView], cube: Cube,
     """
     quality = taken[-1].known.quality
     if quality is None:
-        return [reconstructor.no_quality] if reconstructor.no_quality else []
-    found = [quality.photo_warning] if quality.suspect else []
-    doubtful = (quality.silhouette_iou < _AGREE or covered < COVERED
-                or quality.suspect == 'pose')
-    if not doubtful or len(views) < 3:
-        return found
-    advice = _fitting(even_choice(views, _TRIED_VIEWS), cube, reconstructor, background,
-                      looks)
-    if advice:
-        return [*found, f'silhouettes contradict each other: {advice}']
-    if covered < COVERED:
+        found = [reconstructor.no_quality] if reconstructor.no_quality else []
+    else:
+        found = [quality.photo_warning] if quality.suspect else []
+    contradicted = quality is not None and (
+        quality.silhouette_iou < _AGREE or quality.suspect == 'pose')
+    uncovered = covered < COVERED and len(views) > 1
+    enough = len(views) >= 3
+    if enough and (contradicted or uncovered):
+        advice = _fitting(even_choice(views, _TRIED_VIEWS), cube, reconstructor, background,
+                          looks)
+        if advice:
+            return [*found, f'silhouettes contradict each other: {advice}']
+    if uncovered:
         return [*found, f'masks contradict each other: their hull covers {covered:.0%} of one of '
                         'them; nothing is cut off by them: are masks and poses right?']
+    if quality is None or not (enough and contradicted):
+        return found
     return found or ['silhouettes contradict each other (IoU with the reconstruction '
                      f'{quality.silhouette_iou:.2f}): are poses and background right?']
 
