@@ -473,6 +473,7 @@ def test_the_command_writes_all_files(plain, tmp_path):
     (['--squares', '9x7', '--square-mm', '22'], '--squares, --square-mm without --board'),
     (['--max-views', '5', '--lan'], '--lan, --max-views without --watch'),
     (['--watch', '--order', 'time'], '--order with --watch'),
+    (['--masks', 'masks', '--background', 'segment'], 'masks with the background segment'),
     (['--board', '--axes', 'opengl'], '--axes with --board'),
     (['--turntable-step-deg', '10', '--distance', '1', '--axes', 'opengl'],
      '--axes with --turntable-step-deg'),

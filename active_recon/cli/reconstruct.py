@@ -68,7 +68,8 @@ def reconstruct(
              '(by the colour of a plain background), network, segment (by a learned segmenter), '
              'grabcut, or rembg (if installed).')] = 'auto',
     masks: Annotated[Path | None, typer.Option(
-        help='Folder of masks named like the photos, bright on the object.')] = None,
+        help='With --background auto: folder of masks named like the photos, bright on the '
+             'object.')] = None,
     views: Annotated[int | None, typer.Option(
         min=1, help='Use so many photos at even steps; default: all.')] = None,
     order: Annotated[str, typer.Option(

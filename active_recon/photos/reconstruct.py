@@ -48,7 +48,7 @@ class Options:
     - up: the axis of the file's world that points up (x, y, z, with or without a sign); None: as
       the format says, else the mean of what is up in the photos
     - axes: camera axes, one of LOOKS, instead of the format's
-    - background: one of BACKGROUNDS; masks: a folder of masks
+    - background: one of BACKGROUNDS; masks: a folder of masks, for `auto`
     - views: how many photos at even steps are used; None: all
     - order: of the photos, one of ORDERS
     - ground: whether the table under the object is searched in the photos
@@ -75,6 +75,9 @@ class Options:
         if self.background not in BACKGROUNDS:
             raise ConfigError('background: unknown value: expected one of '
                               f'{", ".join(BACKGROUNDS)}, got {self.background!r}')
+        if self.masks is not None and self.background != 'auto':
+            raise ConfigError(f'masks with the background {self.background}: expected auto, which '
+                              'alone uses masks; leave one of them out')
         for name, value in (('unit', self.unit), ('size', self.size)):
             if value is not None and not 0 < value < np.inf:
                 raise ConfigError(f'{name}: out of range: expected metres above 0, got {value}')
