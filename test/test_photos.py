@@ -254,6 +254,12 @@ def test_masks_that_contradict_are_told_of_with_two_photos_and_without_tables_of
     assert any('masks contradict each other' in warning for warning in shape.warnings)
 
 
+@pytest.mark.parametrize(('model', 'warned'), [('2d3d', True), ('carving', False)])
+def test_only_networks_that_need_the_front_warn_that_photos_do_not_tell_it(plain, model, warned):
+    shape = active_recon.reconstruct(plain, views=1, box=(*CENTRE, SIDE), model=model)
+    assert warned == any("needs the object's front" in warning for warning in shape.warnings)
+
+
 def test_the_size_sets_the_scale_alone(plain, shape, mesh):
     twice = active_recon.reconstruct(plain, size=2 * shape.size)
     np.testing.assert_allclose(twice.occupancy, shape.occupancy, atol=1e-4)

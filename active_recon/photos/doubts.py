@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Camera
+from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.photos.conventions import conventions
 from active_recon.photos.cube import Cube
 from active_recon.photos.hull import coverage, depth_in_masks, hull
@@ -20,6 +21,15 @@ _TRIED_VIEWS = 6
 _CELLS = 64
 _TOWARDS = 0.7  # cosine of the angle between the optical axis and the way to the object
 _OUTSIDE = 3 ** 0.5 / 2  # of the cube, from its centre, in its sides
+
+
+def unknown_front(reconstructor: Reconstructor) -> list[str]:
+    """Return a warning of a network that sees no poses: its shape may be turned."""
+    if not reconstructor.spec.needs_front:
+        return []
+    return ["the network needs the object's front, which photos do not tell: unless that is at +x "
+            'of the object frame, the shape does not fit the photos; models such as '
+            f'{DEFAULT_MODEL} need no front']
 
 
 def doubts(taken: Sequence[TakenView], views: Sequence[PhotoView], cube: Cube,
