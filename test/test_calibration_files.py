@@ -34,6 +34,11 @@ def test_folders_without_images_and_names_twice_are_refused(tmp_path):
         image_paths([tmp_path / 'a', tmp_path / 'b'])
 
 
+def test_a_place_that_does_not_exist_is_refused_as_that(tmp_path):
+    with pytest.raises(DataError, match='imgaes: no such file or folder: expected images'):
+        image_paths([tmp_path, tmp_path / 'imgaes'])
+
+
 def test_a_file_that_is_no_image_is_refused_by_name(tmp_path):
     (tmp_path / 'no.png').write_bytes(b'nothing')
     for path in (tmp_path / 'no.png', tmp_path / 'nowhere.png'):

@@ -18,9 +18,12 @@ def image_paths(places: list[Path]) -> list[Path]:
     """
     Return image files and the images in folders, sorted by name.
 
-    Numbers in names are sorted as numbers: 2 before 10. Raises DataError where there is no image,
-    or two have the same name.
+    Numbers in names are sorted as numbers: 2 before 10. Raises DataError where there is no image
+    or no such place, or two have the same name.
     """
+    if missing := [place for place in places if not place.exists()]:
+        raise DataError(f'{missing[0]}: no such file or folder: expected images, or a folder of '
+                        'them')
     paths = [path for place in places
              for path in (place.iterdir() if place.is_dir() else [place])
              if not place.is_dir() or (path.suffix.lower() in SUFFIXES
