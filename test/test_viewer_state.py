@@ -1,6 +1,7 @@
 """What is known of the loop, in whatever order it is heard, and the words that tell it."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 from urllib.request import urlopen
@@ -313,6 +314,17 @@ def test_an_image_of_the_last_episode_is_not_that_of_the_next():
     assert observer.state.network_image is image
     observer.begin_episode('b', 120)
     assert observer.state.network_image is None
+
+
+def test_a_view_whose_image_was_missed_shows_what_the_network_received():
+    observer = Observer()
+    observer.begin_episode('a', 0)
+    own, received = (np.full((8, 8, 3), value, np.uint8) for value in (1, 2))
+    observer.add_view(replace(view(10), image=own), None, None)
+    observer.add_view(view(20), None, None)
+    for stamp in (10, 20):
+        observer.set_network_image(stamp, received)
+    assert [each.image for each in observer.state.views] == [own, received]
 
 
 def test_names_that_are_not_of_utf8_are_shown_as_far_as_they_can_be():

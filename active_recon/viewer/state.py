@@ -145,10 +145,16 @@ class Observer:
             for view in self.state.views))
 
     def set_network_image(self, stamp: int, image: NDArray[np.uint8]) -> None:
-        """Set the last view as the network received it, (S, S, 3) uint8 RGB."""
+        """
+        Set the last view as the network received it, (S, S, 3) uint8 RGB.
+
+        A view whose own image was missed, as on a busy machine, has it instead.
+        """
         if stamp >= self._begin:
             self._image_stamp = stamp
-            self.state = replace(self.state, network_image=image)
+            self.state = replace(self.state, network_image=image, views=tuple(
+                replace(view, image=image) if view.stamp == stamp and view.image is None else view
+                for view in self.state.views))
 
     def set_goal(self, stamp: int, camera: Camera) -> None:
         """Set the goal; the same stamp again is the same goal."""

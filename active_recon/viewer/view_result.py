@@ -15,7 +15,8 @@ class ViewResult:
     A view that the reconstructor took, and its result; None where it is not known.
 
     - stamp: nanoseconds
-    - image: (H, W, 3) uint8 RGB, at most 160 pixels wide and high
+    - image: (H, W, 3) uint8 RGB, at most 160 pixels wide and high; where the camera's was missed,
+      that which the network received
     - entropy: of the reconstruction after the view, nats
     - latency: from the image's stamp until the occupancy was received, seconds
     - occupied: the occupied cells after the view; iou: theirs with the true object
