@@ -7,13 +7,14 @@ import math
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import AZIMUTHS, Camera, Intrinsics, orbit_camera, TURN
 from active_recon.geometry.framing import cube_corners
+from active_recon.volumes.hidden import LOWEST
 import numpy as np
 from numpy.typing import NDArray
 
 KINDS = ('turntable', 'dome', 'any')
 DOME_AZIMUTHS: NDArray[np.float64] = AZIMUTHS[::2]
 DOME_ELEVATIONS = tuple(map(math.radians, (10, 30, 50, 70)))
-LOWEST, HIGHEST = math.radians(-10), math.radians(85)
+_HIGHEST = math.radians(85)
 _SIDE = 160  # pixels of an image
 _FOCAL = (0.8, 3.0)  # focal length, in image sides
 _FILLED = (0.55, 1.1)  # extent of the cube in the image, in image sides
@@ -82,7 +83,7 @@ def draw_camera(rng: np.random.Generator) -> Camera:
     It looks slightly past the cube's centre, with a small roll. Its distance follows from the
     focal length, so that the cube's extent is 0.55 to 1.1 sides of the image.
     """
-    sine = rng.uniform(math.sin(LOWEST), math.sin(HIGHEST))
+    sine = rng.uniform(math.sin(LOWEST), math.sin(_HIGHEST))
     focal = float(np.exp(rng.uniform(*np.log(_FOCAL))))
     towards = orbit_camera(rng.uniform(0, TURN), math.asin(sine), 1.0)
     distance = filling_distance(towards, focal, rng.uniform(*_FILLED))

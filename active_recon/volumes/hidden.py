@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 LOWEST = math.radians(-10)
-"""The lowest elevation of a camera: from below, an object stands on something."""
+"""The lowest elevation of a camera, radians: further below is what an object stands on."""
 _DIRECTIONS = 200  # twice as many hide 3 % fewer cells of shells
 _STRIDE = 77  # has no divisor in common with them
 _GOLDEN = math.pi * (1 + math.sqrt(5))
