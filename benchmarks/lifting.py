@@ -25,8 +25,8 @@ _KNOWN = '--surfaces 1,5 --disturbed-views 0'
 STUDIES: Mapping[str, str] = {
     'parametric-test': f'data/test {_BESIDE} {_KNOWN}',
     'parametric-unseen': f'data/unseen {_BESIDE} {_KNOWN}',
-    'real-val': f"data/real_val {_BESIDE} --category '!thing_*' --objects 60 {_KNOWN}",
-    'things-val': f"data/real_val {_BESIDE} --category 'thing_*' --objects 60 {_KNOWN}",
+    'real-val': f"data/real_val {_BESIDE} --category '!thing_*' {_KNOWN}",
+    'things-val': f"data/real_val {_BESIDE} --category 'thing_*' {_KNOWN}",
     'any-cameras-unseen': f'any/unseen --models {",".join(_MODELS[:3])} {_HOW} {_KNOWN}',
     'robustness': f"any/test any/unseen --models {SMALL_MODEL},{DEFAULT_MODEL} --counts 1,5 "
                   "--surfaces '' --threads 1 --runtime openvino --no-bf16 "
@@ -41,6 +41,7 @@ SETS: Mapping[str, str] = {
     'things-val': 'real everyday things',
 }
 _COUNTS = (1, 2, 3, 5, 8, 24)
+_FILLED_COUNTS = (1, 3, 5, 8)
 _BOUNDED = (1, 24)
 """Numbers of views whose intervals the long table has room for."""
 _SHORT_COUNTS = (1, 5, 24)
@@ -54,7 +55,8 @@ def run(folder: Path, name: str) -> None:
             shutil.copy(picture, kept)
 
 
-def figures_by_set() -> Iterator[tuple[str, Mapping[str, Mapping[int, Any]]]]:
+def figures_by_set(score: str = 'iou_32') -> Iterator[
+        tuple[str, Mapping[str, Mapping[int, Any]]]]:
     """
     Yield each set's title, and every model's IoU at 32 cells by number of random views.
 
@@ -66,7 +68,7 @@ def figures_by_set() -> Iterator[tuple[str, Mapping[str, Mapping[int, Any]]]]:
                     **{f'ahead of {model}': own['random']
                        for model, own in figures['ahead'].items()}}
         yield f'{title} ({figures["objects"]})', {
-            model: dict(zip(figures['counts'], own['iou_32'], strict=True))
+            model: dict(zip(figures['counts'], own[score], strict=True))
             for model, own in measured.items()}
 
 
@@ -88,6 +90,19 @@ def ahead_table() -> Iterator[str]:
         for model in _MODELS[1:]:
             yield _row(title if model == SMALL_MODEL else '', model, *(
                 _bounded(models[f'ahead of {model}'][count]) for count in _COUNTS))
+
+
+def filled_table() -> Iterator[str]:
+    """Yield a Markdown table of the default beside truths as they are, and beside filled ones."""
+    yield _row('objects', 'model', 'truth', '1 view', *(f'{n} views' for n in _FILLED_COUNTS[1:]))
+    yield '|---' * (len(_FILLED_COUNTS) + 3) + '|'
+    for (title, own), (_, filled) in zip(figures_by_set(), figures_by_set('filled_iou_32'),
+                                         strict=True):
+        for first, model, truth, found in (
+                (title, DEFAULT_MODEL, 'as it is', own), ('', DEFAULT_MODEL, '**filled**', filled),
+                ('', 'carving', 'filled', filled)):
+            yield _row(first, model, truth, *(_bounded(found[model][count])
+                                              for count in _FILLED_COUNTS))
 
 
 def short_table() -> Iterator[str]:
@@ -120,7 +135,8 @@ def _bounded(value: Mapping[str, Any]) -> str:
 def with_tables(text: str) -> str:
     """Return a document with the tables between its marks made anew from the results."""
     return with_tables_between_marks(text, {
-        'iou': long_table, 'iou-short': short_table, 'iou-ahead': ahead_table})
+        'iou': long_table, 'iou-ahead': ahead_table, 'iou-filled': filled_table,
+        'iou-short': short_table})
 
 
 def main() -> None:
