@@ -31,6 +31,11 @@ def test_a_run_of_the_loop_tells_its_views_and_its_end(bag):
     assert 'not recorded' not in told
 
 
+def test_one_view_is_told_as_one(tmp_path):
+    told = info(write_bag(tmp_path / 'run', images() + joints()[:3]))
+    assert '  episode 1: 1 view at azimuth 0 degrees\n' in told
+
+
 def test_an_episode_that_ended_before_its_first_view_is_told(tmp_path):
     begun = LoopRun().messages[:2]  # that it began, and that nothing is done
     told = info(write_bag(tmp_path / 'run', begun + LoopRun('second', BEGIN + 10**10).messages))

@@ -70,13 +70,15 @@ def told_depth(views: 'Sequence[RecordedView]') -> str:
 def _print_run(run: 'RecordedRun', replays: bool) -> None:
     from active_recon.bags.runs.missing import describe_missing
     from active_recon.geometry.cameras import whole_degrees
+    from active_recon.report.words import counted
 
     chosen = 'that its view gate accepts' if 'bag' in run.counters else 'that the loop took'
     typer.echo(f'{"can be replayed, with " if replays else ""}the views {chosen}:')
     for number, episode in enumerate(run.episodes, 1):
         azimuths = ', '.join(str(whole_degrees(view.camera.azimuth)) for view in episode.views)
         end = f', done: {episode.done}' if episode.done else ''
-        taken = (f'{len(episode.views)} views at azimuths {azimuths} degrees'
+        at = 'azimuth' if len(episode.views) == 1 else 'azimuths'
+        taken = (f'{counted(len(episode.views), "view")} at {at} {azimuths} degrees'
                  f'{told_depth(episode.views)}'
                  f'{", after others without an image" if episode.begun_before else ""}')
         typer.echo(f'  episode {number}: {taken if azimuths else "no view"}{end}')
