@@ -47,11 +47,11 @@ def doubts(taken: Sequence[TakenView], views: Sequence[PhotoView], cube: Cube,
         found = [reconstructor.no_quality] if reconstructor.no_quality else []
     else:
         found = [quality.photo_warning] if quality.suspect else []
-    contradicted = quality is not None and (
+    enough = len(views) >= 3
+    contradicted = enough and quality is not None and (
         quality.silhouette_iou < _AGREE or quality.suspect == 'pose')
     uncovered = covered < COVERED and len(views) > 1
-    enough = len(views) >= 3
-    if enough and (contradicted or uncovered):
+    if contradicted or (enough and uncovered):
         advice = _fitting(even_choice(views, _TRIED_VIEWS), cube, reconstructor, background,
                           looks)
         if advice:
@@ -59,10 +59,10 @@ def doubts(taken: Sequence[TakenView], views: Sequence[PhotoView], cube: Cube,
     if uncovered:
         return [*found, f'masks contradict each other: their hull covers {covered:.0%} of one of '
                         'them; nothing is cut off by them: are masks and poses right?']
-    if quality is None or not (enough and contradicted):
-        return found
-    return found or ['silhouettes contradict each other (IoU with the reconstruction '
-                     f'{quality.silhouette_iou:.2f}): are poses and background right?']
+    if quality is not None and contradicted and not found:
+        return ['silhouettes contradict each other (IoU with the reconstruction '
+                f'{quality.silhouette_iou:.2f}): are poses and background right?']
+    return found
 
 
 def _fitting(views: Sequence[PhotoView], cube: Cube, reconstructor: Reconstructor,
