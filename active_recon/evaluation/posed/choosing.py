@@ -86,7 +86,7 @@ def _add_scores(totals: _Totals, count: int, logits: NDArray[np.float32], truth:
                 sides: tuple[int, ...]) -> None:
     for place, threshold in enumerate(THRESHOLDS):
         at = dict.fromkeys(sides, float(logit(threshold)))
-        for name, value in iou_scores(logits, truth.cells, sides, at, '').items():
+        for name, value in iou_scores(logits, {'': truth.cells}, sides, at).items():
             totals.iou[int(name.strip('_'))][place] += value
     if len(logits) == truth.finest:
         for kind, some in zip((totals.near, totals.anywhere), cells, strict=True):

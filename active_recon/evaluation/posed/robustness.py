@@ -200,4 +200,4 @@ def _iou(block: Block, entrant: Entrant, observer: Observer, order: NDArray[np.i
         unknown = {side: np.isnan(pooled(occupancy, side)) for side in entrant.sides}
         known = {side: cells & ~unknown.get(side, np.False_)
                  for side, cells in truth.cells.items()}
-        yield iou_scores(occupancy, known, entrant.sides, entrant.thresholds)
+        yield iou_scores(occupancy, {'iou': known}, entrant.sides, entrant.thresholds)

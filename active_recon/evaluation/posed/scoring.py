@@ -73,19 +73,25 @@ def pooled(values: NDArray[np.floating], side: int) -> NDArray[np.floating]:
     return values
 
 
-def iou_scores(values: NDArray[np.floating], cells: Mapping[int, NDArray[np.bool_]],
-               sides: tuple[int, ...], thresholds: Mapping[int, float],
-               name: str = 'iou') -> Scores:
-    """Return the IoU of values (R, R, R) above thresholds, named `<name>_<cells a side>`."""
-    return {f'{name}_{side}': float(iou(pooled(values, side) > thresholds[side], cells[side]))
-            for side in sides if side in cells}
+def iou_scores(values: NDArray[np.floating], truths: Mapping[str, Mapping[int, NDArray[np.bool_]]],
+               sides: tuple[int, ...], thresholds: Mapping[int, float]) -> Scores:
+    """
+    Return the IoU of values (R, R, R) above thresholds, `<name>_<cells a side>`.
+
+    `truths` are true voxels by name and cells a side; sides that one lacks are left out.
+    """
+    scores: Scores = {}
+    for side in sides:
+        found = pooled(values, side) > thresholds[side]
+        scores |= {f'{name}_{side}': float(iou(found, cells[side]))
+                   for name, cells in truths.items() if side in cells}
+    return scores
 
 
 def fixed_scores(occupancy: NDArray[np.float32], truth: Target, entrant: Entrant) -> Scores:
     """Return `iou_*` and `filled_iou_*` of probabilities (R, R, R) at the entrant's thresholds."""
-    return {name: value for kind, cells in (('iou', truth.cells), ('filled_iou', truth.filled))
-            for name, value in iou_scores(occupancy, cells, entrant.sides, entrant.thresholds,
-                                          kind).items()}
+    return iou_scores(occupancy, {'iou': truth.cells, 'filled_iou': truth.filled}, entrant.sides,
+                      entrant.thresholds)
 
 
 def scored(logits: NDArray[np.float32], truth: Target, entrant: Entrant, count: int,
@@ -134,4 +140,4 @@ def _own_scores(occupancy: NDArray[np.float32], truth: Target, entrant: Entrant,
     own, expected = best_threshold(occupancy)
     thresholds = dict.fromkeys(entrant.sides, own)
     return {f'{prefix}expected_iou': expected, **iou_scores(
-        occupancy, truth.cells, entrant.sides, thresholds, f'{prefix}own_iou')}
+        occupancy, {f'{prefix}own_iou': truth.cells}, entrant.sides, thresholds)}
