@@ -105,15 +105,19 @@ def message_data(msg):
     return cdr(msg) if hasattr(msg, '__msgtype__') else serialize_message(msg)
 
 
-def write_bag(folder, messages, max_bytes=None, parameters=None, one_by_one=False):
+def write_bag(folder, messages, max_bytes=None, parameters=None, one_by_one=False,
+              others=()):
     """
     Write (time, topic, message) into a bag, and return its folder.
 
+    `parameters` are those of the reconstructor, `others` nodes whose parameters it has, too.
     Within a chunk the writer sorts by time, unless each message has one of its own.
     """
     with BagWriter(folder, max_bytes) as bag:
         if parameters:
             bag.attach_parameters('/reconstructor', parameters)
+        for name in others:
+            bag.attach_parameters(name, {})
         for time, topic, msg in messages:
             bag.add_topic(topic, type_name(msg), definition(type_name(msg)),
                           (SENSOR if topic.startswith('/camera/') else LATCHED,))

@@ -471,3 +471,13 @@ def test_images_that_the_loop_did_not_hear_are_told(loop, tmp_path):
     others = [entry for entry in loop.messages if entry[1] != '/diagnostics']
     run = read_run(write_bag(tmp_path / 'run', [*others, *counted]))
     assert run.gaps.uncounted == STILL * len(loop.stamps) - 2
+
+
+def test_what_other_loops_on_the_domain_counted_is_not_told_of_this_one(loop, tmp_path):
+    names = 'reconstructor', 'cell_2/reconstructor', 'wrist/camera'
+    beside = [(loop.end, '/diagnostics', diagnostics_to_msg(
+        NodeStatus(f'/{name}', {'warned/depth': 1}), stamp_from_nanoseconds(loop.end)))
+        for name in names]
+    bag = write_bag(tmp_path / 'run', [*loop.messages, *beside],
+                    others=['/wrist/camera'])
+    assert set(read_run(bag).counters) == {'reconstructor', 'wrist/camera'}

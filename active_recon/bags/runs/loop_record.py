@@ -1,6 +1,6 @@
 """The loop's topics in a bag: views, reconstructions, goals, episodes and counters."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from active_recon.bags.runs.run import Candidates
@@ -44,16 +44,18 @@ class LoopRecord:
 
     - parts: the converted messages by topic name in the loop, then by stamp in nanoseconds
     - published, received: their times, by the same keys; a message published again counts once
-    - counters: the last ones of `/diagnostics`, by node; counted: all of them, with their receive
-      times
+    - counters: the last ones of `/diagnostics`, by node of the loop: those in its namespace, and
+      `nodes`; counted: all of them, with their receive times
 
     Older recordings have an entropy of all cells without a stamp; it is then computed from the
     `probabilities` of each view. `object_size` is the side of the grid in metres. Raises
     DataError on messages that the loop's nodes do not write.
     """
 
-    def __init__(self, bag: Bag, topics: LoopTopics, object_size: float,
-                 object_frame: str) -> None:
+    def __init__(self, bag: Bag, topics: LoopTopics, object_size: float, object_frame: str,
+                 nodes: Iterable[str] = ()) -> None:
+        self._namespace = topics.namespace.strip('/')
+        self._nodes = {name.strip('/') for name in nodes}
         self.parts: dict[str, dict[int, Any]] = {role: {} for role in LOOP}
         self.published: dict[str, dict[int, int]] = {role: {} for role in LOOP}
         self.received: dict[str, dict[int, int]] = {role: {} for role in LOOP}
@@ -122,9 +124,11 @@ class LoopRecord:
     def _count(self, message: RawMessage) -> None:
         if message.type_name != DIAGNOSTICS:
             return
-        for name, status in diagnostics_from_msg(read_message(message)).items():
-            known = self.counters[name.lstrip('/')] = dict(status.counts)
-            self.counted.setdefault(name.lstrip('/'), []).append((message.received, known))
+        for full, status in diagnostics_from_msg(read_message(message)).items():
+            name = full.lstrip('/')
+            if name in self._nodes or name.rpartition('/')[0] == self._namespace:
+                known = self.counters[name] = dict(status.counts)
+                self.counted.setdefault(name, []).append((message.received, known))
 
 
 def _scores_from_msg(msg: Any) -> tuple[Candidates, NDArray[np.float32]]:

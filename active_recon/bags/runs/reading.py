@@ -96,7 +96,8 @@ def _read(bag: Bag, summary: BagSummary, topics: Topics, scene: Scene,
             episode = with_depth_of(camera.depth, episode, bag, stream)
         gaps = _gaps(stream)
         return _Read([episode], {'bag': counters}, gaps, _assumed(stream, scene))
-    record = LoopRecord(bag, loop, node.get('object_size', scene.size), topics.object_frame)
+    record = LoopRecord(bag, loop, node.get('object_size', scene.size), topics.object_frame,
+                        summary.parameters)
     episodes = with_depth(recorded_episodes(stream, record, scene), bag, loop.namespace,
                           summary.provenance, node)
     if camera.of_views:  # the images between the views were not recorded
