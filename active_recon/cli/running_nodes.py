@@ -72,7 +72,12 @@ def set_parameter(
     typer.echo(f'{change.node}: {parameter} was {before}, is {after}')
 
 
-def status(timeout: _Timeout = _TIMEOUT_S) -> None:
+def status(
+    namespace: Annotated[str, typer.Option(
+        help='Namespace of the nodes to show, as of one of several loops. Default: all nodes.'
+    )] = '',
+    timeout: _Timeout = _TIMEOUT_S,
+) -> None:
     """
     Show the diagnostics of the running nodes, once.
 
@@ -82,10 +87,12 @@ def status(timeout: _Timeout = _TIMEOUT_S) -> None:
     that of the nodes.
 
     Example: active-recon status
+
+    Example: active-recon status --namespace cell_1
     """
     from active_recon.launching.running_nodes import running_nodes
 
-    with running_nodes(timeout_s=timeout) as nodes:
+    with running_nodes(namespace, timeout) as nodes:
         readings, silent = nodes.read_status()
     _show(readings)
     for name in silent:

@@ -90,27 +90,38 @@ class RunningNodes(LoopClient):
         return Change(node, before, parameter_value_to_python(self._value(node, name)))
 
     def read_status(self) -> tuple[list[NodeReading], list[str]]:
-        """Return what each node tells of itself, and the names of nodes that told nothing."""
+        """
+        Return what each node tells of itself, and the names of nodes that told nothing.
+
+        They are the nodes in the namespace, or all where that is ''.
+        """
+        heard: dict[str, NodeReading] = {}
         readings: dict[str, NodeReading] = {}
 
         def take(msg: DiagnosticArray) -> None:
-            readings.update((each.name, NodeReading(
+            heard.update((each.name, NodeReading(
                 each.name, _LEVELS.get(each.level, '?'), each.message,
                 {pair.key: pair.value for pair in each.values})) for each in msg.status)
+            readings.update((name, each) for name, each in heard.items() if self._is_asked(name))
 
         def silent() -> list[str]:
             endpoints = self._node.get_publishers_info_by_topic('/diagnostics')
             nodes = {name for name in map(endpoint_node, endpoints) if name is not None}
-            return sorted(name for name in nodes if not is_hidden(name)
-                          and not any(_tells_of(each, name) for each in readings))
+            return sorted(name for name in nodes if not is_hidden(name) and self._is_asked(name)
+                          and not any(_tells_of(each, name) for each in heard))
 
         self._node.create_subscription(DiagnosticArray, '/diagnostics', take, SENSOR_QOS)
         discovered_at = time.monotonic() + _DISCOVERY_S
         self._appears(lambda: bool(readings) and not silent()
                       and time.monotonic() > discovered_at)
         if not readings and not silent():
-            raise self._missing('diagnostics', 'a running node', [])
+            where = f' in the namespace /{self._namespace}' if self._namespace else ''
+            raise self._missing(f'diagnostics{where}', 'a running node', sorted(heard))
         return [readings[name] for name in sorted(readings)], silent()
+
+    def _is_asked(self, name: str) -> bool:
+        """Return whether a node is in the namespace, or in one below it."""
+        return not self._namespace or name.lstrip('/').startswith(f'{self._namespace}/')
 
     def _full_name(self, name: str) -> str:
         if name.startswith('/'):

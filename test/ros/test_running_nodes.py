@@ -132,6 +132,15 @@ def test_the_status_tells_level_message_and_values_of_each_node(told):
     assert re.search(r'^/cell/recorder  OK  ok\n(  .*\n)*  messages ', said, re.MULTILINE)
 
 
+def test_the_status_of_a_namespace_is_of_its_nodes_alone(told):
+    warned_status(told)
+    assert re.findall(r'^/[\w/]+', told(0, 'status', '--namespace', 'cell'), re.MULTILINE) == [
+        '/cell/recorder']
+    said = told(2, 'status', '--namespace', '/cel', '--timeout', '3')
+    assert 'no diagnostics in the namespace /cel: expected a running node, found ' in said
+    assert '/cell/recorder, ' in said
+
+
 def test_the_status_names_a_node_that_tells_nothing(told, shared_bench):
     warned_status(told)
     publisher = shared_bench.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
