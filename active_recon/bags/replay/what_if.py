@@ -11,7 +11,7 @@ from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.bags.replay.replay import decide
 from active_recon.bags.runs.loop_record import LOOP
 from active_recon.bags.runs.loop_setup import LoopSetup, Overrides
-from active_recon.bags.runs.parameters import node_parameters
+from active_recon.bags.runs.parameters import node_parameters, nodes_called
 from active_recon.bags.runs.recorded_object import RecordedObject, replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
 from active_recon.environment import run_episode, TimeStep
@@ -71,8 +71,7 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
                     'weights': str(setup.planner['weights'])}
         parameters['/view_planner'] = planning
         provenance['policy'] = planning['policy']
-    parameters.update({name: values for name, values in run.parameters.items()
-                       if name.rpartition('/')[2] == 'turntable_camera'})  # of the object shown
+    parameters.update(nodes_called('turntable_camera', run.parameters))  # of the object shown
     times = [time for episode in episodes for view in episode.views
              for time in (view.stamp, *view.received.values())]
     return replace(run, episodes=episodes, provenance=provenance, parameters=parameters,

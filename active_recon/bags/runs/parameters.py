@@ -33,8 +33,14 @@ def node_parameters(run: RecordedRun, node: str) -> dict[str, Any]:
 
 def parameters_among(recorded: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, Any]:
     """Return those of a node in any namespace, by full names; empty if there are none."""
-    return checked_parameters(node, next((
-        values for name, values in recorded.items() if name.rpartition('/')[2] == node), {}))
+    return checked_parameters(node, next(iter(nodes_called(node, recorded).values()), {}))
+
+
+def nodes_called(node: str, recorded: Mapping[str, Mapping[str, Any]]
+                 ) -> dict[str, Mapping[str, Any]]:
+    """Return the parameters, by full names, of the nodes of a name in any namespace."""
+    return {name: values for name, values in recorded.items()
+            if name.rpartition('/')[2] == node}
 
 
 def checked_parameters(node: str, recorded: Mapping[str, Any]) -> dict[str, Any]:

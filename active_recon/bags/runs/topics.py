@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
+from active_recon.bags.runs.parameters import nodes_called
 from active_recon.bags.runs.run import TopicSummary
 from active_recon.bags.storage.bag import BagSummary
 from active_recon.bags.storage.message_types import (
@@ -114,8 +115,7 @@ def loop_topics(summary: BagSummary) -> LoopTopics | None:
     present = {topic.name for topic in summary.topics if topic.count}
     remapped = {name: full for name, full in summary.provenance.items() if full in present}
     if 'view' in remapped:  # names are remapped from those in the namespace of the loop's nodes
-        node = next((name for name in summary.parameters
-                     if name.rpartition('/')[2] == 'reconstructor'), remapped['view'])
+        node = next(iter(nodes_called('reconstructor', summary.parameters)), remapped['view'])
         namespace = f'/{node.strip("/")}'.rpartition('/')[0]
         return LoopTopics(f'{namespace}/', remapped)
     namespaces = [topic.name.removesuffix('view') for topic in summary.topics
