@@ -97,7 +97,19 @@ def test_neighbours_that_are_too_far_apart_are_not_interpolated():
     joiner.add_image(20 * MS, IMAGE, 0.0)
     joiner.add_intrinsics(20 * MS, CANONICAL_INTRINSICS)
     joiner.add_pose(100 * MS, pose(1.1))
-    assert only_error(joiner).kind == 'no_pose'
+    error = only_error(joiner)
+    assert error.kind == 'no_pose'
+    assert str(error).endswith('the nearest is 0.020 s away, but that after the image 0.080 s')
+
+
+def test_an_image_whose_poses_end_or_begin_beside_it_is_refused_with_the_side_that_lacks_one():
+    for came, lacks in ((20, 'before'), (-20, 'after')):
+        joiner = ViewJoiner(max_pose_gap=0.05, patience=0.5)
+        joiner.add_pose((1000 + came) * MS, pose(1.0))
+        joiner.add_image(1000 * MS, IMAGE, 0.0)
+        joiner.add_intrinsics(1000 * MS, CANONICAL_INTRINSICS)
+        assert str(only_error(joiner, now=1.0)).endswith(
+            f'the nearest is 0.020 s away, but none came {lacks} the image')
 
 
 def test_an_image_without_any_pose_is_refused_after_a_while():
