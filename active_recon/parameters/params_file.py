@@ -53,6 +53,13 @@ def read_params_file(path: Path) -> dict[str, dict[str, Any]]:
     return {node: {**_own(node, shared), **values} for node, values in given.items()}
 
 
+def meant_for_others(path: Path) -> set[str]:
+    """Return what a file gives to all nodes, by `/**`, that only some of the package's have."""
+    return {str(name) for key, entry in _document(path).items() if str(key).endswith('**')
+            for name in _mapping(path, str(key), entry).get('ros__parameters') or ()
+            if any(name in _names(node) for node in NODE_PARAMETERS)}
+
+
 def nodes_left_out(path: Path) -> list[str]:
     """Return the nodes of others that a file has parameters for; raises as `read_params_file`."""
     names = (str(key).rpartition('/')[2] for key in _document(path))
@@ -86,10 +93,13 @@ def _matches(pattern: str, namespace: str) -> bool:
 
 def _own(node: str, shared: Mapping[str, Any]) -> dict[str, Any]:
     """Return the shared parameters without those that only other nodes have."""
-    own, *others = ({each.name for each in declared(parameters)}
-                    for parameters in (NODE_PARAMETERS[node], *NODE_PARAMETERS.values()))
+    own, *others = map(_names, (node, *NODE_PARAMETERS))
     return {name: value for name, value in shared.items()
             if name in own or name not in set().union(*others)}
+
+
+def _names(node: str) -> set[str]:
+    return {each.name for each in declared(NODE_PARAMETERS[node])}
 
 
 def _as_ros_reads(parameter: Declared, value: object) -> object:

@@ -207,6 +207,19 @@ def test_a_parameter_that_a_node_does_not_have_is_a_warning_with_the_nearest_nam
         'there are object_size, rate']
 
 
+def test_what_a_file_gives_to_all_nodes_for_some_of_them_is_no_warning_of_the_others(
+        make_node, monkeypatch, tmp_path):
+    path = tmp_path / 'all.yaml'
+    path.write_text('/**: {ros__parameters: {object_size: 2.0, colour: red}}\n'
+                    '/**/a_node: {ros__parameters: {mesh: chair}}\n')
+    monkeypatch.setattr('sys.argv', ['a_node', '--ros-args', '--params-file', str(path)])
+    node = make_node(object_size=2.0, colour='red', mesh='chair')
+    said = []
+    monkeypatch.setattr(node, 'get_logger', lambda: SimpleNamespace(warning=said.append))
+    Parameters(node, parameters_of(rate=(float, parameter(1.0, 'Hz'))))
+    assert [each.partition(':')[0] for each in said] == ['parameter colour', 'parameter mesh']
+
+
 @pytest.mark.parametrize(('name', 'near'), [
     ('reconstructor', 'object_size'), ('view_planner', 'object_size'), ('recorder', '')])
 def test_a_misspelt_parameter_is_said_in_the_log_of_a_node_that_runs(start_node, name, near):

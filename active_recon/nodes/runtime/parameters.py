@@ -7,10 +7,11 @@ applies changes while the node runs.
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+import sys
 from typing import Generic, TypeVar
 
 from active_recon.errors import ActiveReconError, ConfigError
-from active_recon.nodes.runtime.run import one_line
+from active_recon.nodes.runtime.run import one_line, params_files
 from active_recon.parameters.declaration import Declared, declared, nearest, NEW_START
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -100,10 +101,17 @@ class Parameters(Generic[Values]):
 
 
 def _warn_of_undeclared(node: Node, known: Iterable[str]) -> None:
-    for name in getattr(node, '_parameter_overrides', ()):  # rclpy has no public access
-        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
-            node.get_logger().warning(f'parameter {name}: this node has none of that name, so it '
-                                      f'changes nothing; {nearest(name, known)}')
+    given = getattr(node, '_parameter_overrides', ())  # rclpy has no public access
+    unknown = [name for name in given
+               if not node.has_parameter(name) and not name.startswith('qos_overrides.')]
+    files = params_files(sys.argv) if unknown else []
+    if files:  # all nodes' parameters, and all policies with them: only who needs them waits
+        from active_recon.parameters.params_file import meant_for_others
+        unknown = [name for name in unknown if name not in set().union(
+            *map(meant_for_others, files))]
+    for name in unknown:
+        node.get_logger().warning(f'parameter {name}: this node has none of that name, so it '
+                                  f'changes nothing; {nearest(name, known)}')
 
 
 def set_read_only_parameter(node: Node, name: str, value: str | list[str],

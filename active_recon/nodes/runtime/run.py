@@ -1,6 +1,6 @@
 """Start, spin and stop a node: shared by every executable."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 import faulthandler
 from itertools import pairwise
@@ -122,14 +122,17 @@ class StopRequests:
 
 def _init(args: list[str] | None) -> None:
     """Parse the arguments; ConfigError where ROS cannot, as on a params file that is no YAML."""
-    given = sys.argv[1:] if args is None else args
-    for option, file in pairwise(given):
-        if option == '--params-file':
-            read_yaml(Path(file))
+    for file in params_files(sys.argv[1:] if args is None else args):
+        read_yaml(file)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise ConfigError(f'cannot start: {error}') from error
+
+
+def params_files(args: Sequence[str]) -> list[Path]:
+    """Return the parameters files that arguments name."""
+    return [Path(file) for option, file in pairwise(args) if option == '--params-file']
 
 
 def one_line(error: Exception) -> str:
