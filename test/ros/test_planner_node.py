@@ -2,9 +2,12 @@
 
 import math
 import signal
+from unittest.mock import Mock
 
 from active_recon.geometry.cameras import azimuth_difference, orbit_camera
 from active_recon.models.weights_files import find_weights, PAPER_MODEL, weights_hash
+from active_recon.nodes.loop.refused_views import refusing_views
+from active_recon.policies.checked import telling_failures
 from active_recon.runtimes import load_policy_runtime
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
@@ -58,6 +61,15 @@ def test_the_planner_asks_decides_refuses_and_finishes(start_node, bench, latent
     fake.begin('second')
     fake.wait_goal(before)
     bench.until(lambda: not fake.done[-1].frame_id, 'an end that is taken back')
+
+
+def test_a_view_on_which_a_policy_fails_is_not_laid_to_the_reconstructor():
+    told = Mock()
+    with refusing_views(told), telling_failures('policy:'):
+        raise RuntimeError('no luck')
+    (_, said), _ = told.raise_warning.call_args
+    assert said == ('no goal after the last view: policy: fails with RuntimeError: no luck; mend '
+                    'the policy, or set another and call start_episode')
 
 
 def test_a_planner_warns_for_as_long_as_it_can_use_no_view_of_the_reconstructor(

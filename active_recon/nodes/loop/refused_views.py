@@ -18,6 +18,8 @@ def refusing_views(diagnostics: Diagnostics) -> Iterator[None]:
         yield
     except ActiveReconError as error:
         diagnostics.reject(error)
-        diagnostics.raise_warning(NO_GOAL, (
-            f'no goal after the last view: {one_line(error)}; weights, object_size and '
-            'object_frame must be those of the reconstructor'))
+        remedy = ('mend the policy, or set another and call start_episode'
+                  if error.kind == 'policy' else
+                  'weights, object_size and object_frame must be those of the reconstructor')
+        diagnostics.raise_warning(
+            NO_GOAL, f'no goal after the last view: {one_line(error)}; {remedy}')
