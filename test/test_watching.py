@@ -264,6 +264,12 @@ def test_it_is_enough_after_the_photos_planned_or_at_the_quality_asked_for(usual
     assert Adviser(StoppingRule(12, min_gain=0.9)).advice(usual).done == 'gain_too_small'
 
 
+def test_a_target_quality_is_refused_for_weights_without_tables_of_quality():
+    with pytest.raises(ConfigError, match='target_quality: .* carving-quality.json, found none'):
+        Adviser(StoppingRule(12, target_quality=0.7), 'carving')
+    Adviser(StoppingRule(12), 'carving')
+
+
 def test_photos_from_every_side_are_enough_and_no_other_place_is_told(usual):
     places = [orbit(15 * step, elevation) for elevation in (20, 40, 60) for step in range(24)]
     full = replace(usual, views=[replace(usual.views[-1], camera=camera) for camera in places])

@@ -6,12 +6,14 @@ import math
 from pathlib import Path
 
 from active_recon.acquisition.goals import Goal
+from active_recon.errors import ConfigError
 from active_recon.models.weights_files import DEFAULT_MODEL, find_weights
 from active_recon.photos.shape import Shape
 from active_recon.planner import Planner
 from active_recon.policies import AUTO_POLICY, load_policy, PolicyOptions
 from active_recon.policies.reasons import GoalReason
 from active_recon.policies.stopping import StoppingRule
+from active_recon.quality.tables import tables_path
 import numpy as np
 
 ELEVATIONS = (math.radians(20), math.radians(60))
@@ -41,13 +43,22 @@ class Advice:
 
 
 class Adviser:
-    """Plans the next photo by the view policy of a model's weights, or by an even sweep."""
+    """
+    Plans the next photo by the view policy of a model's weights, or by an even sweep.
+
+    Raises ConfigError on a target quality for weights without tables, which promise none.
+    """
 
     def __init__(self, stopping: StoppingRule, model: str | Path = DEFAULT_MODEL,
                  threads: int | None = 1) -> None:
+        weights = find_weights(model)
+        tables = tables_path(weights)
+        if stopping.target_quality and not tables.is_file():
+            raise ConfigError(f'target_quality: never promised: expected quality tables beside '
+                              f'the weights, {tables.name}, found none; leave the target out')
         self._stopping = stopping
         self._policy = load_policy(AUTO_POLICY, PolicyOptions(
-            views=stopping.max_views, weights=find_weights(model), threads=threads))
+            views=stopping.max_views, weights=weights, threads=threads))
 
     def advice(self, shape: Shape) -> Advice:
         """
