@@ -254,6 +254,20 @@ def test_masks_that_contradict_are_told_of_with_two_photos_and_without_tables_of
     assert any('masks contradict each other' in warning for warning in shape.warnings)
 
 
+@pytest.mark.parametrize(('off', 'said'), [
+    (0, "the network's own silhouettes, cut by a plain background's colour"),
+    (40, "the network's own silhouettes")])
+def test_a_plain_background_is_said_to_cut_only_where_it_does(off, said, views, rgba):
+    images = [on_plain(image) for image in rgba[:3]]
+    images[1] = np.roll(images[1], off, 0)
+    posed = [view_of(f'photo{number}', image, view)
+             for number, (image, view) in enumerate(zip(images, views, strict=False))]
+    shape = from_views(posed, CameraFile('cameras', ()), Options(
+        box=BOX, up='z', model='carving', ground=False))
+    assert shape.background == said
+    assert all(('plain' in view.background) == ('plain' in said) for view in shape.views)
+
+
 @pytest.mark.parametrize(('model', 'warned'), [('2d3d', True), ('carving', False)])
 def test_only_networks_that_need_the_front_warn_that_photos_do_not_tell_it(plain, model, warned):
     shape = active_recon.reconstruct(plain, views=1, box=(*CENTRE, SIDE), model=model)

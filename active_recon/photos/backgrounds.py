@@ -156,6 +156,11 @@ def cube_pixels(camera: Camera, size: float, pixels: tuple[int, int]) -> NDArray
     return np.asarray(drawn > 0)
 
 
+def uncut(source: str) -> str:
+    """Return what removed a photo's back, see `shown_image`, where no cell was cut off by it."""
+    return 'network' if source == 'network and plain' else source
+
+
 def named(sources: Sequence[str]) -> str:
     """Return in words where the silhouettes of all photos are from."""
     words = {'masks': 'masks from files', 'alpha': 'alpha channels',

@@ -71,8 +71,8 @@ def carved(grid: VoxelGrid, threshold: float, views: Sequence[PhotoView],
     """
     Return the grid without the cells that a mask excludes, and the masks' `coverage`.
 
-    Where masks contradict each other, only their mistakes would be cut out: the grid stays. So
-    would those of what was told from a board, which lack what looks like the board.
+    Where masks contradict each other, only their mistakes would be cut out: the same grid is
+    returned. So would those of what was told from a board, which lack what looks like the board.
     """
     views = [view for view in views if view.mask is not None and view.mask_source != 'board']
     if not views:

@@ -8,7 +8,13 @@ from pathlib import Path
 from active_recon.errors import ConfigError, DataError, ViewError, WeightsError
 from active_recon.geometry.cameras import Camera
 from active_recon.models.weights_files import DEFAULT_MODEL
-from active_recon.photos.backgrounds import BACKGROUNDS, before_clutter, named, separated
+from active_recon.photos.backgrounds import (
+    BACKGROUNDS,
+    before_clutter,
+    named,
+    separated,
+    uncut,
+)
 from active_recon.photos.board_masks import board_views
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
@@ -213,7 +219,10 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
     with reporting('reconstructing', len(views)) as advance:
         taken, unseen = integrate(shown, cube, size, reconstructor, background, advance,
                                   with_depth=True)
-    grid, covered = carved(taken[-1].known.grid, reconstructor.threshold, views, cube)
+    known = taken[-1].known.grid
+    grid, covered = carved(known, reconstructor.threshold, views, cube)
+    if grid is known:
+        taken = [replace(view, background=uncut(view.background)) for view in taken]
     if ground is not None:
         grid = above_ground(grid, reconstructor.threshold, cube, ground)
     return Shape(grid, reconstructor.threshold, taken, cube, ground,
