@@ -402,7 +402,10 @@ def test_a_place_without_an_object_is_refused(plain, rgba, views, tmp_path):
 @pytest.mark.parametrize(('how', 'expected'), [
     ({'background': 'green'}, 'background: unknown value'), ({'size': -1}, 'size: out of range'),
     ({'box': (0, 0, 1)}, 'box: expected four numbers'), ({'views': 0}, 'views: out of range'),
-    ({'up': 'w'}, 'up: not an axis'), ({'size': 0.3, 'unit': 0.1}, 'both set the scale')])
+    ({'size': '0.2'}, "size: no number: .*, got '0.2'"), ({'views': 2.5}, 'views: no number'),
+    ({'threads': '2'}, 'threads: no number'), ({'box': (0, 0, '0', 1)}, 'box: expected four'),
+    ({'box': 1}, 'box: expected four numbers'), ({'up': 'w'}, 'up: not an axis'),
+    ({'size': 0.3, 'unit': 0.1}, 'both set the scale')])
 def test_options_that_cannot_be_are_refused(how, expected, plain):
     with pytest.raises(ConfigError, match=expected):
         active_recon.reconstruct(plain, **how)
@@ -413,6 +416,15 @@ def test_options_that_cannot_be_are_refused(how, expected, plain):
 def test_what_is_for_files_is_refused_beside_pixels(how, rgba, views):
     with pytest.raises(ConfigError, match='not for images with cameras of their own'):
         active_recon.reconstruct(rgba[:1], views[:1], 0.3, **how)
+
+
+def test_images_and_cameras_may_be_any_iterables_and_nothing_else(rgba, views):
+    shape = active_recon.reconstruct(iter(rgba[:2]), iter(views[:2]), BOX[3], box=BOX,
+                                     model='carving')
+    assert len(shape.views) == 2
+    for images, given in ((3, None), (None, views[:1]), (rgba[:1], 3)):
+        with pytest.raises(ConfigError, match='s: expected a list with .*, got (int|NoneType)$'):
+            active_recon.reconstruct(images, given, 0.3)
 
 
 def test_pixels_without_cameras_are_refused(rgba, views):

@@ -1,9 +1,11 @@
 """From photos with known cameras to the shape of the object in them: the whole way in one call."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from numbers import Integral, Real
 from pathlib import Path
+from typing import TypeVar
 
 from active_recon.errors import ConfigError, DataError, ViewError, WeightsError
 from active_recon.geometry.cameras import Camera
@@ -84,17 +86,27 @@ class Options:
         if self.masks is not None and self.background != 'auto':
             raise ConfigError(f'masks with the background {self.background}: expected auto, which '
                               'alone uses masks; leave one of them out')
+        for name, value, kind, expected in (
+                ('unit', self.unit, Real, 'metres'), ('size', self.size, Real, 'metres'),
+                ('views', self.views, Integral, 'a whole number'),
+                ('threads', self.threads, Integral, 'a whole number')):
+            if value is not None and not isinstance(value, kind):
+                raise ConfigError(f'{name}: no number: expected {expected}, got {value!r}')
         for name, value in (('unit', self.unit), ('size', self.size)):
             if value is not None and not 0 < value < np.inf:
                 raise ConfigError(f'{name}: out of range: expected metres above 0, got {value}')
-        if self.box is not None and len(self.box) != 4:
+        if self.box is not None and not (np.shape(self.box) == (4,) and all(
+                isinstance(value, Real) for value in self.box)):
             raise ConfigError('box: expected four numbers, the centre x, y, z and the side, got '
-                              f'{len(self.box)}')
+                              f'{self.box!r}')
         if self.views is not None and self.views < 1:
             raise ConfigError(f'views: out of range: expected 1 or more, got {self.views}')
 
 
+T = TypeVar('T')
 _DEFAULTS = Options()
+_EACH_IMAGE = 'files, or with pixels'
+_EACH_CAMERA = 'a Camera(pose, intrinsics) for each image'
 
 
 def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
@@ -123,12 +135,14 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
         if isinstance(images, Path | str):
             raise ConfigError('images: expected pixels for a list of cameras, got the path '
                               f'{images}')
-        return _of_cameras(images, cameras, options)
+        return _of_cameras(_listed('images', images, _EACH_IMAGE),
+                           _listed('cameras', cameras, _EACH_CAMERA), options)
     if size is not None and unit != 1:
         raise ConfigError('size and unit both set the scale: give one of them')
     if isinstance(images, Path | str):
         place: Path | list[Path] = Path(images)
     else:
+        images = _listed('images', images, _EACH_IMAGE)
         place = [Path(image) for image in images if isinstance(image, Path | str)]
         if len(place) != len(images):
             raise ConfigError('cameras: expected a camera for each image, since pixels have no '
@@ -250,6 +264,15 @@ def _without_depth(views: Sequence[PhotoView], taken: Sequence[TakenView]) -> li
     return [f'{name}: without its depth: {refusal}' for name, refusal in refusals if refusal]
 
 
+def _listed(name: str, given: Iterable[T], each: str) -> list[T]:
+    """Return what was given as a list; raises ConfigError where there is nothing to go through."""
+    try:
+        return list(given)
+    except TypeError as error:
+        raise ConfigError(f'{name}: expected a list with {each}, got {type(given).__name__}'
+                          ) from error
+
+
 def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Options) -> Shape:
     if options.size is None:
         raise ConfigError("size: missing: expected the side of the object's cube in metres, "
@@ -261,9 +284,10 @@ def _of_cameras(images: Sequence[object], cameras: Sequence[Camera], options: Op
             ('axes', options.axes is not None, 'give poses of the optical frame')):
         if given:
             raise ConfigError(f'{name}: not for images with cameras of their own: {instead}')
-    if isinstance(cameras, Camera) or not all(isinstance(each, Camera) for each in cameras):
-        raise ConfigError('cameras: expected a list with a Camera(pose, intrinsics) for each '
-                          f'image, got {type(cameras).__name__}')
+    for each in cameras:
+        if not isinstance(each, Camera):
+            raise ConfigError(f'cameras: expected a list with {_EACH_CAMERA}, got '
+                              f'{type(each).__name__} in it')
     if len(images) != len(cameras) or len(images) == 0:
         raise ConfigError(f'cameras: expected one for each of {len(images)} images, got '
                           f'{len(cameras)}')
