@@ -472,6 +472,16 @@ def test_the_command_says_what_a_robot_description_lacks(shape, tmp_path, monkey
     assert said.exit_code == 0 and NO_COACD in said.output
 
 
+def test_the_command_tells_what_is_of_an_earlier_run(shape, tmp_path, monkeypatch):
+    monkeypatch.setattr('active_recon.photos.reconstruct.from_files', lambda *how: shape)
+    run = ['reconstruct', str(tmp_path), '--out', str(tmp_path / 'out'), '--mesh-format']
+    assert 'earlier run' not in CliRunner().invoke(app, [*run, 'ply', '--bag']).output
+    said = CliRunner().invoke(app, [*run, 'glb']).output
+    for name in ('mesh.ply', 'bag', 'report.html'):
+        assert f'{tmp_path / "out" / name} is of an earlier run' in said
+    assert said.count('earlier run') == 3
+
+
 def test_the_command_writes_all_files(plain, tmp_path):
     out = tmp_path / 'out'
     result = CliRunner().invoke(app, [

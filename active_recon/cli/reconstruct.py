@@ -113,7 +113,7 @@ def reconstruct(
     Example: active-recon reconstruct photos/ --watch --board --lan
     """
     from active_recon.photos.reconstruct import from_files, Options
-    from active_recon.photos.saving import FORMATS, save_shape
+    from active_recon.photos.saving import FORMATS, of_earlier_run, save_shape
 
     if mesh_format not in FORMATS:
         raise ConfigError(f'--mesh-format: unknown value: expected {", ".join(FORMATS)}, got '
@@ -182,7 +182,11 @@ def reconstruct(
     for path in paths:
         typer.echo(f'wrote {path}')
     if bag:
-        _write_bag(shape, folder, out / 'report.html')
+        page = out / 'report.html'
+        _write_bag(shape, folder, page)
+        paths += [folder, page]
+    for path in of_earlier_run(out, paths):
+        typer.echo(f'{path} is of an earlier run, not of this shape', err=True)
 
 
 def _print(shape: 'Shape') -> None:

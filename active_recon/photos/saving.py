@@ -1,5 +1,6 @@
 """A shape as files: mesh, voxels, a picture, and a description of how it was made."""
 
+from collections.abc import Collection
 from dataclasses import asdict
 import json
 from pathlib import Path
@@ -46,6 +47,12 @@ def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply'
         raise DataError(f'{folder}: not written: expected a folder with room, got: '
                         f'{error}') from error
     return paths, missing
+
+
+def of_earlier_run(folder: Path, written: Collection[Path]) -> list[Path]:
+    """Return what a folder has of an earlier shape, where nothing was `written` in its place."""
+    names = [*(f'mesh.{each}' for each in FORMATS), 'bag', 'report.html']
+    return [path for name in names if (path := folder / name).exists() and path not in written]
 
 
 def described(shape: Shape) -> dict[str, object]:
