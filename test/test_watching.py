@@ -1,6 +1,7 @@
 """Photos that arrive: each is taken in or left out, and it is told where to stand next."""
 
 from dataclasses import replace
+import json
 import math
 import shutil
 import signal
@@ -369,6 +370,42 @@ def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(posed, tm
     assert '9.jpg: gone from the folder' in said
 
 
+def test_photos_are_used_once_a_file_of_cameras_has_theirs(posed, tmp_path, adviser):
+    said, whole, photos = [], (posed / 'transforms.json').read_text(), tmp_path / 'photos'
+    photos.mkdir()
+    written = photos / 'transforms.json'
+    watcher = Watcher(photos, Collection(None, Options()), adviser, said.append)
+    clock = iter(range(100))
+
+    def used(photo, cameras):
+        """Return how many photos are used after a photo came and the cameras were written."""
+        if photo:
+            shutil.copy(posed / photo, photos)
+        else:
+            written.write_text(cameras)
+        for _ in range(4):
+            watcher.step(float(next(clock)))
+        shape = watcher._collection.shape
+        return 0 if shape is None else len(shape.views)
+
+    some = json.loads(whole)
+    some['frames'] = some['frames'][:2]
+    assert used('photo0.png', '') == 0
+    assert watcher.progress.lines[0].startswith(
+        f'Not enough yet: {photos}: no cameras beside the photos')
+    assert used('photo1.png', '') == 0
+    assert used('', json.dumps(some)) == 2
+    assert used('photo2.png', '') == 2
+    assert said[-3].startswith('left out: photo2.png: no camera in')
+    assert used('', whole[:300]) == 2
+    assert used('photo3.png', '') == 2
+    assert used('', whole) == 4
+    assert not watcher.result().left_out
+    assert used('', whole[:300]) == 4  # as they were
+    assert said[-3].startswith(f'the cameras have changed, and are not used: {written}: no cam')
+    assert used('', whole) == 4 and said[-3] == 'the cameras have changed'
+
+
 def test_a_photo_is_told_as_left_out_only_as_long_as_it_is(shape, adviser, tmp_path):
     others = [f'{name}: of another lens' for name in ('a.png', 'b.png')]
     used = {'a.png': ['a.png'], 'b.png': ['a.png'], 'c.png': ['b.png', 'c.png']}
@@ -379,7 +416,7 @@ def test_a_photo_is_told_as_left_out_only_as_long_as_it_is(shape, adviser, tmp_p
             replace(shape.views[0], name=name) for name in used[path.name]])
         return ''.join(each for each in left_out if each.startswith(path.name))
 
-    found = SimpleNamespace(add=add, shape=None, metric=True, board=None)
+    found = SimpleNamespace(add=add, shape=None, metric=True, board=None, new_cameras=dict)
     watcher = Watcher(tmp_path, found, adviser, print)
     for number, name in enumerate(used):
         (tmp_path / name).write_bytes(b'any')

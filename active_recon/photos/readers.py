@@ -20,6 +20,7 @@ FORMATS = ('transforms.json (NeRF, instant-ngp, nerfstudio), the folder of a COL
 LOOKS = ('opencv', 'opengl')
 """Camera axes: x right, y down, z forward; or x right, y up, z backward."""
 _MODEL_FOLDERS = ('.', 'sparse', 'sparse/0', 'colmap/sparse/0')
+_MODEL_FILES, _MODEL_ENDINGS = ('cameras', 'images'), ('.bin', '.txt')
 _YAML = {'.yml', '.yaml', '.xml'}
 
 
@@ -75,6 +76,15 @@ def find_cameras(folders: Sequence[Path]) -> Path | None:
     return None
 
 
+def camera_files(place: Path) -> list[Path]:
+    """Return the files that `read_cameras` reads at a place: two of a COLMAP model, or none."""
+    found = place if place.is_file() else find_cameras([place])
+    if found is None or found.is_file():
+        return [] if found is None else [found]
+    return sorted(path for path in found.iterdir() if path.stem in _MODEL_FILES
+                  and path.suffix in _MODEL_ENDINGS)
+
+
 def _read(path: Path, photos: Sequence[PhotoFile]) -> CameraFile:
     if path.is_dir():
         return read_colmap(path)
@@ -84,7 +94,7 @@ def _read(path: Path, photos: Sequence[PhotoFile]) -> CameraFile:
         return read_transforms(path)
     if path.suffix.lower() in _YAML:
         return read_opencv(path, photos)
-    if path.stem in ('cameras', 'images') and path.suffix in ('.bin', '.txt'):
+    if path.stem in _MODEL_FILES and path.suffix in _MODEL_ENDINGS:
         return read_colmap(path.parent)
     raise DataError(f'{path}: no cameras: expected {FORMATS}', 'no_cameras')
 

@@ -58,7 +58,7 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
                                        source.field_of_view)
         return file, posed, []
     folder = photos[0].path.parent
-    path = source or find_cameras([folder, folder.parent])
+    path = place_of_cameras(source, folder)
     if path is None:
         raise DataError(f'{folder}: no cameras beside the photos: expected {FORMATS}; name the '
                         'file by --cameras', 'no_cameras')
@@ -67,3 +67,8 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
     if any(each.is_turned for each in posed):
         file = replace(file, as_seen=[each.as_seen for each in posed])
     return file, posed, left_out
+
+
+def place_of_cameras(source: Path | None, folder: Path) -> Path | None:
+    """Return the file or folder of the cameras of photos in a folder; None where none is found."""
+    return source or find_cameras([folder, folder.parent])

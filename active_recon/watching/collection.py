@@ -1,5 +1,7 @@
 """The photos that came so far, each read and searched once, and the shape made of them."""
 
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,11 +14,25 @@ from active_recon.photos.board_photos import (
 )
 from active_recon.photos.camera_file import CameraFile, PosedPhoto
 from active_recon.photos.files import open_photo, PhotoFile
+from active_recon.photos.readers import camera_files
 from active_recon.photos.reconstruct import from_views, Options
 from active_recon.photos.shape import Shape
-from active_recon.photos.sources import BoardCameras, posed_by, Source, TurntableCameras
+from active_recon.photos.sources import (
+    BoardCameras,
+    place_of_cameras,
+    posed_by,
+    Source,
+    TurntableCameras,
+)
 from active_recon.photos.views import load_view, PhotoView, require_masks, with_camera
 from active_recon.reconstructor import load
+
+Files = Mapping[Path, tuple[int, int]]
+"""Sizes of files, and the times of their last changes, nanoseconds."""
+
+
+class _CamerasError(DataError):
+    """The file of cameras cannot be used, whichever photos there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +65,7 @@ class Collection:
         self._kept: dict[Path, _Kept] = {}
         self._views: dict[Path, PhotoView] = {}
         self._digests: dict[bytes, Path] = {}
+        self._read_cameras: Files = {}
         self.shape: Shape | None = None
         self.metric = False
         self.waiting = 'no photo yet'
@@ -76,6 +93,8 @@ class Collection:
             if not had_shape:
                 self.waiting = self._missing(error)
                 return ''
+            if isinstance(error, _CamerasError):
+                return f'{path.name}: {error}'  # the photo is not at fault: it is kept
             self._digests = digests
             self._forget(path)  # the shape is still that of the others
             return f'{path.name}: {error}'
@@ -93,6 +112,24 @@ class Collection:
             self._update()
         except ActiveReconError as error:
             self.shape, self.waiting = None, self._missing(error)
+
+    def new_cameras(self) -> Files:
+        """Return the files of cameras, none where they are those that the shape was made with."""
+        found = self._camera_files()
+        return {} if found == self._read_cameras else found
+
+    def read_cameras_again(self) -> str:
+        """
+        Make the shape by the cameras as they are now.
+
+        A shape stays where they cannot be used; returns why, else ''.
+        """
+        try:
+            self._update()
+        except ActiveReconError as error:
+            self.waiting = self._missing(error)
+            return '' if self.shape is None else str(error)
+        return ''
 
     def _digests_without(self, path: Path) -> dict[bytes, Path]:
         return {digest: each for digest, each in self._digests.items() if each != path}
@@ -122,9 +159,25 @@ class Collection:
     def _posed(self) -> tuple[CameraFile, list[PosedPhoto], list[str]]:
         if self.board is None:
             photos = [kept.photo for kept in self._kept.values()]
-            return posed_by(self._source, photos, self._options.axes)
+            self._read_cameras = self._camera_files()
+            try:
+                return posed_by(self._source, photos, self._options.axes)
+            except DataError as error:
+                raise _CamerasError(str(error), error.kind) from error
         seen = [kept.seen for kept in self._kept.values() if kept.seen is not None]
         return posed_on_board(seen, self.board.board, self.board.lens_file)
+
+    def _camera_files(self) -> Files:
+        found: dict[Path, tuple[int, int]] = {}
+        if self.board is not None or not self._kept:
+            return found
+        assert not isinstance(self._source, BoardCameras | TurntableCameras)
+        place = place_of_cameras(self._source, next(iter(self._kept)).parent)
+        with suppress(OSError):  # gone since
+            for path in [] if place is None else camera_files(place):
+                status = path.stat()
+                found[path] = status.st_size, status.st_mtime_ns
+        return found
 
     def _view(self, posed: PosedPhoto) -> PhotoView:
         """Return the view of a posed photo, whose pixels are read once."""
@@ -142,4 +195,4 @@ class Collection:
                     'estimated from three, taken from different sides')
         if count and error.kind == 'no_cube':
             return f'no object found yet: {error}'
-        return str(error)
+        return f'not enough yet: {error}' if count else str(error)

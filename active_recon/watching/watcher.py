@@ -8,8 +8,8 @@ import threading
 from active_recon.errors import DataError
 from active_recon.photos.shape import Shape
 from active_recon.watching.advice import Advice, Adviser, ENOUGH
-from active_recon.watching.arrivals import Arrivals
-from active_recon.watching.collection import Collection
+from active_recon.watching.arrivals import Arrivals, SETTLED_S
+from active_recon.watching.collection import Collection, Files
 from active_recon.watching.directions import where_to_stand
 from active_recon.watching.sketch import sketch
 import numpy as np
@@ -75,6 +75,7 @@ class Watcher:
         self._queue: list[Path] = []
         self._left_out: dict[str, str] = {}
         self._away = ''
+        self._cameras: tuple[Files, float] = {}, 0.0
         self.progress = Progress()
         self.verdicts = Verdicts()
 
@@ -99,9 +100,14 @@ class Watcher:
             self._say(f'{self._arrivals.away}; the photos so far stay, and it is looked for again')
         self._away = self._arrivals.away
         if not self._queue or self._away:
-            if gone:
+            changed = self._have_cameras_changed(now)
+            if changed:
+                wrong = self._collection.read_cameras_again()
+                self._say('the cameras have changed'
+                          + (f', and are not used: {wrong}' if wrong else ''))
+            if gone or changed:
                 self._tell()
-            return bool(gone)
+            return bool(gone) or changed
         path = self._queue.pop(0)
         left_out = self._collection.add(path)
         if left_out:
@@ -112,6 +118,13 @@ class Watcher:
         self._tell()
         self.verdicts.put(path.name, left_out)
         return True
+
+    def _have_cameras_changed(self, now: float) -> bool:
+        """Return whether there are other cameras than those of the shape, in whole files."""
+        found = self._collection.new_cameras()
+        if found != self._cameras[0]:
+            self._cameras = found, now
+        return bool(found) and now - self._cameras[1] >= SETTLED_S
 
     def result(self) -> Shape:
         """Return the shape of all photos so far; raises DataError where there is none."""
