@@ -152,6 +152,8 @@ def test_depth_of_another_shape_or_kind_is_refused(tmp_path):
     path.write_text('no image')
     with pytest.raises(DataError, match='got no image'):
         read_depth(path, 320, 240)
+    with pytest.raises(DataError, match='depths/a.png: no depth image: .* found none'):
+        read_depth(tmp_path / 'depths/a.png', 320, 240)
 
 
 def test_a_frame_of_transforms_names_its_depth_and_a_bad_one_leaves_its_photo(tmp_path):

@@ -46,6 +46,9 @@ def read_depth(path: Path, width: int, height: int,
     Reads one channel of 16 bits in millimetres, or of floats in metres, which `turned` turns as
     the photo, of any size of the photo's shape. Raises DataError on another file.
     """
+    if not path.is_file():
+        raise DataError(f'{path}: no depth image: expected the file that the cameras name, '
+                        'found none')
     stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if stored is None or stored.ndim != 2 or stored.dtype not in (
             np.uint16, np.float32, np.float64):
