@@ -4,6 +4,7 @@ from dataclasses import replace
 import json
 from pathlib import Path
 import re
+import shutil
 import struct
 import subprocess
 import sys
@@ -241,6 +242,12 @@ def test_transforms_that_cannot_be_used_are_refused_by_what_is_wrong(change, exp
     path.write_text(json.dumps({**transforms(rig()), **change}))
     with pytest.raises(DataError, match=expected):
         read_transforms(path)
+
+
+def test_the_folder_in_which_colmap_numbers_its_models_has_the_cameras_of_the_first(tmp_path):
+    shutil.copytree(COLMAP / 'binary', tmp_path / 'sparse/0')
+    read = read_cameras(tmp_path / 'sparse', [])
+    assert len(read.entries) == len(read_colmap(COLMAP / 'binary').entries)
 
 
 def test_a_colmap_model_whose_lines_lack_a_number_is_refused(tmp_path):

@@ -19,7 +19,7 @@ FORMATS = ('transforms.json (NeRF, instant-ngp, nerfstudio), the folder of a COL
            '*_par.txt (Middlebury), or OpenCV YAML')
 LOOKS = ('opencv', 'opengl')
 """Camera axes: x right, y down, z forward; or x right, y up, z backward."""
-_MODEL_FOLDERS = ('.', 'sparse', 'sparse/0', 'colmap/sparse/0')
+_MODEL_FOLDERS = ('.', '0', 'sparse', 'sparse/0', 'colmap/sparse/0')
 _MODEL_FILES, _MODEL_ENDINGS = ('cameras', 'images'), ('.bin', '.txt')
 _YAML = {'.yml', '.yaml', '.xml'}
 
