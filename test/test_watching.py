@@ -439,6 +439,20 @@ def test_where_the_original_is_deleted_its_copy_is_taken_in(photos, tmp_path, ad
     assert said.index('b.png: taken in') > said.index('a.png: gone from the folder')
 
 
+def test_a_photo_that_is_written_anew_is_not_told_as_gone(tmp_path):
+    said, photo = [], tmp_path / 'a.jpg'
+    watcher = Watcher(tmp_path, Collection(SOURCE, Options()), None, said.append)
+    watcher._tell = lambda: None
+    for number in range(2):
+        photo.write_bytes(b'no photo'[number:])
+        for now in (2.0 * number, 2.0 * number + 1):
+            watcher.step(now)
+    photo.unlink()
+    watcher.step(9.0)
+    assert [line for line in said if 'left out' not in line] == [
+        'a.jpg: changed', 'a.jpg: gone from the folder']
+
+
 def test_photos_that_arrive_may_have_a_mask_or_none(posed, tmp_path):
     mask = np.zeros((180, 240), np.uint8)
     mask[60:120, 80:160] = 255

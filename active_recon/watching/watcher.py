@@ -93,7 +93,7 @@ class Watcher:
                          if why.endswith(f': the same photo as {path.name}')]:
                 del self._left_out[name]
                 self._queue.append(path.with_name(name))  # it is the only one now
-            self._say(f'{path.name}: gone from the folder')
+            self._say(f'{path.name}: {"changed" if path.exists() else "gone from the folder"}')
         self._queue = [path for path in (*self._queue, *self._arrivals.arrived(now))
                        if path not in gone]
         if self._arrivals.away not in ('', self._away):
