@@ -168,6 +168,23 @@ def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp
         run('dataset', 'build', tmp_path, '--train', 0, '--val', 0, '--test', 0, '--unseen', 0)
 
 
+def test_dataset_refuses_counts_of_splits_that_its_categories_are_never_in(tmp_path):
+    none = ('--train', 0, '--val', 0, '--test', 0, '--unseen', 0)
+    for category, split in (('lamp', 'unseen'), ('bed', 'train')):
+        with pytest.raises(ConfigError, match=f'--{split} with .*{category}'):
+            run('dataset', 'build', tmp_path / 'out', *none, f'--{split}', 1,
+                '--category', category)
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_number_of_views_is_for_drawn_cameras_alone(meshes, tmp_path):
+    for made in (('render', meshes, tmp_path / 'out'),
+                 ('dataset', 'build', tmp_path / 'out', '--category', 'bed', '--unseen', 1)):
+        with pytest.raises(ConfigError, match='--views without --cameras any'):
+            run(*made, '--views', 3)
+    assert not (tmp_path / 'out').exists()
+
+
 def test_two_processes_make_what_one_makes(meshes, tmp_path):
     result = subprocess.run(
         [sys.executable, '-m', 'active_recon.cli.main', 'render', meshes, tmp_path / 'two',

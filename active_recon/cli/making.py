@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.cluster_option import Cluster, reachable, Workers, workers_of
+from active_recon.cli.needed_options import refuse_idle, refuse_lone
 from active_recon.cli.progress import progress_bar
 from active_recon.datasets.seeds import FIRST_SEEDS, SEEDS
 from active_recon.errors import ConfigError, DataError
@@ -32,11 +33,14 @@ Views = Annotated[int, typer.Option(
 Turned = Annotated[bool, typer.Option(
     '--turned', help='Give half of the objects a random yaw, instead of their front at +x.')]
 
+_ANY = '--cameras any'
+
 dataset = typer.Typer(help='Datasets of parametric shapes, made without any download.',
                       no_args_is_help=True)
 
 
 def render(
+    context: typer.Context,
     meshes: Annotated[Path, typer.Argument(
         help='A mesh file, a folder of <category>/<mesh>, or a manifest (CSV).')],
     out: Annotated[Path, typer.Argument(help='Folder of the dataset.')],
@@ -71,6 +75,7 @@ def render(
     from active_recon.datasets.manifest import manifest_jobs, read_manifest
 
     viewing = Viewing(cameras, views, turned)
+    refuse_lone(context, _ANY, cameras == 'any', 'views')
     meshes, out = reachable(meshes, cluster), reachable(out, cluster)
     if meshes.suffix == '.csv':
         if up or front:
@@ -90,6 +95,7 @@ def render(
 
 @dataset.command()
 def build(
+    context: typer.Context,
     out: Annotated[Path, typer.Argument(help='Folder for train/, val/, test/ and unseen/.')],
     train: Annotated[int, typer.Option(
         min=0, max=SEEDS, help='Training objects per category.')] = 400,
@@ -122,13 +128,20 @@ def build(
     from active_recon.datasets.making import shape_jobs
     from active_recon.shapes import ALL_CATEGORIES, generators_hash, UNSEEN_CATEGORIES
 
+    viewing = Viewing(cameras, views, turned)
+    refuse_lone(context, _ANY, cameras == 'any', 'views')
     out = reachable(out, cluster)
     counts = {'train': train, 'val': val, 'test': test, 'unseen': unseen}
-    jobs = [job for name in dict.fromkeys(category or ALL_CATEGORIES)
+    categories = tuple(dict.fromkeys(category or ALL_CATEGORIES))
+    jobs = [job for name in categories
             for split, count in counts.items()
             if (split == 'unseen') == (name in UNSEEN_CATEGORIES)
             for job in shape_jobs(name, range(FIRST_SEEDS[split], FIRST_SEEDS[split] + count),
                                   out / split)]
+    for split, count in counts.items():
+        others = f'with categories that are never in {split}/: {", ".join(categories)}'
+        refuse_idle(context, others, count > 0 and not any(
+            (split == 'unseen') == (name in UNSEEN_CATEGORIES) for name in categories), split)
     made_by, code = out / 'generators.sha256', generators_hash()
     if not made_by.is_file():
         out.mkdir(parents=True, exist_ok=True)
@@ -137,7 +150,7 @@ def build(
     elif made_by.read_text().strip() != code:
         raise DataError(f'{out}: shapes of other generators: expected those of the present code '
                         f'({code[:12]}), got another hash in {made_by}; choose another folder')
-    _make('making', jobs, samples, fine, Viewing(cameras, views, turned), depth, workers, cluster)
+    _make('making', jobs, samples, fine, viewing, depth, workers, cluster)
 
 
 def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Viewing',
