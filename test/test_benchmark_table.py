@@ -3,6 +3,7 @@
 from importlib import import_module
 import json
 from pathlib import Path
+import subprocess
 import sys
 
 from active_recon.models.weights_files import find_weights, weights_hash
@@ -14,7 +15,8 @@ from benchmarks.stream import counting_lost
 import pytest
 from trimesh.creation import box
 
-BENCHMARKS = sorted(path.stem for path in RESULTS.parents[2].glob('benchmarks/*.py')
+ROOT = RESULTS.parents[2]
+BENCHMARKS = sorted(path.stem for path in ROOT.glob('benchmarks/*.py')
                     if "__name__ == '__main__'" in path.read_text())
 
 
@@ -114,3 +116,13 @@ def test_what_another_machine_measured_is_told_where_it_stays_in_the_table(tmp_p
     assert keep({'elsewhere': elsewhere, 'before': before}, order, []) == ['elsewhere', 'before']
     assert keep({'here': own, 'before': own}, order, []) == ['elsewhere']
     assert files['DOCUMENT'].read_text().count('| a view |') == 3
+
+
+@pytest.mark.parametrize('name', ['meshes', pytest.param('watertight', marks=pytest.mark.slow),
+                                  pytest.param('depth', marks=pytest.mark.slow)])
+def test_a_benchmark_of_data_that_are_not_there_ends_in_one_line(name, tmp_path):
+    ended = subprocess.run([sys.executable, '-m', f'benchmarks.{name}', tmp_path / 'none.csv'],
+                           cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith(f'{tmp_path}/none.csv: no ')
+    assert ended.stderr.count('\n') == 1
