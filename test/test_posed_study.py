@@ -24,7 +24,7 @@ from active_recon.evaluation.posed.robustness import (
 )
 from active_recon.evaluation.posed.scene import chosen_folders, read_scene, Scene
 from active_recon.evaluation.posed.scoring import pooled, scored, target
-from active_recon.evaluation.posed.study import Extent, study_set
+from active_recon.evaluation.posed.study import Extent, read_set, study_set
 from active_recon.evaluation.posed.summary import figure, markdown, robustness_figures
 from active_recon.evaluation.posed.walking import some_objects
 from active_recon.models.carving import Carving
@@ -376,6 +376,12 @@ def test_objects_are_chosen_by_their_category(dataset):
     assert len(chosen_folders(folders, most=4)) == 4
     with pytest.raises(ConfigError, match=r"got 'car'; there are lamp, table"):
         chosen_folders(folders, 'car')
+
+
+def test_a_dataset_without_objects_is_refused_as_that_with_its_name(tmp_path):
+    (tmp_path / 'ShapeNetRendering').mkdir()
+    with pytest.raises(DataError, match=f'{tmp_path}: a dataset without objects: expected one'):
+        read_set(tmp_path, [], EXTENT)
 
 
 def test_counts_rise():

@@ -72,7 +72,7 @@ def policies(
 
       active-recon policies data/test --policies random,uniform,farthest --objects 60
     """
-    from active_recon.datasets.layout import list_objects
+    from active_recon.datasets.layout import needed_objects
     from active_recon.evaluation.next_view.study import Episodes
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.evaluation.posed.scene import chosen_folders
@@ -95,7 +95,7 @@ def policies(
                           'which a sequence is found, got none; give one, or leave sequence out')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, half)
     for folder in (*data, *([training] if training is not None and has_sequence else [])):
-        chosen_folders(list_objects(folder), category)
+        chosen_folders(needed_objects(folder), category)
     require_writable_study(out, 'policies')  # all of this is told before hours of measuring
     result: dict[str, Any] = {
         'command': command_line(), 'model': entrant.name,

@@ -46,7 +46,7 @@ def measure(
 
     Example: active-recon quality measure data/real_val real.npz --views 6
     """
-    from active_recon.datasets.layout import list_objects
+    from active_recon.datasets.layout import needed_objects
     from active_recon.datasets.views import read_views
     from active_recon.evaluation.posed.scene import chosen_folders
     from active_recon.evaluation.quality.faults import FAULTS
@@ -69,7 +69,7 @@ def measure(
         views=views, weights=weights, threads=threads)) if kind == LEARNED else None
     writable(out)  # tells before minutes of measuring
     alike: dict[int, list[ObjectFolder]] = {}  # all of a batch are shown from as many views
-    for folder in chosen_folders(list_objects(data), None, objects, seed):
+    for folder in chosen_folders(needed_objects(data), None, objects, seed):
         alike.setdefault(_views_of(folder), []).append(folder)
     if views > (most := max(alike)) > 0:
         raise ConfigError(f'--views: too many: expected at most the {most} of the objects, got '

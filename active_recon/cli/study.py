@@ -83,7 +83,7 @@ def study(
     Example: active-recon study --photos photos/dino_sparse_ring --models
     new=runs/weights.safetensors
     """
-    from active_recon.datasets.layout import list_objects
+    from active_recon.datasets.layout import list_objects, needed_objects
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.evaluation.posed.measuring import Plan
     from active_recon.evaluation.posed.retrieval import read_library
@@ -107,7 +107,7 @@ def study(
         raise ConfigError('validation: same objects twice: expected other objects than those '
                           f'measured, got {validation} for both')
     for folder in data or []:
-        chosen_folders(list_objects(folder), category)
+        chosen_folders(needed_objects(folder), category)
     for folder in (*([] if validation is None else [validation]), *(training or [])):
         list_objects(folder)
     photographs = None if photos is None else _read_photographs(photos, box, up)

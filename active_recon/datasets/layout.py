@@ -180,6 +180,13 @@ def list_objects(root: Path) -> list[ObjectFolder]:
             for folder in sorted(top.glob('*/*')) if folder.is_dir()]
 
 
+def needed_objects(root: Path) -> list[ObjectFolder]:
+    """Return the objects of a dataset; raises DataError where it has none, or is none."""
+    if not (folders := list_objects(root)):
+        raise DataError(f'{root}: a dataset without objects: expected one or more, got none')
+    return folders
+
+
 def write_object(folder: ObjectFolder, images: Sequence[NDArray[np.uint8]],
                  cameras: Sequence[Camera], grid: VoxelGrid) -> None:
     """

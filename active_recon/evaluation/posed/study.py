@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from active_recon.datasets.layout import list_objects
+from active_recon.datasets.layout import needed_objects
 from active_recon.errors import ConfigError
 from active_recon.evaluation.posed.choosing import choose
 from active_recon.evaluation.posed.entrants import Entrant
@@ -45,8 +45,8 @@ class Extent:
 
 def read_set(data: Path, entrants: Sequence[Entrant], extent: Extent, seed: int = 0,
              reporting: Reporting = silent) -> Scene:
-    """Read the objects to measure; raises as `chosen_folders` and `read_scene` do."""
-    folders = chosen_folders(list_objects(data), extent.category, extent.most, seed)
+    """Read the objects to measure; raises as what finds and reads them does."""
+    folders = chosen_folders(needed_objects(data), extent.category, extent.most, seed)
     return read_scene(folders, [entrant.network for entrant in entrants], data.name, reporting)
 
 
