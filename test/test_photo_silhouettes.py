@@ -110,6 +110,7 @@ def test_the_box_of_the_largest_part_is_found():
 def test_a_cube_and_its_part_say_the_same_of_a_camera(views):
     part = CUBE.part(np.array([[-0.5, -0.25, 0], [0, 0.25, 0.5]]))
     assert part.side == pytest.approx(1.09 * 0.5 * CUBE.side)
+    assert CUBE.part(np.array([[-0.5, -0.25, 0], [0, 0.25, 0.5]]), 1.0).side == 0.5 * CUBE.side
     np.testing.assert_allclose(part.centre, CENTRE + CUBE.side * np.array([-0.25, 0, 0.25]))
 
 

@@ -26,7 +26,7 @@ def test_the_notebook_makes_its_photos_and_a_mesh_of_them(tmp_path, monkeypatch,
             exec(''.join(cell['source']), names)
     said = capsys.readouterr().out
     assert 'expected IoU' in said and "network's own silhouettes" in said
-    assert 0.4 < trimesh.load('chair.ply').extents.max() < 0.9
+    assert 0.85 < trimesh.load('chair.ply').extents.max() < 0.91  # the chair fills its cube
     with Image.open('chair.png') as picture:
         assert picture.width > 1000
     assert not names['shape'].left_out

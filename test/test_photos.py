@@ -82,8 +82,8 @@ def truth(shape):
 
 def test_the_object_and_its_cube_are_found(shape):
     assert len(shape.views) == COUNT and not shape.left_out
-    np.testing.assert_allclose(shape.cube.centre, CENTRE, atol=0.1 * SIDE)
-    assert SIDE < shape.cube.side < 1.35 * SIDE
+    np.testing.assert_allclose(shape.cube.centre, CENTRE, atol=0.05 * SIDE)
+    assert SIDE < shape.cube.side < 1.15 * SIDE
     assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.6
     assert 0 < shape.quality.lower_bound < shape.quality.expected_iou < 1
     assert "plain background's colour" in shape.background
@@ -161,8 +161,8 @@ def test_before_clutter_the_cube_is_found_too(clutter, segmented, background):
     shape = (segmented if background == 'auto'
              else active_recon.reconstruct(clutter, background=background))
     assert shape.background == 'the segmenter' and not shape.left_out
-    np.testing.assert_allclose(shape.cube.centre, CENTRE, atol=0.2 * SIDE)
-    assert SIDE < shape.cube.side < 1.5 * SIDE
+    np.testing.assert_allclose(shape.cube.centre, CENTRE, atol=0.1 * SIDE)
+    assert 0.9 * SIDE < shape.cube.side < 1.25 * SIDE
     assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.5
 
 

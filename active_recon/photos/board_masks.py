@@ -7,7 +7,8 @@ from active_recon.acquisition.background import without_specks
 from active_recon.calibration.board import Board
 from active_recon.errors import DataError
 from active_recon.photos.board_print import seen_board
-from active_recon.photos.cube import Cube
+from active_recon.photos.cube import Cube, FIT
+from active_recon.photos.extent import explaining_box
 from active_recon.photos.ground import BOARD_GROUND
 from active_recon.photos.hull import depth_in_masks, hull, object_box, seen_cells
 from active_recon.photos.silhouette_fusion import CELLS, silhouettes
@@ -48,9 +49,11 @@ def board_views(views: Sequence[PhotoView], board: Board, cube: Cube | None
     if not found:
         raise DataError(f'object not found: {empty[0]}', 'no_object')
     if not told:
-        depths = depth_in_masks(found, [cube.camera(view.camera, 1.0) for view in found], CELLS)
-        agreed = hull(depths) & BOARD_GROUND.above(cube, CELLS)
-        cube = _about(agreed, cube) if agreed.any() else cube
+        cameras = [cube.camera(view.camera, 1.0) for view in found]
+        agreed = hull(depth_in_masks(found, cameras, CELLS)) & BOARD_GROUND.above(cube, CELLS)
+        box = explaining_box(agreed, [view.mask for view in found if view.mask is not None],
+                             cameras, standing=True)
+        cube = cube if box is None else cube.part(box, FIT)
     return found, empty, cube
 
 

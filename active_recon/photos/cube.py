@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 MARGIN = 1.09
-"""Side of the cube relative to the longest side of the object's box."""
+"""Side of a cube, relative to the longest side of the object's box, that has room around it."""
+
+FIT = 1.0
+"""The same of a cube that is found: networks were trained in cubes that objects fill."""
 _LEAST_ANGLE_SHARE = 1e-3
 WIDER, NARROWER = 1.6, 0.75
 """
@@ -64,10 +67,10 @@ class Cube:
         found[:3, 3] = self.centre
         return found
 
-    def part(self, box: NDArray[np.float64]) -> 'Cube':
+    def part(self, box: NDArray[np.float64], margin: float = MARGIN) -> 'Cube':
         """Return the cube about a box in sides of this cube, from its centre, (2, 3)."""
         centre = self.centre + self.rotation.T @ box.mean(axis=0) * self.side
-        return Cube(centre, MARGIN * float(np.ptp(box, axis=0).max()) * self.side, self.up)
+        return Cube(centre, margin * float(np.ptp(box, axis=0).max()) * self.side, self.up)
 
 
 def upright(up: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from active_recon.errors import DataError, ViewError
+from active_recon.geometry.cameras import Camera
 from active_recon.photos.backgrounds import shown_image
-from active_recon.photos.cube import Cube
+from active_recon.photos.cube import Cube, FIT
+from active_recon.photos.extent import explaining_box
 from active_recon.photos.ground import Ground, no_table
 from active_recon.photos.hull import (
     ceiling,
@@ -24,6 +26,7 @@ from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.depth_images import DepthImage
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
+from numpy.typing import NDArray
 
 COVERED = 0.95
 """Share of every mask that the hull covers where masks do not contradict each other."""
@@ -107,28 +110,53 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
     some = even_choice(views, SEARCHED_VIEWS)
     cube, largest = start, start.side * (_WIDER if background == 'segment' else 1.0)
     for _ in range(_ROUNDS):
-        cameras = [cube.camera(view.camera, 1.0) for view in some]
-        if all(view.mask is not None for view in some):
-            cells = hull(depth_in_masks(some, cameras, _HULL_CELLS))
-            cells &= seen_cells(cameras, _HULL_CELLS)
-        elif background == 'segment':
-            cells = segmented_cells(
-                some, cube, shipped_segmentation(reconstructor.threads), ground)
-            cells &= seen_cells(cameras, len(cells))
-        else:
-            taken, _ = integrate(some, cube, 1.0, reconstructor, background)
-            cells = taken[-1].known.grid.occupied(reconstructor.threshold)
-        box = object_box(cells if ground is None else cells & ground.above(cube, len(cells)))
-        if box is None:
-            raise DataError('object not found: expected one where the photos look, found nothing '
-                            'there; give its place by --box, or masks by --masks'
-                            + no_table(ground), 'no_cube')
-        before, cube = cube, cube.part(box)
+        found = _found(some, cube, reconstructor, background, ground)
+        before, cube = cube, cube.part(_box(object_box(found.cells), ground))
         cube = replace(cube, side=min(cube.side, largest))
         moved = float(np.linalg.norm(cube.centre - before.centre))
         if max(moved, abs(cube.side - before.side)) < _SAME * before.side:
             break
-    return cube
+    box = (explaining_box(*found, standing=ground is not None) if found.masks
+           else object_box(found.cells))
+    return before.part(_box(box, ground), FIT)
+
+
+class _Found(NamedTuple):
+    """Cells of a cube, (R, R, R); and, if they are a hull, its masks and their cameras there."""
+
+    cells: NDArray[np.bool_]
+    masks: Sequence[NDArray[np.bool_]]
+    cameras: Sequence[Camera]
+
+
+def _found(views: Sequence[PhotoView], cube: Cube, reconstructor: Reconstructor, background: str,
+           ground: Ground | None) -> _Found:
+    """Return what views find in a cube; nothing under a ground."""
+    cameras = [cube.camera(view.camera, 1.0) for view in views]
+    masks = [view.mask for view in views if view.mask is not None]
+    if len(masks) == len(views):
+        found = _Found(hull(depth_in_masks(views, cameras, _HULL_CELLS)), masks, cameras)
+    elif background == 'segment':
+        found = _Found(*segmented_cells(
+            views, cube, shipped_segmentation(reconstructor.threads), ground))
+    else:
+        taken, _ = integrate(views, cube, 1.0, reconstructor, background)
+        found = _Found(taken[-1].known.grid.occupied(reconstructor.threshold), [], [])
+    cells = found.cells
+    if found.masks:
+        cells = cells & seen_cells(cameras, len(cells))
+    if ground is not None:
+        cells = cells & ground.above(cube, len(cells))
+    return found._replace(cells=cells)
+
+
+def _box(box: NDArray[np.float64] | None, ground: Ground | None) -> NDArray[np.float64]:
+    """Return a box that was found; raises DataError where none was."""
+    if box is None:
+        raise DataError('object not found: expected one where the photos look, found nothing '
+                        'there; give its place by --box, or masks by --masks'
+                        + no_table(ground), 'no_cube')
+    return box
 
 
 def even_choice(views: Sequence[T], count: int) -> list[T]:

@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from active_recon.errors import ViewError
+from active_recon.geometry.cameras import Camera
 from active_recon.geometry.resampling import carried_back
 from active_recon.photos.cube import Cube
 from active_recon.photos.ground import Ground
@@ -46,14 +47,22 @@ def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmen
 
 
 def segmented_cells(views: Sequence[PhotoView], cube: Cube, segmentation: Segmentation,
-                    ground: Ground | None = None) -> NDArray[np.bool_]:
-    """Return the cells of a cube, (C, C, C), that the views agree are the object."""
+                    ground: Ground | None = None
+                    ) -> tuple[NDArray[np.bool_], list[NDArray[np.bool_]], list[Camera]]:
+    """
+    Return the cells of a cube, (C, C, C), that the views agree are the object.
+
+    Beside them the masks that they agree on, (S, S) each, and their cameras in sides of the cube.
+    """
     found = []
     for view in views:
         with suppress(ViewError):
             found.append(segmentation.framed(view.image, cube.camera(view.camera, 1.0)))
     above = None if ground is None else ground.above(cube, CELLS)
-    return _agreed(found, above)[1] if found else np.zeros((CELLS,) * 3, np.bool_)
+    if not found:
+        return np.zeros((CELLS,) * 3, np.bool_), [], []
+    shares, cells = _agreed(found, above)
+    return cells, [share > _UNKNOWN for share in shares], [each.camera for each in found]
 
 
 def agreed_shares(framed: Sequence[FramedShares], above: NDArray[np.bool_] | None = None
