@@ -11,11 +11,9 @@ from active_recon.evaluation.statistics import mean_interval
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.cube import MARGIN
 from active_recon.photos.reconstruct import from_views, Options
-from active_recon.photos.shape import Shape
 from active_recon.photos.views import PhotoView
 from active_recon.volumes.meshes import load_mesh
-from active_recon.volumes.voxelisation import voxelise
-from active_recon.volumes.voxels import cell_centers, iou
+from benchmarks.world_iou import iou_around
 import numpy as np
 from numpy.typing import NDArray
 from photo_table import around, centred, PATTERNS, photographed
@@ -42,7 +40,9 @@ def on_tables(count: int, model: str) -> dict[str, Any]:
                 (views, replace(told, background='network')), (masked, told)), strict=True):
             try:
                 shape = from_views(some, file, options)
-                found[way].append(_iou_around(shape, mesh))
+                occupied = shape.occupancy > shape.threshold
+                found[way].append(iou_around(
+                    occupied, shape.cube.world_from_object(1.0), mesh))
             except ActiveReconError as error:
                 print(f'nothing: {error}', file=sys.stderr)  # noqa: T201
                 found[way].append(0.0)
@@ -64,21 +64,6 @@ def scenes(models: Sequence[Path]) -> Iterator[tuple[
         images, masks = photographed(mesh, cameras, pattern, rng)
         yield mesh, pattern, [PhotoView(str(view), image, camera) for view, (image, camera)
                               in enumerate(zip(images, cameras, strict=True))], masks, rng
-
-
-def _iou_around(shape: Shape, mesh: Any) -> float:
-    """Return the IoU with a mesh about the origin, in a cube twice as wide as its longest side."""
-    cells, side = 128, 2 * float(mesh.extents.max())
-    placed = mesh.copy()
-    placed.apply_scale(1 / side)
-    points = np.c_[cell_centers(cells) * side, np.ones(cells ** 3)]
-    local = (points @ np.linalg.inv(shape.world_from_object).T)[:, :3] / shape.size + 0.5
-    own = len(shape.occupancy)
-    at = np.floor(local * own).astype(int)
-    inside = ((at >= 0) & (at < own)).all(axis=1)
-    occupied = np.zeros(cells ** 3, np.bool_)
-    occupied[inside] = shape.occupancy[tuple(at[inside].T)] > shape.threshold
-    return float(iou(occupied.reshape((cells,) * 3), voxelise(placed, cells).occupied(0.5)))
 
 
 def some_models(count: int) -> list[Path]:

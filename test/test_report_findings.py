@@ -10,7 +10,9 @@ from active_recon.policies.reasons import GoalReason
 from active_recon.report.findings import findings
 from active_recon.report.subject import Subject
 from active_recon.report.words import key_words, view_numbers
+from active_recon.volumes.voxels import VoxelGrid
 from judged_quality import quality_of
+import numpy as np
 import pytest
 from report_runs import changed, recorded_run
 
@@ -168,6 +170,18 @@ def test_views_are_named_by_their_numbers_and_three_in_a_row_by_the_first_and_la
 def test_a_cube_that_does_not_fit_is_asked_for_by_the_names_of_what_set_it(run, done, asked):
     [warning] = said(suspected(run, '', '', 'object_size', done=done))
     assert warning.endswith(asked)
+
+
+def test_an_object_that_is_small_in_its_cube_is_told_once_with_what_would_fit(run):
+    last = run.episodes[0].views[-1]
+    cells = np.zeros_like(last.reconstruction.occupancy)
+    cells[20:40, 20:40, 20:40] = 0.9
+    small = replace(last, reconstruction=VoxelGrid(cells), occupied=VoxelGrid(cells))
+    wide = changed(counted(run, warned__loose_cube=1),
+                   views=[*run.episodes[0].views[:-1], small])
+    [warning] = said(wide)
+    assert warning.startswith('The object fills 31% of the side of its cube, which costs accuracy')
+    assert 'object_size 0.312 fits it' in warning
 
 
 def test_warnings_come_before_notes(run):

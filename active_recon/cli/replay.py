@@ -112,7 +112,7 @@ def replay(
     if verified.comparison.verdict == NOTHING_RECORDED:
         _print_reconstruction(verified, run, reconstructor)
     else:
-        _print_comparison(verified, run, took_s)
+        _print_comparison(verified, run, reconstructor.threshold, took_s)
 
 
 def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
@@ -133,7 +133,7 @@ def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
             f'{count} of {last.occupancy.size} '
             f'cells above {reconstructor.threshold:.2f}, entropy {first.entropy():z.0f} to '
             f'{last.entropy():z.0f} nats; {uncompared}')
-        _print_quality(episode)
+        _print_quality(episode, reconstructor.threshold)
         _print_refused_depth([step.reconstruction.depth_refusal for step in episode.steps])
     typer.echo(f'hash {verified.hash}')
 
@@ -152,15 +152,23 @@ def _print_refused_depth(refusals: Sequence[str]) -> None:
         typer.echo(f'depth of {len(refused)} of them was left out: {refused[0]}')
 
 
-def _print_quality(episode: 'ReplayedEpisode') -> None:
-    """Print how good the shape of an episode is after its last view."""
-    quality = episode.steps[-1].reconstruction.quality if episode.steps else None
-    if quality is not None:
-        warning = f'; {quality.warning}' if quality.warning else ''
-        typer.echo(f'quality: {quality.summary}{warning}')
+def _print_quality(episode: 'ReplayedEpisode', threshold: float) -> None:
+    """Print how good the shape of an episode is after its last view, and if its cube is wide."""
+    from active_recon.volumes.loose_cube import loose_cube
+
+    if not episode.steps:
+        return
+    known = episode.steps[-1].reconstruction
+    if known.quality is not None:
+        warning = f'; {known.quality.warning}' if known.quality.warning else ''
+        typer.echo(f'quality: {known.quality.summary}{warning}')
+    loose = loose_cube(known.grid, threshold, len(episode.steps))
+    if loose is not None:
+        typer.echo(loose.warning)
 
 
-def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: float) -> None:
+def _print_comparison(verified: 'Verification', run: 'RecordedRun', threshold: float,
+                      took_s: float) -> None:
     from active_recon.bags.replay.comparison import DIFFERENT
 
     ran_s = (run.end - run.begin) / 1e9
@@ -176,7 +184,7 @@ def _print_comparison(verified: 'Verification', run: 'RecordedRun', took_s: floa
             typer.echo(f'episode {number} had views of which the bag has no image, from before '
                        'the camera or the episode was recorded: it is not compared')
     for replayed in verified.episodes:
-        _print_quality(replayed)
+        _print_quality(replayed, threshold)
     if not verified.knows_policy:
         typer.echo('the bag does not name its policy: goals and stop are not compared')
     if 'weights_sha256' not in run.provenance:

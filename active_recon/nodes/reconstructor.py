@@ -28,7 +28,7 @@ from active_recon.nodes.runtime.qos import LATCHED_QOS, SENSOR_QOS
 from active_recon.nodes.runtime.run import one_line
 from active_recon.nodes.runtime.topic_names import publish_topic_names
 from active_recon.parameters.reconstructor import ReconstructorParameters
-from active_recon.reconstructor import Reconstructor
+from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.saved_states import read_state
 from active_recon.segmentation import Segmentation
 import cv2
@@ -225,9 +225,13 @@ class ReconstructorNode(ManagedNode):
         self._publisher.publish_view(
             view.stamp, view.camera.pose, reconstruction, image if is_cleared else None)
         self._products.add_view(view.stamp, image, camera, reconstruction)
-        self._warnings.check_quality(reconstruction.quality)
+        self._check_shape(reconstruction)
         if self._background.how in ('segment', 'color', 'reference'):
             self._warnings.check_background(image)  # last: nothing waits for it
+
+    def _check_shape(self, known: Reconstruction) -> None:
+        self._warnings.check_shape(
+            known, self._reconstructor.threshold, self._reconstructor.view_count)
 
     def _tell_view_count(self, at_once: bool = True) -> None:
         self._diagnostics.set_value(
@@ -288,7 +292,7 @@ class ReconstructorNode(ManagedNode):
         self._products.take_up(saved)
         self._publisher.publish_occupancy(self._episode.begin, saved.reconstruction,
                                           self._reconstructor.threshold)
-        self._warnings.check_quality(saved.reconstruction.quality)
+        self._check_shape(saved.reconstruction)
         response.success, response.message = True, self._episode.id
         return response
 

@@ -11,8 +11,9 @@ from active_recon.bags.runs.run import PHOTOS
 from active_recon.geometry.cameras import CANONICAL_ELEVATION, ELEVATION_TOLERANCE, whole_degrees
 from active_recon.geometry.view_distance import view_distance
 from active_recon.report.stages import two_clocks
-from active_recon.report.subject import Subject
+from active_recon.report.subject import shown_grid, Subject
 from active_recon.report.words import counted, refusals, times, view_numbers, warned
+from active_recon.volumes.loose_cube import loose_cube
 
 _STOPPED = {
     'max_views': ('view limit', 'It stopped because it had taken as many views as '
@@ -35,6 +36,9 @@ _STOPPED = {
 }
 
 
+_TOLD_OTHERWISE = ('warned/elevation', 'warned/loose_cube')
+
+
 @dataclass(frozen=True)
 class Finding:
     """A sentence and its level: 'warning' or 'note'."""
@@ -47,7 +51,7 @@ def findings(subject: Subject) -> list[Finding]:
     """Return the findings on an episode, warnings first."""
     found = [Finding(level, text) for level, text in (
         *_beginning(subject), *_stop(subject), *_counted(subject), *_missing(subject),
-        *_lost(subject), *_off_goal(subject), *_unusual(subject),
+        *_lost(subject), *_off_goal(subject), *_unusual(subject), *_small(subject),
         *_off_elevation(subject), *_estimate(subject))]
     return sorted(found, key=lambda finding: finding.level != 'warning')
 
@@ -76,7 +80,7 @@ def _counted(subject: Subject) -> Iterator[tuple[str, str]]:
         for refusal in refusals(counts):
             yield 'warning', f'{refusal} (counted by the {name}).'
         for key, count in sorted(counts.items()):
-            if count > 0 and key.startswith('warned/') and key != 'warned/elevation':
+            if count > 0 and key.startswith('warned/') and key not in _TOLD_OTHERWISE:
                 yield 'warning', (f'The {name} warned {times(count)} of '
                                   f'{warned(key.removeprefix("warned/"))}.')
         if {'images', 'views', 'images_unused'} <= counts.keys():
@@ -124,6 +128,15 @@ def _unusual(subject: Subject) -> Iterator[tuple[str, str]]:
             told.setdefault(warning, []).append(number)
     for warning, numbers in told.items():
         yield 'warning', f'After {view_numbers(numbers)}: {warning}'
+
+
+def _small(subject: Subject) -> Iterator[tuple[str, str]]:
+    """Yield that the object is small in its cube, as the last view shows it."""
+    grid = shown_grid(subject.views[-1])
+    loose = None if grid is None else loose_cube(grid, subject.threshold, len(subject.views))
+    if loose is not None:
+        words = loose.cost if subject.of_photos else loose.warning
+        yield 'warning', f'{words[0].upper()}{words[1:]}.'
 
 
 def _off_elevation(subject: Subject) -> Iterator[tuple[str, str]]:

@@ -6,12 +6,14 @@ from active_recon.acquisition.background import main_part_share, WHOLE_SHARE
 from active_recon.geometry.cameras import Camera, CANONICAL_ELEVATION, ELEVATION_TOLERANCE
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.quality.quality import Quality
+from active_recon.reconstructor import Reconstruction
+from active_recon.volumes.loose_cube import loose_cube
 import numpy as np
 from numpy.typing import NDArray
 
 
 class ViewWarnings:
-    """Warns of an unusual elevation, of an object in pieces, and of what does not look right."""
+    """Warns of an unusual elevation, a wide cube, an object in pieces, and unusual views."""
 
     def __init__(self, diagnostics: Diagnostics, needs_front: bool) -> None:
         self._diagnostics, self._needs_front = diagnostics, needs_front
@@ -20,6 +22,7 @@ class ViewWarnings:
         """Forget the views: an episode begins."""
         self._diagnostics.drop_value('Quality')
         self._diagnostics.clear_warning('unusual_views', log=False)
+        self._diagnostics.clear_warning('loose_cube', log=False)
 
     def check_elevation(self, camera: Camera) -> None:
         """Warn where a network that needs the object's front knows one elevation only."""
@@ -30,8 +33,16 @@ class ViewWarnings:
                 f'with, got {math.degrees(camera.elevation):.1f}; the reconstruction will be '
                 'worse'))
 
-    def check_quality(self, quality: Quality | None) -> None:
-        """Show the quality, and warn while the views are unusual."""
+    def check_shape(self, known: Reconstruction, threshold: float, views: int) -> None:
+        """Show the quality after so many views; warn while they are unusual, or the cube wide."""
+        self._check_quality(known.quality)
+        loose = loose_cube(known.grid, threshold, views)
+        if loose is None:
+            self._diagnostics.clear_warning('loose_cube')
+        else:
+            self._diagnostics.raise_warning('loose_cube', loose.warning)
+
+    def _check_quality(self, quality: Quality | None) -> None:
         if quality is None:
             return
         self._diagnostics.set_value('Quality', quality.summary, at_once=False)
