@@ -27,6 +27,7 @@ from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.volumes.loose_cube import loose_cube
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
+from benchmarks.studies import with_tables_between_marks
 from benchmarks.world_iou import iou_around
 import numpy as np
 from rich.progress import track
@@ -64,6 +65,30 @@ def main() -> None:
                   for (place, side), values in found.items()]}, indent=1) + '\n')
     for (place, side), values in found.items():
         print(place, side, _summary(values, found['middle', 1.0]))  # noqa: T201
+
+
+def with_table(text: str, result: Mapping[str, Any]) -> str:
+    """Return a page with the table between its marks."""
+    return with_tables_between_marks(text, {'cube-sizes': lambda: _table(result)})
+
+
+def _table(result: Mapping[str, Any]) -> Iterator[str]:
+    cases = {(case['side'], case['place']): case for case in result['cases']}
+    yield ('| side of the cube, in longest sides of the object | in the middle | on the floor | '
+           'told to be small | told to fit, median [10 %, 90 %] |')
+    yield '|---|---|---|---|---|'
+    for side in SIDES:
+        middle, floor = (cases[side, place] for place in PLACES)
+        advised = middle['advised_side']
+        fits = '' if advised is None else f'{advised[1]:.2f} [{advised[0]:.2f}, {advised[2]:.2f}]'
+        yield (f'| {side:g} | {_told(middle)} | {_told(floor)} | {middle["told_as_loose"]:.0%}, '
+               f'{floor["told_as_loose"]:.0%} | {fits} |')
+
+
+def _told(case: Mapping[str, Any]) -> str:
+    mean, low, high = case['less']
+    beside = f' ({mean:+.3f} [{low:+.3f}, {high:+.3f}])' if mean else ''
+    return f'{case["iou"]:.3f}{beside}'
 
 
 def _of_model(file: Path, front: str, seed: int, reconstructor: Reconstructor

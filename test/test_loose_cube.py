@@ -1,6 +1,9 @@
 """A cube that is too wide for its object, and the cube that would fit."""
 
+from types import SimpleNamespace
+
 import active_recon
+from active_recon.cli.replay import _print_quality
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.objects import find_object
 from active_recon.volumes.loose_cube import FEWEST_VIEWS, FILLED, loose_cube
@@ -44,6 +47,15 @@ def test_too_few_views_and_an_empty_cube_tell_nothing():
     small = grid((10, 20), (10, 20), (10, 20))
     assert loose_cube(small, 0.4, FEWEST_VIEWS - 1) is None
     assert loose_cube(small, 0.95, FEWEST_VIEWS) is None
+
+
+def test_a_replay_tells_of_it_after_the_last_view(capsys):
+    known = SimpleNamespace(quality=None, grid=grid((10, 30), (10, 30), (10, 30)))
+    steps = [SimpleNamespace(reconstruction=known)] * FEWEST_VIEWS
+    _print_quality(SimpleNamespace(steps=steps), 0.4)
+    assert capsys.readouterr().out.rstrip().endswith('object_size 0.2 fits it')
+    _print_quality(SimpleNamespace(steps=steps[1:]), 0.4)
+    assert not capsys.readouterr().out
 
 
 @pytest.fixture(scope='module')
