@@ -177,7 +177,7 @@ def test_an_object_that_is_small_in_its_cube_is_told_once_with_what_would_fit(ru
     cells = np.zeros_like(last.reconstruction.occupancy)
     cells[20:40, 20:40, 20:40] = 0.9
     small = replace(last, reconstruction=VoxelGrid(cells), occupied=VoxelGrid(cells))
-    wide = changed(counted(run, warned__loose_cube=1),
+    wide = changed(counted(run, warned__cube=1),
                    views=[*run.episodes[0].views[:-1], small])
     [warning] = said(wide)
     assert warning.startswith('The object fills 31% of the side of its cube, which costs accuracy')

@@ -153,8 +153,8 @@ def _print_refused_depth(refusals: Sequence[str]) -> None:
 
 
 def _print_quality(episode: 'ReplayedEpisode', threshold: float) -> None:
-    """Print how good the shape of an episode is after its last view, and if its cube is wide."""
-    from active_recon.volumes.loose_cube import loose_cube
+    """Print how good the shape is after an episode's last view, and a cube that fits better."""
+    from active_recon.volumes.better_cube import better_cube
 
     if not episode.steps:
         return
@@ -162,9 +162,9 @@ def _print_quality(episode: 'ReplayedEpisode', threshold: float) -> None:
     if known.quality is not None:
         warning = f'; {known.quality.warning}' if known.quality.warning else ''
         typer.echo(f'quality: {known.quality.summary}{warning}')
-    loose = loose_cube(known.grid, threshold, len(episode.steps))
-    if loose is not None:
-        typer.echo(loose.warning)
+    better = better_cube(known.grid, threshold, len(episode.steps))
+    if better is not None:
+        typer.echo(better.warning)
 
 
 def _print_comparison(verified: 'Verification', run: 'RecordedRun', threshold: float,

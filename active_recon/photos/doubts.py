@@ -13,7 +13,7 @@ from active_recon.photos.integrating import COVERED, even_choice, integrate
 from active_recon.photos.shape import TakenView
 from active_recon.photos.views import PhotoView
 from active_recon.reconstructor import Reconstructor
-from active_recon.volumes.loose_cube import loose_cube
+from active_recon.volumes.better_cube import better_cube
 
 _AGREE = 0.6  # silhouettes with a lower IoU contradict each other
 _BETTER = 0.15  # by which another convention has to be above that, or above a coverage
@@ -66,16 +66,16 @@ def doubts(taken: Sequence[TakenView], views: Sequence[PhotoView], cube: Cube,
     return found
 
 
-def loose(taken: Sequence[TakenView], cube: Cube, threshold: float) -> list[str]:
-    """Return the warning, with the box that fits, of an object that is small in its cube."""
+def better_box(taken: Sequence[TakenView], cube: Cube, threshold: float) -> list[str]:
+    """Return the warning of an object that does not fit its cube, with the box that does."""
     grid = taken[-1].known.grid
-    found = loose_cube(grid, threshold, len(taken))
+    found = better_cube(grid, threshold, len(taken))
     if found is None:
         return []
     placed = cube.world_from_object(grid.size)
     centre = (placed @ [*found.centre, 1.0])[:3]
     box = ','.join(f'{value:.4g}' for value in (*centre, found.side * cube.side / grid.size))
-    return [f'{found.cost}: the box (--box) {box} fits it']
+    return [f'{found.reason}: the box (--box) {box} fits it']
 
 
 def _fitting(views: Sequence[PhotoView], cube: Cube, reconstructor: Reconstructor,

@@ -21,7 +21,7 @@ from active_recon.photos.board_masks import board_views
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
 from active_recon.photos.cube import Cube, first_cube, NARROWER, upward, WIDER
-from active_recon.photos.doubts import doubts, loose, unknown_front
+from active_recon.photos.doubts import better_box, doubts, unknown_front
 from active_recon.photos.files import in_order_of, open_photos, photo_paths
 from active_recon.photos.ground import BOARD_GROUND, Ground, no_table
 from active_recon.photos.ground_search import found_ground
@@ -243,7 +243,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
                  named([view.background for view in taken]), [*left_out, *empty, *unseen],
                  [*unknown_front(reconstructor),
                   *doubts(taken, views, cube, reconstructor, background, covered,
-                          file.looks), *loose(taken, cube, reconstructor.threshold),
+                          file.looks), *better_box(taken, cube, reconstructor.threshold),
                   *_without_depth(views, taken)], dict(reconstructor.provenance))
 
 

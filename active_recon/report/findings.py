@@ -13,7 +13,7 @@ from active_recon.geometry.view_distance import view_distance
 from active_recon.report.stages import two_clocks
 from active_recon.report.subject import shown_grid, Subject
 from active_recon.report.words import counted, refusals, times, view_numbers, warned
-from active_recon.volumes.loose_cube import loose_cube
+from active_recon.volumes.better_cube import better_cube
 
 _STOPPED = {
     'max_views': ('view limit', 'It stopped because it had taken as many views as '
@@ -36,7 +36,7 @@ _STOPPED = {
 }
 
 
-_TOLD_OTHERWISE = ('warned/elevation', 'warned/loose_cube')
+_TOLD_OTHERWISE = ('warned/elevation', 'warned/cube')
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def findings(subject: Subject) -> list[Finding]:
     """Return the findings on an episode, warnings first."""
     found = [Finding(level, text) for level, text in (
         *_beginning(subject), *_stop(subject), *_counted(subject), *_missing(subject),
-        *_lost(subject), *_off_goal(subject), *_unusual(subject), *_small(subject),
+        *_lost(subject), *_off_goal(subject), *_unusual(subject), *_cube(subject),
         *_off_elevation(subject), *_estimate(subject))]
     return sorted(found, key=lambda finding: finding.level != 'warning')
 
@@ -130,12 +130,12 @@ def _unusual(subject: Subject) -> Iterator[tuple[str, str]]:
         yield 'warning', f'After {view_numbers(numbers)}: {warning}'
 
 
-def _small(subject: Subject) -> Iterator[tuple[str, str]]:
-    """Yield that the object is small in its cube, as the last view shows it."""
+def _cube(subject: Subject) -> Iterator[tuple[str, str]]:
+    """Yield that the cube does not fit the object, as the last view shows it."""
     grid = shown_grid(subject.views[-1])
-    loose = None if grid is None else loose_cube(grid, subject.threshold, len(subject.views))
-    if loose is not None:
-        words = loose.cost if subject.of_photos else loose.warning
+    better = None if grid is None else better_cube(grid, subject.threshold, len(subject.views))
+    if better is not None:
+        words = better.reason if subject.of_photos else better.warning
         yield 'warning', f'{words[0].upper()}{words[1:]}.'
 
 

@@ -17,7 +17,7 @@ _REFUSED = {
 }
 _WARNED = {
     'unusual_views': 'views unlike those it knows',
-    'loose_cube': 'an object that is small in its cube',
+    'cube': 'a cube that does not fit the object',
     'learned_policy': 'a view policy that was learned for other weights',
     'weights': 'a reconstructor with other weights than the planner',
     'stalled': 'a camera that stood still away from its goal',

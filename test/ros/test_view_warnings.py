@@ -38,7 +38,7 @@ def test_a_wide_cube_is_warned_of_while_it_is_one_and_until_the_episode_ends():
     warnings.check_shape(known(5, 15), 0.4, 2)
     assert not told.standing
     warnings.check_shape(known(5, 15), 0.4, 3)
-    assert 'object_size 0.2 fits it' in told.standing['loose_cube']
+    assert 'object_size 0.2 fits it' in told.standing['cube']
     warnings.check_shape(known(0, 20), 0.4, 4)
     assert not told.standing
     warnings.check_shape(known(5, 15), 0.4, 5)

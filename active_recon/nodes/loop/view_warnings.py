@@ -7,13 +7,13 @@ from active_recon.geometry.cameras import Camera, CANONICAL_ELEVATION, ELEVATION
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.quality.quality import Quality
 from active_recon.reconstructor import Reconstruction
-from active_recon.volumes.loose_cube import loose_cube
+from active_recon.volumes.better_cube import better_cube
 import numpy as np
 from numpy.typing import NDArray
 
 
 class ViewWarnings:
-    """Warns of an unusual elevation, a wide cube, an object in pieces, and unusual views."""
+    """Warns of an unusual elevation, the cube, an object in pieces, and unusual views."""
 
     def __init__(self, diagnostics: Diagnostics, needs_front: bool) -> None:
         self._diagnostics, self._needs_front = diagnostics, needs_front
@@ -22,7 +22,7 @@ class ViewWarnings:
         """Forget the views: an episode begins."""
         self._diagnostics.drop_value('Quality')
         self._diagnostics.clear_warning('unusual_views', log=False)
-        self._diagnostics.clear_warning('loose_cube', log=False)
+        self._diagnostics.clear_warning('cube', log=False)
 
     def check_elevation(self, camera: Camera) -> None:
         """Warn where a network that needs the object's front knows one elevation only."""
@@ -34,13 +34,13 @@ class ViewWarnings:
                 'worse'))
 
     def check_shape(self, known: Reconstruction, threshold: float, views: int) -> None:
-        """Show the quality after so many views; warn while they are unusual, or the cube wide."""
+        """Show the quality; warn of unusual views, and of a cube that does not fit."""
         self._check_quality(known.quality)
-        loose = loose_cube(known.grid, threshold, views)
-        if loose is None:
-            self._diagnostics.clear_warning('loose_cube')
+        better = better_cube(known.grid, threshold, views)
+        if better is None:
+            self._diagnostics.clear_warning('cube')
         else:
-            self._diagnostics.raise_warning('loose_cube', loose.warning)
+            self._diagnostics.raise_warning('cube', better.warning)
 
     def _check_quality(self, quality: Quality | None) -> None:
         if quality is None:

@@ -6,7 +6,7 @@ import active_recon
 from active_recon.cli.replay import _print_quality
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.objects import find_object
-from active_recon.volumes.loose_cube import FEWEST_VIEWS, FILLED, loose_cube
+from active_recon.volumes.better_cube import better_cube, FEWEST_VIEWS, FILLED
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import VoxelGrid
@@ -24,7 +24,7 @@ def grid(*spans):
 
 
 def test_the_cube_that_fits_is_about_what_was_found():
-    found = loose_cube(grid((10, 30), (18, 24), (0, 12)), 0.4, FEWEST_VIEWS)
+    found = better_cube(grid((10, 30), (18, 24), (0, 12)), 0.4, FEWEST_VIEWS)
     assert found.share == 0.5 and found.side == pytest.approx(0.2)
     assert found.centre == pytest.approx((0.0, 0.01, -0.14))
     assert found.warning == ('the object fills 50% of the side of its cube, which costs accuracy: '
@@ -33,20 +33,28 @@ def test_the_cube_that_fits_is_about_what_was_found():
 
 
 def test_who_has_the_object_in_the_middle_is_not_told_to_move_it():
-    found = loose_cube(grid((10, 30), (10, 30), (10, 30)), 0.4, FEWEST_VIEWS)
+    found = better_cube(grid((10, 30), (10, 30), (10, 30)), 0.4, FEWEST_VIEWS)
     assert found.warning.endswith('object_size 0.2 fits it')
 
 
 def test_one_long_side_fills_a_cube():
     filled = round(FILLED * CELLS)
-    assert loose_cube(grid((18, 20), (18, 20), (0, filled)), 0.4, FEWEST_VIEWS) is None
-    assert loose_cube(grid((18, 20), (18, 20), (0, filled - 1)), 0.4, FEWEST_VIEWS) is not None
+    assert better_cube(grid((18, 20), (18, 20), (0, filled)), 0.4, FEWEST_VIEWS) is None
+    assert better_cube(grid((18, 20), (18, 20), (0, filled - 1)), 0.4, FEWEST_VIEWS) is not None
+
+
+def test_an_object_off_the_middle_of_its_cube_is_told_where_that_would_be():
+    found = better_cube(grid((0, 40), (4, 36), (0, 20)), 0.4, FEWEST_VIEWS)
+    assert found.warning == ('the object is not in the middle of its cube, which costs accuracy: '
+                             'object_size 0.4 fits it, with the origin of the object frame moved '
+                             'to (0, 0, -0.1) m')
+    assert better_cube(grid((0, 40), (4, 36), (9, 25)), 0.4, FEWEST_VIEWS) is None
 
 
 def test_too_few_views_and_an_empty_cube_tell_nothing():
     small = grid((10, 20), (10, 20), (10, 20))
-    assert loose_cube(small, 0.4, FEWEST_VIEWS - 1) is None
-    assert loose_cube(small, 0.95, FEWEST_VIEWS) is None
+    assert better_cube(small, 0.4, FEWEST_VIEWS - 1) is None
+    assert better_cube(small, 0.95, FEWEST_VIEWS) is None
 
 
 def test_a_replay_tells_of_it_after_the_last_view(capsys):
@@ -76,7 +84,7 @@ def test_the_advice_leads_to_a_cube_that_fits(photographed):
     wide = active_recon.load(object_size=1.8, threads=1)
     for image, camera in zip(images, cameras, strict=True):
         known = wide.add_view(image, camera)
-    found = loose_cube(known.grid, wide.threshold, wide.view_count)
+    found = better_cube(known.grid, wide.threshold, wide.view_count)
     assert found.side == pytest.approx(1.0, abs=0.1)
     assert found.centre == pytest.approx((0.0, 0.0, 0.5), abs=0.08)
     fitting = active_recon.load(object_size=found.side, threads=1)
@@ -84,7 +92,7 @@ def test_the_advice_leads_to_a_cube_that_fits(photographed):
         pose = camera.pose.copy()
         pose[:3, 3] -= found.centre
         known = fitting.add_view(image, Camera(pose, camera.intrinsics))
-    assert loose_cube(known.grid, fitting.threshold, fitting.view_count) is None
+    assert better_cube(known.grid, fitting.threshold, fitting.view_count) is None
 
 
 def test_photos_in_a_wide_cube_are_told_the_box_that_fits(photographed):

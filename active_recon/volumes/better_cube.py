@@ -1,0 +1,76 @@
+"""Whether a cube is too wide for what was found in it, or off its middle, and what would fit."""
+
+from dataclasses import dataclass
+
+from active_recon.volumes.voxels import VoxelGrid
+import numpy as np
+from numpy.typing import NDArray
+
+FILLED = 0.85
+"""Share of the cube's side below which what was found is small; see benchmarks/cube_sizes.py."""
+OFF_CENTRE = 0.1
+"""How far the middle of what was found may be from the cube's, in longest sides of it."""
+FEWEST_VIEWS = 3
+"""Views from which the extent of what was found can be trusted."""
+_CENTRED = 0.05  # the same where the cube has to change anyway
+
+
+@dataclass(frozen=True)
+class BetterCube:
+    """
+    The cube that fits what was found in another.
+
+    - share: the longest side of what was found, relative to the cube that it was found in
+    - side, centre: of the cube that fits, metres, in the object frame
+    """
+
+    share: float
+    side: float
+    centre: tuple[float, float, float]
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether its centre is elsewhere."""
+        return max(map(abs, self.centre)) > _CENTRED * self.side
+
+    @property
+    def warning(self) -> str:
+        """The warning in words, for who sets the parameters of nodes."""
+        moved = ''
+        if self.is_moved:
+            place = ', '.join(f'{value:g}' for value in np.round(self.centre, 4) + 0.0)
+            moved = f', with the origin of the object frame moved to ({place}) m'
+        return f'{self.reason}: object_size {self.side:.3g} fits it{moved}'
+
+    @property
+    def reason(self) -> str:
+        """The first part of the warning: what is wrong with the cube at hand."""
+        return ('the object ' + (f'fills {self.share:.0%} of the side' if self.share < FILLED
+                                 else 'is not in the middle')
+                + ' of its cube, which costs accuracy')
+
+
+def better_cube(grid: VoxelGrid, threshold: float, views: int) -> BetterCube | None:
+    """
+    Return the cube that fits what so many views found; None where the one at hand does.
+
+    None too after fewer than FEWEST_VIEWS, and where nothing is found.
+    """
+    occupied = grid.occupied(threshold)
+    if views < FEWEST_VIEWS or not occupied.any():
+        return None
+    box = _box(occupied)
+    share, middle = float(np.ptp(box, axis=0).max()), box.mean(axis=0)
+    if share >= FILLED and np.abs(middle).max() <= OFF_CENTRE * share:
+        return None
+    x, y, z = (middle * grid.size).tolist()
+    return BetterCube(share, share * grid.size, (x, y, z))
+
+
+def _box(occupied: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the box of all occupied cells, (2, 3), in sides of the cube from its centre."""
+    ends = []
+    for axis in range(3):
+        slices = np.flatnonzero(occupied.any(axis=tuple({0, 1, 2} - {axis})))
+        ends.append((slices[0], slices[-1] + 1))
+    return np.array(ends, np.float64).T / len(occupied) - 0.5
