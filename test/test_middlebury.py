@@ -144,6 +144,8 @@ def test_what_is_no_camera_is_refused_by_its_line(line, expected, box, tmp_path)
 
 
 def test_a_folder_without_cameras_or_box_is_refused(folder, box, tmp_path):
+    with pytest.raises(DataError, match='no such folder: expected one of photographs'):
+        read_photographs(tmp_path / 'nowhere')
     with pytest.raises(DataError, match=r'wrong number of camera files: expected one \*_par.txt'):
         read_photographs(tmp_path)
     written(tmp_path, box, 1)

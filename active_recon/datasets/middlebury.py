@@ -61,6 +61,8 @@ def read_photographs(folder: Path, box: Sequence[float] | None = None,
     file; None reads them from README.txt. `up` is the axis of that frame that points up. Raises
     DataError where a file is missing or invalid, ConfigError on an invalid box.
     """
+    if not folder.is_dir():
+        raise DataError(f'{folder}: no such folder: expected one of photographs')
     files = sorted(folder.glob('*_par.txt'))
     if len(files) != 1:
         raise DataError(f'{folder}: wrong number of camera files: expected one *_par.txt, found '

@@ -86,7 +86,7 @@ class RunningNodes(LoopClient):
             parameters=[Parameter(name, kind, value).to_parameter_msg()])
         result, = self._ask(SetParameters, f'{node}/set_parameters', request).results
         if not result.successful:
-            return Change(node, before, before, result.reason or 'refused without a reason')
+            return Change(node, before, before, _refusal(result.reason, name))
         return Change(node, before, parameter_value_to_python(self._value(node, name)))
 
     def read_status(self) -> tuple[list[NodeReading], list[str]]:
@@ -177,6 +177,13 @@ def _tells_of(status: str, node: str) -> bool:
     """Return whether a status is of a node: its full name; others begin theirs with `node`."""
     own = re.split(r'[^\w/]', status, maxsplit=1)[0]
     return own in (node, node.lstrip('/'), node.rpartition('/')[2])
+
+
+def _refusal(reason: str, name: str) -> str:
+    """Return a node's reason not to set a parameter, with what to do about one that is fixed."""
+    if 'read-only' not in reason:
+        return reason or 'refused without a reason'
+    return f'{reason.rstrip(".")}: set it where the node is started, by -p {name}:=VALUE'
 
 
 def _nothing() -> None:

@@ -134,7 +134,8 @@ def load_policy(name: str, options: PolicyOptions | None = None) -> Policy:
     options = options or PolicyOptions()
     if name not in (AUTO_POLICY, *POLICIES):
         raise ConfigError(f'no policy is called {name!r}: expected one of '
-                          f'{", ".join((AUTO_POLICY, *POLICIES))}')
+                          f'{", ".join((AUTO_POLICY, *POLICIES))}, or that of a package that is '
+                          'installed here')
     return POLICIES[policy_in_use(name, options.weights).name].make(options)
 
 
