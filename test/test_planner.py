@@ -212,7 +212,7 @@ def test_it_is_loaded_by_the_name_of_its_policy_and_repeats_with_its_seed():
              .goal.camera.azimuth
              for seed in (1, 1, 2)]
     assert goals[0] == goals[1] != goals[2]
-    with pytest.raises(ConfigError, match="no policy is called 'best': .* of a package that is installed"):
+    with pytest.raises(ConfigError, match="no policy is called 'best': .* that is installed here"):
         Planner.load('best')
 
 

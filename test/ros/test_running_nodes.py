@@ -63,7 +63,8 @@ def test_lists_and_words_are_set_as_the_parameter_has_them(told, shared_bench):
 @pytest.mark.parametrize(('name', 'value', 'reason'), [
     ('target_quality', '-1.5', 'target_quality stays 0.0: .*out of range.*-1.5'),
     ('policy', 'off', 'policy stays .*: invalid value: expected one of auto.*, got .*off'),
-    ('weights', 'mine.safetensors', "weights stays '': .*read-only.*: set it where the node is started")])
+    ('weights', 'mine.safetensors',
+     "weights stays '': .*read-only.*: set it where the node is started")])
 def test_a_refused_value_is_told_with_the_reason_of_the_node(told, name, value, reason):
     said = told(1, 'set', 'view_planner', name, value)
     assert re.fullmatch(f'/view_planner: {reason}.*\n', said), said
