@@ -51,6 +51,13 @@ def test_an_object_off_the_middle_of_its_cube_is_told_where_that_would_be():
     assert better_cube(grid((0, 40), (4, 36), (9, 25)), 0.4, FEWEST_VIEWS) is None
 
 
+def test_what_hovers_beside_the_object_is_no_part_of_what_fits_it():
+    small = grid((10, 20), (10, 20), (0, 10))
+    small.occupancy[38, 20, 20] = 0.9
+    found = better_cube(small, 0.4, FEWEST_VIEWS)
+    assert found.side == pytest.approx(0.1) and found.centre[2] == pytest.approx(-0.15)
+
+
 def test_too_few_views_and_an_empty_cube_tell_nothing():
     small = grid((10, 20), (10, 20), (10, 20))
     assert better_cube(small, 0.4, FEWEST_VIEWS - 1) is None

@@ -2,8 +2,9 @@
 
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.photos.extent import explaining_box
-from active_recon.photos.hull import depth_in_masks, hull, object_box
+from active_recon.photos.hull import depth_in_masks, hull
 from active_recon.photos.views import PhotoView
+from active_recon.volumes.object_box import object_box
 import cv2
 import numpy as np
 import pytest

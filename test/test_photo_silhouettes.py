@@ -16,12 +16,12 @@ from active_recon.photos.hull import (
     coverage,
     depth_in_masks,
     hull,
-    object_box,
     seen_cells,
 )
 from active_recon.photos.integrating import even_choice
 from active_recon.photos.readers import LOOKS
 from active_recon.photos.views import PhotoView, view_of
+from active_recon.volumes.object_box import object_box
 from active_recon.volumes.voxelisation import voxelise
 import numpy as np
 from photo_scene import cameras, CENTRE, LENS, on_plain, rendered, SIDE, thing

@@ -10,9 +10,10 @@ from active_recon.photos.board_print import seen_board
 from active_recon.photos.cube import Cube, FIT
 from active_recon.photos.extent import explaining_box
 from active_recon.photos.ground import BOARD_GROUND
-from active_recon.photos.hull import depth_in_masks, hull, object_box, seen_cells
+from active_recon.photos.hull import depth_in_masks, hull, seen_cells
 from active_recon.photos.silhouette_fusion import CELLS, silhouettes
 from active_recon.photos.views import PhotoView
+from active_recon.volumes.object_box import object_box
 import cv2
 import numpy as np
 from numpy.typing import NDArray

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from active_recon.geometry.cameras import Camera
-from active_recon.photos.hull import object_box
+from active_recon.volumes.object_box import object_box
 import cv2
 import numpy as np
 from numpy.typing import NDArray

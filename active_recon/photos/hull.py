@@ -9,7 +9,6 @@ from active_recon.volumes.voxels import cell_centers
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import find_objects, label
 
 TOUCHED = 0.5
 """How far the centre of a cell may lie outside of an object that touches the cell, cells."""
@@ -65,21 +64,6 @@ def _distances(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     if mask.all():  # nothing is not in it
         return np.full(mask.shape, max(mask.shape), np.float32)
     return np.asarray(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3), np.float32)
-
-
-def object_box(occupied: NDArray[np.bool_]) -> NDArray[np.float64] | None:
-    """
-    Return the box of the largest connected part, (2, 3), in sides of the cube from its centre.
-
-    None where nothing is occupied.
-    """
-    labels, count = label(occupied)
-    if not count:
-        return None
-    largest = int(np.bincount(labels.ravel())[1:].argmax())
-    spans = find_objects(labels)[largest]
-    ends = np.array([[span.start, span.stop] for span in spans], np.float64).T
-    return ends / len(occupied) - 0.5
 
 
 def seen_cells(cameras: Sequence[Camera], side: int) -> NDArray[np.bool_]:

@@ -15,7 +15,6 @@ from active_recon.photos.hull import (
     coverage,
     depth_in_masks,
     hull,
-    object_box,
     seen_cells,
 )
 from active_recon.photos.segmented_views import segmented_cells
@@ -24,6 +23,7 @@ from active_recon.photos.views import PhotoView
 from active_recon.reconstructor import Reconstructor
 from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.depth_images import DepthImage
+from active_recon.volumes.object_box import object_box
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray

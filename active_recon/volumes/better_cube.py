@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from active_recon.volumes.object_box import object_box
 from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
@@ -57,18 +58,28 @@ def better_cube(grid: VoxelGrid, threshold: float, views: int) -> BetterCube | N
     None too after fewer than FEWEST_VIEWS, and where nothing is found.
     """
     occupied = grid.occupied(threshold)
-    if views < FEWEST_VIEWS or not occupied.any():
+    if views < FEWEST_VIEWS or not occupied.any() or _fits(_box(occupied)):
         return None
-    box = _box(occupied)
-    share, middle = float(np.ptp(box, axis=0).max()), box.mean(axis=0)
-    if share >= FILLED and np.abs(middle).max() <= OFF_CENTRE * share:
+    box = object_box(occupied)
+    if box is None or _fits(box):
         return None
-    x, y, z = (middle * grid.size).tolist()
+    x, y, z = (box.mean(axis=0) * grid.size).tolist()
+    share = _share(box)
     return BetterCube(share, share * grid.size, (x, y, z))
 
 
+def _share(box: NDArray[np.float64]) -> float:
+    return float(np.ptp(box, axis=0).max())
+
+
+def _fits(box: NDArray[np.float64]) -> bool:
+    """Return whether a cube fits a box in it, (2, 3), in sides of the cube from its centre."""
+    share = _share(box)
+    return bool(share >= FILLED and np.abs(box.mean(axis=0)).max() <= OFF_CENTRE * share)
+
+
 def _box(occupied: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the box of all occupied cells, (2, 3), in sides of the cube from its centre."""
+    """Return the box of all occupied cells, as `object_box` that of the object, but at once."""
     ends = []
     for axis in range(3):
         slices = np.flatnonzero(occupied.any(axis=tuple({0, 1, 2} - {axis})))
