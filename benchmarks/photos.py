@@ -30,7 +30,8 @@ from active_recon.evaluation.posed.photographs import averaged, EVEN, even_views
 from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.models.weights_files import DEFAULT_MODEL, SMALL_MODEL
 from active_recon.photos.camera_file import CameraFile
-from active_recon.photos.reconstruct import from_views, Options, reconstruct
+from active_recon.photos.options import Options
+from active_recon.photos.reconstruct import from_views, reconstruct
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import BoardCameras
 from active_recon.photos.views import PhotoView

@@ -10,7 +10,8 @@ from active_recon.errors import ActiveReconError
 from active_recon.evaluation.statistics import mean_interval
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.cube import MARGIN
-from active_recon.photos.reconstruct import from_views, Options
+from active_recon.photos.options import Options
+from active_recon.photos.reconstruct import from_views
 from active_recon.photos.views import PhotoView
 from active_recon.volumes.meshes import load_mesh
 from benchmarks.world_iou import iou_around

@@ -8,7 +8,8 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.photos.board_photos import seen_board
 from active_recon.photos.files import LARGEST_SIDE, open_photos, photo_paths
-from active_recon.photos.reconstruct import from_files, Options
+from active_recon.photos.options import Options
+from active_recon.photos.reconstruct import from_files
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 import numpy as np
 from photo_rigs import blank_photos, PINHOLE, rig

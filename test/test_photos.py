@@ -22,8 +22,9 @@ from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.conventions import misreading
 from active_recon.photos.cube import first_cube
 from active_recon.photos.doubts import doubts
+from active_recon.photos.options import Options
 from active_recon.photos.picture import shape_picture
-from active_recon.photos.reconstruct import from_files, from_views, Options
+from active_recon.photos.reconstruct import from_files, from_views
 from active_recon.photos.saving import save_shape
 from active_recon.photos.transforms_json import FLIP
 from active_recon.photos.views import _mask, view_of

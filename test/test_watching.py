@@ -10,7 +10,8 @@ from types import SimpleNamespace
 from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.photos.files import open_photo, open_photos
-from active_recon.photos.reconstruct import from_files, Options
+from active_recon.photos.options import Options
+from active_recon.photos.reconstruct import from_files
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 from active_recon.policies.stopping import StoppingRule
 from active_recon.runtimes import precision

@@ -112,7 +112,8 @@ def reconstruct(
 
     Example: active-recon reconstruct photos/ --watch --board --lan
     """
-    from active_recon.photos.reconstruct import from_files, Options
+    from active_recon.photos.options import Options
+    from active_recon.photos.reconstruct import from_files
     from active_recon.photos.saving import FORMATS, of_earlier_run, save_shape
 
     if mesh_format not in FORMATS:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from active_recon.photos.reconstruct import Options
+    from active_recon.photos.options import Options
     from active_recon.photos.shape import Shape
     from active_recon.photos.sources import Source
     from active_recon.policies.stopping import StoppingRule

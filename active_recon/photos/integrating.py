@@ -10,13 +10,7 @@ from active_recon.photos.backgrounds import shown_image
 from active_recon.photos.cube import Cube, FIT
 from active_recon.photos.extent import explaining_box
 from active_recon.photos.ground import Ground, no_table
-from active_recon.photos.hull import (
-    ceiling,
-    coverage,
-    depth_in_masks,
-    hull,
-    seen_cells,
-)
+from active_recon.photos.hull import ceiling, coverage, depth_in_masks, hull, seen_cells
 from active_recon.photos.segmented_views import segmented_cells
 from active_recon.photos.shape import TakenView
 from active_recon.photos.views import PhotoView

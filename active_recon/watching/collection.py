@@ -14,8 +14,9 @@ from active_recon.photos.board_photos import (
 )
 from active_recon.photos.camera_file import CameraFile, PosedPhoto
 from active_recon.photos.files import open_photo, PhotoFile
+from active_recon.photos.options import Options
 from active_recon.photos.readers import camera_files
-from active_recon.photos.reconstruct import from_views, Options
+from active_recon.photos.reconstruct import from_views
 from active_recon.photos.shape import Shape
 from active_recon.photos.sources import (
     BoardCameras,
