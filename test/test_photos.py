@@ -167,6 +167,14 @@ def test_before_clutter_the_cube_is_found_too(clutter, segmented, background):
     assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.5
 
 
+def test_the_network_alone_finds_an_object_that_is_small_in_its_photos(tmp_path):
+    far = cameras(COUNT, 2.2)
+    folder = write_photos(tmp_path / 'far', far, map(on_plain, rendered(far)))
+    shape = active_recon.reconstruct(folder, background='network')
+    assert 0.9 * SIDE < shape.cube.side < 1.25 * SIDE
+    assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.6
+
+
 def test_a_cube_that_is_searched_in_vain_stays_as_wide_as_it_was(views, clutter):
     shape = active_recon.reconstruct(clutter, background='network', ground=False)
     assert shape.cube.side < 1.01 * first_cube(views, np.array([0.0, 0, 1])).side

@@ -16,8 +16,8 @@ FIT = 1.0
 _LEAST_ANGLE_SHARE = 1e-3
 WIDER, NARROWER = 1.6, 0.75
 """
-Side of the first cube relative to the photos' width: wider than they are, or as a segmenter needs
-it, to which a photo that is small in the cube's image is all object.
+Side of the first cube relative to the photos' width: wider than they are, or as a segmenter or the
+network need it, to which a photo that is small in the cube's image is all object.
 """
 _OF_DISTANCE = 1.1  # the cube's corners are 0.87 sides away from its centre
 

@@ -98,11 +98,11 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
     """
     Return the cube about the object, found in `start` and cut down to what is in it.
 
-    Where every view has a mask, their hull is in it, else the network's reconstruction; nothing
-    under a ground is. Raises DataError where nothing is.
+    Where every view has a mask, their hull is in it, else what the segmenter or the network finds;
+    nothing under a ground is. Raises DataError where nothing is.
     """
     some = even_choice(views, SEARCHED_VIEWS)
-    cube, largest = start, start.side * (_WIDER if background == 'segment' else 1.0)
+    cube, largest = start, start.side * (1.0 if are_masked(views) else _WIDER)
     for _ in range(_ROUNDS):
         found = _found(some, cube, reconstructor, background, ground)
         before, cube = cube, cube.part(_box(object_box(found.cells), ground))
@@ -151,6 +151,11 @@ def _box(box: NDArray[np.float64] | None, ground: Ground | None) -> NDArray[np.f
                         'there; give its place by --box, or masks by --masks'
                         + no_table(ground), 'no_cube')
     return box
+
+
+def are_masked(views: Sequence[PhotoView]) -> bool:
+    """Return whether every view has a mask."""
+    return all(view.mask is not None for view in views)
 
 
 def even_choice(views: Sequence[T], count: int) -> list[T]:

@@ -20,6 +20,7 @@ from active_recon.photos.ground import BOARD_GROUND, Ground, no_table
 from active_recon.photos.ground_search import found_ground
 from active_recon.photos.integrating import (
     above_ground,
+    are_masked,
     carved,
     even_choice,
     found_cube,
@@ -146,7 +147,7 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
         background, views = 'segment', [
             replace(view, mask=None, mask_source='') for view in views]
     with reporting('finding the object', 1) as advance:
-        start = cube or first_cube(poses, up, NARROWER if background == 'segment' else WIDER)
+        start = cube or first_cube(poses, up, WIDER if are_masked(views) else NARROWER)
         ground = _ground(views, file, start, options.ground)
         if ground is not None and told is None:
             start = replace(start, up=ground.normal)
