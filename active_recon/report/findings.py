@@ -132,7 +132,7 @@ def _unusual(subject: Subject) -> Iterator[tuple[str, str]]:
 
 def _cube(subject: Subject) -> Iterator[tuple[str, str]]:
     """Yield that the cube does not fit the object, as the last view shows it."""
-    grid = shown_grid(subject.views[-1])
+    grid = shown_grid(subject.views[-1]) if subject.views else None
     better = None if grid is None else better_cube(grid, subject.threshold, len(subject.views))
     if better is not None:
         words = better.reason if subject.of_photos else better.warning
