@@ -21,8 +21,9 @@ from typing import Any
 
 from active_recon.datasets.manifest import read_manifest
 from active_recon.evaluation.statistics import mean_interval
-from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
+from active_recon.geometry.cameras import Intrinsics, orbit_camera
 from active_recon.models.weights_files import DEFAULT_MODEL, find_weights, weights_hash
+from active_recon.photos.cube import Cube
 from active_recon.reconstructor import Reconstruction, Reconstructor
 from active_recon.volumes.better_cube import better_cube
 from active_recon.volumes.meshes import load_mesh
@@ -36,6 +37,7 @@ SIDES = (0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 """Of the cube, relative to the object's longest side."""
 PLACES = ('middle', 'floor')
 _VIEWS = 5
+_UP = np.array([0.0, 0.0, 1.0])
 _LENS = Intrinsics(420, 420, 320, 240, 640, 480)  # shows all of the widest cube
 
 
@@ -103,30 +105,19 @@ def _of_model(file: Path, front: str, seed: int, reconstructor: Reconstructor
     images = [composite(renderer.render(camera), 255) for camera in cameras]
     for side in SIDES:
         for place in PLACES:
-            centre = np.zeros(3)
-            if place == 'floor':
-                centre[2] = side / 2 - float(mesh.extents[2]) / 2
+            above = (side - float(mesh.extents[2])) / 2 if place == 'floor' else 0.0
+            cube = Cube(np.array([0.0, 0.0, above]), side, _UP)
             reconstructor.object_size = side
             reconstructor.reset()
             for image, camera in zip(images, cameras, strict=True):
-                known = reconstructor.add_view(image, _moved(camera, -centre))
-            yield (place, side), _score(known, reconstructor.threshold, centre, mesh)
+                known = reconstructor.add_view(image, cube.camera(camera, side))
+            yield (place, side), _score(known, reconstructor.threshold, cube, mesh)
 
 
-def _moved(camera: Camera, by: Any) -> Camera:
-    pose = camera.pose.copy()
-    pose[:3, 3] += by
-    return Camera(pose, camera.intrinsics)
-
-
-def _score(known: Reconstruction, threshold: float, centre: Any,
-           mesh: Any) -> tuple[float, float]:
-    occupied = known.grid.occupied(threshold)
-    placed = np.eye(4)
-    placed[:3, :3] *= known.grid.size
-    placed[:3, 3] = centre
+def _score(known: Reconstruction, threshold: float, cube: Cube, mesh: Any) -> tuple[float, float]:
+    found = iou_around(known.grid.occupied(threshold), cube.world_from_object(1.0), mesh)
     better = better_cube(known.grid, threshold, _VIEWS)
-    return iou_around(occupied, placed, mesh), np.nan if better is None else better.side
+    return found, np.nan if better is None else better.side
 
 
 def _summary(values: list[tuple[float, float]],

@@ -133,15 +133,15 @@ def build(
     out = reachable(out, cluster)
     counts = {'train': train, 'val': val, 'test': test, 'unseen': unseen}
     categories = tuple(dict.fromkeys(category or ALL_CATEGORIES))
+    made_in = {split: [name for name in categories
+                       if (split == 'unseen') == (name in UNSEEN_CATEGORIES)] for split in counts}
     jobs = [job for name in categories
-            for split, count in counts.items()
-            if (split == 'unseen') == (name in UNSEEN_CATEGORIES)
+            for split, count in counts.items() if name in made_in[split]
             for job in shape_jobs(name, range(FIRST_SEEDS[split], FIRST_SEEDS[split] + count),
                                   out / split)]
     for split, count in counts.items():
         others = f'with categories that are never in {split}/: {", ".join(categories)}'
-        refuse_idle(context, others, count > 0 and not any(
-            (split == 'unseen') == (name in UNSEEN_CATEGORIES) for name in categories), split)
+        refuse_idle(context, others, count > 0 and not made_in[split], split)
     made_by, code = out / 'generators.sha256', generators_hash()
     if not made_by.is_file():
         out.mkdir(parents=True, exist_ok=True)

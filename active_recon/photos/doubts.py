@@ -9,7 +9,7 @@ from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.photos.conventions import conventions
 from active_recon.photos.cube import Cube
 from active_recon.photos.hull import coverage, depth_in_masks, hull
-from active_recon.photos.integrating import COVERED, even_choice, integrate
+from active_recon.photos.integrating import are_masked, COVERED, even_choice, integrate
 from active_recon.photos.shape import TakenView
 from active_recon.photos.views import PhotoView
 from active_recon.reconstructor import Reconstructor
@@ -81,7 +81,7 @@ def better_box(taken: Sequence[TakenView], cube: Cube, threshold: float) -> list
 def _fitting(views: Sequence[PhotoView], cube: Cube, reconstructor: Reconstructor,
              background: str, looks: str) -> str:
     """Return the advice of the convention whose silhouettes agree best; '' for that in use."""
-    masked = all(view.mask is not None for view in views)
+    masked = are_masked(views)
     best, advice = 0.0, ''
     for words, poses in conventions([view.camera.pose for view in views], looks).items():
         others = [replace(view, camera=Camera(pose, view.camera.intrinsics))

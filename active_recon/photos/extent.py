@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from active_recon.geometry.cameras import Camera
 from active_recon.volumes.object_box import object_box
+from active_recon.volumes.voxels import places
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ _COVERED = 127
 def explaining_box(cells: NDArray[np.bool_], masks: Sequence[NDArray[np.bool_]],
                    cameras: Sequence[Camera], standing: bool) -> NDArray[np.float64] | None:
     """
-    Return the box of the largest part of a hull, as low as explains the masks.
+    Return the box of the largest part of a hull, as low as explains the masks; whole without any.
 
     Cameras above an object leave a cone of the hull below it, and another above it, whose rays
     all meet the object, too. Cut off is what no ray of a mask needs: the rest is the object's
@@ -27,7 +28,7 @@ def explaining_box(cells: NDArray[np.bool_], masks: Sequence[NDArray[np.bool_]],
     box = object_box(cells)
     if box is None:
         return None
-    points = (np.argwhere(cells) + 0.5) / len(cells) - 0.5
+    points = (places(cells) + 0.5) / len(cells) - 0.5
     bottoms, tops = [], []
     for mask, camera in zip(masks, cameras, strict=True):
         least, most = _heights(points, mask, camera, 1 / len(cells))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.views import PhotoView
 from active_recon.quality.silhouettes import cube_outline, eroded, silhouette
-from active_recon.volumes.voxels import cell_centers
+from active_recon.volumes.voxels import cell_centers, places
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +93,7 @@ def coverage(cells: NDArray[np.bool_], views: Sequence[PhotoView],
     nothing in the cube. Takes cells (R, R, R) and cameras in sides of their cube. 1 without masks.
     """
     surface = cells & ~eroded(cells)
-    points = (np.argwhere(surface) + 0.5) / len(cells) - 0.5
+    points = (places(surface) + 0.5) / len(cells) - 0.5
     worst = 1.0
     for view, camera in zip(views, cameras, strict=True):
         if view.mask is None:

@@ -110,8 +110,7 @@ def found_cube(views: Sequence[PhotoView], start: Cube, reconstructor: Reconstru
         moved = float(np.linalg.norm(cube.centre - before.centre))
         if max(moved, abs(cube.side - before.side)) < _SAME * before.side:
             break
-    box = (explaining_box(*found, standing=ground is not None) if found.masks
-           else object_box(found.cells))
+    box = explaining_box(*found, standing=ground is not None)
     return before.part(_box(box, ground), FIT)
 
 

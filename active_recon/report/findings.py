@@ -34,8 +34,6 @@ _STOPPED = {
     '': ('no end recorded', 'The episode is incomplete: the recording ends, or a new episode '
                             'begins, before it was done.'),
 }
-
-
 _TOLD_OTHERWISE = ('warned/elevation', 'warned/cube')
 
 

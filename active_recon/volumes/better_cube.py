@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from active_recon.volumes.object_box import object_box
-from active_recon.volumes.voxels import VoxelGrid
+from active_recon.volumes.voxels import places, VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,15 +30,10 @@ class BetterCube:
     centre: tuple[float, float, float]
 
     @property
-    def is_moved(self) -> bool:
-        """Whether its centre is elsewhere."""
-        return max(map(abs, self.centre)) > _CENTRED * self.side
-
-    @property
     def warning(self) -> str:
         """The warning in words, for who sets the parameters of nodes."""
         moved = ''
-        if self.is_moved:
+        if max(map(abs, self.centre)) > _CENTRED * self.side:
             place = ', '.join(f'{value:g}' for value in np.round(self.centre, 4) + 0.0)
             moved = f', with the origin of the object frame moved to ({place}) m'
         return f'{self.reason}: object_size {self.side:.3g} fits it{moved}'
@@ -80,8 +75,5 @@ def _fits(box: NDArray[np.float64]) -> bool:
 
 def _box(occupied: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the box of all occupied cells, as `object_box` that of the object, but at once."""
-    ends = []
-    for axis in range(3):
-        slices = np.flatnonzero(occupied.any(axis=tuple({0, 1, 2} - {axis})))
-        ends.append((slices[0], slices[-1] + 1))
-    return np.array(ends, np.float64).T / len(occupied) - 0.5
+    at = places(occupied)
+    return np.array([at.min(axis=0), at.max(axis=0) + 1]) / len(occupied) - 0.5
