@@ -75,7 +75,7 @@ def test_an_umlaut_of_two_characters_is_that_of_one(tmp_path):
     ('a2.png,45\n', 'none for a10.png'),
     ('45\n', 'rows do not match the images: .* each of the 2 images, .* got 1'),
     ('a2.png,45\n90\n', 'rows that begin with their names'),
-    ('a2.png,45\na10.png,ninety\n', r'line 2: wrong row: expected 1 numbers, .* got a10.png, '
+    ('a2.png,45\na10.png,ninety\n', r'line 2: wrong row: expected a number, .* got a10.png, '
                                     r'ninety'),
     ('a2.png,45\na10.png,inf\n', 'line 2'),
     ('a2.png,45\na10.png,90\nother/a2.png,40', 'line 3: a second row for a2.png'),

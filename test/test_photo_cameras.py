@@ -101,7 +101,7 @@ def test_a_name_without_a_suffix_may_have_dots(photos, tmp_path):
 
 
 @pytest.mark.parametrize('named', [True, False])
-@pytest.mark.parametrize('suffix', ['yml', 'xml', 'yaml'])
+@pytest.mark.parametrize('suffix', ['yml', 'xml', 'yaml', 'json'])
 def test_what_opencv_writes_has_the_cameras_it_was_written_from(named, suffix, photos, tmp_path):
     assert_same(write_opencv(tmp_path / f'cameras.{suffix}', rig(), named), photos, rig())
 
@@ -228,7 +228,12 @@ def test_an_umlaut_of_two_characters_is_that_of_one(tmp_path):
     ({'h': float('inf')}, 'frame 0: no camera: .*h of inf: expected a number above 0'),
     ({'cx': float('nan')}, 'frame 0: no camera: .*cx, cy of nan'),
     ({'fl_x': 1e400}, 'fl_x of inf'),
-    ({'frames': [{'file_path': 'a.png'}]}, 'frame 0: no camera: .*transform_matrix'),
+    ({'k1': None}, 'frame 0: no camera: .*got: k1 of None: expected a number'),
+    ({'frames': ['a.png']}, "frame 0: no camera: .*got: 'a.png'"),
+    ({'frames': [{'file_path': 'a.png'}]},
+     "frame 0: no camera: .*got: none of 'transform_matrix'"),
+    ({'frames': [{'file_path': 'a.png', 'transform_matrix': [[1, 0], 2]}]},
+     r'got: transform_matrix of \[\[1, 0\], 2\]: expected rows of numbers'),
     ({'frames': [{'file_path': 'a.png', 'transform_matrix': np.ones((3, 4)).tolist()}]},
      'frame 0: no rotation'),
     ({'frames': [{'file_path': 'a.png', 'transform_matrix': [

@@ -126,6 +126,13 @@ def test_the_table_has_turned_to_photos_that_cannot_be_read_too(tmp_path):
     np.testing.assert_allclose(azimuths, [0, -0.3, -0.9, -1.2])
 
 
+def test_a_folder_that_is_called_as_a_photo_is_none(tmp_path):
+    blank_photos(tmp_path, rig(PINHOLE, count=2))
+    (tmp_path / 'masks.png').mkdir()
+    photos, left_out = open_photos(photo_paths(tmp_path))
+    assert [photo.name for photo in photos] == ['photo0.png', 'photo1.png'] and not left_out
+
+
 def test_by_time_the_place_of_a_photo_that_cannot_be_read_is_unknown(tmp_path):
     for number, name in enumerate(('IMG_9998', 'IMG_9999', 'IMG_0001', 'IMG_0002')):
         exif = Image.Exif()

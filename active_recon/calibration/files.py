@@ -100,8 +100,9 @@ def _rows(path: Path, names: list[str], count: int) -> dict[str, list[float]]:
     for number, row in rows:
         values = _numbers(row[-count:])
         if values is None or not count <= len(row) <= count + 1:
-            raise DataError(f'{path}, line {number}: wrong row: expected {count} numbers, or an '
-                            f'image and {count} numbers, got {", ".join(row)}')
+            wanted = 'a number' if count == 1 else f'{count} numbers'
+            raise DataError(f'{path}, line {number}: wrong row: expected {wanted}, or an image '
+                            f'and {wanted}, got {", ".join(row)}')
         if len(row) > count:
             if (name := comparable(Path(row[0]).name)) in named:
                 raise DataError(f'{path}, line {number}: a second row for {Path(row[0]).name}: '

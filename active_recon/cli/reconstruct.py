@@ -25,7 +25,8 @@ def reconstruct(
         help='Folder for mesh, voxels, picture and shape.json.')] = Path('reconstruction'),
     cameras: Annotated[Path | None, typer.Option(
         help='Cameras: transforms.json (NeRF, instant-ngp, nerfstudio), the folder of a COLMAP '
-             'model, *_par.txt (Middlebury), or OpenCV YAML. Default: the one beside the photos.'),
+             'model, *_par.txt (Middlebury), or YAML, XML or JSON of OpenCV. Default: the one '
+             'beside the photos.'),
     ] = None,
     axes: Annotated[str | None, typer.Option(
         help='Camera axes of the file, opencv or opengl, instead of those of its format.')] = None,

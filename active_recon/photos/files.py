@@ -84,7 +84,8 @@ def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
     if not place.is_dir():
         raise DataError(f'{place}: no such folder: expected one with photos '
                         f'({", ".join(ENDINGS)})', 'no_photos')
-    paths = sorted(filter(is_photo, place.iterdir()), key=in_order)
+    paths = sorted((path for path in place.iterdir() if is_photo(path) and not path.is_dir()),
+                   key=in_order)
     if not paths:
         raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none',
                         'no_photos')

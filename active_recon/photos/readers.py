@@ -1,6 +1,7 @@
 """Files of cameras by what they look like: which reader each has, and where one is searched."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 import glob
 from pathlib import Path
@@ -16,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 FORMATS = ('transforms.json (NeRF, instant-ngp, nerfstudio), the folder of a COLMAP model, '
-           '*_par.txt (Middlebury), or OpenCV YAML')
+           '*_par.txt (Middlebury), or YAML, XML or JSON of OpenCV')
 LOOKS = ('opencv', 'opengl')
 """Camera axes: x right, y down, z forward; or x right, y up, z backward."""
 _MODEL_FOLDERS = ('.', '0', 'sparse', 'sparse/0', 'colmap/sparse/0')
 _MODEL_FILES, _MODEL_ENDINGS = ('cameras', 'images'), ('.bin', '.txt')
 _YAML = {'.yml', '.yaml', '.xml'}
+_OPENCV_MATRIX = b'opencv-matrix'  # in JSON of OpenCV, which names its types
 
 
 def read_cameras(path: Path, photos: Sequence[PhotoFile], looks: str | None = None) -> CameraFile:
@@ -90,13 +92,21 @@ def _read(path: Path, photos: Sequence[PhotoFile]) -> CameraFile:
         return read_colmap(path)
     if path.name.endswith('_par.txt'):
         return _read_middlebury(path)
+    if path.suffix.lower() in _YAML or _is_json_of_opencv(path):
+        return read_opencv(path, photos)
     if path.suffix.lower() == '.json':
         return read_transforms(path)
-    if path.suffix.lower() in _YAML:
-        return read_opencv(path, photos)
     if path.stem in _MODEL_FILES and path.suffix in _MODEL_ENDINGS:
         return read_colmap(path.parent)
     raise DataError(f'{path}: no cameras: expected {FORMATS}', 'no_cameras')
+
+
+def _is_json_of_opencv(path: Path) -> bool:
+    if path.suffix != '.json':  # OpenCV tells its formats by their endings
+        return False
+    with suppress(OSError):
+        return _OPENCV_MATRIX in path.read_bytes()
+    return False
 
 
 def _read_middlebury(path: Path) -> CameraFile:

@@ -21,6 +21,7 @@ from active_recon.geometry.lenses import Distortion
 from active_recon.json_text import json_value
 from active_recon.photos.camera_file import CameraFile, Entry, Lens, rigid, sized
 import numpy as np
+from numpy.typing import NDArray
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """OpenGL's camera axes in those of OpenCV, and the other way round, (4, 4)."""
@@ -43,21 +44,33 @@ def read_transforms(path: Path) -> CameraFile:
     for number, frame in enumerate(frames):
         where = f'{path}, frame {number}'
         try:
-            matrix = np.array(frame['transform_matrix'], np.float64)
-            name = str(frame['file_path'])
-            if matrix.shape not in ((4, 4), (3, 4)):
-                raise ValueError(f'transform_matrix of the shape {matrix.shape}')
+            matrix, name = _matrix(frame), str(frame['file_path'])
             if not np.allclose(matrix[3:], _LAST_ROW, atol=1e-4):
                 raise ValueError('transform_matrix: expected 0, 0, 0, 1 as its last row, got '
                                  f'{matrix[3].tolist()}; is it transposed?')
             lens = _lens({**content, **frame})
-        except (KeyError, TypeError, ValueError, OverflowError, ViewError) as error:
+        except (KeyError, ValueError, OverflowError, ViewError) as error:
+            got = f'none of {error}' if isinstance(error, KeyError) else error
             raise DataError(f'{where}: no camera: expected file_path, transform_matrix and '
-                            f'intrinsics, got: {error}') from error
+                            f'intrinsics, got: {got}') from error
         pose = rigid(matrix[:3, :3], matrix[:3, 3], where) @ FLIP
         depth = frame.get('depth_file_path')
         entries.append(Entry(name, pose, lens, path.parent / str(depth) if depth else None))
     return CameraFile(str(path), entries, up=np.array([0.0, 0.0, 1.0]), looks='opengl')
+
+
+def _matrix(frame: Any) -> NDArray[np.float64]:
+    """Return a frame's `transform_matrix`, (3, 4) or (4, 4)."""
+    if not isinstance(frame, Mapping):
+        raise ValueError(f'{frame!r}')
+    given = frame['transform_matrix']
+    try:
+        matrix = np.array(given, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'transform_matrix of {given!r}: expected rows of numbers') from error
+    if matrix.shape not in ((4, 4), (3, 4)):
+        raise ValueError(f'transform_matrix of the shape {matrix.shape}')
+    return matrix
 
 
 def _lens(values: Mapping[str, Any]) -> Lens:
@@ -71,7 +84,7 @@ def _lens(values: Mapping[str, Any]) -> Lens:
             across, _positive({'fl_y': across, **values}, 'fl_y'), *_centre(values, width, height),
             width, height, distortion))
     for angle in ('camera_angle_x', 'camera_angle_y'):
-        if angle in values and not 0 < float(values[angle]) < math.pi:
+        if angle in values and not 0 < _number(values, angle) < math.pi:
             raise ValueError(f'{angle} of {values[angle]}: expected radians from 0 to pi')
     _centre(values, 1, 1)
 
@@ -90,7 +103,7 @@ def _lens(values: Mapping[str, Any]) -> Lens:
 
 def _centre(values: Mapping[str, Any], width: int, height: int) -> tuple[float, float]:
     """Return the principal point, by default the middle of a photo of that size."""
-    x, y = float(values.get('cx', width / 2)), float(values.get('cy', height / 2))
+    x, y = (_number(values, name, half) for name, half in (('cx', width / 2), ('cy', height / 2)))
     if not (math.isfinite(x) and math.isfinite(y)):
         raise ValueError(f'cx, cy of {x}, {y}: expected pixels')
     return x, y
@@ -101,7 +114,7 @@ def _distortion(values: Mapping[str, Any]) -> Distortion | None:
     if model not in _STRAIGHT | _FISHEYE:
         raise ValueError(f'camera_model {model}: expected one of '
                          f'{", ".join(sorted(_STRAIGHT | _FISHEYE))}')
-    k1, k2, k3, k4, p1, p2 = (float(values.get(name, 0)) for name in (
+    k1, k2, k3, k4, p1, p2 = (_number(values, name, 0) for name in (
         'k1', 'k2', 'k3', 'k4', 'p1', 'p2'))
     if model in _FISHEYE or values.get('is_fisheye'):
         return Distortion('equidistant', (k1, k2, k3, k4))
@@ -111,7 +124,16 @@ def _distortion(values: Mapping[str, Any]) -> Distortion | None:
 
 
 def _positive(values: Mapping[str, Any], name: str) -> float:
-    value = float(values[name])
+    value = _number(values, name)
     if not 0 < value < math.inf:
         raise ValueError(f'{name} of {value}: expected a number above 0')
     return value
+
+
+def _number(values: Mapping[str, Any], name: str, otherwise: float | None = None) -> float:
+    """Return a number by its name, or another one, which may be needed, where there is none."""
+    value = values[name] if otherwise is None else values.get(name, otherwise)
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{name} of {value!r}: expected a number') from error
