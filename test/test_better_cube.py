@@ -58,6 +58,26 @@ def test_what_hovers_beside_the_object_is_no_part_of_what_fits_it():
     assert found.side == pytest.approx(0.1) and found.centre[2] == pytest.approx(-0.15)
 
 
+def test_what_hovers_at_the_end_of_a_cube_hides_no_small_object():
+    small = grid((10, 20), (10, 20), (0, 10))
+    small.occupancy[0, 0, 39] = small.occupancy[39, 39, 39] = 0.9  # as wide as the cube
+    found = better_cube(small, 0.4, FEWEST_VIEWS)
+    assert found.side == pytest.approx(0.1) and found.centre[2] == pytest.approx(-0.15)
+
+
+def test_parts_of_an_object_that_lie_apart_fill_the_cube_together():
+    # A table whose legs were not found below its top
+    table = grid((0, 40), (0, 40), (36, 40))
+    table.occupancy[15:25, 15:25, 0:8] = 0.9
+    assert better_cube(table, 0.4, FEWEST_VIEWS) is None
+
+
+def test_cells_strewn_over_a_cube_fill_it():
+    strewn = grid((0, 0), (0, 0), (0, 0))
+    strewn.occupancy[::2, ::2, ::2] = 0.9
+    assert better_cube(strewn, 0.4, FEWEST_VIEWS) is None
+
+
 def test_too_few_views_and_an_empty_cube_tell_nothing():
     small = grid((10, 20), (10, 20), (10, 20))
     assert better_cube(small, 0.4, FEWEST_VIEWS - 1) is None

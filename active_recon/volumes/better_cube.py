@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from active_recon.volumes.object_box import object_box
-from active_recon.volumes.voxels import places, VoxelGrid
+from active_recon.volumes.voxels import VoxelGrid
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +14,7 @@ OFF_CENTRE = 0.1
 FEWEST_VIEWS = 3
 """Views from which the extent of what was found can be trusted."""
 _CENTRED = 0.05  # the same where the cube has to change anyway
+_HOVERING = 0.03  # share of the occupied cells, up to which what lies apart is not the object
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,19 @@ def _fits(box: NDArray[np.float64]) -> bool:
 
 
 def _box(occupied: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the box of all occupied cells, as `object_box` that of the object, but at once."""
-    at = places(occupied)
-    return np.array([at.min(axis=0), at.max(axis=0) + 1]) / len(occupied) - 0.5
+    """
+    Return a box of occupied cells as `object_box` that of the object, but at once.
+
+    Few cells that an empty layer of the grid separates from all others are left out.
+    """
+    left, few, ends = occupied, _HOVERING * np.count_nonzero(occupied), []
+    for axis, others in enumerate(((1, 2), (0, 2), (0, 1))):
+        in_layer = np.count_nonzero(left, axis=others)
+        layers = np.flatnonzero(in_layer)
+        parts = np.split(layers, np.flatnonzero(np.diff(layers) > 1) + 1)
+        counts = [in_layer[part].sum() for part in parts]
+        kept = [part for part, count in zip(parts, counts, strict=True)
+                if count > few or count == max(counts)]
+        ends.append((kept[0][0], kept[-1][-1] + 1))
+        left = left.take(range(*ends[-1]), axis)
+    return np.array(ends).T / len(occupied) - 0.5
