@@ -88,7 +88,8 @@ def test_a_replay_tells_of_it_after_the_last_view(capsys):
     known = SimpleNamespace(quality=None, grid=grid((10, 30), (10, 30), (10, 30)))
     steps = [SimpleNamespace(reconstruction=known)] * FEWEST_VIEWS
     _print_quality(SimpleNamespace(steps=steps), 0.4)
-    assert capsys.readouterr().out.rstrip().endswith('object_size 0.2 fits it')
+    assert capsys.readouterr().out.rstrip().endswith(
+        'object_size 0.2 fits it; to replay the bag in that cube: --box 0,0,0,0.2')
     _print_quality(SimpleNamespace(steps=steps[1:]), 0.4)
     assert not capsys.readouterr().out
 

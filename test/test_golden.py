@@ -194,6 +194,7 @@ def copied(golden, tmp_path):
 @other_slow
 @pytest.mark.parametrize(('options', 'name', 'knows_policy'), [
     (('--threshold', '0.6'), 'threshold-0.6', True),
+    (('--box', '0,0.01,-0.02,1.1'), 'box-1.1', False),
     pytest.param(('--model', '2d3d'), '2d3d', False, marks=pytest.mark.slow),
     pytest.param(('--policy',), '', True, marks=pytest.mark.slow)])
 def test_a_replay_with_overrides_is_a_bag_that_replays_to_the_same_bits(

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from active_recon.bags.replay.comparison import compare, SAME_BITS
+from active_recon.bags.replay.other_cube import about
 from active_recon.bags.replay.replay import replay
 from active_recon.bags.replay.what_if import (
     default_folder,
@@ -21,6 +22,7 @@ from active_recon.models.weights import Bundle, save_weights
 from active_recon.models.weights_files import config_hash, weights_hash
 from active_recon.planner import Planner
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
+from active_recon.volumes.depth_images import DepthImage
 import numpy as np
 import pytest
 from recorded_runs import episode_of, image_at, loop_of, policies, run_of, SECOND, THRESHOLD
@@ -189,6 +191,44 @@ def test_under_another_model_alone_nothing_tells_who_chose_the_views(weights, tm
     same_model = run_with_overrides(run, recorded, Overrides(threshold=0.2))
     assert same_model.parameters['/view_planner']['max_views'] == 3
     assert same_model.parameters['/reconstructor']['threshold'] == 0.2
+
+
+def test_in_another_cube_a_run_is_that_of_a_loop_which_had_it(weights, sweep, tmp_path):
+    centre = np.array([0.2, -0.1, 0.3])
+    away = replace(run_of([about(sweep, -centre)]), path=tmp_path, parameters={
+        '/reconstructor': {'object_size': 2.0, 'object_frame': 'table'},
+        '/turntable_camera': {'mesh': 'chair'}, '/view_planner': {'policy': 'attention'}})
+    wide = LoopSetup(weights[0], {'object_size': 2.0}, {'policy': 'attention'})
+    found = run_with_overrides(away, wide, Overrides(box=(*centre.tolist(), 1.0)))
+    expected = reconstruct_episode(
+        sweep, LoopSetup(weights[0], {'object_size': 1.0}, None).load_reconstructor())
+    for view, own in zip(found.episodes[0].views, expected.views, strict=True):
+        np.testing.assert_allclose(view.camera.pose, own.camera.pose, atol=1e-12)
+        assert view.reconstruction.size == 1.0
+        np.testing.assert_allclose(view.reconstruction.occupancy, own.reconstruction.occupancy,
+                                   atol=1e-5)
+    assert set(found.parameters) == {'/reconstructor'}  # the cube of the others is another one
+    assert found.parameters['/reconstructor']['object_size'] == 1.0
+    assert found.parameters['/reconstructor']['object_frame'] == 'object'
+
+
+def test_about_another_middle_goals_and_depth_are_where_they_were(loop):
+    episode = episode_of(*loop, SECOND, 1.0, given_up=(1,))
+    apart = orbit_camera(0.5, 0.2, 3.0)
+    deep = DepthImage(np.ones((4, 4), np.float32), apart)
+    episode = replace(episode, views=[replace(episode.views[0], depth=deep), *episode.views[1:]])
+    centre = np.array([0.3, 0.0, -0.2])
+    moved = about(episode, centre)
+    before, after = (each.first_goal.final for each in (episode, moved))
+    np.testing.assert_allclose(after.camera.position, before.camera.position - centre)
+    np.testing.assert_allclose(after.candidates.positions, before.candidates.positions - centre)
+    x, y, _ = after.candidates.positions.T
+    np.testing.assert_allclose(after.candidates.azimuths, np.arctan2(y, x) % (2 * np.pi))
+    np.testing.assert_allclose(moved.views[0].depth.camera.position, apart.position - centre)
+    back = about(moved, -centre)
+    for view, own in zip(back.views, episode.views, strict=True):
+        np.testing.assert_allclose(view.camera.pose, own.camera.pose, atol=1e-12)
+        assert (view.goal is None) == (own.goal is None)
 
 
 def test_another_policy_takes_the_place_of_what_auto_came_to(weights, sweep, tmp_path):

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
+from active_recon.cli.box_option import box_numbers
 from active_recon.cli.calibrate import printed_board
 from active_recon.cli.needed_options import refuse_lone
 from active_recon.cli.progress import progress_bar
@@ -162,7 +163,7 @@ def reconstruct(
         raise ConfigError('several of --cameras, --board and --turntable-step-deg: give one of '
                           'them')
     source = sources[0] if sources else None
-    options = Options(None if box is None else _numbers(box), unit, size, up, axes, background,
+    options = Options(None if box is None else box_numbers(box), unit, size, up, axes, background,
                       masks, views, model, order=order, ground=ground)
     if watch:
         from active_recon.cli.watch_photos import Pages, watch_photos
@@ -219,14 +220,3 @@ def _write_bag(shape: 'Shape', folder: Path, page: Path) -> None:
     typer.echo(f'wrote {folder}')
     write_page(report_page([Subject('A', run, run.episodes[0])]), page)
     typer.echo(f'wrote {page}')
-
-
-def _numbers(box: str) -> list[float]:
-    try:
-        numbers = [float(each) for each in box.split(',')]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 4 or not all(map(math.isfinite, numbers)):
-        raise ConfigError('--box: invalid cube: expected x,y,z,side, four numbers separated by '
-                          f'commas, got {box!r}')
-    return numbers

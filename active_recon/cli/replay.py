@@ -9,6 +9,7 @@ from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.bag_info import print_refusals, told_depth
 from active_recon.cli.bag_options import with_bag_options
+from active_recon.cli.box_option import box_numbers
 from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
 from active_recon.cli.shape_files import ShapeFiles
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from active_recon.bags.runs.run import RecordedRun
     from active_recon.bags.runs.scene import Scene
     from active_recon.bags.runs.topics import Topics
+    from active_recon.quality.quality import Quality
     from active_recon.reconstructor import Reconstructor
 
 
@@ -40,9 +42,14 @@ def replay(
         'is an error.')] = None,
     threshold: Annotated[float | None, typer.Option(
         help='Replay with another occupancy threshold.')] = None,
+    box: Annotated[str | None, typer.Option(
+        metavar='X,Y,Z,SIDE',
+        help='Replay in another cube: its centre in the object frame and its side, metres, such '
+             'as the one that is told to fit. In the new bag the object frame has its origin at '
+             'that centre; shapes that are written have it there, too.')] = None,
     out: Annotated[Path | None, typer.Option(
-        help='Folder of the new bag, with --model, --policy or --threshold; default: next to BAG, '
-             'with these options in its name.')] = None,
+        help='Folder of the new bag, with --model, --policy, --threshold or --box; default: next '
+             'to BAG, with these options in its name.')] = None,
     weights: Annotated[Path | None, typer.Option(
         help='The weights file that BAG was recorded with, if those weights do not ship.',
     )] = None,
@@ -64,16 +71,18 @@ def replay(
         help=f'Its numbers: {", ".join(PRECISIONS)}; default: as recorded.')] = None,
 ) -> None:
     """
-    Replay a bag and compare it with the recording, or replay it with another model or policy.
+    Replay a bag and compare it with the recording, or with another model, policy or cube.
 
     Network and policy process the images again in the order of their stamps, without ROS and
     without a clock. With the same machine and versions the results are bit-identical; on another
     machine they agree within a tolerance. The output says which; if they differ, the exit code is
-    1. With --model, --policy or --threshold nothing is compared, and a new bag is written.
+    1. With --model, --policy, --threshold or --box nothing is compared, and a new bag is written.
 
     Example: active-recon replay bags/2026-11-21_14-35-54
 
     Example: active-recon replay bags/sweep --policy farthest
+
+    Example: active-recon replay bags/sweep --box 0,0,-0.03,0.12 --mesh mug.ply
 
     Example: active-recon replay drive.db3 --object-size 0.16 --mesh mug.ply
     """
@@ -83,10 +92,11 @@ def replay(
     from active_recon.bags.runs.reading import read_run
     from active_recon.models.weights_files import find_weights
 
-    overrides = Overrides(find_weights(model) if model else None, policy, threshold)
+    overrides = Overrides(find_weights(model) if model else None, policy, threshold,
+                          None if box is None else box_numbers(box))
     if out and overrides == Overrides():
-        raise ConfigError('--out: no bag to write: expected it with --model, --policy or '
-                          '--threshold, got none of them')
+        raise ConfigError('--out: no bag to write: expected it with --model, --policy, '
+                          '--threshold or --box, got none of them')
     if model and weights:
         raise ConfigError('--weights beside --model: expected one of them, the weights of the '
                           'recording or another model, got both')
@@ -159,12 +169,16 @@ def _print_quality(episode: 'ReplayedEpisode', threshold: float) -> None:
     if not episode.steps:
         return
     known = episode.steps[-1].reconstruction
-    if known.quality is not None:
-        warning = f'; {known.quality.warning}' if known.quality.warning else ''
-        typer.echo(f'quality: {known.quality.summary}{warning}')
+    _print_judged(known.quality)
     better = better_cube(known.grid, threshold, len(episode.steps))
     if better is not None:
-        typer.echo(better.warning)
+        typer.echo(better.warning_of_bag)
+
+
+def _print_judged(quality: 'Quality | None') -> None:
+    if quality is not None:
+        warning = f'; {quality.warning}' if quality.warning else ''
+        typer.echo(f'quality: {quality.summary}{warning}')
 
 
 def _print_comparison(verified: 'Verification', run: 'RecordedRun', threshold: float,
@@ -218,6 +232,8 @@ def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Ov
         entropies = ', '.join(f'{view.entropy:z.0f}' for view in episode.views)
         azimuths = ', '.join(str(whole_degrees(view.camera.azimuth)) for view in episode.views)
         typer.echo(f'views from {azimuths} degrees; entropy {entropies} nats')
+        if episode.views:
+            _print_judged(episode.views[-1].quality)
         _print_refused_depth([view.depth_refusal for view in episode.views])
     typer.echo(f'wrote {folder}')
 

@@ -133,7 +133,7 @@ def _cube(subject: Subject) -> Iterator[tuple[str, str]]:
     grid = shown_grid(subject.views[-1]) if subject.views else None
     better = None if grid is None else better_cube(grid, subject.threshold, len(subject.views))
     if better is not None:
-        words = better.reason if subject.of_photos else better.warning
+        words = better.reason if subject.of_photos else better.warning_of_bag
         yield 'warning', f'{words[0].upper()}{words[1:]}.'
 
 

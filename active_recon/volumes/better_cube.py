@@ -40,6 +40,12 @@ class BetterCube:
         return f'{self.reason}: object_size {self.side:.3g} fits it{moved}'
 
     @property
+    def warning_of_bag(self) -> str:
+        """The same for who has a bag, with the option of `replay`."""
+        box = ','.join(f'{value:.4g}' for value in np.round((*self.centre, self.side), 6) + 0.0)
+        return f'{self.warning}; to replay the bag in that cube: --box {box}'
+
+    @property
     def reason(self) -> str:
         """The first part of the warning: what is wrong with the cube at hand."""
         return ('the object ' + (f'fills {self.share:.0%} of the side' if self.share < FILLED

@@ -1,4 +1,4 @@
-"""A recorded run as it would have been with another model, threshold or policy."""
+"""A recorded run as it would have been with another model, threshold, policy or cube."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -8,6 +8,7 @@ from typing import Any
 
 from active_recon import __version__
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
+from active_recon.bags.replay.other_cube import about
 from active_recon.bags.replay.replay import decide
 from active_recon.bags.runs.loop_record import LOOP
 from active_recon.bags.runs.loop_setup import LoopSetup, Overrides
@@ -16,7 +17,7 @@ from active_recon.bags.runs.recorded_object import RecordedObject, replay_views
 from active_recon.bags.runs.run import RecordedEpisode, RecordedGoal, RecordedRun, RecordedView
 from active_recon.environment import run_episode, TimeStep
 from active_recon.errors import DataError
-from active_recon.geometry.cameras import Camera
+from active_recon.geometry.cameras import Camera, OBJECT_FRAME
 from active_recon.geometry.view_distance import nearest_camera, view_distance
 from active_recon.planner import Decision, Planner
 from active_recon.reconstructor import Reconstruction, Reconstructor
@@ -39,8 +40,10 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
     Return the run as it would have been with the overrides, to be written as a bag.
 
     Another policy chooses among the recorded views, which get new stamps. Otherwise views and
-    goals stay as recorded; with another model the run no longer states the policy that chose
-    them. Raises DataError if the policy asks for a view that was never taken, WeightsError or
+    goals stay as recorded; with another model or cube the run no longer states the policy that
+    chose them. With another cube the object frame has its origin at the cube's centre, and the
+    run no longer states what a simulated turntable showed, which is placed in the recorded cube.
+    Raises DataError if the policy asks for a view that was never taken, WeightsError or
     ConfigError if an override is invalid.
     """
     setup = recorded.with_overrides(overrides)
@@ -48,6 +51,8 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
     # The new bag has the whole images: a replay of it has no reduced ones
     before = [replace(episode, views=[replace(view, reduced=None) for view in episode.views])
               for episode in sorted(run.episodes, key=lambda episode: episode.begin)]
+    if overrides.box is not None:
+        before = [about(episode, np.array(overrides.box[:3])) for episode in before]
     if overrides.policy is None:
         episodes = [reconstruct_episode(episode, reconstructor, advance) for episode in before]
     else:
@@ -64,14 +69,17 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
     parameters: dict[str, Mapping[str, Any]] = {'/reconstructor': {
         **node_parameters(run, 'reconstructor'), **_with_depth(episodes), **made_by,
         'threshold': math.nan, 'weights': str(setup.weights), 'runtime': setup.runtime,
-        'precision': setup.precision, **setup.reconstructor}}
-    if setup.planner is not None and (overrides.policy or not overrides.weights):
+        'precision': setup.precision, **setup.reconstructor,
+        **({'object_frame': OBJECT_FRAME} if overrides.box else {})}}
+    if setup.planner is not None and (
+            overrides.policy or not (overrides.weights or overrides.box)):
         planning = {**node_parameters(run, 'view_planner'), **setup.planner,
                     'policy_in_use': setup.planner['policy'],
                     'weights': str(setup.planner['weights'])}
         parameters['/view_planner'] = planning
         provenance['policy'] = planning['policy']
-    parameters.update(nodes_called('turntable_camera', run.parameters))  # of the object shown
+    if overrides.box is None:
+        parameters.update(nodes_called('turntable_camera', run.parameters))
     times = [time for episode in episodes for view in episode.views
              for time in (view.stamp, *view.received.values())]
     return replace(run, episodes=episodes, provenance=provenance, parameters=parameters,

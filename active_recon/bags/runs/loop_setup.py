@@ -28,18 +28,24 @@ _OF_PLANNER = ('policy', 'seed', 'max_views', 'entropy_tolerance', 'target_quali
 
 @dataclass(frozen=True)
 class Overrides:
-    """What to change of the recorded setup; None keeps what was recorded."""
+    """
+    What to change of the recorded setup; None keeps what was recorded.
+
+    `box` is another cube: x, y, z of its centre in the object frame and its side, metres.
+    """
 
     weights: Path | None = None
     policy: str | None = None
     threshold: float | None = None
+    box: tuple[float, float, float, float] | None = None
 
     @property
     def name(self) -> str:
         """The overrides as a part of a folder's name."""
         return '_'.join(word for word in (
             self.weights and self.weights.stem, self.policy,
-            self.threshold and f'threshold-{self.threshold:g}') if word)
+            self.threshold and f'threshold-{self.threshold:g}',
+            self.box and f'box-{self.box[3]:g}') if word)
 
 
 @dataclass(frozen=True)
@@ -59,13 +65,15 @@ class LoopSetup:
     precision: str = 'auto'
 
     def with_overrides(self, overrides: Overrides) -> 'LoopSetup':
-        """Return the setup with another model, policy or threshold."""
+        """Return the setup with another model, policy, threshold or side of the cube."""
         weights, policy = overrides.weights, overrides.policy
         reconstructor = dict(self.reconstructor)
         if weights is not None:
             reconstructor.pop('threshold', None)  # each model has its own
         if overrides.threshold is not None:
             reconstructor['threshold'] = overrides.threshold
+        if overrides.box is not None:
+            reconstructor['object_size'] = overrides.box[3]
         planner = None if self.planner is None else dict(self.planner)
         if policy is not None:
             yaw = {name: reconstructor[name] for name in ('object_yaw',) if name in reconstructor}
