@@ -329,8 +329,23 @@ def test_what_cannot_be_done_is_refused_before_anything_is_measured(
          'expected two in --policy, got 1'),
         (('evaluate', dataset, '--model', weights, '--training', dataset),
          '--training: no validation objects'),
+        (('evaluate', dataset, '--model', weights, '--validation', dataset),
+         '--validation: no effect'),
     ]:
         assert words in refusal(monkeypatch, capsys, *arguments)
+
+
+def test_a_comparison_of_which_a_part_cannot_be_done_measures_nothing(
+        run, plain, dataset, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr('active_recon.evaluation.policy_study.run_all',
+                        lambda *_: pytest.fail('something was measured'))
+    asked = ('evaluate', dataset, '--model', run / 'weights.safetensors', '--policy', 'attention')
+    for more, words in [
+        (('--against', plain[0] / 'weights.safetensors'), 'attention: no view policy'),
+        (('--training', tmp_path, '--validation', dataset), "no dataset in R2N2's layout"),
+        (('--training', dataset, '--validation', tmp_path), "no dataset in R2N2's layout"),
+    ]:
+        assert words in refusal(monkeypatch, capsys, *asked, *more)
 
 
 @pytest.mark.parametrize(('option', 'value', 'words'), [

@@ -35,7 +35,7 @@ import typer
 if TYPE_CHECKING:
     from active_recon.cluster import Crew
     from active_recon.evaluation.policy_study import Runs
-    from active_recon.evaluation.trial import Trial
+    from active_recon.evaluation.trial import Contender, Trial
     from active_recon.models.weights import Bundle
 
 
@@ -99,6 +99,7 @@ def evaluate(
     --against runs/old/weights.safetensors --policy farthest --rows both.csv
     """
     from active_recon.cli.evaluation_plan import EvaluationPlan, run_on_crew
+    from active_recon.datasets.layout import needed_objects
     from active_recon.evaluation.paired import paired as between
     from active_recon.evaluation.paired import require_same_episodes, write_rows
     from active_recon.evaluation.policy_study import compare, run_all
@@ -110,6 +111,9 @@ def evaluate(
     if training and validation is None:
         raise ConfigError('--training: no validation objects: expected --validation too, on which '
                           'the threshold of the mean shape is chosen, got none')
+    if validation is not None and not training:
+        raise ConfigError('--validation: no effect: expected --training too, whose mean shape has '
+                          'its threshold chosen there, got none')
     named = list(dict.fromkeys(map(str.strip, policy.split(',')))) if policy else []
     if paired and len(named) != 2:
         raise ConfigError('--paired: wrong number of policies: expected two in --policy, got '
@@ -123,15 +127,14 @@ def evaluate(
                               'measures networks of several at the same cells')
     for path in filter(None, (json_file, rows)):
         writable(path)  # tells before hours of measuring
+    for each in filter(None, (*(training or ()), validation)):
+        needed_objects(each)
     torch.set_num_threads(threads)
     plan = EvaluationPlan(reachable(data, cluster), tuple(named), views, starts, seeds, seed,
                           split_file, in_bf16(bf16), threads, runtime)
 
-    def measure(weights: Path, folder: Path | None, crew: 'Crew | None',
-                swapped: bool = False) -> _Measured:
-        bundle, trial, every = plan.prepared(weights, folder, tell=True)
-        if swapped:  # before hours of measuring
-            require_swappable(trial, bundle)
+    def measure(weights: Path, crew: 'Crew | None', bundle: 'Bundle', trial: 'Trial',
+                every: 'list[Contender]') -> _Measured:
         if crew is not None:
             run_on_crew(plan, weights, trial, every, crew)
         return _Measured(weights, bundle, trial, run_all(trial, every, progress_bar))
@@ -140,17 +143,23 @@ def evaluate(
         crew = stack.enter_context(workers_of(cluster, workers)) if cluster else None
         folder = cache if cache or not cluster else Path(
             stack.enter_context(TemporaryDirectory()))
-        own = measure(find_weights(model), folder, crew, latent_study)
-        other = measure(find_weights(against), folder, crew) if against else None
-    trial = own.trial
+        files = [find_weights(each) for each in (model, *([against] if against else []))]
+        prepared = [plan.prepared(weights, folder, tell=True) for weights in files]
+        bundle, trial, _ = prepared[0]
+        if latent_study:
+            require_swappable(trial, bundle)
+        for _, compared, _ in prepared[1:]:
+            require_same_episodes(trial, compared)
+        # All that can be refused was, before hours of measuring
+        own, *others = (measure(weights, crew, *each)
+                        for weights, each in zip(files, prepared, strict=True))
     result: dict[str, Any] = {
         'command': command_line(),
         'model': own.bundle.model, 'weights': weights_hash(own.weights),
         'threshold': trial.threshold, 'objects': len(trial.views), 'episodes': len(trial.objects),
         'unreadable': list(trial.views.unreadable), **compare(trial, own.runs)}
     _print_policies(result)
-    if other is not None:
-        require_same_episodes(trial, other.trial)
+    for other in others:
         result['against'] = {
             'model': other.bundle.model, 'weights': weights_hash(other.weights),
             'above': {name: between(runs, other.runs[name], trial.objects)
@@ -162,7 +171,7 @@ def evaluate(
         result['paired'] = between(own.runs[first], own.runs[second], trial.objects)
         typer.echo(f'{first} minus {second}: {difference(result["paired"])}')
     if rows:
-        models = {str(each.weights): (each.trial, each.runs) for each in (own, other) if each}
+        models = {str(each.weights): (each.trial, each.runs) for each in (own, *others)}
         write_rows(rows, models)
         typer.echo(f'wrote {rows}')
     if yaw_study:
