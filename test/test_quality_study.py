@@ -325,6 +325,11 @@ def test_known_objects_with_faults_are_refused():
             Measured.joined([made_up(40, 1), *faults]), 'abc')
 
 
+def test_known_objects_with_faults_are_told_as_such_where_none_to_calibrate_with_have_any():
+    with pytest.raises(DataError, match='known objects with faults: .* got pose; give their files by'):
+        fit(made_up(20, 0, 'pose'), made_up(20, 1), 'abc')
+
+
 def test_a_study_of_hollow_objects_alone_has_no_figures_of_solid_ones(tables):
     hollow = replace(made_up(20, 3), hollow=np.ones(20 * COUNTS))
     found = study(hollow, tables)

@@ -35,16 +35,20 @@ def fit(known: Measured, calibration: Measured, sha256: str) -> QualityTables:
     see `calibrated`. Raises DataError where one of the parts is empty, `known` is a single row,
     has faults, or all of it is hollow.
     """
-    faulty = calibration.rows(calibration.fault != '')
-    for name, part in (('known', known), ('known solid', known.solid), ('faulty', faulty)):
+    if (known.fault != '').any():
+        raise DataError('quality: known objects with faults: expected those without, got '
+                        f'{", ".join(sorted(set(known.fault.tolist()) - {""}))}; give '
+                        'their files by --calibration')
+    for name, part in (('known', known), ('known solid', known.solid)):
         if not len(part):
             raise DataError(f'quality: no {name} objects: expected some to fit with, got none')
+    faulty = calibration.rows(calibration.fault != '')
+    if not len(faulty):
+        raise DataError('quality: no faulty objects: expected some in the half of --calibration '
+                        'that is used, measured with --fault, got none')
     if len(known) < 2:
         raise DataError('quality: a single known reconstruction: expected two or more to tell '
                         'what is usual, got one; measure more objects or views')
-    if (known.fault != '').any():
-        raise DataError('quality: known objects with faults: expected those without, got '
-                        f'{", ".join(sorted(set(known.fault.tolist()) - {""}))}')
     counts = int(calibration.count[calibration.fault == ''].max(initial=1))
     latents = KnownLatents.of(known.latents)
     given = numbers_of(known, latents)
