@@ -117,6 +117,12 @@ def test_it_begins_with_another_or_with_the_way_down_of_a_lifting_network(tmp_pa
             begin_with(fresh(), wrong)
 
 
+def test_an_encoder_of_other_sizes_is_refused_in_one_line_that_tells_which_fits():
+    with pytest.raises(WeightsError, match='encoder like that of lifting, got: ') as refusal:
+        begin_with(fresh(), find_weights('lifting-large'))
+    assert '\n' not in str(refusal.value)
+
+
 def test_a_perfect_silhouette_costs_nothing_and_a_wrong_one_much():
     alpha = torch.zeros(2, 128, 128)
     alpha[:, 40:90, 30:80] = 1

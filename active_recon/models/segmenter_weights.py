@@ -8,6 +8,7 @@ from active_recon.models.companion_weights import Companion
 from active_recon.models.lifting import Lifting
 from active_recon.models.segmenter import Segmenter, SegmenterConfig
 from active_recon.models.weights import load_weights
+from active_recon.models.weights_bytes import misfit
 from active_recon.models.weights_files import SEGMENTER
 
 
@@ -51,7 +52,9 @@ def begin_with(segmenter: Segmenter, path: Path) -> None:
             raise WeightsError(f'{path}: expected a segmenter or a lifting network to begin with')
         segmenter.begin_with(network.encoder)
     except RuntimeError as error:
-        raise WeightsError(f'{path}: of other sizes: {error}') from error
+        raise WeightsError(f'{path}: of other sizes: expected a segmenter or a lifting network '
+                           f'with an encoder like that of lifting, got: {misfit(error)}'
+                           ) from error
 
 
 def is_segmenter(path: Path) -> bool:
