@@ -56,9 +56,10 @@ def test_a_folder_at_the_place_of_a_file_or_a_file_at_that_of_its_folder_is_refu
 @pytest.mark.parametrize('asked', [
     ('evaluate', 'data', '--json', 'file/it.json'), ('evaluate', 'data', '--rows', 'file/it.csv'),
     ('study', 'data', '--out', 'file'), ('policies', 'data', '--out', 'file'),
-    ('paper', 'table1', '--out', 'file'), ('quality', 'measure', 'data', 'file/it.npz')],
-    ids=' '.join)
-def test_what_cannot_be_written_is_told_before_anything_is_measured(
+    ('paper', 'table1', '--out', 'file'), ('quality', 'measure', 'data', 'file/it.npz'),
+    ('train-depth', 'data', '--validation', 'data', '--out', 'file'),
+    ('train-segmenter', 'data', '--validation', 'data', '--out', 'file')], ids=' '.join)
+def test_what_cannot_be_written_is_told_before_the_work(
         asked, dataset, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'file').touch()

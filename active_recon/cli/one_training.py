@@ -7,16 +7,21 @@ from pathlib import Path
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError
 from active_recon.reporting import by_step
+from active_recon.whole_files import writable
 import typer
 
 
 def checkpoint_in(out: Path, resume: bool) -> Path:
-    """Return where a training's checkpoint lies; raises ConfigError on another training's."""
+    """
+    Return where a training's checkpoint lies.
+
+    Raises ConfigError on another training's, and where none can be written.
+    """
     checkpoint = out / 'checkpoint.safetensors'
     if checkpoint.exists() and not resume:
         raise ConfigError(f'{out}: holds another training ({checkpoint.name}); continue it with '
                           '--resume, or name another folder with --out')
-    return checkpoint
+    return writable(checkpoint)
 
 
 @contextmanager
