@@ -105,6 +105,9 @@ def test_what_cannot_be_measured_is_refused_in_one_line(made, tmp_path, monkeypa
     assert 'same objects twice: expected other objects than those measured' in refused(
         made, '--models', 'carving', '--validation', made)
     assert "R2N2's layout" in refused(tmp_path, '--models', 'carving')
+    assert '--up without --photos' in refused(made, '--models', 'carving', '--up', 'z')
+    assert '--counts, --objects with --photos alone: no effect there' in refused(
+        '--photos', tmp_path, '--models', 'carving', '--counts', 1, '--objects', 2)
     assert '_par.txt' in refused('--photos', tmp_path, '--models', 'carving')
     assert 'box: invalid corners: expected six numbers' in refused(
         '--photos', tmp_path, '--box', '1 a', '--models', 'carving')

@@ -6,6 +6,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 
 from active_recon.cli.bf16_option import Bf16, in_bf16
 from active_recon.cli.command_line import command_line
+from active_recon.cli.needed_options import refuse_idle, refuse_lone
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import print_left_out
 from active_recon.cli.runtime_option import MeasuredIn
@@ -21,6 +22,7 @@ _SHIPPED = (DEFAULT_MODEL, SMALL_MODEL, 'carving', PAPER_MODEL)
 
 
 def study(
+    context: typer.Context,
     data: Annotated[list[Path] | None, typer.Argument(
         help="Folders of objects in R2N2's layout (for example made by `active-recon render` or "
              '`dataset build`); each is measured separately.')] = None,
@@ -94,6 +96,10 @@ def study(
     if not data and photos is None:
         raise ConfigError('study: nothing to measure: expected folders of objects, or --photos '
                           'with a folder of photographs, got neither')
+    refuse_lone(context, '--photos', photos is not None, 'box', 'up')
+    refuse_idle(context, 'with --photos alone', not data, 'surfaces', 'training', 'category',
+                'disturbed_views', 'disturbed_objects',
+                *([] if validation else ['counts', 'objects']))
     torch.set_num_threads(threads)
     plan = Plan(_numbers('counts', counts),
                 _numbers('surfaces', '1,5' if surfaces is None else surfaces), seed, in_bf16(bf16))
