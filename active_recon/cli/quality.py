@@ -128,8 +128,8 @@ def fit(
     Example: active-recon quality fit --known train.npz --calibration real.npz --calibration
     real-pose.npz
 
-    To calibrate tables for objects and cameras of your own: active-recon quality fit
-    --calibration mine.npz
+    To calibrate tables for objects and cameras of your own, beside a copy of the weights:
+    active-recon quality fit --calibration mine.npz --model mine/lifting-large.safetensors
     """
     from active_recon.evaluation.quality.faults import FAULTS
     from active_recon.evaluation.quality.fitting import calibrated
