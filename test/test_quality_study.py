@@ -326,7 +326,7 @@ def test_known_objects_with_faults_are_refused():
 
 
 def test_known_objects_with_faults_are_told_as_such_where_none_to_calibrate_with_have_any():
-    with pytest.raises(DataError, match='known objects with faults: .* got pose; give their files by'):
+    with pytest.raises(DataError, match='with faults: .* got pose; give their files by'):
         fit(made_up(20, 0, 'pose'), made_up(20, 1), 'abc')
 
 
