@@ -1,6 +1,7 @@
 """`active-recon train` and `evaluate`, from the command line to the files that they write."""
 
 from contextlib import redirect_stderr, redirect_stdout
+import csv
 from io import StringIO
 import json
 import math
@@ -284,6 +285,16 @@ def test_two_weights_files_are_compared_on_the_same_episodes(
         found['policies']['random']['iou'][0]['mean'], abs=1e-5)
     assert '--paired: wrong number of policies: expected two in --policy, got 0' in refusal(
         monkeypatch, capsys, *arguments, '--paired')
+
+
+def test_the_rows_of_a_policy_that_draws_have_the_seeds_that_it_drew_by(
+        dataset, tmp_path, monkeypatch):
+    out = tmp_path / 'rows.csv'
+    assert command(
+        monkeypatch, 'evaluate', dataset, '--model', PAPER_MODEL, '--policy', 'random', '--views',
+        2, '--starts', 1, '--seed', 3, '--seeds', 2, '--rows', out, '--threads', 1) == 0
+    with out.open() as file:
+        assert {row['seed'] for row in csv.DictReader(file)} == {'3', '4'}
 
 
 def test_a_policy_that_is_named_twice_is_measured_once(dataset, tmp_path, monkeypatch):

@@ -48,8 +48,9 @@ def write_rows(path: Path, trials: Mapping[str, tuple[Trial, Mapping[str, Sequen
     """
     Write a CSV file, whole or not at all: a row for each model, policy, seed, object, start, view.
 
-    `trials` has the trial and the runs of each model by its name. The column `start` is the index
-    of the first view in the dataset; `view` counts from 1.
+    `trials` has the trial and the runs of each model by its name. The column `seed` counts the
+    runs of a policy from the trial's own on, `start` is the index of the first view in the
+    dataset, and `view` counts from 1.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as unfinished, unfinished.open('w', newline='') as file:
@@ -57,7 +58,7 @@ def write_rows(path: Path, trials: Mapping[str, tuple[Trial, Mapping[str, Sequen
         writer.writerow(COLUMNS)
         for model, (trial, runs) in trials.items():
             for policy, seeds in runs.items():
-                for seed, run in enumerate(seeds):
+                for seed, run in enumerate(seeds, trial.identity['seed']):
                     writer.writerows([model, policy, seed, *row] for row in _rows(trial, run))
 
 
