@@ -73,6 +73,15 @@ def test_what_cannot_be_measured_is_refused_in_one_line(
     assert len(line) == 1 and said in line[0]
 
 
+def test_a_learned_policy_that_weights_lack_is_told_before_a_sequence_is_sought(
+        dataset, tmp_path, monkeypatch, capsys):
+    assert command(monkeypatch, dataset, '--model', 'carving', '--views', 2, '--policies',
+                   'sequence,swapped', '--training', dataset, '--threads', 1,
+                   '--out', tmp_path) == 2
+    said = capsys.readouterr()
+    assert 'no view policy' in said.err and 'finding a sequence' not in said.out
+
+
 def test_a_lone_object_is_not_swapped_for_itself(dataset, tmp_path, monkeypatch, capsys):
     first = list_objects(dataset)[0]
     for part in (first.images_folder, first.voxels_path().parent):

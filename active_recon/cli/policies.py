@@ -73,7 +73,7 @@ def policies(
       active-recon policies data/test --policies random,uniform,farthest --objects 60
     """
     from active_recon.datasets.layout import needed_objects
-    from active_recon.evaluation.next_view.study import Episodes
+    from active_recon.evaluation.next_view.study import Episodes, require_policies
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.evaluation.posed.scene import chosen_folders
     from active_recon.evaluation.posed.study import Extent
@@ -96,6 +96,7 @@ def policies(
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, half)
     for folder in (*data, *([training] if training is not None and has_sequence else [])):
         chosen_folders(needed_objects(folder), category)
+    require_policies(entrant, episodes)
     require_writable_study(out, 'policies')  # all of this is told before hours of measuring
     result: dict[str, Any] = {
         'command': command_line(), 'model': entrant.name,

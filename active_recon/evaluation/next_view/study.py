@@ -97,6 +97,14 @@ def known_names() -> list[str]:
     return [*POLICIES, SEQUENCE, SWAPPED, SWAPPED_TURNED, PEEKING, ORACLE, TOGETHER]
 
 
+def require_policies(entrant: Entrant, episodes: Episodes) -> None:
+    """Raise as `load_policy` where a policy cannot be had, as a learned one of its weights."""
+    for name in episodes.policies:
+        plain, _ = _parted(name)
+        if plain in (*POLICIES, SWAPPED, SWAPPED_TURNED):
+            _policy(plain, [episodes.seed], entrant, episodes, None)
+
+
 def find_offsets(scene: Scene, entrant: Entrant, episodes: Episodes,
                  advance: Callable[[int], None] = lambda done: None) -> Offsets:
     """Return the best sequence of views that is the same for all of a set's objects."""
