@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+import signal
 import sys
 import time
 
@@ -43,6 +44,21 @@ def signalled(kind):
     """Get a signal, as all processes of a terminal do; return which."""
     os.kill(os.getpid(), kind)
     return kind
+
+
+class InterruptedAtStart:
+    """What gets Ctrl-C in a worker that still imports it."""
+
+    def __call__(self, number):
+        return number
+
+    def __reduce__(self):
+        return _interrupted, ()
+
+
+def _interrupted():
+    os.kill(os.getpid(), signal.SIGINT)
+    return InterruptedAtStart()
 
 
 def slowly(folder, number):

@@ -97,6 +97,12 @@ def test_ctrl_c_and_a_closed_terminal_are_the_driver_s():
             ] == kinds
 
 
+def test_ctrl_c_ends_workers_that_still_import_without_a_word(capfd):
+    [found] = results(LocalCrew(2), cluster_items.InterruptedAtStart(), range(1))
+    assert found == Result(0, None, DIED, 'worker_died')
+    assert not capfd.readouterr().err
+
+
 @pytest.mark.parametrize('kind', ['local', pytest.param('ray', marks=pytest.mark.slow)])
 def test_items_are_drawn_as_workers_have_room_for_them(crews, kind):
     drawn = done = most = 0

@@ -1,18 +1,15 @@
 """Work in processes of this machine."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
-import multiprocessing
-import os
-import signal
-import threading
 from typing import Any
 
 from active_recon.cluster.bundles import attempt_all, Bundle, Bundles, Done
+from active_recon.cluster.pools import WorkerPool
 from active_recon.cluster.results import attempt, ATTEMPTS, DIED, Result
 from active_recon.cluster.stores import Place
 
@@ -76,9 +73,8 @@ class _Hand:
         self.renew()
 
     def renew(self) -> None:
-        # spawn, because a fork of a process that has threads (torch, embree, ROS) may hang
-        self._pool = self._stack.enter_context(ProcessPoolExecutor(
-            1, multiprocessing.get_context('spawn'), _begin, (self._function,)))
+        self._pool = self._stack.enter_context(
+            WorkerPool(1, partial(_begin, self._function)))
 
     def submit(self, items: list[Any]) -> 'Future[Done]':
         try:
@@ -123,21 +119,6 @@ _function: Callable[[Any], Any] | None = None
 def _begin(function: Callable[[Any], Any]) -> None:
     global _function
     _function = function
-    begin_worker()
-
-
-def begin_worker() -> None:
-    """Prepare a worker: Ctrl-C and a closed terminal are the driver's, and none outlives it."""
-    for kind in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(kind, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def follow() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
 
 
 def _work(items: list[Any]) -> Done:

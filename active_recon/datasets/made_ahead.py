@@ -1,12 +1,12 @@
 """Processes that make the objects of a recipe, some ahead of what is asked for."""
 
 from collections import deque
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from itertools import count
-import multiprocessing
 
-from active_recon.cluster.local import begin_worker
+from active_recon.cluster.pools import WorkerPool
 from active_recon.datasets.recipes import Made, Maker
 from active_recon.errors import WorkError
 
@@ -21,9 +21,7 @@ class MadeAhead:
 
     def __init__(self, maker: Maker, workers: int, ahead: int, first: int = 0,
                  stride: int = 1) -> None:
-        # spawn, because a fork of a process that has threads (torch) may hang
-        self._pool = ProcessPoolExecutor(workers, multiprocessing.get_context('spawn'), _begin,
-                                         (maker,))
+        self._pool = WorkerPool(workers, partial(_begin, maker))
         self._numbers, self._ahead = count(first, stride), workers + ahead
         self._coming: deque[Future[Made]] = deque()
 
@@ -53,7 +51,6 @@ _maker: Maker | None = None
 def _begin(maker: Maker) -> None:
     global _maker
     _maker = maker
-    begin_worker()
 
 
 def _make(number: int) -> Made:
