@@ -33,13 +33,23 @@ def writable(path: Path) -> Path:
 
     To be asked before the work whose results go there.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        raise ConfigError(f'{path}: cannot be written: expected a folder that files can be made '
-                          f'in, got: {error.strerror}') from error
+    _require_room_in(path.parent, path)
     if path.is_dir():
         raise ConfigError(f'{path}: cannot be written: expected a file, got a folder')
     return path
+
+
+def writable_folder(path: Path) -> Path:
+    """Return the path of a folder; make it, and raise as `writable` does, to be asked as it is."""
+    _require_room_in(path, path)
+    return path
+
+
+def _require_room_in(folder: Path, told: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ConfigError(f'{told}: cannot be written: expected a folder that files can be made '
+                          f'in, got: {error.strerror}') from error

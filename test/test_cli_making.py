@@ -9,7 +9,7 @@ from active_recon.cli.main import app
 from active_recon.datasets.layout import list_objects
 from active_recon.errors import ConfigError, DataError
 from active_recon.shapes import CATEGORIES, generators_hash, UNSEEN_CATEGORIES
-from command_line import command
+from command_line import command, refusal
 import pytest
 import trimesh
 from typer.testing import CliRunner
@@ -165,7 +165,19 @@ def test_dataset_refuses_what_is_no_category_and_what_leaves_nothing_to_make(tmp
     with pytest.raises(ConfigError, match="unknown category: expected one of .*, got 'castle'"):
         run('dataset', 'build', tmp_path, '--category', 'castle')
     with pytest.raises(DataError, match='no objects to make: expected at least one'):
-        run('dataset', 'build', tmp_path, '--train', 0, '--val', 0, '--test', 0, '--unseen', 0)
+        run('dataset', 'build', tmp_path / 'out', '--train', 0, '--val', 0, '--test', 0,
+            '--unseen', 0)
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_objects_are_made(
+        meshes, tmp_path, monkeypatch, capsys):
+    (tmp_path / 'file').touch()
+    for place in ('file', 'file/below'):
+        for asked in (['render', meshes, tmp_path / place],
+                      ['dataset', 'build', tmp_path / place, '--train', 1]):
+            assert f'{place}: cannot be written: expected a folder that files can be' in refusal(
+                monkeypatch, capsys, *asked)
 
 
 def test_dataset_refuses_counts_of_splits_that_its_categories_are_never_in(tmp_path):

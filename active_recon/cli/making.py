@@ -9,7 +9,7 @@ from active_recon.cli.needed_options import refuse_idle, refuse_lone
 from active_recon.cli.progress import progress_bar
 from active_recon.datasets.seeds import FIRST_SEEDS, SEEDS
 from active_recon.errors import ConfigError, DataError
-from active_recon.whole_files import whole_file
+from active_recon.whole_files import whole_file, writable_folder
 import typer
 
 if TYPE_CHECKING:
@@ -90,6 +90,7 @@ def render(
                           f'--explicit-licence, got {meshes}')
     else:
         jobs = mesh_jobs(meshes, out, up, front)
+    _require_work(jobs, out)
     _make('rendering', jobs, samples, fine, viewing, depth, workers, cluster, [meshes])
 
 
@@ -142,9 +143,9 @@ def build(
     for split, count in counts.items():
         others = f'with categories that are never in {split}/: {", ".join(categories)}'
         refuse_idle(context, others, count > 0 and not made_in[split], split)
+    _require_work(jobs, out)
     made_by, code = out / 'generators.sha256', generators_hash()
     if not made_by.is_file():
-        out.mkdir(parents=True, exist_ok=True)
         with whole_file(made_by) as unfinished:
             unfinished.write_text(code + '\n')
     elif made_by.read_text().strip() != code:
@@ -153,14 +154,19 @@ def build(
     _make('making', jobs, samples, fine, viewing, depth, workers, cluster)
 
 
+def _require_work(jobs: 'list[Job]', out: Path) -> None:
+    """Raise DataError where there is nothing to make, ConfigError where nothing can be written."""
+    if not jobs:
+        raise DataError('no objects to make: expected at least one, got none with these options')
+    writable_folder(out)  # else each object is refused, once it is rendered
+
+
 def _make(title: str, jobs: 'list[Job]', samples: int, fine: bool, viewing: 'Viewing',
           depth: bool, workers: int | None, cluster: str | None,
           reads: Sequence[Path] = ()) -> None:
     from active_recon.cluster.telling import told
     from active_recon.datasets.making import make_dataset
 
-    if not jobs:
-        raise DataError('no objects to make: expected at least one, got none with these options')
     rejected, kept = [], 0
     with workers_of(cluster, workers) as crew, progress_bar(title, len(jobs)) as advance:
         outcomes = make_dataset(jobs, samples, 1, fine, viewing, depth, crew, reads)
