@@ -1,6 +1,7 @@
 """Archives in an object store: the rows are those of paths; what is not reached is told."""
 
 from importlib import import_module
+from pathlib import Path
 import shutil
 import subprocess
 import sys
@@ -20,16 +21,25 @@ PAPER = ROOT / 'bags' / 'golden' / 'paper'
 
 def test_what_is_no_shared_storage_is_refused(monkeypatch, capsys, tmp_path):
     for url, reason in (('memory://day', 'the memory of one process'),
-                        ('https://example.com/day', 'no such storage')):
+                        ('https://example.com/day', 'no such storage'),
+                        ('s3:/fleet/day', 'no such storage')):
         said = refusal(monkeypatch, capsys, 'batch', 'measure', url, '--out', tmp_path)
         assert reason in said
         assert 'expected a path or file:///PATH that all machines see, or s3://BUCKET' in said
+    assert 's3:/fleet/out: no such storage' in refusal(
+        monkeypatch, capsys, 'batch', 'measure', PAPER, '--out', 's3:/fleet/out')
     said = refusal(monkeypatch, capsys, 'batch', 'measure', PAPER, '--out', tmp_path, '--truth',
                    'ftp://fleet/truth')
     assert 'no such storage' in said
     for command in (['render', 's3://fleet/meshes', tmp_path], ['dataset', 'build', 's3://fleet']):
         assert 'no path: expected a folder that all machines see' in refusal(
             monkeypatch, capsys, *command)
+
+
+def test_a_url_is_the_same_whatever_the_case_of_its_scheme(monkeypatch):
+    monkeypatch.setattr(Stored, 'require_package', lambda self: None)
+    assert place_of('S3://Fleet/Day/') == Stored('s3://Fleet/Day')
+    assert place_of('FILE:///fleet/Day') == place_of('file:/fleet/Day') == Path('/fleet/Day')
 
 
 def test_without_its_package_a_store_is_refused_with_what_to_install(monkeypatch):

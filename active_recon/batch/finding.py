@@ -19,11 +19,11 @@ def place_of(text: str) -> Place:
 
     Raises ConfigError on other URLs, and where the store's package is not installed.
     """
-    if not re.match(r'[A-Za-z][A-Za-z0-9+.-]*://', text):
+    if not re.match(r'[A-Za-z][A-Za-z0-9+.-]+:/', text):
         return Path(text).absolute()
     url = urlsplit(text)
     if url.scheme in PACKAGES and url.netloc:
-        place = Stored(text.rstrip('/'))
+        place = Stored(url.scheme + text[len(url.scheme):].rstrip('/'))  # S3:// is s3://
         place.require_package()
         return place
     if url.scheme != 'file' or url.netloc not in ('', 'localhost'):
