@@ -1,5 +1,6 @@
 """Many items on a Ray cluster and in local processes: the same results, whatever dies."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 import gc
@@ -7,8 +8,9 @@ from pathlib import Path
 import shutil
 import signal
 import sys
+from types import SimpleNamespace
 
-from active_recon.cli import evaluation_plan
+from active_recon.cli import cluster_option, evaluation_plan
 from active_recon.cli.evaluation_plan import EvaluationPlan, run_on_crew
 from active_recon.cluster import bundles, crew_of, Result
 from active_recon.cluster.bundles import attempt_all, Bundles
@@ -226,6 +228,16 @@ def test_without_ray_or_a_cluster_the_error_says_what_to_do(monkeypatch, capsys,
     monkeypatch.setitem(sys.modules, 'ray', None)
     assert 'pip install active_recon[cluster]' in refusal(
         monkeypatch, capsys, *arguments, 'auto')
+
+
+def test_a_cluster_that_has_no_worker_yet_is_told(monkeypatch, capsys):
+    for workers in (0, 1):
+        crew = SimpleNamespace(workers=workers, dashboard='')
+        monkeypatch.setattr(cluster_option, 'crew_of', lambda *_, crew=crew: nullcontext(crew))
+        with cluster_option.workers_of('head:6379', None) as found:
+            assert found is crew
+        assert ('no CPUs at head:6379: the work begins once a machine joins' in
+                capsys.readouterr().err) == (workers == 0)
 
 
 def test_progress_tells_the_rate_the_workers_and_the_refused():

@@ -31,10 +31,13 @@ def require_cluster(cluster: str | None, workers: int | None) -> None:
 
 @contextmanager
 def workers_of(cluster: str | None, workers: int | None) -> Iterator[Crew]:
-    """Yield the workers, and print the address of their dashboard where they have one."""
+    """Yield the workers; print where their dashboard is, if any, and where there are none yet."""
     with crew_of(cluster, workers) as crew:
         if crew.dashboard:
             typer.echo(f'dashboard of Ray: {crew.dashboard}', err=True)
+        if not crew.workers:
+            typer.echo(f'--cluster: no CPUs at {cluster}: the work begins once a machine joins '
+                       '(`ray start --address HOST:PORT`)', err=True)
         yield crew
 
 
