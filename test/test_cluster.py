@@ -220,8 +220,9 @@ def test_workers_of_an_evaluation_find_its_split_file_from_any_folder(
 
 def test_without_ray_or_a_cluster_the_error_says_what_to_do(monkeypatch, capsys, tmp_path):
     arguments = ['dataset', 'build', tmp_path, '--cluster']
-    assert "invalid address: expected 'auto', 'local', 'ray://HOST:PORT' or 'HOST:PORT', got " \
-        "'far away'" in refusal(monkeypatch, capsys, *arguments, 'far away')
+    for address in ('far away', 'head', 'ray://head'):
+        assert "invalid address: expected 'auto', 'local', 'ray://HOST:PORT' or 'HOST:PORT', " \
+            f"got '{address}'" in refusal(monkeypatch, capsys, *arguments, address)
     for address in ('127.0.0.1:9', 'ray://127.0.0.1:9'):
         assert f'no cluster at {address}: expected a Ray that runs there' in refusal(
             monkeypatch, capsys, *arguments, address)

@@ -12,7 +12,7 @@ from active_recon.cluster.stores import Place
 from active_recon.errors import ConfigError
 
 LOCAL = 'local'
-_ADDRESS = re.compile(r'auto|local|ray://\S+|[\w.-]+:\d+')
+_ADDRESS = re.compile(r'auto|local|ray://\S+:\d+|[\w.-]+:\d+')
 
 
 class Crew(Protocol):
