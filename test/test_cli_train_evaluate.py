@@ -119,6 +119,20 @@ def test_a_new_training_never_overwrites_the_checkpoints_of_another(
     assert (run / 'reconstruction.safetensors').read_bytes() == before
 
 
+def test_weights_of_a_training_that_keeps_nothing_else_are_never_overwritten(
+        dataset, tmp_path, monkeypatch, capsys):
+    (tmp_path / 'weights.safetensors').touch()
+    assert 'holds another training (weights.safetensors)' in refusal(
+        monkeypatch, capsys, *training(dataset, tmp_path))
+
+
+def test_a_training_says_before_it_reads_data_that_its_folder_cannot_be_written(
+        dataset, tmp_path, monkeypatch, capsys):
+    (tmp_path / 'file').touch()
+    assert 'weights.safetensors: cannot be written: expected a folder' in refusal(
+        monkeypatch, capsys, *training(dataset, tmp_path / 'file' / 'run'))
+
+
 def test_a_log_of_another_training_is_never_mixed_with_a_new_one(
         dataset, tmp_path, monkeypatch, capsys):
     log = tmp_path / 'tensorboard' / 'reconstruction' / 'events.out.tfevents.1.host'
@@ -439,12 +453,15 @@ def test_weights_of_another_network_are_refused(
     assert f'got those of {begun}; name it by --model' in line
 
 
-def test_a_policy_alone_leaves_its_reconstruction_as_it_was(run, dataset, tmp_path, monkeypatch):
+def test_a_policy_alone_leaves_its_reconstruction_as_it_was(
+        run, dataset, tmp_path, monkeypatch, capsys):
     out = tmp_path / 'policy'
     assert command(
         monkeypatch, 'train', dataset, '--validation', dataset, '--out', out, '--policy-steps', 2,
         '--policy-batch-size', 2, '--group-size', 2, '--threads', 1, '--seed', 3, '--freeze-from',
         run / 'weights.safetensors') == 0
+    told = capsys.readouterr().out
+    assert 'chosen on' not in told and f'that of {run / "weights.safetensors"}' in told
     before, after = (load_file(folder / 'weights.safetensors') for folder in (run, out))
     for name, tensor in before.items():
         same = bool((after[name] == tensor).all())

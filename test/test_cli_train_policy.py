@@ -62,6 +62,9 @@ def test_a_policy_is_learned_in_two_rounds_and_chooses(
     assert before == {file: file.stat().st_mtime_ns
                       for file in (tmp_path / 'run').rglob('*.npz')}
     np.testing.assert_equal(load_file(made), written)
+    made.unlink()
+    assert command(monkeypatch, 'train-policy', *arguments, '--model', 'named=carving') == 0
+    np.testing.assert_equal(load_file(made), written)
     assert command(monkeypatch, 'train-policy', *arguments, '--candidates', 5) == 2
     assert 'candidates: expected 4 as before, got 5; name another' in capsys.readouterr().err
     # Their views would be chosen by another scorer

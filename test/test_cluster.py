@@ -99,7 +99,15 @@ def test_ctrl_c_and_a_closed_terminal_are_the_driver_s():
             ] == kinds
 
 
-def test_ctrl_c_ends_workers_that_still_import_without_a_word(capfd):
+@pytest.fixture
+def heard():
+    """Ctrl-C is heard, also where the tests run in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_ends_workers_that_still_import_without_a_word(heard, capfd):
     [found] = results(LocalCrew(2), cluster_items.InterruptedAtStart(), range(1))
     assert found == Result(0, None, DIED, 'worker_died')
     assert not capfd.readouterr().err

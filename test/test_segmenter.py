@@ -175,6 +175,7 @@ def test_it_is_trained_and_resumed_from_the_command_line(lamps, tmp_path, monkey
     assert command(monkeypatch, *arguments) == 0
     said = capsys.readouterr()
     assert 'IoU of silhouettes on validation: white ' in said.out
+    assert 'validation: 7/7' in said.out
     assert 'warning: 2 of 2 validation objects are trained on too: their IoU is too h' in said.err
     assert is_segmenter(tmp_path / 'run/segmenter.safetensors')
     assert command(monkeypatch, *arguments) == 2  # holds another training

@@ -173,6 +173,15 @@ def test_a_training_goes_on_where_the_processor_computes_in_another_precision(
     assert [step for step, _ in told] == [step for step, _ in whole[1][3:]]
 
 
+def test_a_training_goes_on_with_other_checkpoints_to_the_same_weights(
+        whole, views, tiny, tmp_path):
+    path = tmp_path / 'run.safetensors'
+    train(CONFIG, views, tiny, path, until=3)
+    other = replace(CONFIG, checkpoint_every=2, validate_every=3)
+    resumed, _ = train(other, views, tiny, path, resume=True)
+    assert_same(resumed, whole[0])
+
+
 def test_a_finished_training_that_is_resumed_does_nothing(whole, finished, views, tiny):
     resumed, told = train(CONFIG, views, tiny, finished, seed=9, resume=True)
     assert told == []

@@ -24,6 +24,7 @@ from active_recon.cli.made_objects import (
 from active_recon.cli.needed_options import refuse_idle, refuse_lone
 from active_recon.cli.reading import read_objects, Split, warn_of_shared_objects
 from active_recon.errors import ConfigError
+from active_recon.whole_files import writable
 import typer
 
 if TYPE_CHECKING:
@@ -154,8 +155,8 @@ def train(
     if scheme not in ('two-stage', 'joint'):
         raise ConfigError("--scheme: unknown scheme: expected 'two-stage' or 'joint', got "
                           f'{scheme!r}')
-    begun_here = [*(out / f'{stage}.safetensors' for stage in ('reconstruction', 'policy', 'joint')
-                    if (out / f'{stage}.safetensors').exists()),
+    begun_here = [*(file for stage in ('reconstruction', 'policy', 'joint', 'weights')
+                    if (file := out / f'{stage}.safetensors').exists()),
                   *(out / 'tensorboard').rglob('events.*')]
     if not resume and begun_here:
         raise ConfigError(f'{out}: holds another training ({begun_here[0].name}); continue it '
@@ -216,6 +217,7 @@ def train(
     _refuse_unused({'--volume-weight': volume_weight, '--silhouette-weight': silhouette_weight,
                     '--volume-loss': volume_loss}, model, network)
     asked = network.spec
+    writable(out / 'weights.safetensors')  # tells before data are read
     with ExitStack() as stack:
         if data:
             training: ViewSet | MadeObjects = read_objects(
@@ -245,8 +247,8 @@ def train(
                            generators_sha256=generators_hash())
         weights = out / 'weights.safetensors'
         save_weights(weights, bundle)
-        typer.echo(f'threshold {bundle.threshold:.2f}, chosen on validation\n'
-                   f'wrote {weights} and its card')
+        chosen = f'that of {freeze_from}' if freeze_from else 'chosen on validation'
+        typer.echo(f'threshold {bundle.threshold:.2f}, {chosen}\nwrote {weights} and its card')
         if own_file != model:
             typer.echo(f'they load where {OWN_NETWORKS}={quote(own_file)} is set')
 

@@ -79,7 +79,7 @@ def train_policy(
     from active_recon.models.scorer_weights import load_scorer_of_any_network, save_scorer
     from active_recon.models.view_scorer import ScorerConfig
     from active_recon.models.weights import state_hash
-    from active_recon.models.weights_files import find_weights, scorer_path
+    from active_recon.models.weights_files import scorer_path
     from active_recon.training.gain_files import Collecting
     from active_recon.training.looked import joined
     from active_recon.training.scorer import (
@@ -129,7 +129,8 @@ def train_policy(
                      'validation_share_of_the_one_step_gap': shares})
         typer.echo(f'round {number}: {shares["all"]:.2f} of the one-step gap on validation')
     assert scorer is not None
-    path = out / scorer_path(find_weights(model)).name
+    assert entrant.path is not None  # of a file, as all that are loaded
+    path = out / scorer_path(entrant.path).name
     save_scorer(path, scorer, config, entrant.weights, {
         'command': command_line(), 'network': entrant.name,
         'training': training.to_dict(), 'collecting': collecting.to_dict(),

@@ -1,11 +1,13 @@
 """`active-recon train-segmenter`: what of an image is the object, before any background."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 from active_recon.cli.bf16_option import Bf16, trained_in_bf16
 from active_recon.cli.command_line import command_line
 from active_recon.cli.one_training import checkpoint_in, shown_steps
+from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import read_objects, warn_of_shared_objects
 import typer
 
@@ -54,7 +56,7 @@ def train_segmenter(
     from active_recon.models.weights_files import find_weights, weights_hash
     from active_recon.training.loop import make_fabric, Run, TrainingConfig
     from active_recon.training.segmenter import train_segmenter
-    from active_recon.training.silhouettes import silhouette_figures
+    from active_recon.training.silhouettes import KINDS, silhouette_figures
     from active_recon.volumes.voxels import FINE_RESOLUTION
     import torch
 
@@ -83,7 +85,9 @@ def train_segmenter(
             fabric, checkpoint, report, resume, begun_with=begun_with))
     if not fabric.is_global_zero:
         return
-    figures = silhouette_figures(segmenter.cpu().eval(), held_out)
+    with progress_bar('validation', len(KINDS)) as advance:
+        figures = silhouette_figures(segmenter.cpu().eval(), held_out,
+                                     advance=partial(advance, 1))
     typer.echo('IoU of silhouettes on validation: '
                + ', '.join(f'{kind} {value:.3f}' for kind, value in figures.items()))
     written = out / 'segmenter.safetensors'

@@ -16,6 +16,8 @@ from safetensors.torch import load_file, save
 from torch import nn, Tensor
 from torch.optim import Optimizer
 
+_FREE = {'bfloat16', 'checkpoint_every', 'validate_every'}  # settings of a training
+
 
 @dataclass(frozen=True)
 class Checkpoint:
@@ -96,13 +98,14 @@ def differences(made: dict[str, Any], asked: dict[str, Any]) -> Iterator[str]:
     """
     Yield in words how settings differ, those within settings each by itself.
 
-    Mixed precision may: it is what suits the machine, and another may go on with what one began.
+    Those of _FREE may: they change no result but for mixed precision, which is what suits the
+    machine, and another may go on with what one began.
     """
     for name in sorted(made.keys() | asked.keys()):
         one, other = made.get(name), asked.get(name)
         if isinstance(one, dict) and isinstance(other, dict):
             yield from differences(one, other)
-        elif one != other and name != 'bfloat16':
+        elif one != other and name not in _FREE:
             yield f'{name}: expected {_short(one)} as before, got {_short(other)}'
 
 

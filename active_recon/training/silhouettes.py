@@ -38,7 +38,15 @@ def silhouette_ious(find: Callable[[Tensor], Tensor], views: ViewSet, kind: str,
 
 
 def silhouette_figures(find: Callable[[Tensor], Tensor], views: ViewSet,
-                       kinds: Sequence[str] = KINDS, count: int = 256) -> dict[str, float]:
-    """Return the mean IoU of silhouettes before backgrounds of each kind; see above."""
-    return {kind: round(float(silhouette_ious(find, views, kind, count).mean()), 4)
-            for kind in kinds}
+                       kinds: Sequence[str] = KINDS, count: int = 256,
+                       advance: Callable[[str], None] = lambda kind: None) -> dict[str, float]:
+    """
+    Return the mean IoU of silhouettes before backgrounds of each kind; see above.
+
+    `advance` is called with each kind once it is measured.
+    """
+    found = {}
+    for kind in kinds:
+        found[kind] = round(float(silhouette_ious(find, views, kind, count).mean()), 4)
+        advance(kind)
+    return found
