@@ -165,6 +165,7 @@ def test_a_full_disk_stops_the_work_with_one_error(crews, kind):
         list(crew.map(cluster_items.without_room, range(100)))
 
 
+@pytest.mark.slow
 def test_a_machine_that_does_not_see_a_path_says_which(crews, tmp_path):
     missing = tmp_path / 'archive'
     with crews['ray']() as crew, pytest.raises(

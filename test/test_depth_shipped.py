@@ -89,6 +89,7 @@ def rendered_of(mesh, camera):
     return Renderer(mesh).render(camera)
 
 
+@pytest.mark.slow
 def test_photos_with_depth_are_taken_in_and_their_bag_replays_to_the_same(tmp_path):
     views = cameras(3)[:2]
     folder = write_photos(tmp_path / 'photos', views, map(on_plain, rendered(views)))

@@ -60,6 +60,7 @@ def test_the_policys_gradients_do_not_reach_into_the_reconstruction(network, att
     assert_close(alone, both)
 
 
+@pytest.mark.slow
 def test_a_joint_training_cut_off_and_resumed_ends_in_the_very_same_weights(
         views, tiny, tmp_path):
     whole = train(views, tiny, tmp_path / 'whole.safetensors')

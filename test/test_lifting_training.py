@@ -170,7 +170,7 @@ def test_the_loss_is_the_mean_of_those_after_the_first_and_after_the_last_view(s
     assert_close(volume(3), (after(1) + after(3)) / 2)
 
 
-@pytest.mark.parametrize('bfloat16', [False, True])
+@pytest.mark.parametrize('bfloat16', [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_the_losses_fall(seen_anyhow, bfloat16):
     torch.manual_seed(0)
     learner = LiftingLearner(Lifting.from_config(TINY), LOSS)

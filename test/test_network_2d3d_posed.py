@@ -53,6 +53,7 @@ def test_the_same_lens_in_finer_pixels_is_the_same_camera():
                  numbers_of(Camera(fine.pose, LENS)))
 
 
+@pytest.mark.slow
 def test_one_image_is_learned_to_be_two_shapes_from_two_sides(posed):
     images = torch.rand(1, 3, 128, 128).expand(2, -1, -1, -1)
     cameras, voxels = cameras_at([0.0, math.pi / 2], 128), torch.zeros(2, 32, 32, 32)

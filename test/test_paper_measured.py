@@ -8,8 +8,10 @@ from active_recon.paper.measured import measure_loss
 from active_recon.paper.study import Study
 import numpy as np
 from paper_study import untrained
+import pytest
 
 
+@pytest.mark.slow
 def test_the_loss_of_an_episode_does_not_depend_on_how_many_are_measured_at_once(
         dataset, tiny, tmp_path, monkeypatch):
     (tmp_path / 'data').mkdir()

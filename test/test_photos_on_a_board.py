@@ -127,6 +127,7 @@ def test_an_object_of_the_colour_of_ink_or_of_paper_is_found(cameras, mesh, leve
         assert iou(view.mask[None], true[None]) > 0.6
 
 
+@pytest.mark.slow
 def test_what_stands_out_beyond_the_board_is_found(mesh):
     tall = mesh.copy()
     tall.apply_translation(-MIDDLE)

@@ -6,6 +6,7 @@ from active_recon.models.registry import network_entry
 from active_recon.training.losses import silhouette_loss
 from active_recon.volumes.silhouettes import frustum, project_all
 from active_recon.volumes.voxels import iou
+import pytest
 from shown_views import known_after
 import torch
 from torch.testing import assert_close
@@ -31,6 +32,7 @@ def test_several_views_are_decoded_from_the_mean_of_their_codes_in_any_order():
     assert known.latent.shape == (2, 256, 1, 1)
 
 
+@pytest.mark.slow
 def test_silhouettes_alone_teach_what_fills_them(views):
     torch.manual_seed(0)
     network = PerspectiveTransformerNet.from_config(PtnConfig(

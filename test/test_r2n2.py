@@ -2,6 +2,7 @@
 
 from active_recon.models.r2n2 import ConvGRUCell, R2n2, R2n2Config, SIZES
 from learning_by_heart import iou_by_heart
+import pytest
 from shown_views import known_after
 import torch
 from torch import nn
@@ -38,6 +39,7 @@ def test_the_published_decoder_doubles_three_times_and_the_small_one_too():
         assert logits.shape == (1, 32, 32, 32)
 
 
+@pytest.mark.slow
 def test_a_small_network_learns_one_object_by_heart(views):
     torch.manual_seed(0)
     network = R2n2.from_config(R2n2Config(

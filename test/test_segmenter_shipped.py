@@ -72,6 +72,7 @@ def test_what_is_exported_finds_what_torch_does(cluttered, library):
                                    atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not DINO.is_dir(), reason='needs dinoSparseRing of Middlebury: name it by '
                                              'ACTIVE_RECON_DINO')
 def test_photographs_before_clutter_gain_where_all_of_them_are_looked_at():

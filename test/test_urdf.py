@@ -75,6 +75,7 @@ def test_without_coacd_each_body_has_its_hull(without_coacd, stool):
     assert parts[0].volume == pytest.approx(stool.convex_hull.volume)
 
 
+@pytest.mark.slow
 def test_convex_parts_keep_to_the_shape():
     pytest.importorskip('coacd')
     cells = np.zeros((16, 16, 16), np.float32)

@@ -67,6 +67,7 @@ def test_a_loop_keeps_to_its_limits_and_its_bag_replays_under_them(
     check_replay(run, settings)
 
 
+@pytest.mark.slow
 def test_a_loop_on_a_dome_takes_views_at_several_elevations_and_its_bag_replays_so(
         start_node, bench, box, tmp_path):
     settings = {'policy': 'uniform', **DOME}
