@@ -33,23 +33,18 @@ def writable(path: Path) -> Path:
 
     To be asked before the work whose results go there.
     """
-    _require_room_in(path.parent, path)
+    writable_folder(path.parent, path)
     if path.is_dir():
         raise ConfigError(f'{path}: cannot be written: expected a file, got a folder')
     return path
 
 
-def writable_folder(path: Path) -> Path:
-    """Return the path of a folder; make it, and raise as `writable` does, to be asked as it is."""
-    _require_room_in(path, path)
-    return path
-
-
-def _require_room_in(folder: Path, told: Path) -> None:
+def writable_folder(folder: Path, told: Path | None = None) -> None:
+    """Make a folder; raises ConfigError, of `told` or of it, where no file can be made in it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise ConfigError(f'{told}: cannot be written: expected a folder that files can be made '
-                          f'in, got: {error.strerror}') from error
+        raise ConfigError(f'{told or folder}: cannot be written: expected a folder that files can '
+                          f'be made in, got: {error.strerror}') from error

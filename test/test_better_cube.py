@@ -6,7 +6,7 @@ import active_recon
 from active_recon.cli.replay import _print_quality
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
 from active_recon.objects import find_object
-from active_recon.volumes.better_cube import better_cube, FEWEST_VIEWS, FILLED
+from active_recon.volumes.better_cube import better_cube, box_text, FEWEST_VIEWS, FILLED
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import VoxelGrid
@@ -30,6 +30,13 @@ def test_the_cube_that_fits_is_about_what_was_found():
     assert found.warning == ('the object fills 50% of the side of its cube, which costs accuracy: '
                              'object_size 0.2 fits it, with the origin of the object frame moved '
                              'to (0, 0.01, -0.14) m')
+
+
+@pytest.mark.parametrize('centre', [(1234.56789, -0.1, 0.0), (0.2, -1e-17, 5e5)])
+def test_a_box_is_told_to_a_thousandth_of_its_side_wherever_it_is(centre):
+    told = [float(value) for value in box_text(centre, 0.123456).split(',')]
+    np.testing.assert_allclose(told, [*centre, 0.123456], rtol=0, atol=0.0001)
+    assert '-0,' not in box_text(centre, 0.123456)
 
 
 def test_who_has_the_object_in_the_middle_is_not_told_to_move_it():

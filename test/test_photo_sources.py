@@ -7,7 +7,7 @@ from active_recon.calibration.lens import write_lens
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.photos.board_photos import seen_board
-from active_recon.photos.files import LARGEST_SIDE, open_photos, photo_paths
+from active_recon.photos.files import is_photo, LARGEST_SIDE, open_photos, photo_paths
 from active_recon.photos.options import Options
 from active_recon.photos.reconstruct import from_files
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
@@ -129,6 +129,7 @@ def test_the_table_has_turned_to_photos_that_cannot_be_read_too(tmp_path):
 def test_a_folder_that_is_called_as_a_photo_is_none(tmp_path):
     blank_photos(tmp_path, rig(PINHOLE, count=2))
     (tmp_path / 'masks.png').mkdir()
+    assert not is_photo(tmp_path / 'masks.png')
     photos, left_out = open_photos(photo_paths(tmp_path))
     assert [photo.name for photo in photos] == ['photo0.png', 'photo1.png'] and not left_out
 

@@ -7,6 +7,7 @@ import inspect
 import math
 from typing import Annotated, Any, TYPE_CHECKING
 
+from active_recon.cli.number_lists import listed_numbers
 from active_recon.errors import ConfigError
 import typer
 
@@ -129,11 +130,8 @@ def _radians(degrees: float | None) -> float | None:
 def _numbers(option: str, text: str | None, count: int) -> list[float] | None:
     if text is None:
         return None
-    try:
-        numbers = [float(each) for each in text.split(',')]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+    numbers = listed_numbers(text)
+    if len(numbers) != count:
         raise ConfigError(f'{option}: invalid list: expected {count} numbers separated by commas, '
                           f'got {text!r}')
     return numbers

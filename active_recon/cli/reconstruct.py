@@ -4,9 +4,9 @@ import math
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
-from active_recon.cli.box_option import box_numbers
 from active_recon.cli.calibrate import printed_board
 from active_recon.cli.needed_options import refuse_lone
+from active_recon.cli.number_lists import box_numbers
 from active_recon.cli.progress import progress_bar
 from active_recon.errors import ConfigError, RecordingError
 from active_recon.models.weights_files import DEFAULT_MODEL

@@ -9,7 +9,7 @@ from typing import Annotated, TYPE_CHECKING
 
 from active_recon.cli.bag_info import print_refusals, told_depth
 from active_recon.cli.bag_options import with_bag_options
-from active_recon.cli.box_option import box_numbers
+from active_recon.cli.number_lists import box_numbers
 from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
 from active_recon.cli.shape_files import ShapeFiles

@@ -217,7 +217,7 @@ def train(
     _refuse_unused({'--volume-weight': volume_weight, '--silhouette-weight': silhouette_weight,
                     '--volume-loss': volume_loss}, model, network)
     asked = network.spec
-    writable(out / 'weights.safetensors')  # tells before data are read
+    weights = writable(out / 'weights.safetensors')  # tells before data are read
     with ExitStack() as stack:
         if data:
             training: ViewSet | MadeObjects = read_objects(
@@ -245,7 +245,6 @@ def train(
     if fabric.is_global_zero:
         bundle.card.update(command=command_line(),
                            generators_sha256=generators_hash())
-        weights = out / 'weights.safetensors'
         save_weights(weights, bundle)
         chosen = f'that of {freeze_from}' if freeze_from else 'chosen on validation'
         typer.echo(f'threshold {bundle.threshold:.2f}, {chosen}\nwrote {weights} and its card')

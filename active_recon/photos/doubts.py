@@ -13,7 +13,7 @@ from active_recon.photos.integrating import are_masked, COVERED, even_choice, in
 from active_recon.photos.shape import TakenView
 from active_recon.photos.views import PhotoView
 from active_recon.reconstructor import Reconstructor
-from active_recon.volumes.better_cube import better_cube
+from active_recon.volumes.better_cube import better_cube, box_text
 
 _AGREE = 0.6  # silhouettes with a lower IoU contradict each other
 _BETTER = 0.15  # by which another convention has to be above that, or above a coverage
@@ -74,7 +74,7 @@ def better_box(taken: Sequence[TakenView], cube: Cube, threshold: float) -> list
         return []
     placed = cube.world_from_object(grid.size)
     centre = (placed @ [*found.centre, 1.0])[:3]
-    box = ','.join(f'{value:.4g}' for value in (*centre, found.side * cube.side / grid.size))
+    box = box_text(centre, found.side * cube.side / grid.size)
     return [f'{found.reason}: the box (--box) {box} fits it']
 
 

@@ -64,13 +64,15 @@ class PhotoFile:
 
 def is_photo(path: Path) -> bool:
     """
-    Return whether a file of a folder is a photo, by its name.
+    Return whether what a folder has is a photo, by its name.
 
-    Hidden files (what a phone has in its bin, what is not whole yet) and depth images are none.
+    Hidden files (what a phone has in its bin, what is not whole yet), depth images and folders
+    are none.
     HEIC, which cannot be read, is one: it has to be told of.
     """
     return (path.suffix.lower() in (*ENDINGS, *HEIC_ENDINGS)
-            and not path.name.startswith(('.', '~')) and not is_depth(path))
+            and not path.name.startswith(('.', '~')) and not is_depth(path)
+            and not path.is_dir())
 
 
 def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
@@ -84,8 +86,7 @@ def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
     if not place.is_dir():
         raise DataError(f'{place}: no such folder: expected one with photos '
                         f'({", ".join(ENDINGS)})', 'no_photos')
-    paths = sorted((path for path in place.iterdir() if is_photo(path) and not path.is_dir()),
-                   key=in_order)
+    paths = sorted(filter(is_photo, place.iterdir()), key=in_order)
     if not paths:
         raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none',
                         'no_photos')

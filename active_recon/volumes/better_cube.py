@@ -1,6 +1,8 @@
 """Whether a cube is too wide for what was found in it, or off its middle, and what would fit."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+import math
 
 from active_recon.volumes.object_box import object_box
 from active_recon.volumes.voxels import VoxelGrid
@@ -42,8 +44,8 @@ class BetterCube:
     @property
     def warning_of_bag(self) -> str:
         """The same for who has a bag, with the option of `replay`."""
-        box = ','.join(f'{value:.4g}' for value in np.round((*self.centre, self.side), 6) + 0.0)
-        return f'{self.warning}; to replay the bag in that cube: --box {box}'
+        return (f'{self.warning}; to replay the bag in that cube: --box '
+                f'{box_text(self.centre, self.side)}')
 
     @property
     def reason(self) -> str:
@@ -51,6 +53,12 @@ class BetterCube:
         return ('the object ' + (f'fills {self.share:.0%} of the side' if self.share < FILLED
                                  else 'is not in the middle')
                 + ' of its cube, which costs accuracy')
+
+
+def box_text(centre: Iterable[float], side: float) -> str:
+    """Return a cube as `--box` takes it: x, y, z of its centre and its side."""
+    decimals = 4 - math.floor(math.log10(side))
+    return ','.join(f'{value:.15g}' for value in np.round((*centre, side), decimals) + 0.0)
 
 
 def better_cube(grid: VoxelGrid, threshold: float, views: int) -> BetterCube | None:

@@ -1,14 +1,15 @@
 """A recorded episode about another middle: its cameras in an object frame that is moved."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from active_recon.bags.runs.run import Candidates, RecordedEpisode, RecordedGoal, RecordedView
+from active_recon.bags.runs.scene import Scene
 from active_recon.geometry.cameras import Camera, wrap_azimuth
 import numpy as np
-from numpy.typing import NDArray
 
 
-def about(episode: RecordedEpisode, centre: NDArray[np.float64]) -> RecordedEpisode:
+def about(episode: RecordedEpisode, centre: Sequence[float]) -> RecordedEpisode:
     """
     Return the episode in an object frame whose origin is at `centre`, (3,), of its own, metres.
 
@@ -19,7 +20,7 @@ def about(episode: RecordedEpisode, centre: NDArray[np.float64]) -> RecordedEpis
                    views=[_of_view(view, centre) for view in episode.views])
 
 
-def _of_view(view: RecordedView, centre: NDArray[np.float64]) -> RecordedView:
+def _of_view(view: RecordedView, centre: Sequence[float]) -> RecordedView:
     depth = view.depth
     if depth is not None and depth.camera is not None:
         depth = replace(depth, camera=_moved(depth.camera, centre))
@@ -27,7 +28,7 @@ def _of_view(view: RecordedView, centre: NDArray[np.float64]) -> RecordedView:
                    goal=None if view.goal is None else _of_goal(view.goal, centre))
 
 
-def _of_goal(goal: RecordedGoal, centre: NDArray[np.float64]) -> RecordedGoal:
+def _of_goal(goal: RecordedGoal, centre: Sequence[float]) -> RecordedGoal:
     found = goal.candidates
     if found is not None:
         positions = found.positions - centre
@@ -37,7 +38,5 @@ def _of_goal(goal: RecordedGoal, centre: NDArray[np.float64]) -> RecordedGoal:
                    replacements=[_of_goal(each, centre) for each in goal.replacements])
 
 
-def _moved(camera: Camera, centre: NDArray[np.float64]) -> Camera:
-    pose = camera.pose.copy()
-    pose[:3, 3] -= centre
-    return replace(camera, pose=pose)
+def _moved(camera: Camera, centre: Sequence[float]) -> Camera:
+    return replace(camera, pose=Scene(object_position=centre).about_object(camera.pose))

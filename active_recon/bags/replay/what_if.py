@@ -52,7 +52,7 @@ def run_with_overrides(run: RecordedRun, recorded: LoopSetup, overrides: Overrid
     before = [replace(episode, views=[replace(view, reduced=None) for view in episode.views])
               for episode in sorted(run.episodes, key=lambda episode: episode.begin)]
     if overrides.box is not None:
-        before = [about(episode, np.array(overrides.box[:3])) for episode in before]
+        before = [about(episode, overrides.box[:3]) for episode in before]
     if overrides.policy is None:
         episodes = [reconstruct_episode(episode, reconstructor, advance) for episode in before]
     else:
