@@ -130,6 +130,7 @@ def test_the_advice_leads_to_a_cube_that_fits(photographed):
     assert better_cube(known.grid, fitting.threshold, fitting.view_count) is None
 
 
+@pytest.mark.slow
 def test_photos_in_a_wide_cube_are_told_the_box_that_fits(photographed):
     images, cameras = photographed
     told = active_recon.reconstruct(images, cameras, 1.8).warnings

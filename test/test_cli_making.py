@@ -197,6 +197,7 @@ def test_a_number_of_views_is_for_drawn_cameras_alone(meshes, tmp_path):
     assert not (tmp_path / 'out').exists()
 
 
+@pytest.mark.slow
 def test_two_processes_make_what_one_makes(meshes, tmp_path):
     result = subprocess.run(
         [sys.executable, '-m', 'active_recon.cli.main', 'render', meshes, tmp_path / 'two',

@@ -62,6 +62,7 @@ def test_one_process_several_and_a_cluster_give_the_same_results(crews):
             assert results(crew, cluster_items.halved, iter(range(200))) == own
 
 
+@pytest.mark.slow
 def test_auto_is_the_cluster_that_ray_address_names(cluster, monkeypatch):
     monkeypatch.setenv('RAY_ADDRESS', cluster)
     with crew_of('auto') as crew:

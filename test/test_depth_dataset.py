@@ -178,6 +178,7 @@ def test_a_refiner_is_trained_and_loaded_from_the_command_line(
     assert command(monkeypatch, *arguments) == 2  # holds another training
 
 
+@pytest.mark.slow
 def test_a_training_may_begin_with_the_refiner_of_another_network(
         deep, calibrated_on_few_views, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

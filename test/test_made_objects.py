@@ -190,6 +190,7 @@ def test_a_pace_that_leaves_nothing_to_draw_is_refused(numbers):
         Pace(*numbers)
 
 
+@pytest.mark.slow
 def test_the_objects_of_a_step_depend_on_nothing_but_its_number(monkeypatch):
     maker, pace = Maker(SHAPES, (), SPEC), Pace(2, 0.5, 3)
     with MadeObjects(maker, pace, 2) as one, MadeObjects(maker, pace, 1) as resumed:

@@ -78,6 +78,7 @@ def test_a_run_measures_iou_both_entropies_and_azimuths_of_every_view(network, v
     assert (run.paper_entropy < run.entropy).all()
 
 
+@pytest.mark.slow
 def test_a_run_longer_than_a_batch_is_the_same_as_its_parts(network, views):
     objects, starts = episodes(views, 24)  # 144: one batch and a bit
     whole = run_policy(network, FarthestPolicy(), views, objects, starts, 0.1, 2)

@@ -295,6 +295,7 @@ def test_without_common_places_there_is_no_sequence():
         find_sequence(objects, [0, 1, 2, 3], 3)
 
 
+@pytest.mark.slow
 def test_luck_does_not_repeat(scene):
     full = replace(scene, framed={128: some_views(scene.views, np.arange(0, 24, 2))},
                    truths={32: torch.ones(4, 32, 32, 32, dtype=torch.bool)})

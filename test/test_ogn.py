@@ -133,6 +133,7 @@ def test_a_small_network_learns_one_object_by_heart(views):
     assert best > 0.9
 
 
+@pytest.mark.slow
 def test_at_64_cells_a_side_a_learned_octree_is_a_fraction_of_the_dense_grid(ball):
     config = replace(TINY, level_channels=(16, 16, 16, 8))
     best, network, codes = learned(config, torch.rand(1, 3, 64, 64), ball[:1], 200)

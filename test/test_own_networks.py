@@ -273,6 +273,7 @@ def test_a_network_with_tensors_that_are_not_stored_is_loaded(own_file, tmp_path
         torch.testing.assert_close(getattr(loaded, name), getattr(network, name))
 
 
+@pytest.mark.slow
 def test_a_network_of_a_file_is_known_to_the_processes_that_share_the_work(tmp_path):
     path = tmp_path / 'my net.v2.py'
     path.write_text(EXAMPLE.read_text())

@@ -175,6 +175,7 @@ def test_the_network_alone_finds_an_object_that_is_small_in_its_photos(tmp_path)
     assert iou(shape.occupancy > shape.threshold, truth(shape)) > 0.6
 
 
+@pytest.mark.slow
 def test_a_cube_that_is_searched_in_vain_stays_as_wide_as_it_was(views, clutter):
     shape = active_recon.reconstruct(clutter, background='network', ground=False)
     assert shape.cube.side < 1.01 * first_cube(views, np.array([0.0, 0, 1])).side

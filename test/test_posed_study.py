@@ -292,6 +292,7 @@ def test_disturbances_are_those_of_objects_of_every_category(dataset, coarse):
     assert sorted(scene.views.categories[sorted(rows)]) == ['lamp', 'table']
 
 
+@pytest.mark.slow
 def test_every_object_is_disturbed_in_its_own_way(scene, coarse, monkeypatch):
     monkeypatch.setattr(robustness, 'YAWS', 1)
     rows = torch.zeros(12, dtype=torch.long)
@@ -303,6 +304,7 @@ def test_every_object_is_disturbed_in_its_own_way(scene, coarse, monkeypatch):
         assert len({*map(tuple, np.reshape(ious, (3, 4)))}) == 3
 
 
+@pytest.mark.slow
 def test_yaws_of_carving_hardly_differ(scene, carving):
     found = list(disturbances(scene, carving, PLAN, 3, 2))
     figures = robustness_figures(found)

@@ -54,6 +54,7 @@ def test_the_voxels_cover_the_object_in_every_view(objects):
     assert agreement.mean() >= 0.8
 
 
+@pytest.mark.slow
 def test_they_do_not_where_the_azimuth_runs_the_other_way(objects):
     agreement = np.array([
         iou(transformed(grid, [mirrored(camera) for camera in cameras]), alphas, (-2, -1))

@@ -115,6 +115,7 @@ def test_a_training_from_one_seed_ends_the_same():
         assert_close(mine, other, rtol=0, atol=0)
 
 
+@pytest.mark.slow
 def test_a_training_may_begin_with_a_scorer_which_stays_as_it_is():
     learned = train_scorer([learnable()], SMALL, ScorerTraining(epochs=40, batch_size=16))
     before = {name: tensor.clone() for name, tensor in learned.state_dict().items()}

@@ -64,6 +64,7 @@ def test_a_toy_is_trained_like_any_other(weights):
     assert (weights.parent / 'reconstruction.safetensors').is_file()
 
 
+@pytest.mark.slow
 def test_toys_are_measured_like_any_others(weights, seen):
     bundle = load_weights(weights)
     few = part_of(seen, chosen=slice(None, None, 4))

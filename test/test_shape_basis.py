@@ -113,6 +113,7 @@ def test_the_category_is_told_by_the_silhouettes(model):
     assert category.tolist() == [1] * 3 + [2] * 3
 
 
+@pytest.mark.slow
 def test_a_member_of_a_family_is_met_better_than_by_the_mean(model):
     thin = torch.stack([box(22, 16, 6), box(12, 24, 4)])  # neither was shown
     mean = iou((model.means[1] > 0).expand(2, -1, -1, -1), thin)

@@ -128,8 +128,9 @@ def test_views_are_reconstructed_and_planned_without_torch():
 
 
 @pytest.mark.parametrize('command', [
-    ('replay', 'bags/golden/run'), ('bag', 'info', 'bags/golden/run'),
-    ('report', 'bags/golden/run', '--out', '{}')], ids=lambda command: command[0])
+    ('replay', 'bags/golden/run'), ('report', 'bags/golden/run', '--out', '{}'),
+    pytest.param(('bag', 'info', 'bags/golden/run'), marks=pytest.mark.slow)],
+    ids=lambda command: command[0])
 def test_a_command_on_a_bag_leaves_torch_out(command, tmp_path):
     pytest.importorskip('openvino')
     page = tmp_path / 'page.html'

@@ -142,6 +142,7 @@ def test_a_file_of_cameras_poses_photos_that_arrive(posed, tmp_path):
     assert len(found.shape.views) == 3
 
 
+@pytest.mark.slow
 def test_a_photo_that_is_gone_leaves_the_shape_of_the_others(posed):
     found = Collection(posed / 'transforms.json', Options())
     for number in range(3):

@@ -60,6 +60,7 @@ def test_the_charts_turn_dark_with_their_reader(chromium, tmp_path):
     chromium.until(lambda: chromium.run(words) == chromium.run(ink) != light, 'the other ink')
 
 
+@pytest.mark.slow
 def test_the_grids_of_the_charts_stand_back_in_light_and_dark(chromium, tmp_path):
     opened(chromium, tmp_path, refusal_row('1.mcap', 'damaged', 'data'))
     for scheme in ('light', 'dark'):

@@ -174,6 +174,7 @@ def test_the_threshold_is_the_loops_own_until_it_is_moved(page, chromium):
     assert not chromium.errors()
 
 
+@pytest.mark.slow
 def test_a_click_is_heard_once_and_a_button_can_be_out_of_reach(page, chromium):
     page.add_button('New episode', 'begin again')
     page.add_button('Next object', 'another one')
@@ -278,6 +279,7 @@ def test_a_bag_is_stepped_through_view_by_view(playback, chromium):
     assert not chromium.errors()
 
 
+@pytest.mark.slow
 def test_a_view_that_is_typed_beyond_the_last_one_is_the_last_one(playback, chromium):
     opened(chromium, playback.page.url)
     field = chromium.driver.find_element('css selector', '.mantine-NumberInput-input')

@@ -109,7 +109,8 @@ def test_page_is_drawn_without_complaint_and_fits_its_window(opened, name, size,
     assert page.errors() == []
 
 
-@pytest.mark.parametrize('count', [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('count', [1, 2])
 def test_long_names_make_the_page_no_wider_than_a_phone(chromium, tmp_path, count):
     run, name = recorded_run('chair', views=2), 'name' * 40
     first, last = run.episodes[0].views
@@ -189,6 +190,7 @@ def test_at_the_recorded_threshold_just_the_recorded_cells_are_drawn(opened):
     assert cells(opened()) == recorded.occupied(0).sum()
 
 
+@pytest.mark.slow
 def test_a_recorded_threshold_beyond_the_slider_holds_until_it_is_moved(chromium, tmp_path):
     run = recorded_run('car', views=1)
     [view] = run.episodes[0].views

@@ -167,7 +167,8 @@ def test_a_planner_keeps_an_episode_that_came_before_it_heard_the_new_time(
 
 
 @pytest.mark.parametrize(('begin', 'order'), [
-    (0, 'the clock first'), (0, 'the episode first'), (20, 'the clock first')])
+    (0, 'the clock first'), pytest.param(0, 'the episode first', marks=pytest.mark.slow),
+    pytest.param(20, 'the clock first', marks=pytest.mark.slow)])
 def test_views_of_an_episode_that_began_at_an_earlier_stamp_are_not_of_the_one_after_a_jump(
         start_node, bench, latent, begin, order):  # noqa: F811
     start_node('view_planner', policy='farthest', start_azimuth=1.0, use_sim_time=True)

@@ -220,11 +220,10 @@ def a_streaming_camera(demo):
     return demo.recording() and demo.recording().stat().st_size > 20_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('moment', 'how'), [
-    (a_streaming_camera, signal.SIGINT),
-    *(pytest.param(*rest, marks=pytest.mark.slow) for rest in (
-        (nothing_yet, signal.SIGTERM), (a_recorder, signal.SIGINT),
-        (a_streaming_camera, signal.SIGTERM)))])
+    (nothing_yet, signal.SIGTERM), (a_recorder, signal.SIGINT),
+    (a_streaming_camera, signal.SIGINT), (a_streaming_camera, signal.SIGTERM)])
 def test_interrupted_demo_ends_its_nodes_and_closes_the_bag(start_demo, moment, how):
     demo = start_demo('--policy', 'farthest', '--views', '24')
     demo.until(lambda: demo.nodes(), 'the first node')

@@ -91,6 +91,8 @@ def run(command: list[str | Path], **options) -> str:
     return done.stdout
 
 
+@pytest.mark.parametrize('install', [
+    pytest.param('pip', marks=pytest.mark.slow), 'colcon'], indirect=True)
 def test_ament_index_finds_the_package(install, tmp_path):
     found = run([sys.executable, '-c', 'from ament_index_python import get_package_prefix; '
                  'print(get_package_prefix("active_recon"))'],

@@ -210,7 +210,8 @@ def test_every_pose_is_of_a_camera_that_looks_at_the_object(bench, watch):
     np.testing.assert_allclose(-pose[:3, 3] / np.linalg.norm(pose[:3, 3]), forward, atol=1e-6)
 
 
-@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('how', [
+    signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 @pytest.mark.parametrize('name', ['turntable_camera', 'reconstructor', 'view_planner'])
 def test_a_node_that_is_asked_to_stop_ends_without_complaint(start_node, box, name, how):
     parameters = {'turntable_camera': {'mesh': box}, 'view_planner': {'policy': 'farthest'}}

@@ -156,7 +156,9 @@ def test_a_node_that_is_given_a_file_that_is_no_yaml_says_so_in_one_line(tmp_pat
     assert f'{path}: no ROS parameters file in YAML' in said and "expected ',' or '}'" in said
 
 
-@pytest.mark.parametrize('node', NODE_PARAMETERS)
+@pytest.mark.parametrize('node', [
+    pytest.param(node, marks=[pytest.mark.slow] * (node != 'reconstructor'))
+    for node in NODE_PARAMETERS])
 def test_a_node_asked_for_help_lists_its_parameters_and_ends(node):
     asked = subprocess.run([sys.executable, '-m', f'active_recon.nodes.{node}', '--help'],
                            cwd=ROOT, capture_output=True, text=True, timeout=600)

@@ -94,6 +94,7 @@ def test_every_message_is_heard_in_order_at_the_rate(bench, play, bag):
     assert [msg.frame_id for msg in episodes] == [msg.frame_id for msg in recorded['/episode']]
 
 
+@pytest.mark.slow
 def test_latched_topics_are_latched_again(bench, play, bag):
     process = play(bag, '--topics', 'episode,camera/pose', '--rate', '0.5')
     poses = bench.subscribe(PoseStamped, 'camera/pose', STREAM_QOS)

@@ -19,7 +19,7 @@ from .conftest import BUDGET_S, FakeCamera
 pytestmark = pytest.mark.ros
 
 
-@pytest.mark.parametrize('mesh_format', ['ply', 'glb'])
+@pytest.mark.parametrize('mesh_format', ['ply', pytest.param('glb', marks=pytest.mark.slow)])
 def test_the_mesh_is_written_where_the_answer_says(start_node, bench, tmp_path, mesh_format):
     # A threshold so low that noise leaves a surface
     start_node('reconstructor', take_views='all', threshold=0.2, mesh_format=mesh_format,

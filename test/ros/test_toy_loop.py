@@ -37,6 +37,7 @@ def weights(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_toys_run_the_loop_and_their_bag_replays_to_the_same_bits(
         start_node, bench, box, weights, registered, tmp_path):
     recorder = start_node('recorder', output_dir=tmp_path / 'bags')
