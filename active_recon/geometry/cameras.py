@@ -289,14 +289,14 @@ def orbit_camera(
         raise ViewError('invalid elevation: expected one within +-90 degrees, at which upright '
                         f'is undefined, got {math.degrees(elevation):.6g} degrees; move the '
                         'camera aside', 'pose')
-    backward = np.array([math.cos(elevation) * math.cos(azimuth),
-                         math.cos(elevation) * math.sin(azimuth), math.sin(elevation)])
-    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
-    pose = np.eye(4)
-    pose[:3, 0] = right
-    pose[:3, 1] = np.cross(-backward, right)
-    pose[:3, 2] = -backward
-    pose[:3, 3] = distance * backward
+    cosine, sine = math.cos(azimuth), math.sin(azimuth)
+    across, up = math.cos(elevation), math.sin(elevation)
+    x, y = across * cosine, across * sine
+    pose = np.array([  # in columns: right, down, forward and the position
+        [-sine, up * cosine, -x, distance * x],
+        [cosine, up * sine, -y, distance * y],
+        [0, -x * cosine - y * sine, -up, distance * up],
+        [0, 0, 0, 1]])
     return OrbitCamera(pose, intrinsics, azimuth, elevation, distance)
 
 
