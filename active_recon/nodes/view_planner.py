@@ -117,6 +117,9 @@ class ViewPlannerNode(ManagedNode):
             self._timeout_timer.wake()
             if planner.wants_volume:
                 self._views.subscribe_volume(params.object_size)
+            if self._undecided is not None:
+                with refusing_views(self._diagnostics):
+                    self._decide(*self._undecided)
             goal = self._goals.camera
             if goal is not None and not params.limits().allows(goal.azimuth):
                 self._follow(planner.next_goal(), self.get_clock().now().nanoseconds)
@@ -129,6 +132,7 @@ class ViewPlannerNode(ManagedNode):
         self._planner.reset()
         self._goals.close()
         self._first_view.begin(self._episode)
+        self._undecided: tuple[int, PlannerView] | None = None  # the policy failed on this view
         self._started = False
         self._done = False
 
@@ -201,8 +205,10 @@ class ViewPlannerNode(ManagedNode):
     def _decide(self, stamp: int, view: PlannerView) -> None:
         if self._episode is None:
             return
+        self._undecided = stamp, view
         decision = self._planner.add_view(view.latent, view.camera, view.entropy, view.volume,
                                           view.quality, view.earlier)
+        self._undecided = None
         self._diagnostics.clear_warning(NO_GOAL)
         self._started = True
         self._diagnostics.count('views')

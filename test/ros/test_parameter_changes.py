@@ -5,7 +5,7 @@ import re
 import shutil
 
 from active_recon.geometry.cameras import Camera
-from active_recon.models.weights_files import find_weights, SHIPPED
+from active_recon.models.weights_files import find_weights, PAPER_MODEL, SHIPPED
 from active_recon.parameters.declaration import NEW_START
 from active_recon.volumes.voxels import VoxelGrid
 from geometry_msgs.msg import PoseStamped
@@ -104,6 +104,22 @@ def in_use(bench):
     answer, = bench.ask(GetParameters, 'view_planner/get_parameters',
                         GetParameters.Request(names=['policy_in_use'])).values
     return answer.string_value
+
+
+def test_a_view_on_which_the_policy_failed_is_decided_on_by_the_one_that_is_set_instead(
+        start_node, bench, latent):  # noqa: F811
+    start_node('view_planner', policy='attention', weights=PAPER_MODEL, start_azimuth=1.0,
+               max_views=2)
+    fake = FakeReconstructor(bench)
+    fake.begin('only')
+    taken = fake.show(latent[:3], 1.0)
+    bench.until(lambda: bench.state('view_planner').problem, 'the failure')
+    assert change(bench, 'view_planner', policy='farthest')['policy'].successful
+    goal = view_goal_from_msg(fake.wait_goal(taken))
+    assert goal.azimuth == pytest.approx(1.0 + math.pi, abs=0.14)
+    bench.until(lambda: not bench.state('view_planner').problem, 'the end of the warning')
+    fake.show(latent, goal.azimuth)
+    bench.until(lambda: fake.done and fake.done[-1].frame_id == 'max_views', 'the end')
 
 
 def test_a_policy_that_is_changed_goes_on_from_what_the_episode_has_seen(

@@ -69,7 +69,7 @@ def test_a_view_on_which_a_policy_fails_is_not_laid_to_the_reconstructor():
         raise RuntimeError('no luck')
     (_, said), _ = told.raise_warning.call_args
     assert said == ('no goal after the last view: policy: fails with RuntimeError: no luck; mend '
-                    'the policy, or set another and call start_episode')
+                    'the policy, or set another, which then chooses')
 
 
 def test_a_planner_warns_for_as_long_as_it_can_use_no_view_of_the_reconstructor(

@@ -18,7 +18,7 @@ def refusing_views(diagnostics: Diagnostics) -> Iterator[None]:
         yield
     except ActiveReconError as error:
         diagnostics.reject(error)
-        remedy = ('mend the policy, or set another and call start_episode'
+        remedy = ('mend the policy, or set another, which then chooses'
                   if error.kind == 'policy' else
                   'weights, object_size and object_frame must be those of the reconstructor')
         diagnostics.raise_warning(
