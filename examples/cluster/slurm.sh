@@ -14,7 +14,9 @@ export RAY_AUTH_MODE=token
 ray get-auth-token --generate > /dev/null
 port=6379
 head=$(scontrol show hostnames "$SLURM_JOB_NODELIST" | head -n 1)
-address=$(srun --nodes=1 --ntasks=1 --nodelist="$head" hostname --ip-address | cut -d ' ' -f 1)
+# Not --ip-address: of many hosts it is their loopback's
+address=$(srun --nodes=1 --ntasks=1 --nodelist="$head" hostname --all-ip-addresses \
+  | cut -d ' ' -f 1)
 
 srun --nodes=1 --ntasks=1 --nodelist="$head" \
   ray start --head --node-ip-address "$address" --port "$port" --dashboard-host 127.0.0.1 \
