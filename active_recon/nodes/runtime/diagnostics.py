@@ -110,12 +110,12 @@ class Diagnostics:
         To be called repeatedly while the condition holds. One that comes and goes is logged,
         with its end, at most every `LOG_EVERY_S` seconds.
         """
+        if kind not in self._logged_warnings and self._log(f'warned/{kind}', message):
+            self._logged_warnings.add(kind)
         is_new = kind not in self._warnings
         self._warnings[kind] = message
         if is_new:
             self._notice(f'warned/{kind}', message)
-        if kind not in self._logged_warnings and self._log(f'warned/{kind}', message):
-            self._logged_warnings.add(kind)
 
     def clear_warning(self, kind: str, log: bool = True) -> None:
         """Clear a warning, and log that it is over if it was logged and `log`."""
@@ -132,10 +132,10 @@ class Diagnostics:
 
     def raise_error(self, kind: str, message: str) -> None:
         """Log an error, the node's state until `clear_error`."""
+        self._node.get_logger().error(message)
         self._counts[f'refused/{kind}'] += 1
         self._failure = message
         self._note_change()
-        self._node.get_logger().error(message)
 
     def clear_error(self) -> None:
         """Clear the error: the node works again."""
@@ -152,9 +152,9 @@ class Diagnostics:
             self.reject(error)
 
     def _record(self, key: str, message: str) -> None:
-        self._notice(key, message)
-        if not self._log(key, message):
+        if not self._log(key, message):  # first: who hears of it looks into the log
             self._unlogged[key] += 1
+        self._notice(key, message)
 
     def _notice(self, key: str, message: str) -> None:
         self._counts[key] += 1
