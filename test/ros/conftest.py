@@ -1,6 +1,7 @@
 """Real nodes as processes, on a private domain of this machine, and a bench that talks to them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 import fcntl
 import os
 from pathlib import Path
@@ -88,7 +89,8 @@ class NodeProcess:
     def ask_to_stop(self, how: signal.Signals = signal.SIGINT) -> None:
         """Send the signal, unless the node has ended."""
         if self.running:
-            os.kill(self.pid, how)
+            with suppress(ProcessLookupError):  # its end has not been reported yet
+                os.kill(self.pid, how)
 
     def stop(self, how: signal.Signals = signal.SIGINT) -> int | None:
         """Ask the node to stop; return its exit code, None if it had to be killed."""
