@@ -48,6 +48,19 @@ def test_a_study_writes_figures_a_table_and_a_picture(made, dataset, tmp_path, m
     assert len(pictures) == 2 and all(cv2.imread(str(path)) is not None for path in pictures)
 
 
+def test_without_fine_voxels_nothing_is_left_blank_and_what_lacks_is_told(
+        dataset, tmp_path, monkeypatch):
+    assert command(monkeypatch, 'study', dataset, '--models', 'carving,2d3d-attention', '--counts',
+                   1, '--surfaces', '', '--disturbed-views', 0, '--threads', 1, '--out',
+                   tmp_path) == 0
+    picture = cv2.imread(str(next(tmp_path.glob('study-*.png'))), cv2.IMREAD_GRAYSCALE)
+    edge = picture.shape[1] // 4
+    assert (picture[:, :edge] < 128).any() and (picture[:, -edge:] < 128).any()
+    assert ('Without thin parts, precision, recall and calibration: carving. They are measured at '
+            'the finest true voxels, 32 cells a side (`--fine` makes 64), of networks with as '
+            'many.') in (tmp_path / 'study.md').read_text()
+
+
 def test_numbers_of_views_that_objects_lack_are_named(made, tmp_path, monkeypatch, capsys):
     assert command(monkeypatch, 'study', made, '--models', 'carving', '--counts', '1,3,5,8',
                    '--surfaces', '', '--disturbed-views', 0, '--threads', 1, '--out',

@@ -357,8 +357,8 @@ def test_a_study_says_all_of_a_folder_and_can_be_written(made, carving, paper):
 
 def test_the_text_of_a_study_tells_what_is_of_some_objects_alone():
     values = {'thin_recall': [0.2, np.nan, 0.4], 'recall': [0.2, 0.3, 0.4]}
-    figures = {'data': 'a folder', 'objects': 3, 'views': 5, 'counts': [1], 'left_out': {},
-               'ahead': {}, 'models': {'one': {
+    figures = {'data': 'a folder', 'objects': 3, 'views': 5, 'cells': [64], 'counts': [1],
+               'left_out': {}, 'ahead': {}, 'models': {'one': {
                    'random': {name: [figure(np.array(own))] for name, own in values.items()},
                    'own_ahead': {}, 'calibration': {}}}}
     rows = [line for line in markdown({'command': 'study', 'sets': [figures]}).splitlines()

@@ -185,23 +185,21 @@ def _write(result: Mapping[str, Any], out: Path) -> list[Path]:
 
 
 def _draw(figures: Mapping[str, Any], path: Path) -> None:
-    """Draw IoU over the number of views, at 64 and 32 cells, random and even, with bands."""
+    """Draw IoU over the number of views, for each number of cells, random and even, with bands."""
     from active_recon.evaluation.statistics import Interval
     from active_recon.paper.plotting import canvas, curves, drawn
     from active_recon.png_files import write_png
 
-    with canvas(11, 7, columns=2, rows=2) as (figure, grid):
+    sides = [side for side in figures['cells']
+             if any(f'iou_{side}' in own['even'] for own in figures['models'].values())]
+    with canvas(5.5 * len(sides), 7, columns=len(sides), rows=2) as (figure, grid):
         for row, kind in enumerate(('random', 'even')):
-            for axes, side in zip(grid[row], (64, 32), strict=True):
+            for axes, side in zip(grid[row], sides, strict=True):
                 lines = {model: [Interval(each['mean'], each['low'], each['high'])
                                  for each in own[kind][f'iou_{side}'] if each is not None]
                          for model, own in figures['models'].items()
-                         if f'iou_{side}' in own.get(kind, {})}
-                if lines:
-                    curves(axes, figures['counts'], lines, f'{kind} views',
-                           f'IoU at {side} cells')
-                else:
-                    axes.set_visible(False)
+                         if f'iou_{side}' in own[kind]}
+                curves(axes, figures['counts'], lines, f'{kind} views', f'IoU at {side} cells')
         figure.suptitle(f'{Path(figures["data"]).name}: {figures["objects"]} objects')
         picture = drawn(figure)
     write_png(path, picture[..., ::-1])

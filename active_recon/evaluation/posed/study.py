@@ -78,7 +78,8 @@ def study_set(data: Path, entrants: Sequence[Entrant], plan: Plan, extent: Exten
     first, *others = taking
     figures = {
         'data': str(data), 'category': extent.category, 'objects': len(scene),
-        'views': scene.view_count, 'counts': list(plan.within(scene.view_count)),
+        'views': scene.view_count, 'cells': sorted(scene.truths, reverse=True),
+        'counts': list(plan.within(scene.view_count)),
         'unreadable': list(scene.views.unreadable), 'left_out': left_out,
         'models': {each.name: entrant_figures(each, measured[each.name]) for each in taking},
         'ahead': {other.name: ahead_figures(measured[first.name], measured[other.name])

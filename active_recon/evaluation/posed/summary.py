@@ -11,6 +11,7 @@ from active_recon.evaluation.posed.measuring import Measured
 from active_recon.evaluation.posed.robustness import Found, YAWS
 from active_recon.evaluation.posed.scoring import Scores
 from active_recon.evaluation.statistics import difference, Interval, mean_interval
+from active_recon.volumes.voxels import FINE_RESOLUTION
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,6 +122,12 @@ def _set_tables(figures: Mapping[str, Any]) -> list[str]:
     cell = partial(_cell, objects=figures['objects'])
     parts = [f'## {figures["data"]}', f'{figures["objects"]} objects of {figures["views"]} views.']
     parts += [f'{name} is left out: {why}.' for name, why in figures['left_out'].items()]
+    if others := [name for name, own in models.items() if 'brier' not in own.get('random', {})]:
+        finest, lacking = figures['cells'][0], FINE_RESOLUTION not in figures['cells']
+        parts += [f'Without thin parts, precision, recall and calibration: {", ".join(others)}. '
+                  f'They are measured at the finest true voxels, {finest} cells a side'
+                  f'{f" (`--fine` makes {FINE_RESOLUTION})" if lacking else ""}, of networks with '
+                  'as many.']
     for kind in ('random', 'even'):
         for side in (64, 32):
             rows = _rows(models, kind, f'iou_{side}', cell)
