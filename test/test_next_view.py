@@ -42,7 +42,7 @@ from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
 from active_recon.geometry.view_distance import pose_directions
 from active_recon.models.carving import Carving
 from active_recon.models.network import ReconstructionNetwork
-from active_recon.policies import load_policy, Observation
+from active_recon.policies import load_policy, Observation, POLICIES, PolicyEntry
 from active_recon.policies.geometric import FarthestPolicy, UniformPolicy
 from active_recon.training.view_gains import some_views
 from active_recon.volumes.occupancy_threshold import expected_iou
@@ -229,6 +229,12 @@ class Fails(FarthestPolicy):
 def test_a_policy_that_fails_is_told_where_its_views_are_chosen(watched):
     with pytest.raises(ViewError, match='policy: fails with ZeroDivisionError: division'):
         chosen_by(Fails(), watched, 5, 4)
+
+
+def test_of_several_policies_the_one_that_fails_is_named(ring, carving, monkeypatch):
+    monkeypatch.setitem(POLICIES, 'mine', PolicyEntry(lambda options: Fails()))
+    with pytest.raises(ViewError, match='^mine@0.01: policy: fails with ZeroDivisionError'):
+        run_episodes(ring, carving, Episodes(('uniform', 'mine@0.01'), 1, 2, bfloat16=False))
 
 
 def test_a_sweep_of_more_views_than_there_are_takes_each_once():

@@ -4,14 +4,15 @@ from contextlib import contextmanager
 import json
 import math
 
-from active_recon.errors import ConfigError, WeightsError
+from active_recon.errors import ConfigError, ViewError, WeightsError
 from active_recon.evaluation.contenders import contender_names, contenders
 from active_recon.evaluation.measure import Episodes
 from active_recon.evaluation.policy_study import compare, decision_ms, policy_study, run_all
 from active_recon.evaluation.statistics import by_object
 from active_recon.evaluation.subsets import drawn_over_categories
-from active_recon.evaluation.trial import Trial
+from active_recon.evaluation.trial import Contender, Trial
 from active_recon.models.attention import AttentionModel
+from active_recon.policies.geometric import FarthestPolicy
 import numpy as np
 import pytest
 from shown_views import part_of
@@ -154,6 +155,18 @@ def test_every_run_is_reported_to_its_end(network, few, attention, tmp_path):
     assert len(listener.told) == 7
     assert {'random-0', 'random-1', 'uniform', 'farthest', 'oracle'} < set(listener.told)
     assert all(done == total for done, total in listener.told.values())
+
+
+class Fails(FarthestPolicy):
+    """A policy with a fault of its own."""
+
+    def choose(self, seen, state):
+        return 1 / 0
+
+
+def test_of_several_policies_the_one_that_fails_is_named(trial):
+    with pytest.raises(ViewError, match='^mine: policy: fails with ZeroDivisionError'):
+        run_all(trial, [Contender('mine', 'mine', lambda rng: Fails())])
 
 
 def test_a_decision_takes_a_time_and_the_oracle_s_is_not_told(trial, attention):

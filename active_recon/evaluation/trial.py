@@ -17,6 +17,7 @@ from active_recon.models.weights import state_hash
 from active_recon.npz_files import read_npz
 from active_recon.plugins import code_hash
 from active_recon.policies import Policy
+from active_recon.policies.checked import naming
 from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
@@ -103,8 +104,9 @@ class Trial:
                               self.count, self.bfloat16, progress)
         # A generator for each block makes interrupted and uninterrupted runs equal
         policy = contender.make(np.random.default_rng([*contender.key.encode(), block]))
-        return run_policy(self.network, policy, self.views, objects, starts, self.threshold,
-                          self.count, None, self.bfloat16, progress)
+        with naming(contender.policy):
+            return run_policy(self.network, policy, self.views, objects, starts, self.threshold,
+                              self.count, None, self.bfloat16, progress)
 
     def _parts(self) -> list[Tensor]:
         return [*batches(len(self.objects), _BLOCK)]

@@ -29,6 +29,7 @@ from active_recon.evaluation.statistics import (
     views_to_reach,
 )
 from active_recon.policies import load_policy, POLICIES, Policy, PolicyOptions
+from active_recon.policies.checked import naming
 import numpy as np
 import torch
 
@@ -196,8 +197,9 @@ def _order(name: str, watched: WatchedObject, start: int, seed: Sequence[int], e
     if name == TOGETHER:
         return chosen_together(watched, start, episodes.count)
     plain, motion_cost = _parted(name)
-    return chosen_by(_policy(plain, seed, entrant, episodes, offsets), watched, start,
-                     episodes.count, motion_cost)
+    with naming(name):
+        return chosen_by(_policy(plain, seed, entrant, episodes, offsets), watched, start,
+                         episodes.count, motion_cost)
 
 
 def _parted(name: str) -> tuple[str, float]:
