@@ -24,7 +24,6 @@ _OF_SMALL = f'--model {SMALL_MODEL}'
 _SWAPPED = 'random,attention,swapped,swapped_turned'
 _AROUND = 'random,uniform,farthest,unseen_entropy,rendered_uncertainty'
 _ON_DOME = 'random,uniform,farthest,unseen_entropy'
-_ON_TRAINING = '--training turn/train --training-objects'
 _COUNTS = (1, 2, 3, 5)
 _PLACES = {'turntable': 'turntable', 'dome': 'dome, as of an arm'}
 
@@ -49,7 +48,7 @@ def _studies_of_small() -> Iterator[tuple[str, str]]:
     """Yield the same of the small network."""
     yield 'turntable-validation', (
         'turn/val --policies random,uniform,farthest,attention,'
-        + _by_cost('0.03', '0.035', '0.04', '0.045', '0.05') + f' {_ON_TRAINING} 8 {_SIXTY}')
+        + _by_cost('0.03', '0.035', '0.04', '0.045', '0.05') + f' {_SIXTY}')
     for name, data in _DATA.items():
         yield f'turntable-{name}-learned', f'data/{data} {_LEARNED}'
         yield f'turntable-{name}-peeking', (
@@ -59,7 +58,7 @@ def _studies_of_small() -> Iterator[tuple[str, str]]:
     for name in ('unseen', 'real'):
         yield f'turntable-{name}-sequence', (
             f'data/{_DATA[name]} --policies random,uniform,sequence,attention '
-            f'{_ON_TRAINING} 60 {_SIXTY}')
+            f'--training turn/train --training-objects 60 {_SIXTY}')
     yield 'turntable-unseen-together', (
         'data/unseen --policies random,uniform,attention,oracle,together --views 3 --objects 12 '
         f'{_HOW}')

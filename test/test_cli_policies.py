@@ -61,6 +61,9 @@ def test_a_sequence_whose_motion_costs_is_found_on_the_training_objects(
     (['--policies', 'random@nan'], "got 'random@nan'"),
     (['--policies', 'sequence'], 'no training objects: expected --training'),
     (['--policies', 'sequence@0.1'], 'no training objects: expected --training'),
+    (['--policies', 'random', '--training', 'none', '--training-objects', 2],
+     '--training, --training-objects without sequence among --policies'),
+    (['--training-objects', 2], '--training-objects without sequence among --policies'),
     (['--model', 'carving,lifting'], 'several networks: expected one'),
     (['--category', 'ship'], 'no such objects'),
 ])

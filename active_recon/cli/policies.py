@@ -6,6 +6,7 @@ from typing import Annotated, Any, TYPE_CHECKING
 
 from active_recon.cli.bf16_option import Bf16, in_bf16
 from active_recon.cli.command_line import command_line
+from active_recon.cli.needed_options import refuse_lone
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import print_left_out
 from active_recon.cli.runtime_option import MeasuredIn
@@ -25,6 +26,7 @@ _LEARNED = [name for name in POLICIES if name not in _UNLEARNED]
 
 
 def policies(
+    context: typer.Context,
     data: Annotated[list[Path], typer.Argument(
         help="Folders of objects in R2N2's layout, each measured by itself; `--cameras turntable` "
              'leaves azimuths to choose, `--cameras dome` elevations too.')],
@@ -93,6 +95,7 @@ def policies(
     if has_sequence and training is None:
         raise ConfigError('policies: no training objects: expected --training with a folder, on '
                           'which a sequence is found, got none; give one, or leave sequence out')
+    refuse_lone(context, 'sequence among --policies', has_sequence, 'training', 'training_objects')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, half)
     for folder in (*data, *([training] if training is not None and has_sequence else [])):
         chosen_folders(needed_objects(folder), category)
