@@ -96,6 +96,19 @@ def test_a_bag_that_cannot_be_read_is_a_row_and_changes_no_other(
                for row in without)
 
 
+def test_the_command_says_of_the_first_refused_bags_why_they_are(tmp_path, monkeypatch, capsys):
+    for number in range(7):
+        (tmp_path / f'{number}.mcap').write_bytes(b'no bag')
+    assert command(monkeypatch, 'batch', 'measure', tmp_path, '--out', tmp_path / 'out',
+                   '--workers', 1) == 2  # all are refused
+    *first, last = [line for line in capsys.readouterr().err.splitlines()
+                    if line.startswith('refused: ')]
+    assert first == [f'refused: {row["refused"]}'
+                     for row in read_table(tmp_path / 'out' / 'table.parquet')][:5]
+    assert all(f'/{number}.mcap: ' in line for number, line in enumerate(first))
+    assert last == 'refused: 2 more; table.parquet and summary.html tell why'
+
+
 def test_a_match_that_is_gone_is_refused_by_itself(archive, tmp_path, monkeypatch):
     (archive / 'gone.mcap').symlink_to('nowhere.mcap')
     there, gone = batch(monkeypatch, 'measure', archive / '[cg]*', tmp_path / 'out')

@@ -26,6 +26,7 @@ from active_recon.reporting import Reporting, silent
 from active_recon.whole_files import whole_file
 
 SUMMARY = 'summary.html'
+MOST_TOLD = 5
 _LIST = 'bags.jsonl'
 _MOST_CHECKED = 16  # paths that are named, whose presence each worker looks at
 _AT_ONCE = 32  # results that are read from a store while others are on their way
@@ -33,11 +34,16 @@ _AT_ONCE = 32  # results that are read from a store while others are on their wa
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of bags: all, those refused, and those whose results were there before."""
+    """
+    Numbers of bags: all, those refused, and those whose results were there before.
+
+    `reasons`: why the first MOST_TOLD of those refused were.
+    """
 
     bags: int
     refused: int
     kept: int
+    reasons: Sequence[str]
 
 
 def run_batch(task: Task, roots: Sequence[Place], crew: Crew,
@@ -90,7 +96,7 @@ def _run(task: Task, roots: Sequence[Place], crew: Crew, reporting: Reporting,
     summary = Summary()
     write_table(summary.counting(_rows(task.out, listed)), task.out / TABLE)
     summary.write(task.out / SUMMARY, task.kind)
-    return Counts(count, refused, kept)
+    return Counts(count, refused, kept, summary.reasons(MOST_TOLD))
 
 
 def _truths(task: Task) -> list[Path]:

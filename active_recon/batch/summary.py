@@ -34,6 +34,10 @@ class Summary:
         self._refused: list[Row] = []
         self._worst: list[tuple[float, int, Row]] = []
 
+    def reasons(self, most: int) -> list[str]:
+        """Return why bags were refused, of the first that were, each with its path."""
+        return [row['refused'] for row in self._refused[:most]]
+
     def counting(self, rows: Iterable[Row]) -> Iterator[Row]:
         """Pass rows on, counting them."""
         for number, row in enumerate(rows):

@@ -46,7 +46,7 @@ _ALL = """
     reason; OUT/summary.html the plots and links. A second start with the same OUT keeps the bags
     that are finished and unchanged. The results do not depend on the workers: processes of this
     machine, or a Ray cluster (--cluster), whose machines must see the bags and OUT at the same
-    paths or URLs.
+    paths or URLs. The exit code is 2 where all bags are refused.
 
     Example: active-recon batch {kind} archive 'fleet/**/*.mcap' --out build/batch
 """
@@ -106,6 +106,10 @@ def _work(
     before = f', {counts.kept} of them finished before' if counts.kept else ''
     typer.echo(f'{counts.bags} bag{"s" if counts.bags != 1 else ""} in {took:.0f} s{before}; '
                f'{counts.refused} refused')
+    for reason in counts.reasons:
+        typer.echo(f'refused: {reason}', err=True)
+    if more := counts.refused - len(counts.reasons):
+        typer.echo(f'refused: {more} more; {TABLE} and {SUMMARY} tell why', err=True)
     for name in (TABLE, SUMMARY):
         typer.echo(f'wrote {task.out / name}')
     if counts.refused == counts.bags:

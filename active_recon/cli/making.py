@@ -68,7 +68,8 @@ def render(
     Render and voxelise meshes, as a dataset in R2N2's layout.
 
     Reads every format of trimesh. An interrupted run continues where it stopped: finished objects
-    are kept. Meshes that cannot be used are listed at the end, with the reason.
+    are kept. Meshes that cannot be used are listed at the end, with the reason; where all are
+    such, the exit code is 2.
     """
     from active_recon.datasets.drawn_cameras import Viewing
     from active_recon.datasets.making import mesh_jobs
@@ -123,7 +124,8 @@ def build(
     Each object has its own seed, so the same options give the same objects, and no object is in
     two splits. The held-out categories, which are never trained on, are in unseen/. The hash of
     the generators' code is written to generators.sha256. An interrupted run continues where it
-    stopped.
+    stopped. Objects that cannot be made are listed at the end, with the reason; where all are
+    such, the exit code is 2.
     """
     from active_recon.datasets.drawn_cameras import Viewing
     from active_recon.datasets.making import shape_jobs
