@@ -329,6 +329,10 @@ def test_the_command_writes_the_files_where_it_is_told_or_says_why_not(
     assert all(f'wrote {tmp_path / "new" / name}' in told for name in names)
     assert command(monkeypatch, 'export', 'ogn', tmp_path) == 2
     assert 'ogn: not exported' in capsys.readouterr().err
+    (tmp_path / 'file').touch()
+    assert command(monkeypatch, 'export', exported('ptn'), tmp_path / 'file') == 2
+    assert f'{tmp_path / "file"}: cannot be written: expected a folder that files can be made' in (
+        capsys.readouterr().err)
     monkeypatch.setitem(sys.modules, 'onnx', None)
     assert command(monkeypatch, 'export', exported('ptn'), tmp_path) == 2
     assert "onnx is not installed: expected it, as `pip install 'active_recon[export]'`" in (

@@ -35,7 +35,7 @@ from active_recon.runtimes.graph_files import (
     POLICY_PART,
     SEGMENT_PART,
 )
-from active_recon.whole_files import whole_file
+from active_recon.whole_files import whole_file, writable_folder
 import numpy as np
 import torch
 
@@ -53,7 +53,7 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
 
     They lie beside the weights, or in another folder, and appear whole. Raises WeightsError as
     `load_weights` does, and ConfigError where the network runs in torch alone, where it has
-    something that no graph can have, or where onnx is not installed.
+    something that no graph can have, where onnx is not installed, or where no file can be written.
     """
     _require_onnx()
     if is_segmenter(weights):
@@ -85,7 +85,7 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
 
 def _saved(graphs: Mapping[str, bytes], weights: Path, folder: Path | None) -> list[Path]:
     """Write graphs beside weights, or in another folder; return the files."""
-    (folder or weights.parent).mkdir(parents=True, exist_ok=True)
+    writable_folder(folder or weights.parent)
     written = []
     for name, data in graphs.items():
         written.append(graph_path(weights, name, folder))
