@@ -512,6 +512,19 @@ def test_the_command_calibrates_the_tables_beside_weights_on_objects_of_one_s_ow
     assert 'warning: calibrated on 30 episodes: expected 39 or more' in capsys.readouterr().err
 
 
+def test_objects_measured_after_too_few_views_are_refused_with_the_number_that_it_takes(
+        tmp_path, monkeypatch, capsys, tables):
+    weights = tmp_path / 'my.safetensors'
+    weights.write_bytes(b'of no network')
+    sha256 = weights_hash(weights)
+    replace(tables, weights_sha256=sha256).write(tables_path(weights))
+    few = made_up(200, 6, weights=sha256)
+    few.rows(few.count < COUNTS).write(tmp_path / 'few.npz')
+    assert f'got none after {COUNTS}; measure some with `--views {COUNTS}`' in refusal(
+        monkeypatch, capsys, 'quality', 'fit', '--calibration', tmp_path / 'few.npz', '--model',
+        weights)
+
+
 def test_what_was_measured_with_another_network_is_refused(tmp_path, monkeypatch, capsys, tables):
     made_up(3, 0).write(tmp_path / 'abc.npz')
     made_up(3, 0, weights='def').write(tmp_path / 'def.npz')

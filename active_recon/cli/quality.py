@@ -29,7 +29,8 @@ def measure(
     data: Annotated[Path, typer.Argument(help="Folder of objects in R2N2's layout, voxelised "
                                               'at the resolution of the network.')],
     out: Annotated[Path, typer.Argument(help='The npz file to write.')],
-    views: Annotated[int, typer.Option(min=1, help='Views of each object.')] = 5,
+    views: Annotated[int, typer.Option(
+        min=1, help='Views of each object; 6 to calibrate tables that ship.')] = 5,
     kind: Annotated[str, typer.Option(
         help="Order of the views: 'random', 'even', or 'attention': those that the learned policy "
              'of the weights chooses.')] = 'random',

@@ -82,7 +82,8 @@ def calibrated(heads: Heads, calibration: Measured) -> QualityTables:
     if missing := set(counts) - set(usual.solid.count.tolist()):
         raise DataError('quality: no objects to calibrate with after some numbers of views: '
                         f'expected solid ones without a fault after 1 to {counts[-1]}, got none '
-                        f'after {", ".join(map(str, sorted(missing)))}')
+                        f'after {", ".join(map(str, sorted(missing)))}; measure some with '
+                        f'`--views {counts[-1]}`')
     own = numbers_of(usual, heads.known_latents)
     z = standardised(own, heads.centre, heads.scale)
     expected = expected_iou(z, heads.head, np.asarray(heads.intercepts)[usual.count - 1])
