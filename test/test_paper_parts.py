@@ -128,6 +128,11 @@ def test_the_steps_of_a_reconstruction_sum_to_its_time(study):
     assert sum(float(share) for share in percent[:-1]) == pytest.approx(100, abs=0.3)
 
 
+def test_times_tell_in_words_of_how_many_threads_they_are(study):
+    assert 'on 1 CPU thread (' in (study.out / 'table4.md').read_text()
+    assert 'on 1 CPU thread, the mean' in (study.out / 'fig10.md').read_text()
+
+
 def test_figure_7_shows_photographs_where_pascal3d_is_given(study, tmp_path, monkeypatch):
     views = study.read(study.objects('test'))
     photographs = replace(part_of(views, chosen=slice(1)), unreadable=('one',))
