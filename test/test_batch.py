@@ -135,6 +135,7 @@ def test_a_folder_that_cannot_be_read_is_refused_by_itself(archive, tmp_path, mo
     assert rows[2]['refused_kind'] == 'file' and 'Permission denied' in rows[2]['refused']
 
 
+@pytest.mark.slow
 def test_a_row_of_a_bag_without_shapes_names_the_weights_that_made_them(tmp_path, monkeypatch):
     folder = write_bag(tmp_path / 'run', images() + joints())
     (row,) = batch(monkeypatch, 'measure', folder, tmp_path / 'out')
@@ -182,6 +183,7 @@ def test_every_episode_of_a_long_bag_has_a_row(tmp_path, monkeypatch):
     assert [row['episode'] for row in work.rows_of(task, PAPER)] == [*range(1, 801)]
 
 
+@pytest.mark.slow
 def test_a_truth_that_is_fitted_turns_with_the_yaw_that_is_told(tmp_path, monkeypatch):
     folder = write_bag(tmp_path / 'run', images() + joints())
     bar, turned_bar = tmp_path / 'bar.ply', tmp_path / 'turned.ply'

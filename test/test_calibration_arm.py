@@ -78,6 +78,7 @@ def test_it_is_found_through_a_bent_lens_and_noise():
     assert_same(found.base_from_board, BASE_FROM_BOARD)
 
 
+@pytest.mark.slow
 def test_an_arm_that_is_not_quite_where_it_says_is_forgiven():
     rng = np.random.default_rng(5)
     views = [orbit_camera(rng.uniform(-3, 3), rng.uniform(0.6, 1.4), 0.45).pose

@@ -42,6 +42,7 @@ def test_policies_are_measured_set_by_set_and_told_in_a_table(dataset, tmp_path,
     assert '| oracle |' in text and 'the repeatable gap' in text
 
 
+@pytest.mark.slow
 def test_a_sequence_whose_motion_costs_is_found_on_the_training_objects(
         dataset, tmp_path, monkeypatch, capsys):
     assert command(monkeypatch, dataset, '--model', 'carving', '--policies', 'sequence@1e-6',

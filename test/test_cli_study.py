@@ -82,6 +82,7 @@ def test_objects_that_cannot_be_read_are_named(made, tmp_path, monkeypatch, caps
     assert 'some lamps: 1 read, 0 missing, 1 left out\n' in told
 
 
+@pytest.mark.slow
 def test_training_objects_that_cannot_be_read_are_named(made, tmp_path, monkeypatch, capsys):
     last = list_objects(copytree(made, tmp_path / 'known'))[-1]
     (last.images_folder / '01.png').write_bytes(b'')

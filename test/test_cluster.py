@@ -149,6 +149,7 @@ def test_no_item_of_a_bundle_that_is_given_back_is_lost_or_doubled(crews, kind):
     assert [result.value for result in found] == list(range(44))
 
 
+@pytest.mark.slow
 def test_an_error_in_the_middle_of_the_work_starts_no_other_ray(crews):
     import ray
 

@@ -66,6 +66,7 @@ def states_of(network, views):
         yield observer, state
 
 
+@pytest.mark.slow
 def test_auto_measures_in_torch_what_was_not_exported_in_whatever_precision(weights, tmp_path):
     alone = tmp_path / weights.name
     shutil.copy(weights, alone)

@@ -114,6 +114,7 @@ def test_two_photos_tell_no_table(views, count):
     assert found_ground(views[:count], np.zeros(3), UP) is None
 
 
+@pytest.mark.slow
 def test_a_texture_as_coarse_as_the_object_tells_no_table(mesh, cameras):
     assert found_ground(photos_of(mesh, cameras, 'coarse'), np.zeros(3), UP) is None
 
@@ -126,6 +127,7 @@ def test_without_a_table_there_is_none(views):
         assert found_ground(others, np.zeros(3), UP) is None
 
 
+@pytest.mark.slow
 def test_what_is_seen_from_below_stands_on_nothing(views, monkeypatch):
     low = view_of('low', views[0].image, Camera(
         np.diag([1.0, -1, -1, 1]) @ views[0].camera.pose, views[0].camera.intrinsics))

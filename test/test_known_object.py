@@ -10,7 +10,7 @@ def saved(mesh, path):
     return path
 
 
-@pytest.mark.parametrize('resolution', [32, 64])
+@pytest.mark.parametrize('resolution', [32, pytest.param(64, marks=pytest.mark.slow)])
 def test_a_scan_without_an_underside_is_as_solid_as_cameras_can_tell(tmp_path, resolution):
     box = trimesh.creation.box((0.6, 0.6, 0.9))
     whole = KnownObject(saved(box, tmp_path / 'whole.ply')).occupied(resolution)

@@ -42,6 +42,7 @@ def test_undistortion_inverts_distortion(lens):
     np.testing.assert_allclose(lens.undistort(lens.distort(points())), points(), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_undistortion_ends_where_a_wide_lens_hardly_moves_any_more():
     # Beyond some 39 degrees the model folds, which its image's corners are near
     lens = Distortion('plumb_bob', (-0.42, 0.22, -0.001, 0.002, -0.07))

@@ -101,6 +101,7 @@ def test_every_parameter_learns_from_two_views(network):
         assert parameter.grad.any(), name
 
 
+@pytest.mark.slow
 def test_a_small_network_learns_one_object_by_heart(views):
     torch.manual_seed(0)
     network = Network2d3d.from_config(Network2d3dConfig(

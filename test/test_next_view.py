@@ -121,6 +121,7 @@ def short():
                     bfloat16=False)
 
 
+@pytest.mark.slow
 def test_two_renderings_show_the_same_outlines_in_another_light_from_a_little_beside(scene):
     one, other = (another_rendering(scene.views, seed) for seed in (1, 2))
     colors = [rendering.images[..., :3].double() for rendering in (one, other)]

@@ -126,6 +126,7 @@ def learned(config, image, truth, steps):
     return best, network, state['latent'].flatten(1)
 
 
+@pytest.mark.slow
 def test_a_small_network_learns_one_object_by_heart(views):
     config = OgnConfig(image_channels=(8, 8, 16), code_channels=(32,), level_channels=(16, 16, 8))
     image = views.white(torch.tensor([3]), torch.tensor([0]))

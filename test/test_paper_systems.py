@@ -101,6 +101,7 @@ def test_a_missing_system_is_trained_and_then_found(study, small_batches):
             have_systems(replace(study, **other), [TWO_STAGE])
 
 
+@pytest.mark.slow
 def test_a_training_is_told_as_it_goes(study, small_batches):
     told = []
 

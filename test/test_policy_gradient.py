@@ -143,6 +143,7 @@ def nearest_of_each(network, attention, views, monkeypatch):
     return nearest
 
 
+@pytest.mark.slow
 def test_episodes_keep_their_views_as_far_apart_as_the_policy_says(
         network, attention, views, monkeypatch):
     assert min(nearest_of_each(network, attention, views, monkeypatch)) < 0.5

@@ -129,6 +129,7 @@ def test_no_sequence_of_three_is_better_than_the_best(trial):
         found['best_from_start']['mean'] - found['policies']['oracle']['mean'])
 
 
+@pytest.mark.slow
 def test_random_s_mean_is_that_of_all_sequences_that_begin_as_it_did(trial):
     runs = run_all(trial, contenders(['random'], seeds=12))
     ious = np.stack([by_object(run.iou[:, 2], trial.objects.numpy()) for run in runs['random']])

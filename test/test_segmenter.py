@@ -185,7 +185,8 @@ def test_it_is_trained_and_resumed_from_the_command_line(lamps, tmp_path, monkey
     assert "begun_with: expected '' as before, got" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('library', ['openvino', 'onnxruntime'])
+@pytest.mark.parametrize('library', [
+    'openvino', pytest.param('onnxruntime', marks=pytest.mark.slow)])
 def test_an_exported_segmenter_answers_as_in_torch(library, tmp_path):
     pytest.importorskip('onnx')
     pytest.importorskip(library)

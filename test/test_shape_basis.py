@@ -144,6 +144,7 @@ def test_it_answers_alike_however_gradients_are_switched(model, mode):
     assert again['features'].isfinite().all()
 
 
+@pytest.mark.slow
 def test_objects_of_other_categories_are_left_out(model):
     other = ShapeBasis(('box',), 5)
     fit_shapes(other, torch.cat([BALLS[:2], BOXES]), np.array(['ball'] * 2 + ['box'] * len(BOXES)))

@@ -63,6 +63,7 @@ def test_shadows_are_one_connected_share_of_a_table_without_which_it_is_lighter(
     assert (with_post[:, :, :3] < without[:, :, :3] - 0.02).any()
 
 
+@pytest.mark.slow
 def test_most_tables_have_two_colors_and_some_have_spots_of_all():
     count = 60
     cameras = Cameras(*(part[:1, :1].expand(1, count, *part.shape[2:])

@@ -227,6 +227,7 @@ def test_a_split_keeps_the_surface_and_leaves_no_triangle_on_both_sides():
     assert ((heights >= -1e-6).all(axis=1) | (heights <= 1e-6).all(axis=1)).all()
 
 
+@pytest.mark.slow
 def test_a_pattern_changes_colours_and_not_the_shape():
     changed = []
     for seed in range(10):

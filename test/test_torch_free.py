@@ -53,6 +53,7 @@ def found():
     return imported_with(*MODULES)
 
 
+@pytest.mark.slow
 def test_torch_would_be_noticed():
     assert imported_with('active_recon.runtimes.torch')[0] == {
         'active_recon.runtimes.torch': 'True'}

@@ -236,7 +236,7 @@ def test_a_gradient_that_is_not_finite_names_its_batch_and_changes_nothing(views
     assert_close(network.state_dict(), before, rtol=0, atol=0)
 
 
-@pytest.mark.parametrize('bfloat16', [False, True])
+@pytest.mark.parametrize('bfloat16', [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_the_loss_falls(views, tiny, tmp_path, bfloat16):
     one = part_of(views, slice(1))
     config = TrainingConfig(steps=24, batch_size=2, learning_rate=3e-2, max_views=2,

@@ -273,6 +273,7 @@ def test_a_target_quality_is_refused_for_weights_without_tables_of_quality():
     Adviser(StoppingRule(12), 'carving')
 
 
+@pytest.mark.slow
 def test_photos_from_every_side_are_enough_and_no_other_place_is_told(usual):
     places = [orbit(15 * step, elevation) for elevation in (20, 40, 60) for step in range(24)]
     full = replace(usual, views=[replace(usual.views[-1], camera=camera) for camera in places])

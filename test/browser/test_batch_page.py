@@ -50,6 +50,7 @@ def test_the_page_fits_the_narrowest_window(chromium, tmp_path):
     assert chromium.run('return document.documentElement.scrollWidth') <= 320
 
 
+@pytest.mark.slow
 def test_the_charts_turn_dark_with_their_reader(chromium, tmp_path):
     opened(chromium, tmp_path, refusal_row('1.mcap', 'damaged', 'data'))
     ink, words = (f'return getComputedStyle(document.querySelector("{of}")).{what}'

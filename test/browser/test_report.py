@@ -125,7 +125,8 @@ def test_long_names_make_the_page_no_wider_than_a_phone(chromium, tmp_path, coun
     assert chromium.run('return document.documentElement.scrollWidth') <= PHONE[0]
 
 
-@pytest.mark.parametrize('name', ['one', pytest.param('three', marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('name', ['one', 'three'])
 def test_no_figure_of_the_timing_table_is_cut_off_on_a_phone(opened, name):
     page = opened(name, PHONE)
     inside = page.run(

@@ -32,8 +32,9 @@ def spoil(bench, kind, topic, profile, listens):
 @pytest.mark.parametrize(('name', 'kind', 'topic', 'profile', 'listens', 'theirs', 'ours'), [
     ('turntable_camera', Image, 'camera/image_raw', LATCHED_QOS, True,
      'requests (reliable, transient local)', '(reliable, volatile)'),
-    ('turntable_camera', PoseStamped, 'camera/pose', HASTY, True,
-     'requests (reliable, volatile, deadline 0.25 s)', '(reliable, volatile)'),
+    pytest.param('turntable_camera', PoseStamped, 'camera/pose', HASTY, True,
+                 'requests (reliable, volatile, deadline 0.25 s)', '(reliable, volatile)',
+                 marks=pytest.mark.slow),
     ('view_planner', PoseStamped, 'view', PLAIN, False,
      'offers (reliable, volatile)', '(reliable, transient local)'),
 ])

@@ -166,6 +166,7 @@ def test_the_status_names_a_silent_node_whose_name_is_like_that_of_another(
         silent.destroy_node()
 
 
+@pytest.mark.slow
 def test_the_status_leaves_hidden_nodes_out(told, shared_bench):
     warned_status(told)
     hidden = Node('_watching', context=shared_bench.node.context)
