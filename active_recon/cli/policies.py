@@ -97,14 +97,14 @@ def policies(
                           'which a sequence is found, got none; give one, or leave sequence out')
     refuse_lone(context, 'sequence among --policies', has_sequence, 'training', 'training_objects')
     episodes = Episodes(tuple(dict.fromkeys(wanted)), starts, views, seeds, seed, half)
-    for folder in (*data, *([training] if training is not None and has_sequence else [])):
+    for folder in (*data, *([training] if training is not None else [])):
         chosen_folders(needed_objects(folder), category)
     require_policies(entrant, episodes)
     require_writable_study(out, 'policies')  # all of this is told before hours of measuring
     result: dict[str, Any] = {
         'command': command_line(), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}
-    if training is not None and has_sequence:
+    if training is not None:
         if any(training.resolve() == each.resolve() for each in data):
             typer.echo('warning: --training is measured, too: what is told of the sequence is too '
                        'good', err=True)

@@ -10,7 +10,7 @@ from active_recon.paper.claims import larger
 from active_recon.paper.comparison import compared, seen_at_random, weights_of
 from active_recon.paper.measured import measure, Measured
 from active_recon.paper.plotting import boxes, canvas, curves, drawn
-from active_recon.paper.results import Claim, Column, cpu_threads, Result, Table
+from active_recon.paper.results import Claim, Column, counted, Result, Table
 from active_recon.paper.spreads import per_view
 from active_recon.paper.study import Study
 from active_recon.paper.timing import over_runs, timed_runs
@@ -130,9 +130,9 @@ def make10(study: Study) -> Result:
         picture = drawn(figure)
     return Result(
         'Figure 10: time of prediction over the views',
-        f'Seconds of predicting from 1 to {len(lines)} images, on {cpu_threads(study.threads)}, '
-        f'the mean of {len(runs)} fresh processes; the first prediction of a process is its '
-        'slowest. Bands are 95 % intervals over processes.',
+        f'Seconds of predicting from 1 to {len(lines)} images, on '
+        f'{counted(study.threads, "CPU thread")}, the mean of {len(runs)} fresh processes; the '
+        'first prediction of a process is its slowest. Bands are 95 % intervals over processes.',
         [Table('Seconds of all predictions so far', 'views',
                [str(view + 1) for view in range(len(lines))], [Column('seconds', lines)],
                digits=4)], claims10(runs), picture)

@@ -127,14 +127,9 @@ def format_interval(spread: Interval, digits: int = 3) -> str:
     return f'{spread.mean:.{digits}f} [{spread.low:.{digits}f}, {spread.high:.{digits}f}]'
 
 
-def cpu_threads(count: int) -> str:
-    """Return a number of CPU threads in words."""
-    return f'{count} CPU thread{"s" * (count > 1)}'
-
-
-def counted(views: int) -> str:
-    """Return a number of views in words."""
-    return f'{views} view{"s" * (views > 1)}'
+def counted(count: int, thing: str = 'view') -> str:
+    """Return a number of views, or of other things, with their noun."""
+    return f'{count} {thing}{"s" * (count > 1)}'
 
 
 def plain(cell: Cell) -> Any:

@@ -8,7 +8,7 @@ from active_recon.evaluation.statistics import Interval
 from active_recon.paper import published
 from active_recon.paper.claims import FAILS, HOLDS
 from active_recon.paper.plotting import bars, canvas, drawn, Picture
-from active_recon.paper.results import Claim, Column, cpu_threads, Result, Table
+from active_recon.paper.results import Claim, Column, counted, Result, Table
 from active_recon.paper.study import Study
 from active_recon.paper.timing import over_runs, timed_runs
 from active_recon.paper.writing import provenance
@@ -29,9 +29,9 @@ def make(study: Study) -> Result:
     total = over_runs([sum(run['steps'].values()) for run in runs])
     text = (
         f'Seconds of a single-view reconstruction, the mean of {len(runs)} fresh processes on '
-        f'{cpu_threads(study.threads)} ({platform.machine()}). Loading counts the import of the '
-        'libraries; pre-processing reads an image, lays it on white and brings it to the '
-        "network's camera; the prediction is the process's first, and so its slowest; the "
+        f'{counted(study.threads, "CPU thread")} ({platform.machine()}). Loading counts the '
+        'import of the libraries; pre-processing reads an image, lays it on white and brings it '
+        "to the network's camera; the prediction is the process's first, and so its slowest; the "
         'outputs are voxels and a mesh. Brackets are 95 % intervals over processes. The paper '
         'measured a graphics card of its time.')
     return Result('Table 4: time of each step of a single-view reconstruction', text,

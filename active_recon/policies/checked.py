@@ -9,7 +9,8 @@ from active_recon.errors import ActiveReconError, ViewError
 from active_recon.policies.base import Choice, Observation, Policy
 import numpy as np
 
-_KIND = 'policy'  # of what follows from a policy of somebody's own
+FAULT = 'policy'
+"""The kind of an error that a policy of somebody's own makes."""
 
 
 def checked_choice(found: Any, count: int, batch: int = 1) -> tuple[Choice, Any]:
@@ -25,15 +26,15 @@ def checked_choice(found: Any, count: int, batch: int = 1) -> tuple[Choice, Any]
                    else np.asarray(choice.azimuth, np.float64))
     except (AttributeError, TypeError, ValueError) as error:
         raise ViewError('policy: no choice: expected a Choice of arrays, and a state, got: '
-                        f'{error}', _KIND) from error
+                        f'{error}', FAULT) from error
     # An infinite score leaves no order among candidates that motion is taken off from
     if scores.shape != (batch, count) or not np.isfinite(scores).all():
         raise ViewError(f'policy: no usable scores: expected ({batch}, {count}) finite numbers, '
                         f'got {scores.shape} with {(~np.isfinite(scores)).sum()} NaN or '
-                        'infinite', _KIND)
+                        'infinite', FAULT)
     if azimuth is not None and (azimuth.shape != (batch,) or np.isinf(azimuth).any()):
         raise ViewError(f'policy: no usable azimuth: expected ({batch},), radians or NaN, got '
-                        f'{azimuth.shape}, {azimuth}', _KIND)
+                        f'{azimuth.shape}, {azimuth}', FAULT)
     return replace(choice, scores=scores, azimuth=azimuth), state
 
 
@@ -58,7 +59,7 @@ def telling_failures(what: str) -> Iterator[None]:
     except ActiveReconError:
         raise
     except Exception as error:
-        raise ViewError(f'{what} fails with {type(error).__name__}: {error}', _KIND) from error
+        raise ViewError(f'{what} fails with {type(error).__name__}: {error}', FAULT) from error
 
 
 @contextmanager
@@ -67,6 +68,6 @@ def naming(name: str) -> Iterator[None]:
     try:
         yield
     except ViewError as error:
-        if error.kind != _KIND:
+        if error.kind != FAULT:
             raise
-        raise ViewError(f'{name}: {error}', _KIND) from error
+        raise ViewError(f'{name}: {error}', FAULT) from error

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from active_recon.errors import ActiveReconError
 from active_recon.nodes.runtime.diagnostics import Diagnostics
 from active_recon.nodes.runtime.run import one_line
+from active_recon.policies.checked import FAULT
 
 NO_GOAL = 'no_goal'
 """The warning that stays until a view is followed by a goal, or by the end of the episode."""
@@ -19,7 +20,7 @@ def refusing_views(diagnostics: Diagnostics) -> Iterator[None]:
     except ActiveReconError as error:
         diagnostics.reject(error)
         remedy = ('mend the policy, or set another, which then chooses'
-                  if error.kind == 'policy' else
+                  if error.kind == FAULT else
                   'weights, object_size and object_frame must be those of the reconstructor')
         diagnostics.raise_warning(
             NO_GOAL, f'no goal after the last view: {one_line(error)}; {remedy}')
