@@ -6,6 +6,7 @@ from functools import cache
 import json
 import math
 from pathlib import Path
+import re
 import shutil
 import sys
 from types import ModuleType
@@ -211,7 +212,17 @@ def test_weights_without_integers_are_told_and_auto_goes_on_without_them(exporte
     with pytest.raises(WeightsError, match='not quantised: expected lifting-decode-int8.onnx bes'):
         load_runtime(exported('lifting'), 'openvino', precision='int8')
     instead = load_runtime(exported('lifting'), precision='int8', threads=1).provenance
-    assert instead['computed_by'].startswith('torch') and 'not quantised' in instead[REMARK]
+    assert instead['computed_by'].startswith('openvino') and 'int8' not in instead['computed_by']
+    assert 'not quantised' in instead[REMARK]
+
+
+@pytest.mark.parametrize('numbers', ['bf16', 'int8'])
+def test_auto_keeps_to_the_export_where_the_processor_lacks_the_precision(monkeypatch, numbers):
+    monkeypatch.setattr('active_recon.runtimes.precision._flags', frozenset)
+    for load in (load_runtime, load_policy_runtime):
+        instead = load(precision=numbers, threads=1).provenance
+        assert re.match('openvino .*, f32, ', instead['computed_by'])
+        assert instead[REMARK].startswith(f'the precision auto instead of {numbers}: precision: ')
 
 
 @pytest.mark.parametrize(('model', 'words'), [

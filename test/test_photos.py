@@ -28,6 +28,8 @@ from active_recon.photos.reconstruct import from_files, from_views
 from active_recon.photos.saving import save_shape
 from active_recon.photos.transforms_json import FLIP
 from active_recon.photos.views import _mask, view_of
+from active_recon.reconstructor import Reconstructor
+from active_recon.runtimes import REMARK
 from active_recon.segmentation import Segmentation, shipped_segmentation
 from active_recon.volumes.binvox import read_binvox
 from active_recon.volumes.voxelisation import voxelise
@@ -282,6 +284,12 @@ def test_a_plain_background_is_said_to_cut_only_where_it_does(off, said, views, 
 def test_only_networks_that_need_the_front_warn_that_photos_do_not_tell_it(plain, model, warned):
     shape = active_recon.reconstruct(plain, views=1, box=(*CENTRE, SIDE), model=model)
     assert warned == any("needs the object's front" in warning for warning in shape.warnings)
+
+
+def test_what_the_runtime_has_to_say_is_a_warning(plain, monkeypatch):
+    monkeypatch.setattr(Reconstructor, 'provenance', {REMARK: 'torch instead'})
+    shape = active_recon.reconstruct(plain, views=1, box=(*CENTRE, SIDE), model='carving')
+    assert 'torch instead' in shape.warnings
 
 
 def test_the_size_sets_the_scale_alone(plain, shape, mesh):

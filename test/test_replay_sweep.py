@@ -43,6 +43,15 @@ def test_a_sweep_has_nothing_to_compare_and_says_so(tmp_path, monkeypatch, capsy
     assert 'compared' not in said
 
 
+def test_a_replay_warns_where_the_network_is_not_run_as_asked_for(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr('active_recon.runtimes.precision._flags', frozenset)
+    sweep = sweep_of(AZIMUTHS[:1], tmp_path / 'sweep')
+    for more in ((), ('--threshold', 0.5)):
+        code, said = replayed(monkeypatch, capsys, sweep, '--precision', 'int8', *more)
+        assert code == 0
+        assert said.count('warning: the precision auto instead of int8: precision: int8 is') == 1
+
+
 @pytest.mark.parametrize('policy', [
     name if name in ('attention', 'farthest') else pytest.param(name, marks=pytest.mark.slow)
     for name in POLICIES])

@@ -1,6 +1,6 @@
 """`active-recon replay`: replays a recorded run without ROS, as recorded or with overrides."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from active_recon.cli.policy_option import policy_option
 from active_recon.cli.progress import bag_progress, progress_bar
 from active_recon.cli.shape_files import ShapeFiles
 from active_recon.errors import ConfigError
-from active_recon.runtimes import PRECISIONS, RUNTIME_CHOICES
+from active_recon.runtimes import PRECISIONS, REMARK, RUNTIME_CHOICES
 import typer
 
 if TYPE_CHECKING:
@@ -112,6 +112,7 @@ def replay(
         _write_with_overrides(run, setup, overrides, out, files)
         return
     reconstructor, planner = setup.load_reconstructor(), setup.load_planner()
+    _warn_of_runtime(reconstructor.provenance, {} if planner is None else planner.provenance)
     began = time.monotonic()
     with _bar('replaying', run) as advance:
         verified = verify(run, reconstructor, planner, lambda: advance(1, ''))
@@ -123,6 +124,12 @@ def replay(
         _print_reconstruction(verified, run, reconstructor)
     else:
         _print_comparison(verified, run, reconstructor.threshold, took_s)
+
+
+def _warn_of_runtime(*provenances: Mapping[str, str]) -> None:
+    """Warn, once, where networks were not run by what was preferred."""
+    for remark in dict.fromkeys(told[REMARK] for told in provenances if REMARK in told):
+        typer.echo(f'warning: {remark}', err=True)
 
 
 def _print_reconstruction(verified: 'Verification', run: 'RecordedRun',
@@ -221,6 +228,7 @@ def _write_with_overrides(run: 'RecordedRun', setup: 'LoopSetup', overrides: 'Ov
 
     with _bar('replaying', run) as advance:
         other = run_with_overrides(run, setup, overrides, lambda: advance(1, ''))
+    _warn_of_runtime(other.provenance)
     folder = out or default_folder(run.path, overrides)
     write_run(other, folder)
     shapes = [(episode.views[-1].reconstruction, episode.views)

@@ -33,6 +33,7 @@ from active_recon.photos.sources import posed_by, Source, TurntableCameras
 from active_recon.photos.views import load_views, PhotoView, view_of
 from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
+from active_recon.runtimes import REMARK
 from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.meshes import axis_direction
 import numpy as np
@@ -179,7 +180,9 @@ def from_views(views: Sequence[PhotoView], file: CameraFile, options: Options = 
                  [*unknown_front(reconstructor),
                   *doubts(taken, views, cube, reconstructor, background, covered,
                           file.looks), *better_box(taken, cube, reconstructor.threshold),
-                  *_without_depth(views, taken)], dict(reconstructor.provenance))
+                  *_without_depth(views, taken),
+                  *filter(None, [reconstructor.provenance.get(REMARK)])],
+                 dict(reconstructor.provenance))
 
 
 def _ground(views: Sequence[PhotoView], file: CameraFile, start: Cube,

@@ -148,8 +148,9 @@ def load_runtime(weights: Path | None = None, runtime: str = AUTO, device: str =
     """
     Return a runtime of the network in a weights file; None: those that ship.
 
-    `auto` is openvino where these very weights are exported beside them, else torch; where an
-    export is there and cannot be used, the provenance's `remark` says why. `threads` is the number
+    `auto` is openvino where these very weights are exported beside them, else torch. Where an
+    export is there and cannot be used, or not in the precision that is asked for, `auto` takes
+    torch or the precision auto, and the provenance's `remark` says why. `threads` is the number
     of CPU threads; None is the library's default. `precision` is one of `precision.PRECISIONS`.
     Raises WeightsError, and ConfigError on a runtime, a device or a precision that is not
     available, and on less than one thread.
@@ -199,14 +200,22 @@ def _loaded(what: str, parts: Sequence[str], weights: Path | None, runtime: str,
 
 def _loaded_by_choice(what: str, parts: Sequence[str], weights: Path | None, device: str,
                       threads: int | None, precision: str) -> Any:
+    if device != 'cpu' or not is_exported(weights, parts):
+        return _loaded(what, parts, weights, 'torch', device, threads, precision)
     remark = ''
-    if device == 'cpu' and is_exported(weights, parts):
+    for tried in (precision,) if precision in (AUTO, 'f32') else (precision, AUTO):
         try:
-            return _loaded(what, parts, weights, 'openvino', device, threads, precision)
+            loaded = _loaded(what, parts, weights, 'openvino', device, threads, tried)
+            return _with_remark(loaded, remark)
         except (ConfigError, WeightsError) as error:
-            remark = f'the runtime torch instead of openvino: {error}'
-    loaded = _loaded(what, parts, weights, 'torch', device, threads,
-                     'f32' if remark else precision)
-    if remark:
-        loaded.provenance = {**loaded.provenance, REMARK: remark}
+            reason = error
+            remark = f'the precision auto instead of {precision}: {error}'
+    loaded = _loaded(what, parts, weights, 'torch', device, threads, 'f32')
+    return _with_remark(loaded, f'the runtime torch instead of openvino: {reason}')
+
+
+def _with_remark(loaded: Any, remark: str) -> Any:
+    remarks = [remark, loaded.provenance.get(REMARK)]
+    if any(remarks):
+        loaded.provenance = {**loaded.provenance, REMARK: '; '.join(filter(None, remarks))}
     return loaded
