@@ -27,9 +27,10 @@ def call(
     Call a service of the running nodes, and print its answer.
 
     The reconstructor has start_episode, save_mesh, save_state, load_state and capture_background;
-    the planner plan and stop_episode; the recorder start and stop; the simulated turntable
-    next_object. Services of the type std_srvs/srv/Trigger of other nodes can be called, too. The
-    exit code is 1 if the service did not succeed. ROS_DOMAIN_ID must be that of the nodes.
+    the planner plan, skip_goal and stop_episode; the recorder start and stop; the simulated
+    turntable next_object. Services of the type std_srvs/srv/Trigger of other nodes can be called,
+    too. The exit code is 1 if the service did not succeed. ROS_DOMAIN_ID must be that of the
+    nodes.
 
     Example: active-recon call save_mesh
     """

@@ -1,5 +1,6 @@
 """ROS node of the planner: publishes the next view after each view, or that it is done."""
 
+from collections.abc import Callable
 import math
 
 from active_recon.acquisition.goals import Goal
@@ -7,6 +8,7 @@ from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import Camera
 from active_recon.nodes.loop.first_view import FirstView
 from active_recon.nodes.loop.goal_publisher import GoalPublisher
+from active_recon.nodes.loop.goal_words import instead_words, place_words
 from active_recon.nodes.loop.other_planner import OtherPlanner
 from active_recon.nodes.loop.policy_loader import loaded_policy, tell_policy, tell_reconstructor
 from active_recon.nodes.loop.refused_views import NO_GOAL, refusing_views
@@ -60,6 +62,7 @@ class ViewPlannerNode(ManagedNode):
         self._done_pub = self.create_publisher(Header, 'done', LATCHED_QOS)
         self._diagnostics.measure_rates('views', 'goals')
         self.create_service(Trigger, 'plan', self._on_plan)
+        self.create_service(Trigger, 'skip_goal', self._on_skip)
         self.create_service(Trigger, 'stop_episode', self._on_stop)
 
     def activate(self) -> None:
@@ -244,7 +247,7 @@ class ViewPlannerNode(ManagedNode):
         if camera is None or reason is None:
             return
         self._goals.publish_reason(reason)
-        self.get_logger().info(f'goal at {_place_words(camera)}: {reason.sentence}')
+        self.get_logger().info(f'goal at {place_words(camera)}: {reason.sentence}')
 
     def _publish_done(self, stamp: int, reason: str) -> None:
         """Publish why the episode is done, at the stamp of a view; '' while it is not."""
@@ -267,15 +270,17 @@ class ViewPlannerNode(ManagedNode):
         timeout, failed = self._params.values.goal_timeout, self._goals.camera
         if timeout == 0 or failed is None or not self._goals.open_for > timeout:
             return
+        self._give_up(failed, lambda instead: self._diagnostics.warn('goal_timeout', (
+            f'no view from {place_words(failed)}: expected one within {timeout:g} s, got none; '
+            f'it is left out of this episode, {instead}')))
+
+    def _give_up(self, failed: Camera, tell: Callable[[str], None]) -> Decision:
+        """Leave the open goal out of the episode; tell and publish what follows in its place."""
         decision = self._planner.give_up(failed, self._first_view.camera)
-        instead = (f'the next best is {_place_words(decision.goal.camera)}' if decision.goal else
-                   'no reachable goal is left' if decision.reason == 'no_reachable_azimuth' else
-                   f'the episode ends: {decision.reason}')
-        self._diagnostics.warn('goal_timeout', (
-            f'no view from {_place_words(failed)}: expected one within '
-            f'{timeout:g} s, got none; it is left out of this episode, {instead}'))
+        tell(instead_words(decision))
         self._follow(decision, self.get_clock().now().nanoseconds)
         self._tell_reason()
+        return decision
 
     def _on_plan(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Publish the goal after the views so far with a new stamp; answer with its azimuth."""
@@ -296,6 +301,19 @@ class ViewPlannerNode(ManagedNode):
         response.message = f'{goal.camera.azimuth:.6f}'
         return response
 
+    def _on_skip(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Give the open goal up at once; answer with the azimuth of the next, or why none is."""
+        goal = self._goals.camera if self.is_active else None
+        if goal is None:
+            response.message = 'no goal to skip: expected an open one, there is none'
+            return response
+        decision = self._give_up(goal, lambda instead: self.get_logger().info(
+            f'skipped: {place_words(goal)} is left out of this episode, {instead}'))
+        response.success = True
+        response.message = (decision.reason if decision.goal is None
+                            else f'{decision.goal.camera.azimuth:.6f}')
+        return response
+
     def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """End the episode; the next one goes on as usual."""
         if not self.is_active or self._episode is None:
@@ -306,11 +324,6 @@ class ViewPlannerNode(ManagedNode):
         if not self._done:
             self._follow(self._planner.stop(), self.get_clock().now().nanoseconds)
         return response
-
-
-def _place_words(camera: Camera) -> str:
-    return (f'azimuth {math.degrees(camera.azimuth):.1f}, elevation '
-            f'{math.degrees(camera.elevation):.1f} degrees')
 
 
 def main(args: list[str] | None = None) -> None:

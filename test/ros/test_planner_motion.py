@@ -74,6 +74,24 @@ def test_a_goal_without_a_view_gives_way_to_the_next_best_until_none_is_left(fak
         assert not change(fake, reachable_azimuths=[], goal_timeout=0.0)
 
 
+def test_a_goal_that_is_skipped_gives_way_to_the_next_best_at_once_until_none_is_left(fake, node):
+    try:
+        assert not change(fake, reachable_azimuths=[START, 2.0])
+        asked = fake.bench.now()
+        answer = fake.bench.call('skip_goal')
+        assert (answer.success, answer.message) == (True, '2.000000')
+        assert azimuth(fake.wait_goal(asked)) == pytest.approx(2.0)
+        [told] = node.log('skipped: ')
+        assert 'azimuth 57.3, elevation 30.0 degrees is left out of this episode, the next' in told
+        assert fake.bench.call('skip_goal').message == 'no_reachable_azimuth'
+        assert wait_end(fake, 'no_reachable_azimuth') > asked
+        answer = fake.bench.call('skip_goal')
+        assert (answer.success, answer.message) == (
+            False, 'no goal to skip: expected an open one, there is none')
+    finally:
+        assert not change(fake, reachable_azimuths=[])
+
+
 def test_a_goal_that_is_forbidden_while_it_is_open_is_taken_back(fake):
     asked = fake.bench.now()
     try:
