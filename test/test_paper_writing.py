@@ -123,6 +123,14 @@ def test_there_is_no_document_of_nothing(study):
         write_document(study)
 
 
+def test_a_result_that_cannot_be_read_is_not_told_as_not_measured_yet(study):
+    for name in ('table1', 'table5'):
+        write_result(study, name, INPUTS, result(name))
+    (study.out / 'table5.json').write_text('{"title": ')
+    with pytest.raises(DataError, match='table5.json: no readable result'):
+        write_document(study)
+
+
 def test_objects_are_known_by_their_names_and_voxels(dataset, tmp_path):
     every, lamps = Objects(dataset), Objects(dataset, 'lamp')
     assert every.identity()['objects'] == 6

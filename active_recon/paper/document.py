@@ -24,14 +24,10 @@ def write_document(study: Study) -> bool:
     """
     Write README.md with all results there are; return whether it changed.
 
-    Raises DataError where there is no result.
+    Raises DataError where there is no result, or one that cannot be read.
     """
-    there = {}
-    for name in PARTS:
-        try:
-            there[name] = read_result(study, name)
-        except DataError:
-            continue
+    there = {name: read_result(study, name) for name in PARTS
+             if (study.out / f'{name}.json').is_file()}
     if not there:
         raise DataError(f'{study.out}: no results: expected at least one part, found none; '
                         '`active-recon paper all` makes them')
